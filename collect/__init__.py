@@ -1,0 +1,1 @@
+"""Scenes, tasks, the Gymnasium environments, operators and the session loop."""

@@ -1,0 +1,16 @@
+"""Array types and the read-only copy that every value in the house is made of."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+
+def frozen(values: ArrayLike, dtype: Any = np.float64) -> NDArray[Any]:
+    """Return a read-only copy of the values."""
+    array = np.array(values, dtype=dtype)
+    array.setflags(write=False)
+    return array

@@ -1,0 +1,77 @@
+"""What a controller sends to the robot, and how it fared."""
+
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+import numpy as np
+
+from handrail.controllers.arrays import FloatArray, frozen
+
+
+class Status(StrEnum):
+    """How an update went; everything but `ok` and `clipped` brakes the robot."""
+
+    OK = "ok"
+    CLIPPED = "clipped"  # a direct command that the limits cut
+    INVALID_INTENT = "invalid_intent"  # wrong size, NaN or infinite
+    INVALID_STATE = "invalid_state"
+    STALE_INTENT = "stale_intent"
+    SOLVER_FAILED = "solver_failed"
+
+    @property
+    def brakes(self) -> bool:
+        """Whether the command of this update brakes the robot."""
+        return self not in (Status.OK, Status.CLIPPED)
+
+
+@dataclass(frozen=True)
+class Health:
+    """How the controller fared in one update.
+
+    Attributes:
+        status: what happened.
+        solve_time: of the whole update [s].
+        slack: largest violation of a soft limit in the plan, in its own unit.
+        smallest_distance: smallest signed distance now, tool against work surfaces left out [m].
+        work_distance: smallest signed distance of the tool against work surfaces now [m].
+    """
+
+    status: Status = Status.OK
+    solve_time: float = 0.0
+    slack: float = 0.0
+    smallest_distance: float = np.inf
+    work_distance: float = np.inf
+
+
+@dataclass(frozen=True)
+class Command:
+    """A velocity trajectory from now on, linear between its knots, at rest after the last.
+
+    Attributes:
+        velocities: generalised velocities at times 0, dt, 2 dt, …, (k, n) [m/s, rad/s].
+        dt: time between knots [s].
+        gripper: 0 open, 1 closed.
+        health: how the controller fared.
+    """
+
+    velocities: FloatArray
+    dt: float
+    gripper: float = 0.0
+    health: Health = field(default_factory=Health)
+
+    def __post_init__(self) -> None:
+        """Copy the array and make it read-only."""
+        object.__setattr__(self, "velocities", frozen(self.velocities))
+
+    def velocity(self, time: float) -> FloatArray:
+        """Return the commanded velocity `time` [s] from the update on, (n,)."""
+        knot = max(time, 0.0) / self.dt
+        index = int(knot)
+        if index >= len(self.velocities) - 1:
+            return (
+                self.velocities[-1]
+                if np.isclose(knot, len(self.velocities) - 1)
+                else np.zeros_like(self.velocities[0])
+            )
+        weight = knot - index
+        return (1.0 - weight) * self.velocities[index] + weight * self.velocities[index + 1]

@@ -1,0 +1,228 @@
+"""A robot is data: the description file that MuJoCo, pinocchio and CasADi are all built from."""
+
+import tomllib
+from dataclasses import dataclass
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from handrail.controllers.arrays import FloatArray, frozen
+from handrail.controllers.errors import HandrailError
+from handrail.controllers.rotation import matrix_from_rpy, matrix_to_axis
+from handrail.controllers.shape import Shape
+
+_FOLDER = Path(__file__).parent / "robots"
+_PLANAR = ("x", "y", "theta")
+
+
+@dataclass(frozen=True)
+class Placement:
+    """A rigid transform: `p_parent = rotation @ p + translation` [m]."""
+
+    translation: FloatArray  # (3,)
+    rotation: FloatArray  # (3, 3)
+
+
+@dataclass(frozen=True)
+class PlacedShape:
+    """A shape on a frame of the robot; `tool` shapes may work close to work surfaces."""
+
+    name: str
+    frame: str
+    shape: Shape
+    placement: Placement
+    tool: bool = False
+    rgba: tuple[float, ...] = (0.5, 0.5, 0.5, 1.0)
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Box limits of the generalised coordinates, each (n,), in [m] or [rad] and seconds."""
+
+    position_lower: FloatArray
+    position_upper: FloatArray
+    velocity: FloatArray
+    acceleration: FloatArray
+    effort: FloatArray
+    servo: FloatArray
+
+
+@dataclass(frozen=True)
+class Gripper:
+    """Two fingers that slide along the frame's x axis; lengths [m], force [N], speed [m/s]."""
+
+    frame: str
+    mass: float
+    finger_mass: float
+    finger_size: tuple[float, float, float]
+    stroke: float
+    tip: float
+    force: float
+    speed: float
+    friction: float
+    camera: tuple[float, float, float]
+    camera_tilt: float
+
+
+@dataclass(frozen=True)
+class RobotDescription:
+    """Everything that Handrail knows of a robot; see `robots/ridgeback_ur10.toml` for the format."""
+
+    name: str
+    base_kind: str
+    base_mass: float
+    base_height: float
+    base_size: tuple[float, float]
+    urdf: Path
+    mesh_root: Path
+    mount: Placement
+    arm_joints: tuple[str, ...]
+    tool_frame: str
+    tool_placement: Placement
+    home: FloatArray
+    limits: Limits
+    gripper: Gripper | None
+    collision: tuple[PlacedShape, ...]
+    self_pairs: tuple[tuple[str, str], ...]
+    scene_shapes: tuple[str, ...]
+    floor_shapes: tuple[str, ...]
+    visual: tuple[PlacedShape, ...]
+
+    @property
+    def base_joints(self) -> tuple[str, ...]:
+        """Names of the base coordinates; none on a fixed base."""
+        return _PLANAR if self.base_kind == "planar" else ()
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Names of all generalised coordinates, base first."""
+        return self.base_joints + self.arm_joints
+
+
+def robot_names() -> list[str]:
+    """Return the robots that come with Handrail."""
+    return sorted(path.stem for path in _FOLDER.glob("*.toml"))
+
+
+def load_description(robot: str | Path) -> RobotDescription:
+    """Read a robot by name, or from a description file.
+
+    Raises:
+        HandrailError: no such robot, or the file lacks something.
+    """
+    path = Path(robot) if str(robot).endswith(".toml") else _FOLDER / f"{robot}.toml"
+    if not path.is_file():
+        raise HandrailError(
+            f"unknown robot {str(robot)!r}: expected a .toml file or one of {', '.join(robot_names())}"
+        )
+    try:
+        return _parse(tomllib.loads(path.read_text()), path.parent)
+    except tomllib.TOMLDecodeError as error:
+        raise HandrailError(f"robot description {path}: not valid TOML: {error}") from error
+    except KeyError as error:
+        raise HandrailError(f"robot description {path}: expected an entry {error}, found none") from error
+
+
+def _parse(data: dict[str, Any], folder: Path) -> RobotDescription:
+    urdf, mesh_root = _find_urdf(data["arm"]["urdf"], folder)
+    gripper = data.get("gripper")
+    self_collision = data["self_collision"]
+    description = RobotDescription(
+        name=data["name"],
+        base_kind=data["base"]["kind"],
+        base_mass=data["base"]["mass"],
+        base_height=data["base"]["height"],
+        base_size=tuple(data["base"]["size"]),
+        urdf=urdf,
+        mesh_root=mesh_root,
+        mount=_placement(data["arm"]),
+        arm_joints=tuple(data["arm"]["joints"]),
+        tool_frame=data["tool"]["frame"],
+        tool_placement=_placement(data["tool"]),
+        home=frozen(data["home"]["q"]),
+        limits=Limits(**{name: frozen(values) for name, values in data["limits"].items()}),
+        gripper=_gripper(gripper) if gripper else None,
+        collision=tuple(_placed_shape(entry) for entry in data["collision"]),
+        self_pairs=tuple((first, second) for first, second in self_collision["pairs"]),
+        scene_shapes=tuple(self_collision["scene"]),
+        floor_shapes=tuple(self_collision["floor"]),
+        visual=tuple(_placed_shape(entry) for entry in data.get("visual", [])),
+    )
+    _check(description)
+    return description
+
+
+def _check(description: RobotDescription) -> None:
+    if description.base_kind not in ("planar", "fixed"):
+        raise HandrailError(f"base kind {description.base_kind!r}: expected planar or fixed")
+    size = len(description.joints)
+    arrays = {"home": description.home, **vars(description.limits)}
+    for name, values in arrays.items():
+        if values.shape != (size,):
+            raise HandrailError(
+                f"{name} of robot {description.name}: expected {size} numbers, got {values.size}"
+            )
+    names = {shape.name for shape in description.collision}
+    used = {name for pair in description.self_pairs for name in pair}
+    for name in used.union(description.scene_shapes, description.floor_shapes) - names:
+        raise HandrailError(
+            f"collision shape {name!r} of robot {description.name}: expected one of {', '.join(sorted(names))}"
+        )
+
+
+def _gripper(data: dict[str, Any]) -> Gripper:
+    return Gripper(**{key: tuple(value) if isinstance(value, list) else value for key, value in data.items()})
+
+
+def _placement(data: dict[str, Any], key: str = "translation") -> Placement:
+    rotation = matrix_from_rpy(np.array(data.get("rpy", [0.0, 0.0, 0.0])))
+    return Placement(frozen(data.get(key, [0.0, 0.0, 0.0])), frozen(rotation))
+
+
+def _placed_shape(data: dict[str, Any]) -> PlacedShape:
+    if "capsule" in data:
+        shape, placement = _capsule(data)
+    else:
+        kind = next((kind for kind in ("box", "sphere", "cylinder") if kind in data), None)
+        if kind is None:
+            raise HandrailError(
+                f"shape {data.get('name', data)}: expected one of box, capsule, cylinder, sphere"
+            )
+        shape, placement = Shape(kind, np.atleast_1d(data[kind])), _placement(data, "at")
+    return PlacedShape(
+        name=data.get("name", ""),
+        frame=data["frame"],
+        shape=shape,
+        placement=placement,
+        tool=data.get("tool", False),
+        rgba=tuple(data.get("rgba", (0.5, 0.5, 0.5, 1.0))),
+    )
+
+
+def _capsule(data: dict[str, Any]) -> tuple[Shape, Placement]:
+    a, b = np.array(data["a"], dtype=float), np.array(data["b"], dtype=float)
+    length = float(np.linalg.norm(b - a))
+    placement = Placement(frozen((a + b) / 2), frozen(matrix_to_axis((b - a) / length)))
+    return Shape("capsule", np.array([data["capsule"], length])), placement
+
+
+def _find_urdf(urdf: str, folder: Path) -> tuple[Path, Path]:
+    """Return the URDF and the folder that its `package://` paths start from."""
+    beside = folder / urdf
+    if beside.is_file():
+        return beside, folder
+    distribution = urdf.split("/")[0]
+    try:
+        files = metadata.files(distribution) or []
+    except metadata.PackageNotFoundError:
+        files = []
+    for file in files:
+        if str(file).endswith(urdf):
+            path = Path(str(file.locate())).resolve()
+            return path, path.parents[len(Path(urdf).parts) - 1]
+    raise HandrailError(
+        f"URDF {urdf}: expected it beside the description or in the package {distribution}; "
+        f"install it with: pip install {distribution}"
+    )

@@ -1,0 +1,62 @@
+"""What the operator asks for: values on channels, and a mask of those that are commanded."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from handrail.controllers.arrays import BoolArray, FloatArray, frozen
+from handrail.controllers.channels import Channels
+from handrail.controllers.errors import HandrailError
+
+
+@dataclass(frozen=True)
+class Intent:
+    """A partial command.
+
+    Attributes:
+        values: one number a channel, in the order of `Channels.names`, (m,); where the mask is
+            false they mean nothing.
+        mask: which channels the operator owns now, (m,).
+        gripper: 0 open, 1 closed.
+        mode: name of the teleop mode that made it.
+        time: when the operator asked [s], on the clock of the state.
+    """
+
+    values: FloatArray
+    mask: BoolArray
+    gripper: float = 0.0
+    mode: str = ""
+    time: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Copy the arrays and make them read-only."""
+        object.__setattr__(self, "values", frozen(self.values))
+        object.__setattr__(self, "mask", frozen(self.mask, dtype=bool))
+
+    @classmethod
+    def idle(cls, channels: Channels, time: float = 0.0) -> "Intent":
+        """Return the intent of an operator who touches nothing."""
+        return cls(np.zeros(channels.size), np.zeros(channels.size, dtype=bool), time=time)
+
+    def check(self, channels: Channels) -> None:
+        """Check the shapes against the robot's channels.
+
+        Raises:
+            HandrailError: values or mask have the wrong size.
+        """
+        for name in ("values", "mask"):
+            shape = getattr(self, name).shape
+            if shape != (channels.size,):
+                raise HandrailError(
+                    f"{name} of an intent: expected {channels.size} channels "
+                    f"({channels.names[0]} … {channels.names[-1]}), got shape {shape}"
+                )
+
+    @property
+    def is_finite(self) -> bool:
+        """Whether every commanded value, the gripper and the time are numbers."""
+        return bool(
+            np.all(np.isfinite(self.values[self.mask]))
+            and np.isfinite(self.gripper)
+            and np.isfinite(self.time)
+        )

@@ -1,0 +1,50 @@
+"""Rotations: matrices, quaternions (wxyz), rotation vectors."""
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.spatial.transform import Rotation
+
+from handrail.controllers.arrays import FloatArray
+
+
+def skew(vector: ArrayLike) -> FloatArray:
+    """Return the matrix of the cross product: `skew(a) @ b = a × b`, (3, 3)."""
+    x, y, z = np.asarray(vector, dtype=float)
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+
+
+def matrix_from_rpy(rpy: ArrayLike) -> FloatArray:
+    """Return `Rz(yaw) Ry(pitch) Rx(roll)` as URDF defines it; angles [rad]."""
+    return Rotation.from_euler("xyz", np.asarray(rpy, dtype=float)).as_matrix()
+
+
+def matrix_to_axis(axis: ArrayLike) -> FloatArray:
+    """Return a rotation whose z column is the unit vector `axis`."""
+    z = np.asarray(axis, dtype=float)
+    helper = np.eye(3)[int(np.argmin(np.abs(z)))]
+    x = np.cross(helper, z)
+    x /= np.linalg.norm(x)
+    return np.column_stack([x, np.cross(z, x), z])
+
+
+def quaternion_from_matrix(matrix: ArrayLike) -> FloatArray:
+    """Return the unit quaternion (w, x, y, z) with w >= 0, (4,)."""
+    x, y, z, w = Rotation.from_matrix(np.asarray(matrix)).as_quat()
+    quaternion = np.array([w, x, y, z])
+    return quaternion if w >= 0 else -quaternion
+
+
+def matrix_from_quaternion(quaternion: ArrayLike) -> FloatArray:
+    """Return the rotation matrix of a quaternion (w, x, y, z), (3, 3)."""
+    w, x, y, z = np.asarray(quaternion, dtype=float)
+    return Rotation.from_quat([x, y, z, w]).as_matrix()
+
+
+def rotation_vector(matrix: ArrayLike) -> FloatArray:
+    """Return the rotation vector (axis times angle) [rad] of a rotation matrix, (3,)."""
+    return Rotation.from_matrix(np.asarray(matrix)).as_rotvec()
+
+
+def orientation_error(quaternion: ArrayLike, goal: ArrayLike) -> float:
+    """Return `d_r = 1 - <q, g>²` in [0, 1] (the paper's equation 8)."""
+    return float(1.0 - np.dot(np.asarray(quaternion), np.asarray(goal)) ** 2)

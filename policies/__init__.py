@@ -1,0 +1,1 @@
+"""Imitation policies through LeRobot."""
