@@ -86,6 +86,7 @@ class RobotDescription:
     gripper: Gripper | None
     collision: tuple[PlacedShape, ...]
     self_pairs: tuple[tuple[str, str], ...]
+    self_margins: FloatArray  # largest margin that each self pair can keep [m]
     scene_shapes: tuple[str, ...]
     floor_shapes: tuple[str, ...]
     visual: tuple[PlacedShape, ...]
@@ -145,7 +146,8 @@ def _parse(data: dict[str, Any], folder: Path) -> RobotDescription:
         limits=Limits(**{name: frozen(values) for name, values in data["limits"].items()}),
         gripper=_gripper(gripper) if gripper else None,
         collision=tuple(_placed_shape(entry) for entry in data["collision"]),
-        self_pairs=tuple((first, second) for first, second in self_collision["pairs"]),
+        self_pairs=tuple((first, second) for first, second, *_ in self_collision["pairs"]),
+        self_margins=frozen([(*pair, np.inf)[2] for pair in self_collision["pairs"]]),
         scene_shapes=tuple(self_collision["scene"]),
         floor_shapes=tuple(self_collision["floor"]),
         visual=tuple(_placed_shape(entry) for entry in data.get("visual", [])),

@@ -1,0 +1,57 @@
+"""The last gate before the robot: every velocity command passes it."""
+
+import numpy as np
+
+from handrail.controllers.arrays import FloatArray
+from handrail.controllers.description import RobotDescription
+
+_TOLERANCE = 1e-5  # relative; rounding to float32 is no violation
+
+
+class Limiter:
+    """Clips a velocity command to the limits of the robot.
+
+    With the previous command v⁻ and the target v, over a step of h seconds:
+    `v⁺ = clip(clip(v, ±v_max), v⁻ ± h a_max)`. With a position given, the velocity towards a position
+    limit is also kept below what can brake before it, `sqrt(2 a_max distance)`.
+    """
+
+    def __init__(self, description: RobotDescription) -> None:
+        self._limits = description.limits
+
+    def limit(
+        self, previous: FloatArray, target: FloatArray, duration: float, q: FloatArray | None = None
+    ) -> tuple[FloatArray, bool]:
+        """Return the velocity that may be commanded, (n,), and whether it differs from the target.
+
+        A target of the wrong size, or with a number that is not finite, brakes.
+
+        Args:
+            previous: the velocity commanded last, (n,) [m/s, rad/s].
+            target: the velocity asked for, (n,).
+            duration: of the step [s].
+            q: the position, (n,) [m, rad]; None leaves position limits alone.
+        """
+        target = np.asarray(target, dtype=np.float64)
+        valid = target.shape == previous.shape and bool(np.all(np.isfinite(target)))
+        wanted = target if valid else np.zeros_like(previous)
+        maximum = self._limits.velocity
+        allowed = np.clip(wanted, -maximum, maximum)
+        if q is not None:
+            allowed = np.clip(allowed, *self._braking_range(q))
+        step = self._limits.acceleration * duration
+        allowed = np.clip(allowed, previous - step, previous + step)
+        tolerance = _TOLERANCE * (maximum + step)
+        return allowed, not valid or bool(np.any(np.abs(allowed - wanted) > tolerance))
+
+    def brake(self, velocity: FloatArray, dt: float, steps: int) -> FloatArray:
+        """Return the velocities of the fastest stop, (steps + 1, n)."""
+        times = dt * np.arange(steps + 1)[:, None]
+        speed = np.maximum(np.abs(velocity) - self._limits.acceleration * times, 0.0)
+        return np.sign(velocity) * speed
+
+    def _braking_range(self, q: FloatArray) -> tuple[FloatArray, FloatArray]:
+        above = np.maximum(self._limits.position_upper - q, 0.0)
+        below = np.maximum(q - self._limits.position_lower, 0.0)
+        twice = 2.0 * self._limits.acceleration
+        return -np.sqrt(twice * below), np.sqrt(twice * above)

@@ -1,0 +1,92 @@
+"""The masked optimal control problem of one update (the paper's equation 6), as a value."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from handrail.controllers.arrays import FloatArray, frozen
+from handrail.controllers.collision import CollisionModel
+from handrail.controllers.description import Limits
+
+
+@dataclass(frozen=True)
+class Problem:
+    """`min Σ_k ½ ‖r(q_k, v_k, u_k) - ref_k‖²_W_k + ρ₁ s + ½ ρ₂ s²` over N stages.
+
+    Dynamics: `v_k = v_{k-1} + dt u_k`, `q_k = q_{k-1} + dt v_{k-1} + ½ dt² u_k`. Hard: `|u| ≤ a_max`.
+    Soft, with slack s: velocity and position limits, and `d_p(q_k) ≥ margin_p` for every pair.
+
+    Attributes:
+        q: position now, (n,).
+        v: velocity now, (n,).
+        dt: length of a stage [s].
+        reference: of every residual row, (N, r).
+        weights: of every residual row, (N, r).
+        limits: of the robot.
+        collision: the pairs that keep apart.
+        margins: smallest distance wanted of each pair [m], (P,).
+        reach: distance beyond the margin at which a pair enters the problem [m].
+        slack_linear: ρ₁.
+        slack_quadratic: ρ₂.
+    """
+
+    q: FloatArray
+    v: FloatArray
+    dt: float
+    reference: FloatArray
+    weights: FloatArray
+    limits: Limits
+    collision: CollisionModel
+    margins: FloatArray
+    reach: float
+    slack_linear: float
+    slack_quadratic: float
+
+    @property
+    def horizon(self) -> int:
+        """Number of stages N."""
+        return len(self.reference)
+
+    def rollout(self, u: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return positions and velocities at the N + 1 nodes under accelerations u, (N, n)."""
+        v = np.vstack([self.v, self.v + self.dt * np.cumsum(u, axis=0)])
+        q = np.vstack([self.q, self.q + self.dt * np.cumsum(0.5 * (v[:-1] + v[1:]), axis=0)])
+        return q, v
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A solution: trajectories, slack, and how the solver fared.
+
+    Attributes:
+        q: positions at the nodes, (N + 1, n).
+        v: velocities at the nodes, (N + 1, n).
+        u: accelerations of the stages, (N, n).
+        collision_slack: largest shortfall of a distance against its margin in the plan [m].
+        limit_slack: largest excess over a velocity or position limit, relative to that limit.
+        distances: signed distances now, (P,).
+        solved: whether the solver reports a solution.
+        iterations: of the solver.
+    """
+
+    q: FloatArray
+    v: FloatArray
+    u: FloatArray
+    collision_slack: float
+    limit_slack: float
+    distances: FloatArray
+    solved: bool
+    iterations: int
+
+    def __post_init__(self) -> None:
+        """Copy the arrays and make them read-only."""
+        for name in ("q", "v", "u", "distances"):
+            object.__setattr__(self, name, frozen(getattr(self, name)))
+
+    def is_solution(self, problem: Problem, tolerance: float = 1e-6) -> bool:
+        """Whether the plan is finite, obeys the dynamics from the state and the hard acceleration limits."""
+        if not self.solved or not np.all(np.isfinite(self.u)):
+            return False
+        q, v = problem.rollout(self.u)
+        inside = np.abs(self.u) <= problem.limits.acceleration * (1.0 + tolerance) + tolerance
+        return bool(np.all(inside) and np.allclose(q, self.q) and np.allclose(v, self.v))
