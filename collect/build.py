@@ -1,0 +1,102 @@
+"""From settings to a session: the robot, the environment, the operator and the controller."""
+
+import importlib.metadata
+from collections.abc import Sequence
+
+import gymnasium
+import numpy as np
+
+from handrail.collect.config import SessionConfig, check_fps
+from handrail.collect.env import HandrailEnv
+from handrail.collect.operators.modes import TeleopMode, find_mode
+from handrail.collect.operators.pick_place_script import PickPlaceScript
+from handrail.collect.operators.reach_script import ReachScript
+from handrail.collect.operators.scripted import ScriptedOperator
+from handrail.collect.operators.steering import Gains
+from handrail.collect.session import Observer, Session
+from handrail.controllers.channels import Channels
+from handrail.controllers.controller import Controller
+from handrail.controllers.direct import DirectController
+from handrail.controllers.errors import HandrailError
+from handrail.controllers.model import RobotModel
+from handrail.controllers.mpc import MaskedMpc
+from handrail.datasets.frames import moment_features
+from handrail.datasets.schema import Feature
+
+ENVIRONMENTS = {"pick_place": "handrail/PickPlace-v0", "reach": "handrail/Reach-v0"}
+SCRIPTS = {"pick_place": PickPlaceScript, "reach": ReachScript}
+_VERSIONED = ("handrail", "lerobot", "mujoco", "pin", "coal", "casadi", "daqp", "numpy", "gymnasium")
+
+
+def build_env(config: SessionConfig, fps: int) -> HandrailEnv:
+    """Return the environment of a session.
+
+    Raises:
+        HandrailError: a setting is wrong, or cameras are asked for and GL is missing.
+    """
+    config.check()
+    check_fps(fps)
+    env = gymnasium.make(
+        ENVIRONMENTS[config.task],
+        robot=config.robot,
+        fps=fps,
+        cameras=config.camera_names,
+        image_size=(config.image_size, config.image_size),
+        disable_env_checker=True,
+    )
+    unwrapped = env.unwrapped
+    if not isinstance(unwrapped, HandrailEnv):
+        raise HandrailError(f"environment of task {config.task}: expected a HandrailEnv, got {unwrapped}")
+    return unwrapped
+
+
+def build_session(config: SessionConfig, env: HandrailEnv, observers: Sequence[Observer] = ()) -> Session:
+    """Return the session of an environment."""
+    mode = build_mode(config, env.model)
+    gains = Gains()
+    script = SCRIPTS[config.task](env.model, gains, drives=config.mode == "switching")
+    human = config.human.scaled(config.noise)
+    operator = ScriptedOperator(env.model, script, mode, human, gains)
+    controller = build_controller(mode, env.model, env.fps)
+    return Session(env, controller, operator, observers, config.realtime)
+
+
+def build_controller(mode: TeleopMode, model: RobotModel, fps: int) -> Controller:
+    """Return the controller of a mode."""
+    return DirectController(model, period=1.0 / fps) if mode.direct else MaskedMpc(model)
+
+
+def build_mode(config: SessionConfig, model: RobotModel) -> TeleopMode:
+    """Return the teleop mode, with the mask of the command line if there is one.
+
+    Raises:
+        HandrailError: the mask has the wrong size or other characters than 0 and 1.
+    """
+    mode = find_mode(config.mode)
+    if not config.mask:
+        return mode
+    channels = Channels.of(model.description)
+    if set(config.mask) - {"0", "1"} or len(config.mask) != channels.size:
+        raise HandrailError(
+            f"--mask {config.mask}: expected {channels.size} characters 0 or 1, "
+            f"one each for {', '.join(channels.names)}; got {len(config.mask)}"
+        )
+    names = tuple(np.array(channels.names)[np.array(list(config.mask)) == "1"])
+    return TeleopMode(f"mask:{config.mask}", lambda focus: names, mode.direct, "a mask of one's own")
+
+
+def session_features(env: HandrailEnv) -> dict[str, Feature]:
+    """Return the dataset's columns of an environment."""
+    return moment_features(
+        state=env.agent_names,
+        environment=env.state_names,
+        joints=env.model.joints,
+        channels=Channels.of(env.model.description).names,
+        cameras=env.cameras,
+        image_size=env.image_size,
+    )
+
+
+def software_versions() -> dict[str, str]:
+    """Return the versions that a dataset depends on."""
+    return {name: importlib.metadata.version(name) for name in _VERSIONED}

@@ -1,0 +1,147 @@
+"""What a recording session is made of, as typed settings; light to import."""
+
+import os
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from handrail.collect.operators.human import HumanSettings
+from handrail.controllers.errors import HandrailError, unknown_name
+
+TASKS = ("pick_place", "reach")
+MODE_NAMES = ("base", "base+ee", "direct", "ee", "joints", "switching")
+OPERATORS = ("scripted",)
+CAMERAS = ("wrist", "scene")
+FPS_RANGE = (10, 100)
+
+
+@dataclass(frozen=True)
+class SessionConfig:
+    """Who steers what, how, and what is watched."""
+
+    task: str = "pick_place"
+    """What to do: pick_place or reach."""
+    mode: str = "ee"
+    """Teleop mode: ee, base, base+ee, joints, switching or direct (no MPC)."""
+    mask: str = ""
+    """A mask of your own instead of the mode's: 0 or 1 for each channel (base twist, tool twist, joints)."""
+    operator: str = "scripted"
+    """Who steers: scripted."""
+    noise: float = 1.0
+    """How human the scripted hand is: 0 perfect, 1 as measured in people."""
+    human: HumanSettings = field(default_factory=HumanSettings)
+    robot: str = "ridgeback_ur10"
+    """A robot that comes with Handrail, or a description file (.toml)."""
+    seed: int = 0
+    """Of scenes and operator: the same seed and versions give the same data."""
+    cameras: Annotated[str, tyro.conf.arg(metavar="NAMES")] = ""
+    """Cameras to record, comma-separated: wrist, scene; none by default."""
+    image_size: int = 128
+    """Height and width of the pictures [pixels]."""
+    realtime: bool = False
+    """Pace the loop by the wall clock."""
+
+    @property
+    def camera_names(self) -> tuple[str, ...]:
+        """The cameras asked for."""
+        return tuple(name.strip() for name in self.cameras.split(",") if name.strip())
+
+    def check(self) -> None:
+        """Check what can be checked without loading anything heavy.
+
+        Raises:
+            HandrailError: one setting is wrong; the message says what may be chosen.
+        """
+        _choice("task", self.task, TASKS)
+        _choice("mode", self.mode, MODE_NAMES)
+        _choice("operator", self.operator, OPERATORS)
+        for camera in self.camera_names:
+            _choice("camera", camera, CAMERAS)
+        if len(set(self.camera_names)) != len(self.camera_names):
+            raise HandrailError(f"--cameras {self.cameras}: expected each camera once")
+        if not 0.0 <= self.noise <= 5.0:
+            raise HandrailError(f"--noise {self.noise}: expected a number from 0 (perfect) to 5")
+        if self.seed < 0:
+            raise HandrailError(f"--seed {self.seed}: expected a whole number >= 0")
+        if not 16 <= self.image_size <= 1024 or self.image_size % 2:
+            raise HandrailError(f"--image_size {self.image_size}: expected an even number from 16 to 1024")
+
+
+@dataclass(frozen=True)
+class DatasetConfig:
+    """Where the episodes go; the flags are LeRobot's."""
+
+    repo_id: str = "handrail/demo"
+    """Name of the dataset, owner/name."""
+    root: str = ""
+    """Its folder; LeRobot's own place for the name when empty."""
+    num_episodes: int = 10
+    """Episodes to record."""
+    fps: int = 20
+    """Control and recording rate [Hz], 10 to 100."""
+    single_task: str = ""
+    """What is done, in words; the task's own sentence when empty."""
+
+    @property
+    def folder(self) -> Path:
+        """The folder of the dataset: as given, or where LeRobot keeps its own."""
+        if self.root:
+            return Path(self.root).expanduser()
+        hub = Path(os.environ.get("HF_HOME", "~/.cache/huggingface")).expanduser()
+        return Path(os.environ.get("HF_LEROBOT_HOME", hub / "lerobot")).expanduser() / self.repo_id
+
+    def check(self) -> None:
+        """Check the settings.
+
+        Raises:
+            HandrailError: one is wrong.
+        """
+        check_fps(self.fps)
+        if self.num_episodes < 1:
+            raise HandrailError(f"--dataset.num_episodes {self.num_episodes}: expected 1 or more")
+
+
+@dataclass(frozen=True)
+class RecordConfig(SessionConfig):
+    """Record demonstrations of a robot steered through the masked MPC as a LeRobot dataset."""
+
+    dataset: DatasetConfig = field(default_factory=DatasetConfig)
+    resume: bool = False
+    """Add to the dataset that is there (repaired first if need be)."""
+    overwrite: bool = False
+    """Remove the dataset that is there."""
+    display_data: bool = False
+    """Show robot, cameras, intent and distances in rerun."""
+    display_save: str = ""
+    """Save what rerun would show to this .rrd file."""
+
+    def check(self) -> None:
+        """Check what can be checked without loading anything heavy.
+
+        Raises:
+            HandrailError: one setting is wrong.
+        """
+        super().check()
+        self.dataset.check()
+        if self.resume and self.overwrite:
+            raise HandrailError("--resume and --overwrite: expected one of them, got both")
+        if self.display_save and not self.display_save.endswith(".rrd"):
+            raise HandrailError(f"--display_save {self.display_save}: expected a file that ends in .rrd")
+
+
+def check_fps(fps: int) -> None:
+    """Check a control and recording rate [Hz].
+
+    Raises:
+        HandrailError: it is out of range.
+    """
+    low, high = FPS_RANGE
+    if not low <= fps <= high:
+        raise HandrailError(f"--dataset.fps {fps}: expected {low} to {high}")
+
+
+def _choice(thing: str, name: str, choices: tuple[str, ...]) -> None:
+    if name not in choices:
+        raise unknown_name(thing, name, choices)

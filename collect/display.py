@@ -1,0 +1,133 @@
+"""Shows a session in rerun: robot, cameras, intent against motion, distances."""
+
+import contextlib
+from pathlib import Path
+
+import numpy as np
+
+from handrail.collect.env import HandrailEnv
+from handrail.controllers.channels import Channels
+from handrail.controllers.errors import HandrailError
+from handrail.controllers.shape import Obstacle
+from handrail.datasets.frames import Moment
+
+_ROBOT = (235, 190, 40)
+_SCENE = (150, 160, 170)
+
+
+class Display:
+    """Sends every moment to rerun; an observer of a session.
+
+    Args:
+        spawn: open the viewer.
+        save: also or instead write to this .rrd file; empty for none.
+
+    Raises:
+        HandrailError: rerun is not installed, or the viewer or the file cannot be opened.
+    """
+
+    def __init__(self, spawn: bool = True, save: str = "") -> None:
+        try:
+            import rerun as rr
+        except ImportError as error:
+            raise HandrailError(
+                "--display_data, --display_save: expected rerun, found none; pip install 'handrail[display]'"
+            ) from error
+        self._rr = rr
+        rr.init("handrail")
+        if save:
+            _check_file(Path(save))
+            rr.save(save)
+        if spawn:
+            try:
+                rr.spawn(connect=not save)
+            except (RuntimeError, OSError) as error:
+                raise HandrailError(f"--display_data: the rerun viewer did not start: {error}") from error
+        self._episode = -1
+        self._frame = 0
+
+    def begin(self, env: HandrailEnv, seed: int) -> None:
+        """Draw the scene of a new episode."""
+        self._model = env.model
+        self._channels = Channels.of(env.model.description)
+        self._period = 1.0 / env.fps
+        self._episode += 1
+        self._frame = 0
+        rr = self._rr
+        rr.set_time("episode", sequence=self._episode)
+        rr.set_time("time", duration=0.0)
+        rr.log("world", rr.Clear(recursive=True))
+        rr.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP)
+        for obstacle in env.obstacles():
+            self._log_shape(f"world/scene/{obstacle.name}", obstacle)
+
+    def see(self, moment: Moment) -> None:
+        """Log one moment."""
+        rr = self._rr
+        rr.set_time("time", duration=self._frame * self._period)
+        self._frame += 1
+        q = moment.state[: self._model.size].astype(float)
+        v = moment.state[self._model.size : 2 * self._model.size].astype(float)
+        self._log_robot(q)
+        self._log_tracking(moment, q, v)
+        for name, image in moment.images.items():
+            rr.log(f"camera/{name}", rr.Image(image))
+        health = moment.health
+        rr.log("distance/smallest", rr.Scalars(_finite(health.smallest_distance)))
+        rr.log("distance/work", rr.Scalars(_finite(health.work_distance)))
+        rr.log("controller/solve_time_ms", rr.Scalars(1e3 * health.solve_time))
+        rr.log("controller/slack", rr.Scalars(health.slack))
+        rr.log("controller/status", rr.TextLog(f"{moment.intent.mode}: {health.status.value}"))
+
+    def _log_robot(self, q: np.ndarray) -> None:
+        """Draw the robot's collision shapes where they are."""
+        for placed in self._model.description.collision:
+            pose = self._model.pose(q, placed.frame)
+            position = pose.position + pose.rotation @ placed.placement.translation
+            rotation = pose.rotation @ placed.placement.rotation
+            shape = Obstacle(placed.name, placed.shape, position, rotation)
+            self._log_shape(f"world/robot/{placed.name}", shape, _ROBOT)
+
+    def _log_tracking(self, moment: Moment, q: np.ndarray, v: np.ndarray) -> None:
+        """Plot what is asked on each owned channel against what happens."""
+        rr, channels = self._rr, self._channels
+        realised = np.concatenate([self._base_twist(q, v), self._model.jacobian(q) @ v, v])
+        for name, asked, owned, real in zip(
+            channels.names, moment.intent.values, moment.intent.mask, realised, strict=True
+        ):
+            rr.log(f"motion/{name}/realised", rr.Scalars(real))
+            if owned and np.isfinite(asked):
+                rr.log(f"motion/{name}/asked", rr.Scalars(asked))
+
+    def _base_twist(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        if not self._channels.base:
+            return np.zeros(0)
+        c, s = np.cos(q[2]), np.sin(q[2])
+        return np.array([c * v[0] + s * v[1], -s * v[0] + c * v[1], v[2]])
+
+    def _log_shape(self, path: str, thing: Obstacle, colour: tuple[int, int, int] = _SCENE) -> None:
+        rr, size = self._rr, thing.shape.size
+        self._rr.log(path, rr.Transform3D(translation=thing.position, mat3x3=thing.rotation))
+        shapes = {
+            "box": lambda: rr.Boxes3D(half_sizes=[size / 2], colors=[colour]),
+            "capsule": lambda: rr.Capsules3D(
+                radii=[size[0]], lengths=[size[-1]], translations=[[0, 0, -size[-1] / 2]], colors=[colour]
+            ),
+            "cylinder": lambda: rr.Cylinders3D(radii=[size[0]], lengths=[size[-1]], colors=[colour]),
+            "sphere": lambda: rr.Ellipsoids3D(half_sizes=[[size[0]] * 3], colors=[colour]),
+        }
+        rr.log(path, shapes[thing.shape.kind]())
+
+    def close(self) -> None:
+        """Write out what is still buffered."""
+        with contextlib.suppress(AttributeError):
+            self._rr.get_global_data_recording().flush()
+
+
+def _check_file(path: Path) -> None:
+    if not path.parent.is_dir():
+        raise HandrailError(f"--display_save {path}: expected an existing folder, found none at {path.parent}")
+
+
+def _finite(value: float) -> float:
+    return value if np.isfinite(value) else np.nan

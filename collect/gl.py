@@ -1,0 +1,53 @@
+"""Chooses how MuJoCo draws, before it is imported; import `mujoco` from here.
+
+`import mujoco` itself dies when `MUJOCO_GL` names a library that is not there, so the choice is made first.
+State-only environments never need a graphics library.
+"""
+
+import ctypes
+import os
+import sys
+
+from handrail.controllers.errors import HandrailError
+
+_LIBRARIES = {"egl": ("libEGL.so.1",), "osmesa": ("libOSMesa.so.8", "libOSMesa.so.6", "libOSMesa.so")}
+
+
+def _loads(backend: str) -> bool:
+    for library in _LIBRARIES[backend]:
+        try:
+            ctypes.CDLL(library)
+        except OSError:
+            continue
+        return True
+    return False
+
+
+def choose_backend() -> None:
+    """Set `MUJOCO_GL` to one that can be imported; leave macOS, Windows and a person's good choice alone."""
+    if not sys.platform.startswith("linux"):
+        return
+    wanted = os.environ.get("MUJOCO_GL", "").lower()
+    if wanted in _LIBRARIES and not _loads(wanted):
+        os.environ["MUJOCO_GL"] = "disable"
+    elif not wanted and _loads("egl"):
+        os.environ["MUJOCO_GL"] = "egl"
+    elif not wanted and not os.environ.get("DISPLAY"):
+        os.environ["MUJOCO_GL"] = "disable"
+
+
+def missing_graphics(reason: object) -> HandrailError:
+    """Return the error for cameras without a graphics library."""
+    detail = " ".join(str(reason).split()) or type(reason).__name__
+    return HandrailError(
+        f"cameras need OpenGL, which is missing here (MUJOCO_GL={os.environ.get('MUJOCO_GL', '')!r}: {detail}); "
+        "install it with: apt-get install libegl1 libgl1-mesa-dri, and unset MUJOCO_GL; "
+        "without cameras everything else works"
+    )
+
+
+choose_backend()
+
+import mujoco  # noqa: E402
+
+__all__ = ["choose_backend", "missing_graphics", "mujoco"]

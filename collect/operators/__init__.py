@@ -1,0 +1,1 @@
+"""Operators: observation in, intent out; scripted ones with a human-like hand."""

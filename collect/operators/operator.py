@@ -1,0 +1,45 @@
+"""The protocol of an operator, and what it sees."""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from handrail.collect.tasks.task import TaskState
+from handrail.controllers.controller import State
+from handrail.controllers.intent import Intent
+from handrail.controllers.model import Pose
+
+
+@dataclass(frozen=True)
+class View:
+    """What an operator sees now.
+
+    Attributes:
+        state: of the robot.
+        tool: pose of the tool point.
+        opening: of the gripper, 0 closed, 1 open.
+        task: the truth of this moment.
+    """
+
+    state: State
+    tool: Pose
+    opening: float
+    task: TaskState
+
+
+class Operator(Protocol):
+    """Whoever steers: a script, a person, a trained policy."""
+
+    @property
+    def name(self) -> str:
+        """What the dataset says of who steered."""
+        ...
+
+    def reset(self, view: View, rng: np.random.Generator) -> None:
+        """Begin an episode."""
+        ...
+
+    def act(self, view: View) -> Intent:
+        """Return the intent now."""
+        ...

@@ -1,0 +1,97 @@
+"""A script made of phases: go there, with the hand or the base, then the next."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from handrail.collect.operators.modes import Focus, Wish
+from handrail.collect.operators.operator import View
+from handrail.collect.operators.steering import Gains, base_twist, hand_twist, pose_errors
+from handrail.controllers.arrays import FloatArray
+from handrail.controllers.model import Pose
+
+
+@dataclass(frozen=True)
+class Phase:
+    """One thing to do.
+
+    Attributes:
+        name: for logs and metrics.
+        hand: goal of the tool.
+        base: where the base would stand, (x, y, θ).
+        focus: which of the two ends the phase, and is steered in switching mode.
+        gripper: 0 open, 1 closed.
+        distance: from the goal at which the phase ends [m].
+        angle: the same for orientation [rad].
+        pace: share of the full stick.
+        dwell: time to wait, hands still, before the next phase [s].
+        patience: time after which the operator goes on anyway [s].
+    """
+
+    name: str
+    hand: Pose
+    base: FloatArray
+    focus: Focus = "hand"
+    gripper: float = 0.0
+    distance: float = 0.05
+    angle: float = 0.2
+    pace: float = 1.0
+    dwell: float = 0.0
+    patience: float = np.inf
+
+
+class PhaseRunner:
+    """Runs phases one after the other; `redo` may send it back to an earlier one.
+
+    Args:
+        gains: of the operator.
+        redo: asked when a phase ends; the index to go back to, or None to go on.
+    """
+
+    def __init__(self, gains: Gains, redo: Callable[[View, str], int | None]) -> None:
+        self._gains = gains
+        self._redo = redo
+
+    def start(self, phases: list[Phase], time: float, index: int = 0) -> None:
+        """Begin with a list of phases."""
+        self._phases = phases
+        self._enter(index, time)
+
+    @property
+    def phase(self) -> Phase:
+        """The phase now."""
+        return self._phases[min(self._index, len(self._phases) - 1)]
+
+    def wish(self, view: View) -> Wish:
+        """Return what is wanted now, and go to the next phase when this one is done."""
+        self._advance(view)
+        phase = self.phase
+        still = self._index >= len(self._phases) or self._reached_at is not None
+        hand = np.zeros(6) if still else hand_twist(view.tool, phase.hand, self._gains, phase.pace)
+        base = np.zeros(3) if still else base_twist(view.state.q, phase.base, self._gains)
+        return Wish(hand, base, phase.focus, phase.gripper)
+
+    def _enter(self, index: int, time: float) -> None:
+        self._index = index
+        self._entered = time
+        self._reached_at: float | None = None
+
+    def _advance(self, view: View) -> None:
+        if self._index >= len(self._phases):
+            return
+        time = view.state.time
+        if self._reached_at is None and (self._reached(view) or time - self._entered > self.phase.patience):
+            self._reached_at = time
+        if self._reached_at is not None and time - self._reached_at >= self.phase.dwell:
+            back = self._redo(view, self.phase.name)
+            self._enter(self._index + 1 if back is None else back, time)
+
+    def _reached(self, view: View) -> bool:
+        phase = self.phase
+        if phase.focus == "base":
+            q = view.state.q
+            turn = np.arctan2(np.sin(phase.base[2] - q[2]), np.cos(phase.base[2] - q[2]))
+            return bool(np.hypot(*(phase.base[:2] - q[:2])) < phase.distance and abs(turn) < phase.angle)
+        distance, angle = pose_errors(view.tool, phase.hand)
+        return distance < phase.distance and angle < phase.angle

@@ -1,0 +1,170 @@
+"""How an operator carries a cube from one table to a bin on another."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from handrail.collect.operators.modes import Wish
+from handrail.collect.operators.operator import View
+from handrail.collect.operators.phases import Phase, PhaseRunner
+from handrail.collect.operators.standing import standing_point
+from handrail.collect.operators.steering import Gains, pose_errors
+from handrail.collect.tasks.task import TaskState
+from handrail.controllers.arrays import FloatArray
+from handrail.controllers.model import Pose, RobotModel
+
+_HELD = 0.05  # a cube this near to the tool point is held [m]
+_RETREAT = 0.40  # hand behind the table's edge while carrying [m]
+_AHEAD = 0.80  # hand before the base's centre while carrying [m]
+_CLEARANCE = 0.25  # of the chassis behind the floor obstacles [m]
+
+
+@dataclass(frozen=True)
+class _Place:
+    """What matters of a table: the near edge's x, the height, and the thing on it."""
+
+    edge: float
+    thing: FloatArray
+
+
+class PickPlaceScript:
+    """Approach, grasp, lift, carry, place for `handrail/PickPlace-v0`; a script.
+
+    Args:
+        model: of the robot.
+        gains: of the operator.
+        drives: whether the operator drives the base by itself between the places (switching).
+    """
+
+    def __init__(self, model: RobotModel, gains: Gains, drives: bool) -> None:
+        self._model = model
+        self._gains = gains
+        self._drives = drives
+        self._runner = PhaseRunner(gains, self._redo)
+
+    def reset(self, view: View) -> None:
+        """Look at the scene and plan."""
+        self._runner.start(self._phases(view), view.state.time)
+
+    def wish(self, view: View) -> Wish:
+        """Return what is wanted now."""
+        return self._runner.wish(view)
+
+    def _redo(self, view: View, name: str) -> int | None:
+        """Grasp again when the cube stayed behind."""
+        cube = view.task.pose("cube").position
+        if name != "lift" or np.linalg.norm(cube - view.tool.position) < _HELD:
+            return None
+        phases = self._phases(view)
+        index = next(i for i, phase in enumerate(phases) if phase.name == "above")
+        self._runner.start(phases, view.state.time, index)
+        return index
+
+    def _phases(self, view: View) -> list[Phase]:
+        task = view.task
+        cube = task.pose("cube")
+        pick = _Place(_front_edge(task, "cube_table"), cube.position)
+        place = _Place(_front_edge(task, "bin_table"), task.pose("bin").position)
+        down = grasp_rotation(view.tool.rotation, cube.rotation)
+        rim = task.object("bin").top - place.thing[2]
+        phases = self._pick(pick, down)
+        lane = self._lane(task)
+        phases += self._carry(pick, place, down, lane)
+        phases += self._place(place, down, rim)
+        if self._drives:
+            drive = self._drive(view.state.q[:3], self._stand(pick), phases[0].hand, lane, 0.0)
+            phases = drive + phases
+        return phases
+
+    def _pick(self, pick: _Place, down: FloatArray) -> list[Phase]:
+        cube, base = pick.thing, self._stand(pick)
+        stage = np.array([pick.edge - 0.15, cube[1], cube[2] + 0.30])
+
+        def phase(name: str, position: FloatArray, **options: float) -> Phase:
+            return Phase(name, Pose(position, down), base, **options)  # type: ignore[arg-type]
+
+        return [
+            phase("stage", stage, distance=0.10, angle=0.30),
+            phase("above", cube + [0, 0, 0.14], distance=0.02, angle=0.10),
+            phase("descend", cube + [0, 0, 0.004], distance=0.010, angle=0.10, pace=0.4, patience=8.0),
+            phase("grasp", cube + [0, 0, 0.004], distance=1.0, angle=3.2, gripper=1.0, dwell=1.2),
+            phase("lift", cube + [0, 0, 0.22], distance=0.04, angle=0.3, gripper=1.0, pace=0.6),
+        ]
+
+    def _carry(self, pick: _Place, place: _Place, down: FloatArray, lane: float) -> list[Phase]:
+        """Pull the cube back until the base is behind the floor obstacles, cross, and go up to the other table."""
+        height = max(pick.thing[2], place.thing[2]) + 0.30
+        hand_lane = lane + _AHEAD
+
+        def phase(name: str, x: float, at: _Place, base: FloatArray) -> Phase:
+            hand = Pose(np.array([x, at.thing[1], height]), down)
+            return Phase(name, hand, base, gripper=1.0, distance=0.12, angle=0.4)
+
+        if self._drives:
+            retreat = phase("retreat", pick.edge - _RETREAT, pick, self._stand(pick))
+            front = phase("front", place.edge - _RETREAT, place, self._stand(place))
+            return [retreat, *self._drive(self._stand(pick), self._stand(place), front.hand, lane, 1.0)]
+        return [
+            phase("retreat", hand_lane, pick, np.array([lane, pick.thing[1], 0.0])),
+            phase("cross", hand_lane, place, np.array([lane, place.thing[1], 0.0])),
+            phase("front", place.edge - _RETREAT, place, self._stand(place)),
+        ]
+
+    def _place(self, place: _Place, down: FloatArray, height: float) -> list[Phase]:
+        rim = place.thing + [0, 0, height]
+        base = self._stand(place)
+
+        def phase(name: str, rise: float, **options: float) -> Phase:
+            return Phase(name, Pose(rim + [0, 0, rise], down), base, **options)  # type: ignore[arg-type]
+
+        return [
+            phase("over", 0.18, gripper=1.0, distance=0.03, angle=0.3),
+            phase("lower", 0.045, gripper=1.0, distance=0.025, angle=0.3, pace=0.4),
+            phase("release", 0.045, distance=1.0, angle=3.2, dwell=0.8),
+            phase("rise", 0.25, distance=0.05, angle=0.5),
+        ]
+
+    def _stand(self, place: _Place) -> FloatArray:
+        """Return where the base stands: comfortable, and clear of the table."""
+        base = standing_point(self._model, place.thing)
+        length = self._model.description.base_size[0]
+        base[0] = min(base[0], place.edge - length / 2 - 0.25)
+        return base
+
+    def _drive(
+        self, start: FloatArray, goal: FloatArray, hand: Pose, lane: float, gripper: float
+    ) -> list[Phase]:
+        """Drive in the lane behind the obstacles, then up to the table."""
+        points = [goal]
+        if abs(goal[1] - start[1]) > 0.3:
+            back, across = (np.array([min(lane, start[0]), y, 0.0]) for y in (start[1], goal[1]))
+            points = [back, across, goal] if start[0] > lane else [across, goal]
+        return [
+            Phase("drive", hand, point, focus="base", gripper=gripper, distance=0.12, angle=0.15)
+            for point in points
+        ]
+
+    def _lane(self, task: TaskState) -> float:
+        """Return the x of the lane in which the base passes behind everything on the floor [m]."""
+        bodies = [item for item in task.episode.scene.objects if item.name.startswith("obstacle")]
+        behind = [item.position[0] - np.hypot(*item.shape.size[:2]) / 2 for item in bodies]
+        return float(min(behind, default=0.0)) - self._model.description.base_size[0] / 2 - _CLEARANCE
+
+
+def _front_edge(task: TaskState, table: str) -> float:
+    """Return the x of a table's edge that faces the robot [m]."""
+    item = task.object(table)
+    return float(item.position[0] - item.shape.size[0] / 2)
+
+
+def grasp_rotation(tool: FloatArray, cube: FloatArray) -> FloatArray:
+    """Return the rotation that points the tool down, fingers square to the cube, nearest to the tool's now, (3, 3)."""
+    yaw = np.arctan2(cube[1, 0], cube[0, 0])
+    candidates = []
+    for angle in yaw + np.pi / 2 * np.arange(4):
+        x = np.array([np.cos(angle), np.sin(angle), 0.0])
+        z = np.array([0.0, 0.0, -1.0])
+        candidates.append(np.column_stack([x, np.cross(z, x), z]))
+    origin = np.zeros(3)
+    turns = [pose_errors(Pose(origin, tool), Pose(origin, rotation))[1] for rotation in candidates]
+    return candidates[int(np.argmin(turns))]

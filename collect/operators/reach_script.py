@@ -1,0 +1,32 @@
+"""How an operator reaches a pose: near it with the base, then with the hand."""
+
+import numpy as np
+
+from handrail.collect.operators.modes import Wish
+from handrail.collect.operators.operator import View
+from handrail.collect.operators.phases import Phase, PhaseRunner
+from handrail.collect.operators.standing import standing_point
+from handrail.collect.operators.steering import Gains
+from handrail.controllers.model import RobotModel
+
+
+class ReachScript:
+    """Reaches the goal of `handrail/Reach-v0`; a script."""
+
+    def __init__(self, model: RobotModel, gains: Gains, drives: bool) -> None:
+        self._model = model
+        self._drives = drives
+        self._runner = PhaseRunner(gains, redo=lambda view, name: None)
+
+    def reset(self, view: View) -> None:
+        """Plan to drive to where the goal is in comfortable reach, then to steer the hand to it."""
+        goal = view.task.goal or view.tool
+        base = standing_point(self._model, goal.position)
+        phases = [Phase("reach", goal, base, distance=0.02, angle=0.05, patience=np.inf)]
+        if self._drives and np.hypot(*(base[:2] - view.state.q[:2])) > 0.4:
+            phases.insert(0, Phase("drive", goal, base, focus="base", distance=0.15, angle=0.2))
+        self._runner.start(phases, view.state.time)
+
+    def wish(self, view: View) -> Wish:
+        """Return what is wanted now."""
+        return self._runner.wish(view)

@@ -1,0 +1,65 @@
+"""Where an operator pushes the stick: towards a pose, slower when near."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from handrail.controllers.arrays import FloatArray
+from handrail.controllers.model import Pose
+from handrail.controllers.rotation import rotation_vector
+
+
+@dataclass(frozen=True)
+class Gains:
+    """How briskly an operator steers.
+
+    Attributes:
+        gain: of the distance to go [1/s].
+        hand_speed: full stick of the hand's translation [m/s].
+        hand_rate: full stick of the hand's rotation [rad/s].
+        base_speed: full stick of the base's translation [m/s].
+        base_rate: full stick of the base's rotation [rad/s].
+    """
+
+    gain: float = 1.2
+    hand_speed: float = 0.35
+    hand_rate: float = 0.6
+    base_speed: float = 0.5
+    base_rate: float = 0.3
+
+    @property
+    def full(self) -> FloatArray:
+        """Full deflection of hand twist and base twist, (9,)."""
+        hand = [self.hand_speed] * 3 + [self.hand_rate] * 3
+        return np.array([*hand, self.base_speed, self.base_speed, self.base_rate])
+
+
+def saturated(vector: FloatArray, largest: float) -> FloatArray:
+    """Return the vector, shortened to the largest norm."""
+    norm = float(np.linalg.norm(vector))
+    return vector * (largest / norm) if norm > largest else vector
+
+
+def hand_twist(tool: Pose, goal: Pose, gains: Gains, pace: float = 1.0) -> FloatArray:
+    """Return the twist that steers the hand to a goal, world-aligned at the tool point, (6,).
+
+    `v = sat(gain (p_goal - p))`, `ω = sat(gain log(R_goal Rᵀ))`; `pace` scales the largest speeds.
+    """
+    linear = saturated(gains.gain * (goal.position - tool.position), pace * gains.hand_speed)
+    turn = rotation_vector(goal.rotation @ tool.rotation.T)
+    return np.concatenate([linear, saturated(gains.gain * turn, pace * gains.hand_rate)])
+
+
+def base_twist(q: FloatArray, goal: FloatArray, gains: Gains) -> FloatArray:
+    """Return the twist that drives the base to (x, y, θ), in the base frame, (3,)."""
+    c, s = np.cos(q[2]), np.sin(q[2])
+    world = saturated(gains.gain * (goal[:2] - q[:2]), gains.base_speed)
+    turn = np.arctan2(np.sin(goal[2] - q[2]), np.cos(goal[2] - q[2]))
+    rate = np.clip(gains.gain * turn, -gains.base_rate, gains.base_rate)
+    return np.array([c * world[0] + s * world[1], -s * world[0] + c * world[1], rate])
+
+
+def pose_errors(tool: Pose, goal: Pose) -> tuple[float, float]:
+    """Return distance [m] and angle [rad] between two poses."""
+    distance = float(np.linalg.norm(goal.position - tool.position))
+    return distance, float(np.linalg.norm(rotation_vector(goal.rotation @ tool.rotation.T)))

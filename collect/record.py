@@ -1,0 +1,174 @@
+"""Records episodes into a dataset, with a progress bar, and says what came of it."""
+
+import contextlib
+import signal
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from types import FrameType
+
+import numpy as np
+from rich.console import Console
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
+from rich.table import Table
+
+from handrail.collect.build import build_env, build_session, session_features, software_versions
+from handrail.collect.config import RecordConfig
+from handrail.collect.env import HandrailEnv
+from handrail.collect.recorder import Recorder
+from handrail.collect.session import Observer, Outcome, Session
+from handrail.controllers.errors import HandrailError
+from handrail.datasets.writer import EpisodeWriter
+
+INTERRUPTED = 130
+FAILED = 1
+
+
+@dataclass
+class _Log:
+    """What has been recorded in this run."""
+
+    outcomes: list[Outcome] = field(default_factory=list)
+    trouble: str = ""
+    exit_code: int = 0
+
+    @property
+    def successes(self) -> int:
+        return sum(outcome.success for outcome in self.outcomes)
+
+
+def record(config: RecordConfig) -> int:
+    """Record as configured; return the exit code: 0, 1 after a failure, 130 after Ctrl-C.
+
+    Raises:
+        HandrailError: a setting is wrong; nothing has been written then.
+    """
+    console = Console(stderr=True)
+    env = build_env(config, config.dataset.fps)
+    try:
+        displays = _displays(config)
+        session = build_session(config, env)  # a wrong mask shows here, before anything is written
+        with _open_writer(config, env) as writer:
+            task = config.dataset.single_task or env.task_description
+            recorder = Recorder(writer, task, config.operator, config.mode)
+            session = build_session(config, env, [*displays, recorder])
+            log = _Log()
+            _record_all(config, session, recorder, writer, log, console)
+            _report(config, writer, log, console)
+    finally:
+        env.close()
+    return log.exit_code
+
+
+def episode_seed(seed: int, episode: int) -> int:
+    """Return the seed of an episode: far apart for every seed and number."""
+    return int(np.random.SeedSequence([seed, episode]).generate_state(1)[0])
+
+
+def _open_writer(config: RecordConfig, env: HandrailEnv) -> EpisodeWriter:
+    dataset = config.dataset
+    arguments = (
+        dataset.folder,
+        dataset.repo_id,
+        dataset.fps,
+        session_features(env),
+        env.model.description.name,
+    )
+    if config.resume:
+        return EpisodeWriter.resume(*arguments, versions=software_versions())
+    return EpisodeWriter.create(*arguments, versions=software_versions(), overwrite=config.overwrite)
+
+
+def _record_all(
+    config: RecordConfig,
+    session: Session,
+    recorder: Recorder,
+    writer: EpisodeWriter,
+    log: _Log,
+    console: Console,
+) -> None:
+    """Record until the number is reached, the operator interrupts, or the disk or an encoder fails."""
+    with _progress(console) as progress, _termination_interrupts():
+        bar = progress.add_task("recording", total=config.dataset.num_episodes, success="–")
+        try:
+            while len(log.outcomes) < config.dataset.num_episodes:
+                outcome = session.run(episode_seed(config.seed, writer.num_episodes))
+                recorder.save(outcome)
+                log.outcomes.append(outcome)
+                rate = f"{log.successes}/{len(log.outcomes)} succeeded"
+                progress.update(bar, advance=1, success=rate)
+        except KeyboardInterrupt:
+            log.trouble, log.exit_code = "interrupted: the open episode is dropped", INTERRUPTED
+        except HandrailError as error:
+            log.trouble, log.exit_code = str(error), FAILED
+
+
+def _report(config: RecordConfig, writer: EpisodeWriter, log: _Log, console: Console) -> None:
+    if log.trouble:
+        console.print(f"error: {log.trouble}", style="bold red", highlight=False, soft_wrap=True)
+    if log.outcomes:
+        console.print(_summary(config, log.outcomes))
+    console.print(
+        f"{writer.num_episodes} episodes, {writer.num_frames} frames in {writer.root}",
+        highlight=False,
+        soft_wrap=True,
+    )
+
+
+def _summary(config: RecordConfig, outcomes: list[Outcome]) -> Table:
+    simulated = sum(outcome.seconds for outcome in outcomes)
+    wall = sum(outcome.wall_time for outcome in outcomes)
+    distance = min(outcome.smallest_distance for outcome in outcomes)
+    rows = {
+        "task, mode": f"{config.task}, {config.mode}",
+        "success": f"{sum(outcome.success for outcome in outcomes)} of {len(outcomes)}",
+        "recorded": f"{simulated:.1f} s in {wall:.1f} s: {simulated / wall:.1f} × real time",
+        "smallest distance": f"{distance:.3f} m",
+        "contacts": str(sum(outcome.contacts for outcome in outcomes)),
+        "braked updates": str(sum(outcome.brakes for outcome in outcomes)),
+    }
+    table = Table(show_header=False, box=None)
+    for name, value in rows.items():
+        table.add_row(name, value)
+    return table
+
+
+def _displays(config: RecordConfig) -> list[Observer]:
+    if not (config.display_data or config.display_save):
+        return []
+    from handrail.collect.display import Display  # rerun is an extra
+
+    return [Display(spawn=config.display_data, save=config.display_save)]
+
+
+def _progress(console: Console) -> Progress:
+    return Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("{task.fields[success]}"),
+        TimeElapsedColumn(),
+        TextColumn("left"),
+        TimeRemainingColumn(),
+        console=console,
+    )
+
+
+@contextlib.contextmanager
+def _termination_interrupts() -> Iterator[None]:
+    """Let SIGTERM end a recording as Ctrl-C does."""
+
+    def interrupt(number: int, frame: FrameType | None) -> None:
+        raise KeyboardInterrupt
+
+    previous = signal.signal(signal.SIGTERM, interrupt)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, previous)

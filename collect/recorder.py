@@ -1,0 +1,52 @@
+"""Writes what a session shows into a dataset, episode by episode."""
+
+from handrail.collect.env import HandrailEnv
+from handrail.collect.session import Outcome
+from handrail.datasets.frames import Moment, moment_row
+from handrail.datasets.writer import EpisodeWriter
+
+
+class Recorder:
+    """Records moments as frames; an observer of a session.
+
+    Args:
+        writer: of the dataset.
+        task: what is being done, in words.
+        operator: who steers.
+        mode: name of the teleop mode.
+    """
+
+    def __init__(self, writer: EpisodeWriter, task: str, operator: str, mode: str) -> None:
+        self._writer = writer
+        self._task = task
+        self._operator = operator
+        self._mode = mode
+
+    def begin(self, env: HandrailEnv, seed: int) -> None:
+        """Drop what an episode that ended early left open."""
+        if self._writer.open_frames:
+            self._writer.discard_episode()
+
+    def see(self, moment: Moment) -> None:
+        """Add a frame."""
+        self._writer.add_frame(moment_row(moment), self._task)
+
+    def save(self, outcome: Outcome) -> int:
+        """Save the episode with how it went; return its number.
+
+        Raises:
+            HandrailError: the disk or an encoder failed; the saved episodes are whole.
+        """
+        return self._writer.save_episode(
+            {
+                "success": outcome.success,
+                "failure_reason": outcome.failure_reason,
+                "operator": self._operator,
+                "mode": self._mode,
+                "seed": outcome.seed,
+                "wall_time": outcome.wall_time,
+                "brakes": outcome.brakes,
+                "late": outcome.late,
+                "contacts": outcome.contacts,
+            }
+        )

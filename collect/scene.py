@@ -1,0 +1,178 @@
+"""One scene, two uses: MuJoCo bodies for the simulation, obstacles for the controller."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from handrail.collect import geometry
+from handrail.collect.gl import mujoco
+from handrail.controllers.arrays import FloatArray, frozen
+from handrail.controllers.errors import HandrailError, unknown_name
+from handrail.controllers.shape import Obstacle, Shape
+
+Colour = tuple[float, float, float, float]
+_GREY: Colour = (0.6, 0.6, 0.6, 1.0)
+
+
+@dataclass(frozen=True)
+class Part:
+    """A piece of an object: a shape at a place in the object's frame; `rgba` None takes the object's."""
+
+    shape: Shape
+    position: FloatArray
+    rotation: FloatArray = field(default_factory=lambda: np.eye(3))
+    rgba: Colour | None = None
+
+    def __post_init__(self) -> None:
+        """Copy the arrays and make them read-only."""
+        for name in ("position", "rotation"):
+            object.__setattr__(self, name, frozen(getattr(self, name)))
+
+
+@dataclass(frozen=True)
+class SceneObject:
+    """A thing in the scene.
+
+    Attributes:
+        name: unique in the scene.
+        shape: what the controller avoids; encloses the parts.
+        position: of its centre in the world [m], (3,).
+        rotation: world from object, (3, 3).
+        rgba: its colour.
+        mass: of a thing that can be moved [kg]; 0 stands still.
+        work_surface: whether the tool may come close to it.
+        ghost: drawn, never touched: a marker.
+        parts: what is drawn and touched, if not the shape itself.
+        friction: sliding friction coefficient.
+    """
+
+    name: str
+    shape: Shape
+    position: FloatArray
+    rotation: FloatArray = field(default_factory=lambda: np.eye(3))
+    rgba: Colour = _GREY
+    mass: float = 0.0
+    work_surface: bool = False
+    ghost: bool = False
+    parts: tuple[Part, ...] = ()
+    friction: float = 0.8
+
+    def __post_init__(self) -> None:
+        """Copy the arrays and make them read-only."""
+        for name in ("position", "rotation"):
+            object.__setattr__(self, name, frozen(getattr(self, name)))
+
+    @property
+    def movable(self) -> bool:
+        """Whether it can be pushed, grasped and carried."""
+        return self.mass > 0
+
+    @property
+    def top(self) -> float:
+        """Height of its upper face above the floor [m], for an upright object."""
+        return float(self.position[2] + geometry.bounding_box(self.shape)[2] / 2)
+
+    def obstacle(self) -> Obstacle:
+        """Return it as the controller sees it."""
+        return Obstacle(self.name, self.shape, self.position, self.rotation, work_surface=self.work_surface)
+
+
+@dataclass(frozen=True)
+class View:
+    """A camera in the world: where it stands, what it looks at [m], vertical field of view [deg]."""
+
+    position: tuple[float, float, float] = (-2.9, -2.6, 2.3)
+    target: tuple[float, float, float] = (0.0, 0.0, 0.6)
+    fovy: float = 50.0
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Everything around the robot but the floor, and the camera that overlooks it."""
+
+    objects: tuple[SceneObject, ...] = ()
+    view: View = field(default_factory=View)
+
+    def __post_init__(self) -> None:
+        """Check the names.
+
+        Raises:
+            HandrailError: two objects share a name.
+        """
+        names = [item.name for item in self.objects]
+        for name in names:
+            if names.count(name) > 1:
+                raise HandrailError(f"scene: expected unique object names, got {name!r} more than once")
+
+    def find(self, name: str) -> SceneObject:
+        """Return an object by name.
+
+        Raises:
+            HandrailError: there is none.
+        """
+        for item in self.objects:
+            if item.name == name:
+                return item
+        raise unknown_name("scene object", name, [item.name for item in self.objects])
+
+    @property
+    def movables(self) -> tuple[SceneObject, ...]:
+        """The things that can be moved."""
+        return tuple(item for item in self.objects if item.movable)
+
+    def obstacles(self) -> tuple[Obstacle, ...]:
+        """Return what the controller has to avoid: neither the floor, nor markers, nor movable things."""
+        return tuple(item.obstacle() for item in self.objects if not (item.movable or item.ghost))
+
+
+def add_scene(spec: mujoco.MjSpec, scene: Scene) -> None:
+    """Add the objects and the scene camera to the spec."""
+    for item in scene.objects:
+        _add_object(spec, item)
+    spec.worldbody.add_camera(name="scene", fovy=scene.view.fovy, **_view_pose(scene.view))
+
+
+def _add_object(spec: mujoco.MjSpec, item: SceneObject) -> None:
+    body = spec.worldbody.add_body(name=item.name, **geometry.pose(item.position, item.rotation))
+    if item.movable:
+        body.add_freejoint(name=item.name)
+        body.explicitinertial = True
+        body.mass, body.ipos, body.iquat = item.mass, [0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0]
+        body.inertia = geometry.shape_inertia(item.mass, item.shape)
+    for index, part in enumerate(item.parts or (Part(item.shape, np.zeros(3)),)):
+        body.add_geom(
+            name=item.name if index == 0 else f"{item.name}_{index}",
+            rgba=part.rgba or item.rgba,
+            group=geometry.VISIBLE_GROUP,
+            **geometry.geom_shape(part.shape),
+            **geometry.pose(part.position, part.rotation),
+            **_contact(item),
+        )
+
+
+def _contact(item: SceneObject) -> dict[str, Any]:
+    if item.ghost:
+        return {"contype": 0, "conaffinity": 0}
+    return {
+        "contype": geometry.SCENE_BIT,
+        "conaffinity": geometry.SCENE_BIT | (geometry.FLOOR_BIT if item.movable else 0),
+        "condim": 4,
+        "friction": [item.friction, 0.01, 0.0001],
+    }
+
+
+def _view_pose(view: View) -> dict[str, FloatArray]:
+    """Return the pose of a camera that looks along −z with y up."""
+    position = np.array(view.position)
+    forward = np.array(view.target) - position
+    forward /= np.linalg.norm(forward)
+    right = np.cross(forward, [0.0, 0.0, 1.0])
+    right = right / np.linalg.norm(right) if np.any(right) else np.array([0.0, -1.0, 0.0])
+    return geometry.pose(position, np.column_stack([right, np.cross(right, forward), -forward]))
+
+
+def box(size: Iterable[float]) -> Shape:
+    """Return a box with full lengths [m]."""
+    return Shape("box", np.array(list(size)))

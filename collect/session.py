@@ -1,0 +1,168 @@
+"""The one loop that runs task, operator, controller and recorder: observe, ask, complete, act, record."""
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from handrail.collect.env import HandrailEnv
+from handrail.collect.operators.operator import Operator, View
+from handrail.controllers.command import Command, Status
+from handrail.controllers.controller import Controller
+from handrail.controllers.model import RobotModel
+from handrail.datasets.frames import Moment
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How an episode went.
+
+    Attributes:
+        seed: of the environment.
+        success: whether the task was done.
+        failure_reason: why not; empty after a success.
+        frames: control periods.
+        seconds: simulated time [s].
+        wall_time: time it took [s].
+        brakes: updates in which the controller braked the robot.
+        late: periods that a real-time loop overran.
+        contacts: forbidden contacts.
+        smallest_distance: smallest signed distance, tool against work surfaces left out [m].
+    """
+
+    seed: int
+    success: bool
+    failure_reason: str
+    frames: int
+    seconds: float
+    wall_time: float
+    brakes: int
+    late: int
+    contacts: int
+    smallest_distance: float
+
+
+class Observer(Protocol):
+    """Something that watches a session: a recorder, a display."""
+
+    def begin(self, env: HandrailEnv, seed: int) -> None:
+        """Take note that an episode begins."""
+        ...
+
+    def see(self, moment: Moment) -> None:
+        """Take one moment."""
+        ...
+
+
+class Session:
+    """Runs episodes.
+
+    Args:
+        env: a Handrail environment.
+        controller: completes the intent.
+        operator: whoever steers.
+        observers: shown every moment.
+        realtime: pace the loop by the wall clock.
+    """
+
+    def __init__(
+        self,
+        env: HandrailEnv,
+        controller: Controller,
+        operator: Operator,
+        observers: Sequence[Observer] = (),
+        realtime: bool = False,
+    ) -> None:
+        self.env = env
+        self._controller = controller
+        self._operator = operator
+        self._observers = observers
+        self._realtime = realtime
+
+    @property
+    def model(self) -> RobotModel:
+        """The robot's model."""
+        return self.env.model
+
+    def run(self, seed: int) -> Outcome:
+        """Run one episode and return how it went; the same seed gives the same episode."""
+        observation, info = self.env.reset(seed=seed)
+        self._controller.reset(self.env.obstacles())
+        self._operator.reset(self._view(), np.random.default_rng([seed, 1]))
+        for observer in self._observers:
+            observer.begin(self.env, seed)
+        tally = _Tally(seed, 1.0 / self.env.fps)
+        done = False
+        while not done:
+            wall_clock = time.time()
+            intent = self._operator.act(self._view())
+            command = self._controller.update(self.env.state(), intent)
+            action = action_of(command, 1.0 / self.env.fps)
+            following, _, terminated, truncated, info = self.env.step(action)
+            moment = Moment(
+                state=observation["agent_pos"],
+                environment=observation["environment_state"],
+                images=observation.get("pixels", {}),
+                intent=intent,
+                action=action,
+                health=command.health,
+                contacts=info["contacts"],
+                wall_clock=wall_clock,
+            )
+            for observer in self._observers:
+                observer.see(moment)
+            tally.add(moment)
+            observation, done = following, terminated or truncated
+            if self._realtime:
+                tally.pace()
+        return tally.outcome(info)
+
+    def _view(self) -> View:
+        task = self.env.task_state()
+        return View(self.env.state(), task.tool, task.opening, task)
+
+
+def action_of(command: Command, period: float) -> np.ndarray:
+    """Return the env's action: the velocity commanded at the end of the period and the gripper, (n + 1,) float32."""
+    return np.append(command.velocity(period), command.gripper).astype(np.float32)
+
+
+class _Tally:
+    """Counts along an episode and keeps its pace."""
+
+    def __init__(self, seed: int, period: float) -> None:
+        self._seed = seed
+        self._period = period
+        self._start = time.perf_counter()
+        self._frames = self._brakes = self._late = self._contacts = 0
+        self._smallest = np.inf
+
+    def add(self, moment: Moment) -> None:
+        self._frames += 1
+        self._brakes += Status(moment.health.status).brakes
+        self._contacts += moment.contacts
+        self._smallest = min(self._smallest, moment.health.smallest_distance)
+
+    def pace(self) -> None:
+        """Wait for the end of the period, or note that it is over."""
+        ahead = self._start + self._frames * self._period - time.perf_counter()
+        if ahead > 0:
+            time.sleep(ahead)
+        else:
+            self._late += 1
+
+    def outcome(self, info: dict) -> Outcome:
+        return Outcome(
+            seed=self._seed,
+            success=bool(info["is_success"]),
+            failure_reason=str(info["failure_reason"]),
+            frames=self._frames,
+            seconds=self._frames * self._period,
+            wall_time=time.perf_counter() - self._start,
+            brakes=self._brakes,
+            late=self._late,
+            contacts=self._contacts,
+            smallest_distance=float(self._smallest),
+        )

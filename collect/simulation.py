@@ -1,0 +1,162 @@
+"""One episode's physics: a robot in a scene, driven by velocities."""
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from handrail.collect.contacts import ContactMonitor
+from handrail.collect.gl import mujoco
+from handrail.collect.robot import FINGERS, RobotSpec, build_robot
+from handrail.collect.scene import Scene, add_scene
+from handrail.collect.stage import set_stage
+from handrail.controllers.arrays import FloatArray
+from handrail.controllers.controller import State
+from handrail.controllers.model import Pose, RobotModel
+
+_LARGEST_TIMESTEP = 0.002
+
+
+@dataclass(frozen=True)
+class Twist:
+    """Linear [m/s] and angular [rad/s] velocity in the world, each (3,)."""
+
+    linear: FloatArray
+    angular: FloatArray
+
+    @property
+    def is_still(self) -> bool:
+        """Whether it moves slower than 2 cm/s and 0.2 rad/s."""
+        return bool(np.linalg.norm(self.linear) < 0.02 and np.linalg.norm(self.angular) < 0.2)
+
+
+class Simulation:
+    """A fresh MuJoCo model and data; nothing of an earlier episode can remain in it.
+
+    Attributes:
+        mujoco_model: the compiled model.
+        data: its state.
+        substeps: integration steps in one control step.
+        commanded: velocity commanded last, (n,) [m/s, rad/s].
+    """
+
+    def __init__(
+        self, model: RobotModel, scene: Scene, q: FloatArray, step: float, meshes: bool = False
+    ) -> None:
+        self._model = model
+        self._scene = scene
+        self._step = step
+        self.substeps = math.ceil(step / _LARGEST_TIMESTEP - 1e-9)
+        robot = _robot(model, meshes, step / self.substeps)
+        spec = robot.spec.copy()
+        add_scene(spec, scene)
+        self.mujoco_model = spec.compile()
+        self.data = mujoco.MjData(self.mujoco_model)
+        self._contacts = ContactMonitor(
+            self.mujoco_model, robot.contact_geoms, robot.grasp_geoms, [m.name for m in scene.movables]
+        )
+        self._index()
+        self.commanded = np.zeros(model.size)
+        self._place(q)
+
+    def _index(self) -> None:
+        """Find where the robot is in MuJoCo's arrays."""
+        compiled, names = self.mujoco_model, self._model.joints
+        self._q_index = np.array([compiled.joint(name).qposadr[0] for name in names])
+        self._v_index = np.array([compiled.joint(name).dofadr[0] for name in names])
+        self._servo_index = np.array([compiled.actuator(name).id for name in names])
+        self._tool = compiled.site("tool").id
+        gripper = self._model.description.gripper
+        self._stroke = gripper.stroke if gripper else 0.0
+        self._speed = gripper.speed if gripper else 0.0
+        if gripper:
+            self._finger_index = np.array([compiled.joint(name).qposadr[0] for name in FINGERS])
+            self._gripper_servo = compiled.actuator("gripper").id
+
+    def _place(self, q: FloatArray) -> None:
+        self.data.qpos[self._q_index] = q
+        if self._stroke:
+            self.data.qpos[self._finger_index] = self._stroke / 2
+            self.data.ctrl[self._gripper_servo] = self._stroke
+        mujoco.mj_forward(self.mujoco_model, self.data)
+
+    def advance(self, velocity: FloatArray, gripper: float) -> tuple[str, ...]:
+        """Reach a velocity linearly over one control step; return the forbidden contacts on the way.
+
+        Args:
+            velocity: commanded at the end of the step, (n,) [m/s, rad/s].
+            gripper: 0 open, 1 closed; approached at the gripper's speed.
+        """
+        self._contacts.clear()
+        start, data = self.commanded, self.data
+        for index in range(1, self.substeps + 1):
+            weight = index / self.substeps
+            data.ctrl[self._servo_index] = (1.0 - weight) * start + weight * velocity
+            self._move_gripper(gripper)
+            mujoco.mj_step(self.mujoco_model, data)
+            self._contacts.look(data)
+        self.commanded = np.array(velocity, dtype=np.float64)
+        mujoco.mj_kinematics(self.mujoco_model, data)
+        mujoco.mj_camlight(self.mujoco_model, data)
+        return self._contacts.names
+
+    def _move_gripper(self, gripper: float) -> None:
+        if not self._stroke:
+            return
+        wanted = (1.0 - gripper) * self._stroke - 0.01 * gripper
+        now = self.data.ctrl[self._gripper_servo]
+        reach = self._speed * self._step / self.substeps
+        self.data.ctrl[self._gripper_servo] = now + min(max(wanted - now, -reach), reach)
+
+    def state(self) -> State:
+        """Return the measured positions and velocities."""
+        return State(self.data.qpos[self._q_index], self.data.qvel[self._v_index], self.data.time)
+
+    @property
+    def tool(self) -> Pose:
+        """The pose of the tool point."""
+        rotation = self.data.site_xmat[self._tool].reshape(3, 3).copy()
+        return Pose(self.data.site_xpos[self._tool].copy(), rotation)
+
+    @property
+    def opening(self) -> float:
+        """How far the gripper is open, from 0 to 1; 0 for a robot without one."""
+        if not self._stroke:
+            return 0.0
+        return float(np.clip(self.data.qpos[self._finger_index].sum() / self._stroke, 0.0, 1.0))
+
+    @property
+    def is_stable(self) -> bool:
+        """Whether MuJoCo never had to give up on a step."""
+        warnings = self.data.warning
+        bad = (
+            mujoco.mjtWarning.mjWARN_BADQACC,
+            mujoco.mjtWarning.mjWARN_BADQVEL,
+            mujoco.mjtWarning.mjWARN_BADQPOS,
+        )
+        return all(warnings[int(kind)].number == 0 for kind in bad)
+
+    def poses(self) -> dict[str, Pose]:
+        """Return where every scene object is now, by name."""
+        return {item.name: self._pose(item.name) for item in self._scene.objects}
+
+    def twists(self) -> dict[str, Twist]:
+        """Return how every movable object moves now, by name."""
+        return {item.name: self._twist(item.name) for item in self._scene.movables}
+
+    def _pose(self, name: str) -> Pose:
+        body = self.data.body(name)
+        return Pose(body.xpos.copy(), body.xmat.reshape(3, 3).copy())
+
+    def _twist(self, name: str) -> Twist:
+        velocity = self.data.joint(name).qvel
+        rotation = self.data.body(name).xmat.reshape(3, 3)
+        return Twist(velocity[:3].copy(), rotation @ velocity[3:])
+
+
+@lru_cache(maxsize=8)
+def _robot(model: RobotModel, meshes: bool, timestep: float) -> RobotSpec:
+    robot = build_robot(model, meshes)
+    set_stage(robot.spec, timestep)
+    return robot

@@ -1,0 +1,74 @@
+"""Things that tasks put into scenes: tables, an open bin, obstacles on the floor, cubes."""
+
+import numpy as np
+
+from handrail.collect.scene import Colour, Part, SceneObject, box
+from handrail.controllers.rotation import matrix_from_rpy
+from handrail.controllers.shape import Shape
+
+_WOOD: Colour = (0.72, 0.56, 0.40, 1.0)
+_WALL: Colour = (0.20, 0.42, 0.70, 1.0)
+_CONE: Colour = (0.90, 0.45, 0.10, 1.0)
+
+
+def table(name: str, x: float, y: float, size: tuple[float, float, float]) -> SceneObject:
+    """Return a solid table on the floor, centred at x, y; size is depth, width, height [m]."""
+    return SceneObject(
+        name, box(size), np.array([x, y, size[2] / 2]), rgba=_WOOD, work_surface=True
+    )
+
+
+def cube(name: str, x: float, y: float, bottom: float, yaw: float, edge: float, mass: float) -> SceneObject:
+    """Return a cube that can be grasped, standing at height `bottom` [m], turned by `yaw` [rad]."""
+    return SceneObject(
+        name,
+        box([edge] * 3),
+        np.array([x, y, bottom + edge / 2]),
+        matrix_from_rpy([0.0, 0.0, yaw]),
+        rgba=(0.85, 0.16, 0.14, 1.0),
+        mass=mass,
+        friction=1.0,
+    )
+
+
+def open_bin(name: str, x: float, y: float, bottom: float, inner: float, height: float) -> SceneObject:
+    """Return a square bin without a lid, 1 cm thick; to the controller it is one box [m]."""
+    wall = 0.01
+    outer = inner + 2 * wall
+    parts = [Part(box([outer, outer, wall]), np.array([0.0, 0.0, (wall - height) / 2]))]
+    for sign in (-1.0, 1.0):
+        offset = sign * (inner + wall) / 2
+        parts.append(Part(box([wall, outer, height - wall]), np.array([offset, 0.0, wall / 2])))
+        parts.append(Part(box([inner, wall, height - wall]), np.array([0.0, offset, wall / 2])))
+    return SceneObject(
+        name,
+        box([outer, outer, height]),
+        np.array([x, y, bottom + height / 2]),
+        rgba=_WALL,
+        work_surface=True,
+        parts=tuple(parts),
+    )
+
+
+def pillar(name: str, x: float, y: float, radius: float, height: float) -> SceneObject:
+    """Return a cylinder that stands on the floor [m]."""
+    return SceneObject(
+        name, Shape("cylinder", np.array([radius, height])), np.array([x, y, height / 2]), rgba=_CONE
+    )
+
+
+def crate(name: str, x: float, y: float, yaw: float, size: tuple[float, float, float]) -> SceneObject:
+    """Return a box that stands on the floor; full lengths [m], turned by `yaw` [rad]."""
+    return SceneObject(
+        name,
+        box(size),
+        np.array([x, y, size[2] / 2]),
+        matrix_from_rpy([0.0, 0.0, yaw]),
+        rgba=(0.55, 0.58, 0.36, 1.0),
+    )
+
+
+def footprint(item: SceneObject) -> float:
+    """Return the radius of the circle around an upright object, seen from above [m]."""
+    size = item.shape.size
+    return float(np.hypot(*size[:2]) / 2) if item.shape.kind == "box" else float(size[0])

@@ -1,0 +1,163 @@
+"""Fetch a cube from one table and put it into a bin on another, past obstacles on the floor."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from handrail.collect.scene import Scene, SceneObject, View
+from handrail.collect.tasks.furniture import crate, cube, footprint, open_bin, pillar, table
+from handrail.collect.tasks.task import Episode, Outcome, TaskState
+from handrail.controllers.arrays import FloatArray
+from handrail.controllers.errors import HandrailError
+from handrail.controllers.model import RobotModel
+from handrail.controllers.rotation import quaternion_from_matrix
+
+_MOST_OBSTACLES = 3
+_EDGE, _MASS = 0.05, 0.1  # of the cube [m], [kg]
+_BIN_HEIGHT = 0.10
+_POSE = ("x", "y", "z", "qw", "qx", "qy", "qz")
+_VIEW = View(position=(-2.9, -3.3, 3.0), target=(0.25, 0.0, 0.35), fovy=48.0)
+
+
+@dataclass(frozen=True)
+class PickPlace:
+    """The tables are 2.7 m apart, farther than the arm reaches, so the base has to drive.
+
+    Success: the cube at rest inside the bin, the gripper open and away from it. Failure: the cube on the floor.
+
+    Attributes:
+        name: of the task.
+        description: what the operator is asked to do.
+        horizon: time limit [s].
+        clearance: between the robot's start and anything on the floor, and between obstacles [m].
+        retreat: least distance of the tool point from the cube at the end [m].
+    """
+
+    name: str = "PickPlace"
+    description: str = "Pick up the cube and put it into the bin on the other table."
+    horizon: float = 90.0
+    clearance: float = 0.15
+    retreat: float = 0.08
+
+    @property
+    def state_names(self) -> tuple[str, ...]:
+        """Cube pose, bin centre, the tables' top centres, obstacles (absent ones are all zero)."""
+        names = [f"cube.{axis}" for axis in _POSE]
+        names += [f"{item}.{axis}" for item in ("bin", "cube_table", "bin_table") for axis in "xyz"]
+        for index in range(_MOST_OBSTACLES):
+            names += [f"obstacle_{index}.{quantity}" for quantity in ("x", "y", "radius", "height")]
+        return tuple(names)
+
+    def sample(self, model: RobotModel, rng: np.random.Generator) -> Episode:
+        """Draw tables, cube, bin, obstacles and the robot's start."""
+        side = rng.choice([-1.0, 1.0])
+        cube_table = _sample_table("cube_table", side, rng)
+        bin_table = _sample_table("bin_table", -side, rng)
+        q = _sample_start(model, rng)
+        objects = (
+            cube_table,
+            bin_table,
+            _sample_cube(cube_table, rng),
+            _sample_bin(bin_table, rng),
+            *self._sample_obstacles(model, q, rng),
+        )
+        return Episode(Scene(objects, _VIEW), q)
+
+    def features(self, state: TaskState) -> FloatArray:
+        """Return the numbers that `state_names` names, (28,)."""
+        pose = state.pose("cube")
+        numbers = [*pose.position, *quaternion_from_matrix(pose.rotation), *state.pose("bin").position]
+        for name in ("cube_table", "bin_table"):
+            item = state.object(name)
+            numbers += [item.position[0], item.position[1], item.top]
+        for item in state.episode.scene.objects:
+            if item.name.startswith("obstacle"):
+                numbers += [item.position[0], item.position[1], footprint(item), item.top]
+        return np.pad(np.array(numbers), (0, len(self.state_names) - len(numbers)))
+
+    def outcome(self, state: TaskState) -> Outcome:
+        """Judge where the cube is, whether it rests, and where the gripper is."""
+        position = state.pose("cube").position
+        if position[2] < 2 * _EDGE:
+            return Outcome(failure="dropped")
+        away = float(np.linalg.norm(state.tool.position - position)) >= self.retreat
+        rests = _inside_bin(state, position) and state.twists["cube"].is_still
+        return Outcome(success=rests and away and state.opening > 0.8)
+
+    def _sample_obstacles(
+        self, model: RobotModel, q: FloatArray, rng: np.random.Generator
+    ) -> list[SceneObject]:
+        """Draw two or three obstacles; reject those that overlap another or come close to the robot's start.
+
+        Raises:
+            HandrailError: there is no room for them.
+        """
+        wanted = int(rng.integers(2, _MOST_OBSTACLES + 1))
+        start, reach = _start_circle(model, q)
+        placed: list[SceneObject] = []
+        for _ in range(1000):
+            if len(placed) == wanted:
+                return placed
+            item = _sample_obstacle(f"obstacle_{len(placed)}", rng)
+            circles = [(start, reach), *((other.position[:2], footprint(other)) for other in placed)]
+            if all(
+                np.linalg.norm(item.position[:2] - centre) > radius + footprint(item) + self.clearance
+                for centre, radius in circles
+            ):
+                placed.append(item)
+        raise HandrailError(
+            f"task {self.name}: no room for {wanted} obstacles around robot {model.description.name}, "
+            f"which starts at {start.round(2).tolist()}"
+        )
+
+
+def _sample_table(name: str, side: float, rng: np.random.Generator) -> SceneObject:
+    x, y = 1.05 + rng.uniform(-0.05, 0.05), side * 1.35 + rng.uniform(-0.05, 0.05)
+    return table(name, x, y, (0.6, 0.7, rng.uniform(0.55, 0.65)))
+
+
+def _front_edge(item: SceneObject) -> float:
+    """Return the x of the table's edge that faces the robot [m]."""
+    return float(item.position[0] - item.shape.size[0] / 2)
+
+
+def _sample_cube(on: SceneObject, rng: np.random.Generator) -> SceneObject:
+    x = _front_edge(on) + rng.uniform(0.10, 0.20)
+    y = on.position[1] + rng.uniform(-0.15, 0.15)
+    yaw = rng.uniform(-np.pi / 4, np.pi / 4)  # a cube looks the same every quarter turn
+    return cube("cube", x, y, on.top, yaw, _EDGE, _MASS)
+
+
+def _sample_bin(on: SceneObject, rng: np.random.Generator) -> SceneObject:
+    inner = rng.uniform(0.24, 0.28)
+    x = _front_edge(on) + inner / 2 + rng.uniform(0.04, 0.10)
+    y = on.position[1] + rng.uniform(-0.12, 0.12)
+    return open_bin("bin", x, y, on.top, inner, _BIN_HEIGHT)
+
+
+def _sample_obstacle(name: str, rng: np.random.Generator) -> SceneObject:
+    x, y = rng.uniform([-0.4, -0.45], [0.5, 0.45])
+    height = rng.uniform(0.2, 0.5)
+    if rng.random() < 0.6:
+        return pillar(name, x, y, rng.uniform(0.10, 0.18), height)
+    width, depth = rng.uniform(0.16, 0.26, 2)
+    return crate(name, x, y, rng.uniform(-np.pi / 4, np.pi / 4), (width, depth, height))
+
+
+def _sample_start(model: RobotModel, rng: np.random.Generator) -> FloatArray:
+    """Return home with a little noise: 10 cm, 0.15 rad, 0.05 rad in the arm's joints."""
+    base = len(model.description.base_joints)
+    spread = np.concatenate([np.array([0.10, 0.10, 0.15])[:base], np.full(model.size - base, 0.05)])
+    return model.description.home + rng.uniform(-spread, spread)
+
+
+def _start_circle(model: RobotModel, q: FloatArray) -> tuple[FloatArray, float]:
+    """Return a circle around the chassis where it starts: centre (2,) and radius [m]."""
+    base = model.pose(q, "planar_base").position[:2]
+    return base, float(np.hypot(*model.description.base_size) / 2)
+
+
+def _inside_bin(state: TaskState, position: FloatArray) -> bool:
+    pose, size = state.pose("bin"), state.object("bin").shape.size
+    local = pose.rotation.T @ (position - pose.position)
+    return bool(np.all(np.abs(local) < size / 2))

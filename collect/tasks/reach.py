@@ -1,0 +1,93 @@
+"""Reach a pose with the tool: the benchmark of the paper's Table I."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from handrail.collect.scene import Part, Scene, SceneObject, View
+from handrail.collect.tasks.task import Episode, Outcome, TaskState
+from handrail.controllers.arrays import FloatArray
+from handrail.controllers.model import Pose, RobotModel
+from handrail.controllers.rotation import matrix_to_axis, orientation_error, quaternion_from_matrix
+from handrail.controllers.shape import Shape
+
+_COLOURS = ((0.85, 0.15, 0.15, 1.0), (0.15, 0.7, 0.2, 1.0), (0.15, 0.3, 0.9, 1.0))
+_ARROW = 0.18  # length of the marker's axes [m]
+
+
+@dataclass(frozen=True)
+class Reach:
+    """Goals uniform in x, y ∈ [−1, 1] m, z ∈ [0.7, 1.0] m, with a random orientation; start at home.
+
+    Success at the first moment with `d_p ≤ 0.1 m` and `d_r = 1 − ⟨q, g⟩² ≤ 0.05`.
+
+    Attributes:
+        name: of the task.
+        description: what the operator is asked to do.
+        horizon: time limit [s].
+        position_tolerance: largest d_p [m].
+        orientation_tolerance: largest d_r.
+    """
+
+    name: str = "Reach"
+    description: str = "Move the gripper to the goal frame."
+    horizon: float = 30.0
+    position_tolerance: float = 0.1
+    orientation_tolerance: float = 0.05
+
+    @property
+    def state_names(self) -> tuple[str, ...]:
+        """The goal's position and quaternion."""
+        return tuple(f"goal.{axis}" for axis in ("x", "y", "z", "qw", "qx", "qy", "qz"))
+
+    def sample(self, model: RobotModel, rng: np.random.Generator) -> Episode:
+        """Draw a goal."""
+        position = rng.uniform([-1.0, -1.0, 0.7], [1.0, 1.0, 1.0])
+        goal = Pose(position, _rotation(rng))
+        return Episode(Scene((_marker(goal),), _VIEW), model.description.home, goal)
+
+    def features(self, state: TaskState) -> FloatArray:
+        """Return the goal pose, (7,)."""
+        goal = _goal(state)
+        return np.concatenate([goal.position, quaternion_from_matrix(goal.rotation)])
+
+    def outcome(self, state: TaskState) -> Outcome:
+        """Judge by the distance and the orientation error."""
+        goal = _goal(state)
+        distance = float(np.linalg.norm(state.tool.position - goal.position))
+        turn = orientation_error(
+            quaternion_from_matrix(state.tool.rotation), quaternion_from_matrix(goal.rotation)
+        )
+        return Outcome(distance <= self.position_tolerance and turn <= self.orientation_tolerance)
+
+
+_VIEW = View(position=(-2.6, -3.0, 2.2), target=(-0.35, 0.0, 0.65))
+
+
+def _goal(state: TaskState) -> Pose:
+    return state.goal if state.goal is not None else state.tool
+
+
+def _rotation(rng: np.random.Generator) -> FloatArray:
+    """Return a rotation about a normalised uniform-cube axis by an angle uniform in [0, π]."""
+    axis = rng.uniform(-1.0, 1.0, 3)
+    axis /= np.linalg.norm(axis)
+    return Rotation.from_rotvec(axis * rng.uniform(0.0, np.pi)).as_matrix()
+
+
+def _marker(goal: Pose) -> SceneObject:
+    """Return three coloured axes on a ball, drawn without contact."""
+    axes = tuple(
+        Part(
+            Shape("capsule", np.array([0.011, _ARROW])),
+            np.eye(3)[index] * _ARROW / 2,
+            matrix_to_axis(np.eye(3)[index]),
+            colour,
+        )
+        for index, colour in enumerate(_COLOURS)
+    )
+    ball = Part(Shape("sphere", np.array([0.03])), np.zeros(3), rgba=(0.95, 0.85, 0.2, 1.0))
+    return SceneObject(
+        "goal", Shape("sphere", np.array([_ARROW])), goal.position, goal.rotation, ghost=True, parts=(*axes, ball)
+    )

@@ -1,0 +1,127 @@
+"""What a task is: it samples an episode, names its state, and judges the outcome."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+
+from handrail.collect.scene import Scene, SceneObject
+from handrail.collect.simulation import Twist
+from handrail.controllers.arrays import FloatArray, frozen
+from handrail.controllers.errors import unknown_name
+from handrail.controllers.model import Pose, RobotModel
+from handrail.controllers.shape import Obstacle
+
+
+@dataclass(frozen=True)
+class Episode:
+    """A sampled beginning: the scene, where the robot starts, (n,), and a goal of the tool if there is one."""
+
+    scene: Scene
+    q: FloatArray
+    goal: Pose | None = None
+
+    def __post_init__(self) -> None:
+        """Copy the array and make it read-only."""
+        object.__setattr__(self, "q", frozen(self.q))
+
+
+@dataclass(frozen=True)
+class TaskState:
+    """The truth of a moment, for judging an outcome and for scripted operators.
+
+    Attributes:
+        time: since the episode began [s].
+        tool: pose of the tool point.
+        opening: of the gripper, 0 closed to 1 open.
+        episode: how it began: scene with the objects' shapes, goal.
+        poses: of every object of the scene, by name.
+        twists: of every movable object, by name.
+        stable: whether the physics went well so far.
+    """
+
+    time: float
+    tool: Pose
+    opening: float
+    episode: Episode
+    poses: Mapping[str, Pose]
+    twists: Mapping[str, Twist] = field(default_factory=dict)
+    stable: bool = True
+
+    @property
+    def goal(self) -> Pose | None:
+        """Where the tool has to go, if the task says so."""
+        return self.episode.goal
+
+    @property
+    def obstacles(self) -> tuple[Obstacle, ...]:
+        """What the robot must not touch."""
+        return self.episode.scene.obstacles()
+
+    def pose(self, name: str) -> Pose:
+        """Return where an object is.
+
+        Raises:
+            HandrailError: the scene has no such object.
+        """
+        if name not in self.poses:
+            raise unknown_name("scene object", name, self.poses)
+        return self.poses[name]
+
+    def object(self, name: str) -> SceneObject:
+        """Return an object as it was at the beginning, with its shape.
+
+        Raises:
+            HandrailError: the scene has no such object.
+        """
+        return self.episode.scene.find(name)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How it stands: success, a failure with its reason, or neither yet."""
+
+    success: bool = False
+    failure: str = ""
+
+    @property
+    def over(self) -> bool:
+        """Whether the episode ends."""
+        return self.success or bool(self.failure)
+
+
+class Task(Protocol):
+    """A task; a frozen dataclass in its own file, with one line in `handrail.collect.TASKS`."""
+
+    @property
+    def name(self) -> str:
+        """A short name, as in `Reach`."""
+        ...
+
+    @property
+    def description(self) -> str:
+        """One sentence: what to do; LeRobot's `task` string."""
+        ...
+
+    @property
+    def horizon(self) -> float:
+        """Time after which an episode is given up [s]."""
+        ...
+
+    @property
+    def state_names(self) -> tuple[str, ...]:
+        """Names of the numbers in `environment_state`, (k,)."""
+        ...
+
+    def sample(self, model: RobotModel, rng: np.random.Generator) -> Episode:
+        """Return the beginning of an episode."""
+        ...
+
+    def features(self, state: TaskState) -> FloatArray:
+        """Return the `environment_state`, (k,), in [m], wxyz quaternions."""
+        ...
+
+    def outcome(self, state: TaskState) -> Outcome:
+        """Judge a moment."""
+        ...

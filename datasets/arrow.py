@@ -1,0 +1,57 @@
+"""Arrow arrays from numpy arrays and strings, by their buffers.
+
+`pyarrow.array` imports pandas on its first call, 0.5 to 1 s in the middle of a recording; this does not.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+import pyarrow as pa
+
+
+def numbers(values: np.ndarray, kind: pa.DataType) -> pa.Array:
+    """Return numbers or truth values as an Arrow array.
+
+    Args:
+        values: `(N,)`, cast to `kind`.
+        kind: A number type or bool.
+    """
+    if kind == pa.bool_():
+        packed = np.packbits(np.asarray(values, bool), bitorder="little")
+        return pa.Array.from_buffers(kind, len(values), [None, pa.py_buffer(packed)])
+    plain = np.ascontiguousarray(values, dtype=kind.to_pandas_dtype())
+    return pa.Array.from_buffers(kind, len(plain), [None, pa.py_buffer(plain)])
+
+
+def strings(values: Sequence[str]) -> pa.Array:
+    """Return strings as an Arrow array."""
+    encoded = [value.encode() for value in values]
+    offsets = np.concatenate(([0], np.cumsum([len(value) for value in encoded]))).astype(np.int32)
+    buffers = [None, pa.py_buffer(offsets), pa.py_buffer(b"".join(encoded))]
+    return pa.Array.from_buffers(pa.string(), len(encoded), buffers)
+
+
+def fixed_lists(values: np.ndarray, kind: pa.DataType) -> pa.Array:
+    """Return rows of numbers as an Arrow array of lists of one length.
+
+    Args:
+        values: `(N, d)`.
+        kind: The list type.
+    """
+    flat = numbers(np.reshape(values, -1), kind.value_type)  # type: ignore[attr-defined]
+    return pa.FixedSizeListArray.from_arrays(flat, type=kind)
+
+
+def one_list(values: pa.Array, shape: tuple[int, ...]) -> pa.Array:
+    """Return values as an Arrow array with one entry: lists nested as in a numpy array of that shape."""
+    for size in reversed(shape):
+        offsets = numbers(np.arange(0, len(values) + 1, size), pa.int32())
+        values = pa.ListArray.from_arrays(offsets, values)
+    return values
+
+
+def one_scalar(value: str | bool | int | float | None, kind: pa.DataType) -> pa.Array:
+    """Return an Arrow array with one entry, which may be null."""
+    if value is None:
+        return pa.nulls(1, kind)
+    return strings([str(value)]) if kind == pa.string() else numbers(np.array([value]), kind)

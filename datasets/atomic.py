@@ -1,0 +1,71 @@
+"""The few ways in which Handrail changes a disk: a file is there whole, under its name, or not at all.
+
+A file is written under a temporary name on the same file system, synced, renamed, and the folder synced.
+"""
+
+import os
+import shutil
+from pathlib import Path
+
+
+def write_synced(path: Path, data: bytes) -> None:
+    """Write a file and wait until the disk has it.
+
+    Raises:
+        OSError: The disk is full, or the folder is missing or not writable.
+    """
+    with open(path, "wb") as file:
+        file.write(data)
+        file.flush()
+        os.fsync(file.fileno())
+
+
+def sync_file(path: Path) -> None:
+    """Wait until the disk has a file that something else has written."""
+    _sync(path, os.O_RDONLY)
+
+
+def sync_folder(path: Path) -> None:
+    """Wait until the disk has the names in a folder."""
+    _sync(path, os.O_RDONLY | os.O_DIRECTORY)
+
+
+def make_folder(path: Path) -> None:
+    """Create a folder and those above it, each name synced into its parent."""
+    if path.is_dir():
+        return
+    make_folder(path.parent)
+    path.mkdir(exist_ok=True)
+    sync_folder(path.parent)
+
+
+def replace(path: Path, data: bytes, staging: Path) -> None:
+    """Write or replace a file so that a reader sees the old one or the new one, whole."""
+    make_folder(path.parent)
+    staged = staging / path.name
+    write_synced(staged, data)
+    os.replace(staged, path)
+    sync_folder(path.parent)
+
+
+def move(source: Path, target: Path) -> None:
+    """Rename a file into another folder of the same file system, durably."""
+    make_folder(target.parent)
+    os.replace(source, target)
+    sync_folder(target.parent)
+
+
+def remove(path: Path) -> None:
+    """Remove a file, a link or a whole folder; what is not there is fine."""
+    if path.is_dir() and not path.is_symlink():
+        shutil.rmtree(path)
+    else:
+        path.unlink(missing_ok=True)
+
+
+def _sync(path: Path, flags: int) -> None:
+    descriptor = os.open(path, flags)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)

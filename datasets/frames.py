@@ -1,0 +1,101 @@
+"""What Handrail records of every moment: the columns of a frame."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from handrail.controllers.arrays import FloatArray
+from handrail.controllers.command import Health
+from handrail.controllers.intent import Intent
+from handrail.datasets.schema import Feature
+
+
+@dataclass(frozen=True)
+class Moment:
+    """One control period: what was observed, asked, commanded, and how the controller fared.
+
+    Attributes:
+        state: the robot as observed, (s,); `observation.state`.
+        environment: the task as observed, (e,); `observation.environment_state`.
+        images: pictures by camera, (height, width, 3) uint8 each.
+        intent: what the operator asked for.
+        action: what was commanded: velocities at the end of the period and the gripper, (n + 1,).
+        health: of the controller.
+        contacts: forbidden contacts in the period.
+        wall_clock: Unix time at its beginning [s].
+    """
+
+    state: FloatArray
+    environment: FloatArray
+    images: dict[str, np.ndarray]
+    intent: Intent
+    action: FloatArray
+    health: Health
+    contacts: int
+    wall_clock: float
+
+
+def moment_features(
+    state: Sequence[str],
+    environment: Sequence[str],
+    joints: Sequence[str],
+    channels: Sequence[str],
+    cameras: Sequence[str] = (),
+    image_size: tuple[int, int] = (128, 128),
+) -> dict[str, Feature]:
+    """Return the columns of a robot, a task and its cameras.
+
+    Policy inputs are under `observation.*`, the policy output is `action`; the rest is beside them, so that
+    LeRobot's policies do not read it.
+
+    Args:
+        state: names of the observed robot state.
+        environment: names of the observed task state.
+        joints: names of the generalised coordinates.
+        channels: names of the command channels.
+        cameras: names of the cameras.
+        image_size: height and width [pixels].
+    """
+    scalar = Feature("float32")
+    asked = (*channels, "gripper")
+    pictures = {f"observation.images.{name}": Feature("video", (*image_size, 3)) for name in cameras}
+    return {
+        "observation.state": Feature("float32", (len(state),), tuple(state)),
+        "observation.environment_state": Feature("float32", (len(environment),), tuple(environment)),
+        **pictures,
+        "action": Feature("float32", (len(joints) + 1,), (*(f"v_{name}" for name in joints), "gripper")),
+        "teleop.values": Feature("float32", (len(asked),), asked),
+        "teleop.mask": Feature("bool", (len(asked),), asked),
+        "teleop.mode": Feature("string"),
+        "controller.solve_time": scalar,
+        "controller.status": Feature("string"),
+        "controller.slack": scalar,
+        "controller.smallest_distance": scalar,
+        "controller.work_distance": scalar,
+        "safety.contacts": Feature("int64"),
+        "wall_clock": Feature("float64"),
+    }
+
+
+def moment_row(moment: Moment) -> dict[str, Any]:
+    """Return a moment as a frame of `moment_features`."""
+    intent, health = moment.intent, moment.health
+    pictures = {f"observation.images.{name}": image for name, image in moment.images.items()}
+    return {
+        "observation.state": moment.state,
+        "observation.environment_state": moment.environment,
+        **pictures,
+        "action": moment.action,
+        "teleop.values": np.append(np.where(intent.mask, intent.values, 0.0), intent.gripper),
+        "teleop.mask": np.append(intent.mask, True),
+        "teleop.mode": intent.mode,
+        "controller.solve_time": health.solve_time,
+        "controller.status": health.status.value,
+        "controller.slack": health.slack,
+        "controller.smallest_distance": health.smallest_distance,
+        "controller.work_distance": health.work_distance,
+        "safety.contacts": moment.contacts,
+        "wall_clock": moment.wall_clock,
+    }

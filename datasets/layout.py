@@ -1,0 +1,97 @@
+"""Where the files of a LeRobot v3.0 dataset lie when every episode has its own.
+
+Episode `i` is file `i % 1000` of chunk `i // 1000` in each of its streams: one parquet of rows, one mp4 a
+camera, one parquet that holds the episode's line of metadata. Two hidden folders are Handrail's own:
+`.handrail` (files being written, the lock) and `.damaged` (what `repair` set aside).
+"""
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+FILES_IN_A_CHUNK = 1000
+DATA_PATH = "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
+VIDEO_PATH = "videos/{video_key}/chunk-{chunk_index:03d}/file-{file_index:03d}.mp4"
+EPISODES_PATH = "meta/episodes/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
+INFO_PATH = "meta/info.json"
+STATS_PATH = "meta/stats.json"
+TASKS_PATH = "meta/tasks.parquet"
+MANIFEST_PATH = "meta/handrail.json"
+STAGING = ".handrail"
+DAMAGED = ".damaged"
+
+_NUMBERED = re.compile(r"chunk-(\d{3,})/file-(\d{3,})\.(?:parquet|mp4)")
+
+
+def chunk_and_file(episode: int) -> tuple[int, int]:
+    """Return the chunk and the file number of an episode's files."""
+    return divmod(episode, FILES_IN_A_CHUNK)
+
+
+def episode_of(path: Path) -> int | None:
+    """Return which episode a data, video or metadata file belongs to, or None for a stray name."""
+    match = _NUMBERED.fullmatch("/".join(path.parts[-2:]))
+    if match is None or int(match[2]) >= FILES_IN_A_CHUNK:
+        return None
+    return int(match[1]) * FILES_IN_A_CHUNK + int(match[2])
+
+
+@dataclass(frozen=True)
+class Layout:
+    """The paths of one dataset.
+
+    Attributes:
+        root: The dataset's folder.
+    """
+
+    root: Path
+
+    def data(self, episode: int) -> Path:
+        """Return the parquet with the rows of an episode."""
+        return self._numbered(DATA_PATH, episode)
+
+    def video(self, key: str, episode: int) -> Path:
+        """Return the mp4 of one camera of an episode."""
+        return self._numbered(VIDEO_PATH, episode, video_key=key)
+
+    def row(self, episode: int) -> Path:
+        """Return the parquet with the metadata of an episode; it exists exactly if the episode is saved."""
+        return self._numbered(EPISODES_PATH, episode)
+
+    @property
+    def info(self) -> Path:
+        """The file that LeRobot opens first."""
+        return self.root / INFO_PATH
+
+    @property
+    def stats(self) -> Path:
+        """The statistics over all episodes."""
+        return self.root / STATS_PATH
+
+    @property
+    def tasks(self) -> Path:
+        """The task sentences."""
+        return self.root / TASKS_PATH
+
+    @property
+    def manifest(self) -> Path:
+        """What Handrail keeps of the schema: written once, first of all."""
+        return self.root / MANIFEST_PATH
+
+    @property
+    def staging(self) -> Path:
+        """Files under temporary names, and the lock."""
+        return self.root / STAGING
+
+    @property
+    def damaged(self) -> Path:
+        """Where `repair` puts what it does not dare to delete."""
+        return self.root / DAMAGED
+
+    def relative(self, path: Path) -> str:
+        """Return a path inside the dataset as text, with forward slashes."""
+        return path.relative_to(self.root).as_posix()
+
+    def _numbered(self, pattern: str, episode: int, **keys: str) -> Path:
+        chunk, file = chunk_and_file(episode)
+        return self.root / pattern.format(chunk_index=chunk, file_index=file, **keys)

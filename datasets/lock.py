@@ -1,0 +1,64 @@
+"""One writer a dataset: an advisory lock that dies with its process."""
+
+import contextlib
+import fcntl
+import os
+from pathlib import Path
+from typing import BinaryIO
+
+from handrail.controllers.errors import HandrailError
+from handrail.datasets.atomic import make_folder
+
+LOCK_NAME = "lock"
+
+
+class DatasetLock:
+    """The right to change one dataset, held from construction to `release`."""
+
+    def __init__(self, staging: Path):
+        """Take the lock.
+
+        Args:
+            staging: The dataset's staging folder; created if missing.
+
+        Raises:
+            HandrailError: Another process, or another writer in this one, holds it.
+            OSError: The folder cannot be written.
+        """
+        self._path = staging / LOCK_NAME
+        self._file: BinaryIO | None = self._acquire()
+
+    def release(self) -> None:
+        """Give the lock back and remove the staging folder if nothing else is in it; safe to call twice."""
+        if self._file is None:
+            return
+        file, self._file = self._file, None
+        try:
+            self._path.unlink(missing_ok=True)
+            with contextlib.suppress(OSError):  # not empty: somebody else's already, or worth a look
+                self._path.parent.rmdir()
+        finally:
+            file.close()
+
+    def _acquire(self) -> BinaryIO:
+        while True:
+            make_folder(self._path.parent)
+            file = open(self._path, "ab")  # noqa: SIM115 - held open for as long as the lock is
+            try:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except OSError as error:
+                file.close()
+                raise HandrailError(
+                    f"dataset {str(self._path.parent.parent)!r} is being written by another recorder:"
+                    " expected to be the only one; close the other, or choose another root"
+                ) from error
+            if self._is_current(file):
+                return file
+            file.close()
+
+    def _is_current(self, file: BinaryIO) -> bool:
+        """Return whether the locked file is still the one with the lock's name (its owner removes it)."""
+        try:
+            return os.path.samestat(os.fstat(file.fileno()), self._path.stat())
+        except FileNotFoundError:
+            return False

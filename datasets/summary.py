@@ -1,0 +1,154 @@
+"""One line an episode: what was done, how it ended, how smooth and how safe it was.
+
+What a dataset does not hold stays None and is shown as "–", so that any LeRobot dataset can be looked at.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from handrail.datasets.metrics import sparc
+from handrail.datasets.reader import DatasetInfo, read_episodes, read_info, read_rows_of
+
+UNKNOWN = "–"
+HEADINGS = (
+    "episode",
+    "task",
+    "mode",
+    "success",
+    "why not",
+    "length [s]",
+    "smallest distance [m]",
+    "smoothness",
+    "contacts",
+)
+TOOL = ("tool_x", "tool_y", "tool_z")
+STATE, ACTION = "observation.state", "action"
+MODE, DISTANCE, CONTACTS = "teleop.mode", "controller.smallest_distance", "safety.contacts"
+
+
+@dataclass(frozen=True)
+class EpisodeSummary:
+    """One episode at a glance.
+
+    Attributes:
+        episode: Its number.
+        task: Its task sentences, joined by "; ".
+        mode: Its teleop modes, in the order in which they first occur, joined by " → ".
+        success: How it ended.
+        failure_reason: Why it failed.
+        length: Duration [s].
+        smallest_distance: Smallest distance to a collision [m].
+        smoothness: SPARC of the tool's speed, or else of the norm of the commanded velocity.
+        contacts: How many unwanted contacts began.
+    """
+
+    episode: int
+    task: str
+    mode: str | None
+    success: bool | None
+    failure_reason: str | None
+    length: float
+    smallest_distance: float | None
+    smoothness: float | None
+    contacts: int | None
+
+    def cells(self) -> tuple[str, ...]:
+        """Return the line as text, one cell for each of `HEADINGS`."""
+        success = None if self.success is None else ("yes" if self.success else "no")
+        return (
+            str(self.episode),
+            self.task or UNKNOWN,
+            self.mode or UNKNOWN,
+            success or UNKNOWN,
+            self.failure_reason or UNKNOWN,
+            f"{self.length:.1f}",
+            _number(self.smallest_distance, "{:.3f}"),
+            _number(self.smoothness, "{:.2f}"),
+            _number(self.contacts, "{:d}"),
+        )
+
+
+def summarize(root: str | Path) -> list[EpisodeSummary]:
+    """Return one summary an episode, in order.
+
+    Args:
+        root: The folder of any LeRobot v3.0 dataset.
+
+    Raises:
+        HandrailError: There is no dataset, or a file of it cannot be read.
+    """
+    info = read_info(root)
+    wanted = [name for name in (STATE, ACTION, MODE, DISTANCE, CONTACTS) if _is_column(info, name)]
+    return [_summary(info, row, read_rows_of(info, row, wanted)) for row in read_episodes(root)]
+
+
+def _summary(info: DatasetInfo, row: dict[str, Any], frames: dict[str, np.ndarray]) -> EpisodeSummary:
+    distance = _finite(frames.get(DISTANCE))
+    contacts = frames.get(CONTACTS)
+    return EpisodeSummary(
+        episode=row["episode_index"],
+        task="; ".join(row.get("tasks") or ()),
+        mode=_mode(row, frames),
+        success=_as_bool(row.get("success")),
+        failure_reason=row.get("failure_reason") or None,
+        length=row["length"] / info.fps,
+        smallest_distance=None if distance is None else float(distance.min()),
+        smoothness=_smoothness(info, frames),
+        contacts=None if contacts is None or contacts.ndim != 1 else _contacts_begun(contacts),
+    )
+
+
+def _mode(row: dict[str, Any], frames: dict[str, np.ndarray]) -> str | None:
+    modes = [str(mode) for mode in dict.fromkeys(frames.get(MODE, ())) if mode]
+    return " → ".join(modes) or row.get("mode") or None
+
+
+def _smoothness(info: DatasetInfo, frames: dict[str, np.ndarray]) -> float | None:
+    speed = _tool_speed(info, frames)
+    if speed is None:
+        speed = _commanded_speed(info, frames)
+    value = float("nan") if speed is None else sparc(speed, info.fps)
+    return value if np.isfinite(value) else None
+
+
+def _tool_speed(info: DatasetInfo, frames: dict[str, np.ndarray]) -> np.ndarray | None:
+    """Return the tool's speed [m/s], `(N − 1,)`, if the state names its position."""
+    names = info.features[STATE].names if STATE in frames else None
+    if not names or any(name not in names for name in TOOL):
+        return None
+    positions = frames[STATE][:, [names.index(name) for name in TOOL]].astype(float)
+    return np.linalg.norm(np.diff(positions, axis=0), axis=1) * info.fps
+
+
+def _commanded_speed(info: DatasetInfo, frames: dict[str, np.ndarray]) -> np.ndarray | None:
+    """Return the norm of the commanded velocity, `(N,)`; another tool's action may be a position."""
+    names = info.features[ACTION].names if ACTION in frames and info.from_handrail else None
+    if not names or frames[ACTION].ndim != 2:
+        return None
+    moving = [index for index, name in enumerate(names) if "gripper" not in name]
+    return np.linalg.norm(frames[ACTION][:, moving].astype(float), axis=1)
+
+
+def _contacts_begun(contacts: np.ndarray) -> int:
+    """Return how many contacts began: the sum of all rises of their number, `(N,)`."""
+    return int(np.maximum(np.diff(contacts.astype(np.int64), prepend=0), 0).sum())
+
+
+def _finite(values: np.ndarray | None) -> np.ndarray | None:
+    finite = None if values is None else values[np.isfinite(values)]
+    return finite if finite is not None and finite.size else None
+
+
+def _is_column(info: DatasetInfo, name: str) -> bool:
+    return name in info.features and info.features[name].dtype not in ("video", "image")
+
+
+def _as_bool(value: Any) -> bool | None:
+    return bool(value) if isinstance(value, bool | int | float) else None
+
+
+def _number(value: float | None, pattern: str) -> str:
+    return UNKNOWN if value is None else pattern.format(value)

@@ -1,0 +1,74 @@
+"""What every command shares: LeRobot-like flags, one line an error, exit codes."""
+
+import contextlib
+import io
+import re
+import sys
+from collections.abc import Callable, Sequence
+from typing import NoReturn
+
+import tyro
+
+from handrail.controllers.errors import HandrailError
+
+BAD_INPUT = 2
+FAILED = 1
+INTERRUPTED = 130
+
+
+def parse[Config](config: Callable[..., Config], prog: str, arguments: Sequence[str] | None = None) -> Config:
+    """Return the config of a command line; `--flag=true` and `--flag` both work, as do `_` and `-`.
+
+    Exits with 0 after `--help` and with 2 and one line on standard error after bad input.
+    """
+    arguments = [_boolean(argument) for argument in (sys.argv[1:] if arguments is None else arguments)]
+    said = io.StringIO()
+    try:
+        with contextlib.redirect_stderr(said):
+            return tyro.cli(
+                config,
+                prog=prog,
+                args=arguments,
+                config=(tyro.conf.OmitSubcommandPrefixes,),
+                use_underscores=True,
+            )
+    except SystemExit as stop:
+        if stop.code:
+            fail(_one_line(said.getvalue(), prog), BAD_INPUT)
+        raise
+
+
+def run(main: Callable[[], int | None]) -> NoReturn:
+    """Run a command's body; an expected error becomes one line and exit code 2."""
+    try:
+        sys.exit(main())
+    except HandrailError as error:
+        fail(str(error), BAD_INPUT)
+    except BrokenPipeError:
+        sys.exit(FAILED)
+    except KeyboardInterrupt:
+        fail("interrupted", INTERRUPTED)
+
+
+def fail(message: str, code: int) -> NoReturn:
+    """Print one line on standard error and exit."""
+    print(f"error: {message}", file=sys.stderr)
+    sys.exit(code)
+
+
+def _boolean(argument: str) -> str:
+    match = re.fullmatch(r"--([\w.\-]+)=(true|false)", argument, flags=re.IGNORECASE)
+    if not match:
+        return argument
+    *path, name = match[1].split(".")
+    return "--" + ".".join([*path, name if match[2].lower() == "true" else f"no_{name}"])
+
+
+def _one_line(message: str, prog: str) -> str:
+    """Return what a boxed message says, in one line."""
+    lines = [line.strip(" │╭╮╰╯─┌┐└┘┤├━") for line in message.splitlines()]
+    titles = ("Parsing error", "Value error", "Unrecognized options", "Required options", "For full helptext")
+    said = [line for line in lines if line and line not in titles and not line.startswith(titles[-1])]
+    if "Argument helptext:" in said:
+        said = said[: said.index("Argument helptext:")]
+    return f"{' '.join(said) or 'bad command line'} (see {prog} --help)"

@@ -1,0 +1,192 @@
+"""Killed at any moment, a recording loses at most the open episode, and nothing it had reported as saved."""
+
+import random
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from datasets_guillotine import Guillotine, tear_staged_files
+from datasets_helpers import (
+    check_pictures,
+    create,
+    digest,
+    frame_of,
+    length_of,
+    open_with_lerobot,
+    record,
+    record_one,
+    resume,
+    tree,
+)
+
+from handrail.datasets.layout import Layout
+from handrail.datasets.lock import LOCK_NAME
+from handrail.datasets.reader import read_episodes, read_frames
+from handrail.datasets.repair import repair
+
+GUILLOTINE = Guillotine()
+
+
+@pytest.fixture
+def quick_disk(monkeypatch):
+    """Skip the waits for the disk: a killed process, unlike a power failure, does not need them."""
+    monkeypatch.setattr("os.fsync", lambda descriptor: None)
+
+
+def _session(root: Path, saved: dict[int, str]) -> None:
+    """Record two episodes, close, resume, discard one, record two more (with another task)."""
+    with create(root) as writer:
+        for _ in range(2):
+            episode = record_one(writer, cameras=False)
+            saved[episode] = digest(root, episode, cameras=False)
+    with resume(root) as writer:
+        writer.add_frame(frame_of(9, 0, cameras=False), "forget me")
+        writer.discard_episode()
+        for _ in range(2):
+            episode = record_one(writer, cameras=False)
+            saved[episode] = digest(root, episode, cameras=False)
+
+
+def _check_episodes(root: Path, count: int) -> None:
+    rows = read_episodes(root)
+    assert [row["episode_index"] for row in rows] == list(range(count))
+    start = 0
+    for episode, row in enumerate(rows):
+        assert (row["dataset_from_index"], row["length"]) == (start, length_of(episode))
+        frames = read_frames(root, episode)
+        assert frames["index"].tolist() == list(range(start, start + length_of(episode)))
+        expected = [frame_of(episode, i, cameras=False)["action"] for i in range(length_of(episode))]
+        assert np.array_equal(frames["action"], np.array(expected))
+        start += length_of(episode)
+
+
+def _check_after_kill(root: Path, saved: dict[int, str]) -> None:
+    """The law: all that was reported is there to the byte, repair settles, and recording goes on."""
+    if not Layout(root).manifest.exists():
+        assert not saved
+        create(root).close()  # a folder that never became a dataset is as good as an empty one
+    report = repair(root)
+    assert len(saved) <= report.episodes <= len(saved) + 1
+    assert not report.moved
+    assert not report.damage
+    for episode, expected in saved.items():
+        assert digest(root, episode, cameras=False) == expected
+    settled = tree(root)
+    assert repair(root).clean
+    assert tree(root) == settled
+    with resume(root) as writer:
+        assert record_one(writer, cameras=False) == report.episodes
+    _check_episodes(root, report.episodes + 1)
+    assert not (root / ".handrail").exists()
+    assert not any(LOCK_NAME in path for path in tree(root))
+
+
+def _kill_session_everywhere(folder: Path, is_torn: Callable[[int], bool]) -> None:
+    lived, k = False, 0
+    while not lived:
+        k += 1
+        root, saved = folder / str(k), {}
+        lived = GUILLOTINE.run(root, k, lambda root=root, saved=saved: _session(root, saved))
+        if is_torn(k):
+            tear_staged_files(root)
+        _check_after_kill(root, saved)
+    assert len(saved) == 4
+    assert k > 60  # the hook really saw the changes
+
+
+def test_killed_at_every_change_to_the_disk(tmp_path, quick_disk):
+    _kill_session_everywhere(tmp_path, lambda k: k % 2 == 0)
+
+
+@pytest.mark.slow
+def test_killed_at_every_change_to_the_disk_the_other_way(tmp_path, quick_disk):
+    _kill_session_everywhere(tmp_path, lambda k: k % 2 == 1)
+
+
+def test_overwriting_killed_at_every_change(tmp_path, quick_disk):
+    """Cut short, it leaves the old dataset whole, or an empty one; either may be overwritten or resumed."""
+    lived, k = False, 0
+    while not lived:
+        k += 1
+        root = record(tmp_path / str(k), 2)
+        lived = GUILLOTINE.run(root, k, lambda root=root: create(root, overwrite=True).close())
+        episodes = repair(root).episodes
+        assert episodes in (0, 2)
+        with resume(root) as writer:
+            assert record_one(writer, cameras=False) == episodes
+        _check_episodes(root, episodes + 1)
+        create(root, overwrite=True).close()
+    assert k > 10
+
+
+def test_repair_killed_at_every_change(tmp_path, quick_disk):
+    """Nothing that belonged to a saved episode is ever lost, and repairing again ends the same."""
+    lived, k = False, 0
+    while not lived:
+        k += 1
+        root = record(tmp_path / str(k), 4)
+        layout = Layout(root)
+        layout.data(1).write_bytes(b"damaged")
+        layout.info.write_bytes(b"{torn")
+        kept = {path.read_bytes() for e in (1, 2, 3) for path in (layout.data(e), layout.row(e))}
+        lived = GUILLOTINE.run(root, k, lambda root=root: repair(root))
+        repair(root)
+        assert repair(root).clean
+        _check_episodes(root, 1)
+        assert kept <= {path.read_bytes() for path in layout.damaged.rglob("*.parquet")}
+    assert k > 10
+
+
+def _kill_repeatedly(root: Path, kills: int) -> tuple[int, int]:
+    """Kill a recorder again and again; return the number of reported episodes and of repairs."""
+    reported: dict[int, str] = {}
+    repairs, moments = 0, random.Random(kills)
+    for _ in range(kills):
+        command = [sys.executable, str(Path(__file__).parent / "datasets_recorder.py"), str(root)]
+        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as child:
+            assert child.stdout is not None
+            assert child.stdout.readline() == "ready\n"
+            time.sleep(moments.uniform(0.0, 0.6))
+            child.kill()
+            lines = [line for line in child.stdout.read().splitlines(keepends=True) if line.endswith("\n")]
+        reported |= {int(line.split()[0]): line.split()[1] for line in lines}
+        repairs += not _check_survivors(root, reported)
+    return len(reported), repairs
+
+
+def _check_survivors(root: Path, reported: dict[int, str]) -> bool:
+    """Check the law with cameras; return whether there was nothing to repair."""
+    for episode, expected in reported.items():
+        assert digest(root, episode, cameras=True) == expected
+    report = repair(root)
+    assert len(reported) <= report.episodes <= len(reported) + 1
+    assert not report.moved
+    with resume(root, cameras=True) as writer:
+        record_one(writer, cameras=True)
+        reported |= {episode: digest(root, episode, cameras=True) for episode in range(writer.num_episodes)}
+    dataset = open_with_lerobot(root)
+    assert dataset.num_episodes == len(reported)
+    assert len(dataset) == sum(map(length_of, reported))
+    check_pictures(
+        dataset, [0, len(dataset) // 2, len(dataset) - length_of(len(reported) - 1), len(dataset) - 1]
+    )
+    return report.clean
+
+
+def test_sigkill(tmp_path):
+    reported, _ = _kill_repeatedly(tmp_path / "set", 4)
+    assert reported > 4
+
+
+@pytest.mark.slow
+def test_sigkill_often(tmp_path, capsys):
+    reported, repairs = _kill_repeatedly(tmp_path / "set", 30)
+    with capsys.disabled():
+        print(
+            f"\n30 kills, {reported} saved episodes, none lost; {repairs} times there was something to repair"
+        )
+    assert reported > 60
