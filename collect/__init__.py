@@ -1,6 +1,7 @@
 """Scenes, tasks, the Gymnasium environments, operators and the session loop.
 
-Importing it registers one environment a task, `handrail/<name>-v0`; nothing heavy is imported until one is made.
+Importing it registers one environment a task, `handrail/<name>-v0`; nothing heavy is imported until one is
+made.
 """
 
 import gymnasium

@@ -28,8 +28,13 @@ SCRIPTS = {"pick_place": PickPlaceScript, "reach": ReachScript}
 _VERSIONED = ("handrail", "lerobot", "mujoco", "pin", "coal", "casadi", "daqp", "numpy", "gymnasium")
 
 
-def build_env(config: SessionConfig, fps: int) -> HandrailEnv:
+def build_env(config: SessionConfig, fps: int, render: bool = False) -> HandrailEnv:
     """Return the environment of a session.
+
+    Args:
+        config: of the session.
+        fps: control and recording rate [Hz].
+        render: whether `env.render()` shall give good-looking pictures.
 
     Raises:
         HandrailError: a setting is wrong, or cameras are asked for and GL is missing.
@@ -42,6 +47,7 @@ def build_env(config: SessionConfig, fps: int) -> HandrailEnv:
         fps=fps,
         cameras=config.camera_names,
         image_size=(config.image_size, config.image_size),
+        render_mode="rgb_array" if render else None,
         disable_env_checker=True,
     )
     unwrapped = env.unwrapped

@@ -86,11 +86,8 @@ class DatasetConfig:
 
     @property
     def folder(self) -> Path:
-        """The folder of the dataset: as given, or where LeRobot keeps its own."""
-        if self.root:
-            return Path(self.root).expanduser()
-        hub = Path(os.environ.get("HF_HOME", "~/.cache/huggingface")).expanduser()
-        return Path(os.environ.get("HF_LEROBOT_HOME", hub / "lerobot")).expanduser() / self.repo_id
+        """The folder of the dataset."""
+        return dataset_folder(self.repo_id, self.root)
 
     def check(self) -> None:
         """Check the settings.
@@ -129,6 +126,72 @@ class RecordConfig(SessionConfig):
             raise HandrailError("--resume and --overwrite: expected one of them, got both")
         if self.display_save and not self.display_save.endswith(".rrd"):
             raise HandrailError(f"--display_save {self.display_save}: expected a file that ends in .rrd")
+
+
+@dataclass(frozen=True)
+class StoredConfig:
+    """A dataset that is there."""
+
+    repo_id: str = "handrail/demo"
+    """Name of the dataset, owner/name."""
+    root: str = ""
+    """Its folder; LeRobot's own place for the name when empty."""
+
+    @property
+    def folder(self) -> Path:
+        """The folder of the dataset."""
+        return dataset_folder(self.repo_id, self.root)
+
+
+@dataclass(frozen=True)
+class ReplayConfig:
+    """Run a recorded episode's commands in its environment and report the deviation."""
+
+    dataset: StoredConfig = field(default_factory=StoredConfig)
+    episode: int = -1
+    """Which episode; all of them when negative."""
+    sheet: str = ""
+    """Also write a contact sheet of the episode to this .png file."""
+
+    def check(self) -> None:
+        """Check the settings.
+
+        Raises:
+            HandrailError: one is wrong.
+        """
+        if self.sheet and not (self.sheet.endswith(".png") and Path(self.sheet).expanduser().parent.is_dir()):
+            raise HandrailError(f"--sheet {self.sheet}: expected a .png file in an existing folder")
+        if self.sheet and self.episode < 0:
+            raise HandrailError("--sheet: expected --episode with the number of one episode")
+
+
+@dataclass(frozen=True)
+class InspectConfig:
+    """Print the episodes of a LeRobot dataset as a table."""
+
+    dataset: StoredConfig = field(default_factory=StoredConfig)
+    repair: bool = False
+    """Repair what a crash left behind, first."""
+
+
+@dataclass(frozen=True)
+class DemoConfig:
+    """Record a few real demonstrations and show what came out."""
+
+    root: str = "outputs/demo"
+    """Folder for the dataset and the picture."""
+    episodes: int = 5
+    """How many."""
+    overwrite: bool = False
+    """Remove an earlier demo's dataset."""
+
+
+def dataset_folder(repo_id: str, root: str) -> Path:
+    """Return the folder of a dataset: as given, or where LeRobot keeps its own."""
+    if root:
+        return Path(root).expanduser()
+    hub = Path(os.environ.get("HF_HOME", "~/.cache/huggingface")).expanduser()
+    return Path(os.environ.get("HF_LEROBOT_HOME", hub / "lerobot")).expanduser() / repo_id
 
 
 def check_fps(fps: int) -> None:

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from handrail.collect.gl import mujoco
+from handrail.collect.gl import MjData, MjModel
 from handrail.controllers.arrays import BoolArray
 
 _SCENE, _ROBOT, _GRASP, _MOVABLE = range(4)
@@ -17,7 +17,7 @@ class ContactMonitor:
     """
 
     def __init__(
-        self, model: mujoco.MjModel, robot: Iterable[str], grasp: Iterable[str], movable: Iterable[str]
+        self, model: MjModel, robot: Iterable[str], grasp: Iterable[str], movable: Iterable[str]
     ) -> None:
         self._model = model
         kinds = np.zeros(model.ngeom, dtype=np.intp)
@@ -32,7 +32,7 @@ class ContactMonitor:
         """Forget the contacts so far."""
         self._pairs.clear()
 
-    def look(self, data: mujoco.MjData) -> None:
+    def look(self, data: MjData) -> None:
         """Remember the forbidden contacts of this instant."""
         if data.ncon == 0:
             return

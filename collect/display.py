@@ -126,7 +126,9 @@ class Display:
 
 def _check_file(path: Path) -> None:
     if not path.parent.is_dir():
-        raise HandrailError(f"--display_save {path}: expected an existing folder, found none at {path.parent}")
+        raise HandrailError(
+            f"--display_save {path}: expected an existing folder, found none at {path.parent}"
+        )
 
 
 def _finite(value: float) -> float:

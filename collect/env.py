@@ -29,8 +29,8 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     """A robot does a task.
 
     Action, (n + 1,) float32: the generalised velocities that the robot shall have at the end of the step
-    [m/s, rad/s], reached linearly from those commanded before, and the gripper (0 open, 1 closed). Every action
-    passes the `Limiter`; one that is not finite brakes.
+    [m/s, rad/s], reached linearly from those commanded before, and the gripper (0 open, 1 closed). Every
+    action passes the `Limiter`; one that is not finite brakes.
 
     Args:
         task: a `Task`, or the name of its class as `module:Class`.
@@ -87,7 +87,7 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self._steps = 0
         self._gripper = 0.0
 
-    def _action_space(self) -> spaces.Box:
+    def _action_space(self) -> spaces.Space[Any]:
         limit = np.append(self.model.description.limits.velocity, 1.0).astype(np.float32)
         low = -limit
         low[-1] = 0.0
@@ -99,8 +99,7 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             "environment_state": box_space(len(self.state_names)),
         }
         if self.cameras:
-            pictures = {camera: image_space(*self.image_size) for camera in self.cameras}
-            parts["pixels"] = spaces.Dict(pictures)
+            parts["pixels"] = spaces.Dict({camera: image_space(*self.image_size) for camera in self.cameras})
         return spaces.Dict(parts)
 
     @property
@@ -166,11 +165,10 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             options: `episode`: an `Episode` to begin with instead of a sampled one.
         """
         super().reset(seed=seed)
-        self._episode = (options or {}).get("episode") or self.task.sample(self.model, self.np_random)
+        episode: Episode = (options or {}).get("episode") or self.task.sample(self.model, self.np_random)
         meshes = bool(self.cameras or self.render_mode)
-        self._simulation = Simulation(
-            self.model, self._episode.scene, self._episode.q, 1.0 / self.fps, meshes=meshes
-        )
+        self._simulation = Simulation(self.model, episode.scene, episode.q, 1.0 / self.fps, meshes=meshes)
+        self._episode = episode
         self._steps = 0
         self._gripper = 0.0
         state = self.task_state()

@@ -7,6 +7,7 @@ State-only environments never need a graphics library.
 import ctypes
 import os
 import sys
+from typing import Any
 
 from handrail.controllers.errors import HandrailError
 
@@ -39,8 +40,9 @@ def choose_backend() -> None:
 def missing_graphics(reason: object) -> HandrailError:
     """Return the error for cameras without a graphics library."""
     detail = " ".join(str(reason).split()) or type(reason).__name__
+    backend = os.environ.get("MUJOCO_GL", "")
     return HandrailError(
-        f"cameras need OpenGL, which is missing here (MUJOCO_GL={os.environ.get('MUJOCO_GL', '')!r}: {detail}); "
+        f"cameras need OpenGL, which is missing here (MUJOCO_GL={backend!r}: {detail}); "
         "install it with: apt-get install libegl1 libgl1-mesa-dri, and unset MUJOCO_GL; "
         "without cameras everything else works"
     )
@@ -48,6 +50,22 @@ def missing_graphics(reason: object) -> HandrailError:
 
 choose_backend()
 
-import mujoco  # noqa: E402
+import mujoco as _mujoco  # noqa: E402
 
-__all__ = ["choose_backend", "missing_graphics", "mujoco"]
+mujoco: Any = _mujoco  # it comes without type stubs, and so do its classes
+type MjSpec = Any
+type MjsBody = Any
+type MjModel = Any
+type MjData = Any
+type MjrContext = Any
+
+__all__ = [
+    "MjData",
+    "MjModel",
+    "MjSpec",
+    "MjrContext",
+    "MjsBody",
+    "choose_backend",
+    "missing_graphics",
+    "mujoco",
+]

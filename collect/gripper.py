@@ -4,7 +4,7 @@ import numpy as np
 import pinocchio as pin
 
 from handrail.collect import geometry
-from handrail.collect.gl import mujoco
+from handrail.collect.gl import MjsBody, MjSpec, mujoco
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.description import Gripper
 
@@ -13,7 +13,7 @@ _PALM_LENGTH = 0.155  # of the drawn palm, along the frame's z [m]
 _REFLECTED = 1.0  # inertia of the motor behind each finger, seen through its gear [kg]
 
 
-def add_gripper(spec: mujoco.MjSpec, gripper: Gripper, mount: mujoco.MjsBody, frame: pin.SE3) -> None:
+def add_gripper(spec: MjSpec, gripper: Gripper, mount: MjsBody, frame: pin.SE3) -> None:
     """Add palm mass, fingers, their servo and the wrist camera to the body that carries the frame."""
     palm = mount.add_body(name="gripper", gravcomp=1.0, **geometry.pose(frame.translation, frame.rotation))
     size = np.array([0.12, 0.08, _PALM_LENGTH])
@@ -27,9 +27,9 @@ def add_gripper(spec: mujoco.MjSpec, gripper: Gripper, mount: mujoco.MjsBody, fr
     palm.add_camera(name="wrist", fovy=70.0, **_camera_pose(gripper))
 
 
-def _add_finger(palm: mujoco.MjsBody, gripper: Gripper, name: str, side: float) -> None:
+def _add_finger(palm: MjsBody, gripper: Gripper, name: str, side: float) -> None:
     """Add a finger; its joint coordinate is its distance from the closed position [m]."""
-    width, depth, length = gripper.finger_size
+    width, _, length = gripper.finger_size
     finger = palm.add_body(
         name=f"{name}_body", pos=[side * width / 2, 0.0, gripper.tip - length / 2], gravcomp=1.0
     )
@@ -62,7 +62,7 @@ def _add_finger(palm: mujoco.MjsBody, gripper: Gripper, name: str, side: float) 
     _add_carriage(finger, gripper, name)
 
 
-def _add_carriage(finger: mujoco.MjsBody, gripper: Gripper, name: str) -> None:
+def _add_carriage(finger: MjsBody, gripper: Gripper, name: str) -> None:
     """Draw what joins the finger to the palm."""
     width, depth, length = gripper.finger_size
     gap = gripper.tip - length - _PALM_LENGTH
@@ -80,7 +80,7 @@ def _add_carriage(finger: mujoco.MjsBody, gripper: Gripper, name: str) -> None:
     )
 
 
-def _couple(spec: mujoco.MjSpec) -> None:
+def _couple(spec: MjSpec) -> None:
     """Make the fingers mirror each other, as the rack between them does."""
     coupling = spec.add_equality(
         name="fingers", objtype=mujoco.mjtObj.mjOBJ_JOINT, type=mujoco.mjtEq.mjEQ_JOINT
@@ -92,7 +92,7 @@ def _couple(spec: mujoco.MjSpec) -> None:
     coupling.solref = [0.004, 1.0]
 
 
-def _add_servo(spec: mujoco.MjSpec, gripper: Gripper) -> None:
+def _add_servo(spec: MjSpec, gripper: Gripper) -> None:
     """Add a position servo on the opening [m] whose force [N] on each finger is limited."""
     tendon = spec.add_tendon(name="opening")
     for finger in ("finger_left", "finger_right"):

@@ -1,5 +1,7 @@
 """What an environment shows: names, spaces and numbers of the robot's part of the observation."""
 
+from typing import Any
+
 import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
@@ -45,11 +47,11 @@ def bounded(numbers: FloatArray) -> NDArray[np.float32]:
     return np.clip(np.nan_to_num(numbers), -_BOUND, _BOUND).astype(np.float32)
 
 
-def box_space(size: int) -> spaces.Box:
+def box_space(size: int) -> spaces.Space[Any]:
     """Return the space of `size` bounded numbers."""
     return spaces.Box(-_BOUND, _BOUND, (size,), np.float32)
 
 
-def image_space(height: int, width: int) -> spaces.Box:
+def image_space(height: int, width: int) -> spaces.Space[Any]:
     """Return the space of a colour picture, height by width by 3."""
     return spaces.Box(0, 255, (height, width, 3), np.uint8)

@@ -46,6 +46,9 @@ class _Log:
 def record(config: RecordConfig) -> int:
     """Record as configured; return the exit code: 0, 1 after a failure, 130 after Ctrl-C.
 
+    Args:
+        config: of the recording.
+
     Raises:
         HandrailError: a setting is wrong; nothing has been written then.
     """
@@ -53,10 +56,11 @@ def record(config: RecordConfig) -> int:
     env = build_env(config, config.dataset.fps)
     try:
         displays = _displays(config)
-        session = build_session(config, env)  # a wrong mask shows here, before anything is written
+        build_session(config, env)  # a wrong mask, or cameras without GL, show before anything is written
+        env.reset(seed=config.seed)
         with _open_writer(config, env) as writer:
             task = config.dataset.single_task or env.task_description
-            recorder = Recorder(writer, task, config.operator, config.mode)
+            recorder = Recorder(writer, task, _session_columns(config))
             session = build_session(config, env, [*displays, recorder])
             log = _Log()
             _record_all(config, session, recorder, writer, log, console)
@@ -69,6 +73,17 @@ def record(config: RecordConfig) -> int:
 def episode_seed(seed: int, episode: int) -> int:
     """Return the seed of an episode: far apart for every seed and number."""
     return int(np.random.SeedSequence([seed, episode]).generate_state(1)[0])
+
+
+def _session_columns(config: RecordConfig) -> dict[str, str | float]:
+    """Return what every episode's metadata says of the session; `handrail-replay` builds it anew from this."""
+    return {
+        "environment": config.task,
+        "robot": config.robot,
+        "operator": config.operator,
+        "mode": config.mode,
+        "noise": config.noise,
+    }
 
 
 def _open_writer(config: RecordConfig, env: HandrailEnv) -> EpisodeWriter:

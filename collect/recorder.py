@@ -1,9 +1,11 @@
 """Writes what a session shows into a dataset, episode by episode."""
 
+from collections.abc import Mapping
+
 from handrail.collect.env import HandrailEnv
 from handrail.collect.session import Outcome
 from handrail.datasets.frames import Moment, moment_row
-from handrail.datasets.writer import EpisodeWriter
+from handrail.datasets.writer import EpisodeWriter, Scalar
 
 
 class Recorder:
@@ -12,15 +14,13 @@ class Recorder:
     Args:
         writer: of the dataset.
         task: what is being done, in words.
-        operator: who steers.
-        mode: name of the teleop mode.
+        columns: what every episode's metadata says of the session (operator, mode, …).
     """
 
-    def __init__(self, writer: EpisodeWriter, task: str, operator: str, mode: str) -> None:
+    def __init__(self, writer: EpisodeWriter, task: str, columns: Mapping[str, Scalar]) -> None:
         self._writer = writer
         self._task = task
-        self._operator = operator
-        self._mode = mode
+        self._columns = dict(columns)
 
     def begin(self, env: HandrailEnv, seed: int) -> None:
         """Drop what an episode that ended early left open."""
@@ -38,11 +38,10 @@ class Recorder:
             HandrailError: the disk or an encoder failed; the saved episodes are whole.
         """
         return self._writer.save_episode(
-            {
+            self._columns
+            | {
                 "success": outcome.success,
                 "failure_reason": outcome.failure_reason,
-                "operator": self._operator,
-                "mode": self._mode,
                 "seed": outcome.seed,
                 "wall_time": outcome.wall_time,
                 "brakes": outcome.brakes,

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handrail.collect.geometry import VISIBLE_GROUP
-from handrail.collect.gl import missing_graphics, mujoco
+from handrail.collect.gl import MjData, MjModel, MjrContext, missing_graphics, mujoco
 from handrail.controllers.errors import unknown_name
 
 CAMERAS = ("wrist", "scene")
@@ -39,7 +39,7 @@ class Painter:
         HandrailError: there is no OpenGL on this machine.
     """
 
-    def __init__(self, model: mujoco.MjModel, size: tuple[int, int], quality: Quality = FAST) -> None:
+    def __init__(self, model: MjModel, size: tuple[int, int], quality: Quality = FAST) -> None:
         self._height, self._width = size
         self._quality = quality
         self._scene = mujoco.MjvScene(model, maxgeom=300)
@@ -50,7 +50,7 @@ class Painter:
         self._camera.type = mujoco.mjtCamera.mjCAMERA_FIXED
         self._open(model)
 
-    def _open(self, model: mujoco.MjModel) -> None:
+    def _open(self, model: MjModel) -> None:
         try:
             from mujoco.gl_context import GLContext
 
@@ -61,7 +61,7 @@ class Painter:
             raise missing_graphics(error) from error
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._context)
 
-    def paint(self, model: mujoco.MjModel, data: mujoco.MjData, camera: str) -> NDArray[np.uint8]:
+    def paint(self, model: MjModel, data: MjData, camera: str) -> NDArray[np.uint8]:
         """Return what a camera sees, (height, width, 3).
 
         Raises:
@@ -88,7 +88,7 @@ class Painter:
         self._gl.free()
 
 
-def _context(model: mujoco.MjModel, height: int, width: int, quality: Quality) -> mujoco.MjrContext:
+def _context(model: MjModel, height: int, width: int, quality: Quality) -> MjrContext:
     """Return a render context; size and quality are settings of the model while it is made."""
     visual = model.vis
     before = (
@@ -104,7 +104,7 @@ def _context(model: mujoco.MjModel, height: int, width: int, quality: Quality) -
         _set(model, before)
 
 
-def _set(model: mujoco.MjModel, values: tuple[int, int, int, int]) -> None:
+def _set(model: MjModel, values: tuple[int, int, int, int]) -> None:
     visual = model.vis
     visual.global_.offheight, visual.global_.offwidth = values[:2]
     visual.quality.shadowsize, visual.quality.offsamples = values[2:]

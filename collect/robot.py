@@ -10,7 +10,7 @@ import numpy as np
 import pinocchio as pin
 
 from handrail.collect import geometry
-from handrail.collect.gl import mujoco
+from handrail.collect.gl import MjsBody, MjSpec, mujoco
 from handrail.collect.gripper import add_gripper
 from handrail.collect.meshes import pieces, placed_meshes
 from handrail.controllers.description import PlacedShape
@@ -20,6 +20,7 @@ from handrail.controllers.rotation import quaternion_from_matrix
 
 BASE_BODY = "planar_base"
 FINGERS = ("finger_left", "finger_right")
+_DRIVE_TIME = 0.0025  # [s]
 
 
 @dataclass(frozen=True)
@@ -32,7 +33,7 @@ class RobotSpec:
         grasp_geoms: those that may touch movable things: fingers and palm.
     """
 
-    spec: mujoco.MjSpec
+    spec: MjSpec
     contact_geoms: tuple[str, ...]
     grasp_geoms: tuple[str, ...]
 
@@ -40,15 +41,15 @@ class RobotSpec:
 class Mounts:
     """Where pinocchio's joints and frames are in MuJoCo's tree."""
 
-    def __init__(self, model: RobotModel, bodies: list[mujoco.MjsBody]) -> None:
+    def __init__(self, model: RobotModel, bodies: list[MjsBody]) -> None:
         self._model = model
         self._bodies = bodies
 
-    def joint(self, index: int) -> mujoco.MjsBody:
+    def joint(self, index: int) -> MjsBody:
         """Return the body that moves with a joint of pinocchio's."""
         return self._bodies[index]
 
-    def frame(self, name: str) -> tuple[mujoco.MjsBody, pin.SE3]:
+    def frame(self, name: str) -> tuple[MjsBody, pin.SE3]:
         """Return the body that carries a frame, and the frame's placement on it."""
         frame = self._model.pinocchio.frames[self._model.frame_id(name)]
         return self._bodies[frame.parentJoint], frame.placement
@@ -83,7 +84,7 @@ def _ghost(group: int) -> dict[str, int]:
     return {"contype": 0, "conaffinity": 0, "group": group}
 
 
-def _add_bodies(spec: mujoco.MjSpec, model: RobotModel) -> list[mujoco.MjsBody]:
+def _add_bodies(spec: MjSpec, model: RobotModel) -> list[MjsBody]:
     """Add one body for the base and one for each arm joint; return them by pinocchio's joint index."""
     description, pinocchio = model.description, model.pinocchio
     base = spec.worldbody.add_body(name=BASE_BODY)
@@ -105,8 +106,13 @@ def _add_bodies(spec: mujoco.MjSpec, model: RobotModel) -> list[mujoco.MjsBody]:
     return bodies
 
 
-def _add_joint(body: mujoco.MjsBody, model: RobotModel, index: int) -> None:
-    """Add a one-degree-of-freedom joint with the axis of pinocchio's motion subspace."""
+def _add_joint(body: MjsBody, model: RobotModel, index: int) -> None:
+    """Add a one-degree-of-freedom joint with the axis of pinocchio's motion subspace.
+
+    The rotor's inertia, seen through the gear, keeps the velocity loop of a light link slower than
+    `_DRIVE_TIME`: MuJoCo solves contacts before it integrates the servo implicitly, and a faster loop would
+    throw what the gripper holds.
+    """
     joint = model.pinocchio.joints[index]
     name = model.pinocchio.names[index]
     if joint.nq != 1 or joint.nv != 1:
@@ -124,6 +130,7 @@ def _add_joint(body: mujoco.MjsBody, model: RobotModel, index: int) -> None:
         type=mujoco.mjtJoint.mjJNT_HINGE if hinge else mujoco.mjtJoint.mjJNT_SLIDE,
         axis=axis[3:] if hinge else axis[:3],
         limited=limited,
+        armature=_DRIVE_TIME * model.description.limits.servo[joint.idx_v] if limited else 0.0,
         range=[
             float(model.pinocchio.lowerPositionLimit[joint.idx_q]) if limited else 0.0,
             float(model.pinocchio.upperPositionLimit[joint.idx_q]) if limited else 0.0,
@@ -141,7 +148,7 @@ def _base_inertia(model: RobotModel) -> pin.Inertia:
     return centre.act(chassis) + fixed
 
 
-def _set_inertia(body: mujoco.MjsBody, inertia: pin.Inertia) -> None:
+def _set_inertia(body: MjsBody, inertia: pin.Inertia) -> None:
     moments, axes = np.linalg.eigh(inertia.inertia)
     axes[:, 2] *= np.sign(np.linalg.det(axes))
     body.explicitinertial = True
@@ -176,7 +183,7 @@ def _add_contact_shapes(model: RobotModel, mounts: Mounts) -> tuple[str, ...]:
     return tuple(shape.name for shape in solid)
 
 
-def _add_pairs(spec: mujoco.MjSpec, model: RobotModel) -> None:
+def _add_pairs(spec: MjSpec, model: RobotModel) -> None:
     """Let the robot touch itself only where the description says that it can."""
     description = model.description
     tools = {shape.name for shape in description.collision if shape.tool and description.gripper}
@@ -187,7 +194,7 @@ def _add_pairs(spec: mujoco.MjSpec, model: RobotModel) -> None:
                 spec.add_pair(name=f"{first}:{second}", geomname1=first, geomname2=second)
 
 
-def _add_servos(spec: mujoco.MjSpec, model: RobotModel) -> None:
+def _add_servos(spec: MjSpec, model: RobotModel) -> None:
     """Add a velocity servo on each joint: force = gain (command − velocity), within the effort limit."""
     limits = model.description.limits
     for name, gain, effort in zip(model.joints, limits.servo, limits.effort, strict=True):
@@ -197,7 +204,7 @@ def _add_servos(spec: mujoco.MjSpec, model: RobotModel) -> None:
         servo.set_to_velocity(kv=gain)
 
 
-def _add_meshes(spec: mujoco.MjSpec, model: RobotModel, mounts: Mounts) -> None:
+def _add_meshes(spec: MjSpec, model: RobotModel, mounts: Mounts) -> None:
     for mesh in placed_meshes(model):
         for index, piece in enumerate(pieces(mesh.path)):
             name = f"{mesh.name}_{index}"

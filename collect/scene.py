@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from handrail.collect import geometry
-from handrail.collect.gl import mujoco
+from handrail.collect.gl import MjSpec
 from handrail.controllers.arrays import FloatArray, frozen
 from handrail.controllers.errors import HandrailError, unknown_name
 from handrail.controllers.shape import Obstacle, Shape
@@ -127,14 +127,14 @@ class Scene:
         return tuple(item.obstacle() for item in self.objects if not (item.movable or item.ghost))
 
 
-def add_scene(spec: mujoco.MjSpec, scene: Scene) -> None:
+def add_scene(spec: MjSpec, scene: Scene) -> None:
     """Add the objects and the scene camera to the spec."""
     for item in scene.objects:
         _add_object(spec, item)
     spec.worldbody.add_camera(name="scene", fovy=scene.view.fovy, **_view_pose(scene.view))
 
 
-def _add_object(spec: mujoco.MjSpec, item: SceneObject) -> None:
+def _add_object(spec: MjSpec, item: SceneObject) -> None:
     body = spec.worldbody.add_body(name=item.name, **geometry.pose(item.position, item.rotation))
     if item.movable:
         body.add_freejoint(name=item.name)
@@ -170,7 +170,8 @@ def _view_pose(view: View) -> dict[str, FloatArray]:
     forward /= np.linalg.norm(forward)
     right = np.cross(forward, [0.0, 0.0, 1.0])
     right = right / np.linalg.norm(right) if np.any(right) else np.array([0.0, -1.0, 0.0])
-    return geometry.pose(position, np.column_stack([right, np.cross(right, forward), -forward]))
+    axes = np.column_stack([right, np.cross(right, forward), -forward])
+    return geometry.pose(position, axes.astype(np.float64))
 
 
 def box(size: Iterable[float]) -> Shape:

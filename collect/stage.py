@@ -1,10 +1,10 @@
 """What every scene stands on and is lit by: floor, sky, lights, solver options."""
 
 from handrail.collect import geometry
-from handrail.collect.gl import mujoco
+from handrail.collect.gl import MjSpec, mujoco
 
 
-def set_stage(spec: mujoco.MjSpec, timestep: float) -> None:
+def set_stage(spec: MjSpec, timestep: float) -> None:
     """Add floor, sky and lights, and set how the simulation integrates.
 
     Args:
@@ -23,17 +23,18 @@ def set_stage(spec: mujoco.MjSpec, timestep: float) -> None:
     _add_lights(spec)
 
 
-def _set_quality(spec: mujoco.MjSpec) -> None:
+def _set_quality(spec: MjSpec) -> None:
     visual = spec.visual
     visual.headlight.ambient = [0.35, 0.35, 0.37]
     visual.headlight.diffuse = [0.25, 0.25, 0.25]
     visual.headlight.specular = [0.05, 0.05, 0.05]
     visual.map.znear = 0.005
     visual.map.zfar = 20.0
+    visual.map.shadowclip = 1.6
     visual.rgba.haze = [0.82, 0.87, 0.92, 1.0]
 
 
-def _add_sky(spec: mujoco.MjSpec) -> None:
+def _add_sky(spec: MjSpec) -> None:
     spec.add_texture(
         name="sky",
         type=mujoco.mjtTexture.mjTEXTURE_SKYBOX,
@@ -45,7 +46,7 @@ def _add_sky(spec: mujoco.MjSpec) -> None:
     )
 
 
-def _add_floor(spec: mujoco.MjSpec) -> None:
+def _add_floor(spec: MjSpec) -> None:
     spec.add_texture(
         name="checker",
         type=mujoco.mjtTexture.mjTEXTURE_2D,
@@ -72,10 +73,10 @@ def _add_floor(spec: mujoco.MjSpec) -> None:
     )
 
 
-def _add_lights(spec: mujoco.MjSpec) -> None:
+def _add_lights(spec: MjSpec) -> None:
     for name, position, diffuse, shadow in (
-        ("sun", (-2.0, -2.5, 6.0), 0.55, True),
-        ("fill", (3.0, 3.0, 5.0), 0.20, False),
+        ("sun", (1.6, -2.0, 4.5), 0.55, True),
+        ("fill", (-3.0, 3.0, 5.0), 0.20, False),
     ):
         spec.worldbody.add_light(
             name=name,

@@ -1,6 +1,7 @@
-"""Arrow arrays from numpy arrays and strings, by their buffers.
+"""Arrow arrays from numpy arrays and strings, by their buffers, and back.
 
-`pyarrow.array` imports pandas on its first call, 0.5 to 1 s in the middle of a recording; this does not.
+`pyarrow.array` imports pandas on its first call, 0.5 to 1 s in the middle of a recording, and so does
+`to_numpy`; this does not.
 """
 
 from collections.abc import Sequence
@@ -55,3 +56,15 @@ def one_scalar(value: str | bool | int | float | None, kind: pa.DataType) -> pa.
     if value is None:
         return pa.nulls(1, kind)
     return strings([str(value)]) if kind == pa.string() else numbers(np.array([value]), kind)
+
+
+def to_numpy(values: pa.Array) -> np.ndarray:
+    """Return an Arrow array of numbers or truth values as a numpy array, `(N,)`; nulls become NaN."""
+    if values.null_count:
+        return values.to_numpy(zero_copy_only=False)
+    if values.type == pa.bool_():
+        packed = np.frombuffer(values.buffers()[1], np.uint8)
+        return (
+            np.unpackbits(packed, count=values.offset + len(values), bitorder="little")[values.offset :] != 0
+        )
+    return np.from_dlpack(values)  # type: ignore[arg-type]

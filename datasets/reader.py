@@ -14,7 +14,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from handrail.controllers.errors import HandrailError, unknown_name
-from handrail.datasets.arrow import numbers
+from handrail.datasets.arrow import numbers, to_numpy
 from handrail.datasets.layout import Layout
 from handrail.datasets.schema import Feature
 
@@ -161,7 +161,8 @@ def _episode_table(path: Path, episode: int, names: Sequence[str]) -> pa.Table:
         groups = [group for group in range(file.num_row_groups) if _may_hold(file.metadata, group, episode)]
         wanted = list(dict.fromkeys(("episode_index", *names)))
         table = file.read_row_groups(groups, columns=wanted)
-    return table.filter(numbers(table.column("episode_index").to_numpy() == episode, pa.bool_()))
+    mask = to_numpy(table.column("episode_index").combine_chunks()) == episode
+    return table.filter(numbers(mask, pa.bool_()))
 
 
 def _may_hold(metadata: pq.FileMetaData, group: int, episode: int) -> bool:
@@ -177,7 +178,7 @@ def _to_numpy(column: pa.ChunkedArray, feature: Feature) -> np.ndarray:
     values = column.combine_chunks()
     while isinstance(values, pa.ExtensionArray) or pa.types.is_nested(values.type):
         values = values.storage if isinstance(values, pa.ExtensionArray) else values.flatten()
-    flat = values.to_numpy(zero_copy_only=False).astype(feature.dtype)
+    flat = to_numpy(values).astype(feature.dtype)
     return flat if feature.is_scalar else flat.reshape(-1, *feature.shape)
 
 

@@ -24,7 +24,7 @@ HEADINGS = (
     "smoothness",
     "contacts",
 )
-TOOL = ("tool_x", "tool_y", "tool_z")
+TOOL = ("tool.x", "tool.y", "tool.z")
 STATE, ACTION = "observation.state", "action"
 MODE, DISTANCE, CONTACTS = "teleop.mode", "controller.smallest_distance", "safety.contacts"
 

@@ -142,6 +142,11 @@ class EpisodeWriter:
         return self._manifest.repo_id
 
     @property
+    def features(self) -> Mapping[str, Feature]:
+        """The columns that each frame must have."""
+        return self._manifest.features
+
+    @property
     def num_episodes(self) -> int:
         """Number of saved episodes."""
         return self._totals.episodes

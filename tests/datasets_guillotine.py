@@ -30,10 +30,10 @@ class Guillotine:
     def run(self, root: Path, k: int, script: Callable[[], object]) -> bool:
         """Run a script and kill it at its k-th change; return whether it lived to its end."""
         self._root, self._left, self.dead = str(root), k, False
-        lived = self._survives(script)
-        self._root = ""
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", ResourceWarning)
+            lived = self._survives(script)
+            self._root = ""
             gc.collect()  # a dead process holds no lock
         return lived
 

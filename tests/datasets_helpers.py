@@ -32,6 +32,7 @@ STATE_FEATURES = {
     "engaged": Feature("bool"),
     "wall_clock": Feature("float64"),
 }
+TINY_FEATURES = {key: STATE_FEATURES[key] for key in ("action", "teleop.mode")}  # for many quick episodes
 CAMERA_FEATURES = STATE_FEATURES | {key: Feature("video", (32, 48, 3)) for key in CAMERAS}
 
 
@@ -66,22 +67,23 @@ def record_one(writer: EpisodeWriter, cameras: bool) -> int:
     """Record and save the next episode."""
     episode = writer.num_episodes
     for index in range(length_of(episode)):
-        writer.add_frame(frame_of(episode, index, cameras), TASKS[episode // 2 % 2])
+        frame = frame_of(episode, index, cameras)
+        writer.add_frame({key: frame[key] for key in writer.features}, TASKS[episode // 2 % 2])
     return writer.save_episode({"success": episode % 2 == 0, "failure_reason": None, "seed": episode})
 
 
-def create(root: Path, cameras: bool = False, **options) -> EpisodeWriter:
-    features = CAMERA_FEATURES if cameras else STATE_FEATURES
+def create(root: Path, cameras: bool = False, features=None, **options) -> EpisodeWriter:
+    features = features or (CAMERA_FEATURES if cameras else STATE_FEATURES)
     return EpisodeWriter.create(root, REPO, FPS, features, ROBOT, {"handrail": "0"}, **options)
 
 
-def resume(root: Path, cameras: bool = False) -> EpisodeWriter:
-    features = CAMERA_FEATURES if cameras else STATE_FEATURES
+def resume(root: Path, cameras: bool = False, features=None) -> EpisodeWriter:
+    features = features or (CAMERA_FEATURES if cameras else STATE_FEATURES)
     return EpisodeWriter.resume(root, REPO, FPS, features, ROBOT, {"handrail": "0"})
 
 
-def record(root: Path, episodes: int, cameras: bool = False) -> Path:
-    with create(root, cameras) as writer:
+def record(root: Path, episodes: int, cameras: bool = False, features=None) -> Path:
+    with create(root, cameras, features) as writer:
         for _ in range(episodes):
             record_one(writer, cameras)
     return root

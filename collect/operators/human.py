@@ -86,7 +86,11 @@ class HumanHand:
         noise, drift = self._step_wander(time)
         settings = self._settings
         touched = np.abs(self._held) > 0
-        moved = self._held + settings.noise * np.abs(self._held) * noise + settings.drift * self._full * drift * touched
+        moved = (
+            self._held
+            + settings.noise * np.abs(self._held) * noise
+            + settings.drift * self._full * drift * touched
+        )
         return np.clip(moved, -self._full, self._full) if settings.noise or settings.drift else moved
 
     def _delayed(self, wanted: FloatArray, time: float) -> FloatArray:

@@ -68,7 +68,9 @@ MODES = {
         TeleopMode("base+ee", _always("base", "ee"), False, "steer base and hand at once"),
         TeleopMode("joints", _always("joint"), False, "steer every joint, kept safe by the MPC"),
         TeleopMode("switching", _by_focus, False, "drive the base, then steer the hand"),
-        TeleopMode("direct", _always("joint"), True, "all joint velocities, clipped to limits only: the baseline"),
+        TeleopMode(
+            "direct", _always("joint"), True, "all joint velocities, clipped to limits only: the baseline"
+        ),
     )
 }
 

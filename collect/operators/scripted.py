@@ -74,7 +74,9 @@ class ScriptedOperator:
 
     def _switch(self, focus: Focus, time: float) -> None:
         """Take the hand off the stick for a moment when the mode's channels change."""
-        changes = self._focus is not None and self._map.mode.groups(focus) != self._map.mode.groups(self._focus)
+        changes = self._focus is not None and self._map.mode.groups(focus) != self._map.mode.groups(
+            self._focus
+        )
         if changes:
             self._free_at = time + self._settings.switch_time
         self._focus = focus

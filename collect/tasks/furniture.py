@@ -7,15 +7,25 @@ from handrail.controllers.rotation import matrix_from_rpy
 from handrail.controllers.shape import Shape
 
 _WOOD: Colour = (0.72, 0.56, 0.40, 1.0)
+_CABINET: Colour = (0.87, 0.86, 0.83, 1.0)
 _WALL: Colour = (0.20, 0.42, 0.70, 1.0)
 _CONE: Colour = (0.90, 0.45, 0.10, 1.0)
 
 
 def table(name: str, x: float, y: float, size: tuple[float, float, float]) -> SceneObject:
     """Return a solid table on the floor, centred at x, y; size is depth, width, height [m]."""
-    return SceneObject(
-        name, box(size), np.array([x, y, size[2] / 2]), rgba=_WOOD, work_surface=True
+    depth, width, height = size
+    slab, inset = 0.04, 0.03
+    parts = (
+        Part(box([depth, width, slab]), np.array([0.0, 0.0, (height - slab) / 2])),
+        Part(
+            box([depth - 2 * inset, width - 2 * inset, height - slab]),
+            np.array([0.0, 0.0, -slab / 2]),
+            rgba=_CABINET,
+        ),
     )
+    centre = np.array([x, y, height / 2])
+    return SceneObject(name, box(size), centre, rgba=_WOOD, work_surface=True, parts=parts)
 
 
 def cube(name: str, x: float, y: float, bottom: float, yaw: float, edge: float, mass: float) -> SceneObject:

@@ -16,14 +16,15 @@ _MOST_OBSTACLES = 3
 _EDGE, _MASS = 0.05, 0.1  # of the cube [m], [kg]
 _BIN_HEIGHT = 0.10
 _POSE = ("x", "y", "z", "qw", "qx", "qy", "qz")
-_VIEW = View(position=(-2.9, -3.3, 3.0), target=(0.25, 0.0, 0.35), fovy=48.0)
+_VIEW = View(position=(3.0, 0.0, 3.5), target=(0.05, 0.0, 0.2), fovy=56.0)
 
 
 @dataclass(frozen=True)
 class PickPlace:
     """The tables are 2.7 m apart, farther than the arm reaches, so the base has to drive.
 
-    Success: the cube at rest inside the bin, the gripper open and away from it. Failure: the cube on the floor.
+    Success: the cube at rest inside the bin, the gripper open and away from it.
+    Failure: the cube on the floor.
 
     Attributes:
         name: of the task.

@@ -89,5 +89,10 @@ def _marker(goal: Pose) -> SceneObject:
     )
     ball = Part(Shape("sphere", np.array([0.03])), np.zeros(3), rgba=(0.95, 0.85, 0.2, 1.0))
     return SceneObject(
-        "goal", Shape("sphere", np.array([_ARROW])), goal.position, goal.rotation, ghost=True, parts=(*axes, ball)
+        "goal",
+        Shape("sphere", np.array([_ARROW])),
+        goal.position,
+        goal.rotation,
+        ghost=True,
+        parts=(*axes, ball),
     )

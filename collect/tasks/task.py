@@ -16,7 +16,7 @@ from handrail.controllers.shape import Obstacle
 
 @dataclass(frozen=True)
 class Episode:
-    """A sampled beginning: the scene, where the robot starts, (n,), and a goal of the tool if there is one."""
+    """A sampled beginning: the scene, where the robot starts, (n,), and the tool's goal if there is one."""
 
     scene: Scene
     q: FloatArray
