@@ -76,7 +76,7 @@ def episode_seed(seed: int, episode: int) -> int:
 
 
 def _session_columns(config: RecordConfig) -> dict[str, str | float]:
-    """Return what every episode's metadata says of the session; `handrail-replay` builds it anew from this."""
+    """Return what every episode's metadata says of the session; a replay builds it anew from this."""
     return {
         "environment": config.task,
         "robot": config.robot,

@@ -125,7 +125,7 @@ class Session:
 
 
 def action_of(command: Command, period: float) -> np.ndarray:
-    """Return the env's action: the velocity commanded at the end of the period and the gripper, (n + 1,) float32."""
+    """Return the env's action: velocity at the end of the period and gripper, (n + 1,) float32."""
     return np.append(command.velocity(period), command.gripper).astype(np.float32)
 
 

@@ -170,7 +170,8 @@ def _check(description: RobotDescription) -> None:
     used = {name for pair in description.self_pairs for name in pair}
     for name in used.union(description.scene_shapes, description.floor_shapes) - names:
         raise HandrailError(
-            f"collision shape {name!r} of robot {description.name}: expected one of {', '.join(sorted(names))}"
+            f"collision shape {name!r} of robot {description.name}: "
+            f"expected one of {', '.join(sorted(names))}"
         )
 
 

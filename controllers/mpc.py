@@ -27,6 +27,8 @@ from handrail.controllers.problem import Plan, Problem
 from handrail.controllers.real_time import RealTimeSolver
 from handrail.controllers.shape import Obstacle
 
+_LARGEST_INTENT = 10.0  # [m/s, rad/s]; beyond any robot's limits, and keeps the QP well scaled
+
 Prediction = Callable[[Intent, int], FloatArray]
 """Ψ: the intent and a number of stages N → predicted values on every channel, (N, m)."""
 
@@ -154,16 +156,18 @@ class MaskedMpc:
             if not plan.is_solution(problem):
                 status, plan = Status.SOLVER_FAILED, None
         health = self._health(state, status, plan)
-        velocities = self._brake(state) if plan is None else plan.v
+        velocities = self._brake(state, status) if plan is None else plan.v
         gripper = intent.gripper if np.isfinite(intent.gripper) else self._last_gripper()
         command = Command(velocities, setup.settings.dt, float(np.clip(gripper, 0.0, 1.0)), health)
-        self._memory = _Memory(plan, state.time, command)
+        time = state.time if np.isfinite(state.time) else self._memory.time
+        self._memory = _Memory(plan, time, command)
         return replace(command, health=replace(health, solve_time=perf_counter() - start))
 
     def problem(self, state: State, intent: Intent) -> Problem:
         """Return the optimal control problem of a state and an intent."""
         setup, settings = self._setup, self._setup.settings
         predicted = np.where(intent.mask, setup.predict(intent, settings.horizon), 0.0)
+        predicted = np.clip(predicted, -_LARGEST_INTENT, _LARGEST_INTENT)
         reference = np.tile(setup.residuals.reference, (settings.horizon, 1))
         reference[:, : setup.channels.size] = predicted
         weights = np.tile(setup.residuals.weights(np.asarray(intent.mask)), (settings.horizon, 1))
@@ -205,15 +209,19 @@ class MaskedMpc:
         weight = (stages - lower)[:, None]
         return (1.0 - weight) * padded[lower] + weight * padded[upper]
 
-    def _brake(self, state: State) -> FloatArray:
-        steps = self._setup.settings.horizon
-        finite = bool(np.all(np.isfinite(state.v)) and np.isfinite(state.time))
-        velocity = self._start_velocity(state) if finite else self._last_velocity()
-        return self._setup.limiter.brake(velocity, self._setup.settings.dt, steps)
+    def _brake(self, state: State, status: Status) -> FloatArray:
+        settings = self._setup.settings
+        trusted = status is not Status.INVALID_STATE
+        velocity = self._start_velocity(state) if trusted else self._last_velocity(state.time)
+        return self._setup.limiter.brake(velocity, settings.dt, settings.horizon)
 
-    def _last_velocity(self) -> FloatArray:
+    def _last_velocity(self, time: float) -> FloatArray:
+        """Return what is commanded at a time, which may be no number, (n,)."""
         command = self._memory.command
-        return np.zeros(self._setup.model.size) if command is None else command.velocities[1]
+        if command is None:
+            return np.zeros(self._setup.model.size)
+        elapsed = time - self._memory.time
+        return command.velocity(elapsed) if np.isfinite(elapsed) else command.velocities[1]
 
     def _last_gripper(self) -> float:
         return 0.0 if self._memory.command is None else self._memory.command.gripper

@@ -144,7 +144,7 @@ class StageResiduals:
         return np.concatenate([objective.weights(mask) for objective in self.objectives])
 
     def evaluate(self, q: FloatArray, v: FloatArray, u: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return residuals (N, r) and transposed Jacobians (N, 3n, r) by (q, v, u), overwritten by the next call."""
+        """Return residuals (N, r) and transposed Jacobians (N, 3n, r); the next call overwrites them."""
         n = q.shape[1]
         self._z[:, :n], self._z[:, n : 2 * n], self._z[:, 2 * n :] = q, v, u
         self._evaluate()

@@ -72,7 +72,7 @@ class RealTimeSolver:
         return hessian, gradient
 
     def _distance_rows(self, problem: Problem, q: FloatArray) -> tuple[_Rows, FloatArray]:
-        """Linearise `d ≥ bound` at the nodes after now; a pair that is inside its margin recovers gradually."""
+        """Linearise `d ≥ bound` at the nodes after now; a pair inside its margin recovers gradually."""
         horizon, size = self._shape
         distances = problem.collision.distances(q, float(problem.margins.max()) + problem.reach)
         now = distances.values[0]
@@ -129,7 +129,7 @@ class _LimitRows:
         self._taken = np.zeros((*self._offsets.shape, 2), dtype=bool)
 
     def add_violated(self, rows: _Rows, change: FloatArray, slack: float) -> bool:
-        """Add rows for the limits that a change (N, n) breaks beyond the slack; return whether there were any."""
+        """Add rows for the limits that a change (N, n) breaks beyond the slack; return whether any."""
         values = self._offsets + np.einsum("kaj,jn->kan", self._coefficients, change) / self._scales
         over = np.stack([values, -values], axis=-1) > 1.0 + slack + _LIMIT_TOLERANCE
         new = np.argwhere(over & ~self._taken)

@@ -37,7 +37,8 @@ class Shape:
         object.__setattr__(self, "size", frozen(self.size))
         if self.size.shape != (_SIZES[self.kind],) or not np.all(self.size > 0):
             raise HandrailError(
-                f"size of a {self.kind}: expected {_SIZES[self.kind]} positive lengths [m], got {self.size.tolist()}"
+                f"size of a {self.kind}: expected {_SIZES[self.kind]} positive lengths [m], "
+                f"got {self.size.tolist()}"
             )
 
 

@@ -15,7 +15,7 @@ _AXES = {"X": np.array([1.0, 0.0, 0.0]), "Y": np.array([0.0, 1.0, 0.0]), "Z": np
 
 @dataclass(frozen=True)
 class SymbolicPose:
-    """Position (3, 1), rotation world from frame (3, 3) and Jacobian (6, n) of a frame, as expressions of q."""
+    """Position (3, 1), rotation world from frame (3, 3), Jacobian (6, n) of a frame: expressions of q."""
 
     position: ca.SX
     rotation: ca.SX

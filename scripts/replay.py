@@ -24,7 +24,7 @@ def _replay(config: ReplayConfig) -> int:
 
     root = config.dataset.folder
     episodes = range(len(read_episodes(root))) if config.episode < 0 else [config.episode]
-    table = Table("episode", "largest deviation", "of", "tool at the end [m]", "success", "recorded", "contacts")
+    table = Table("episode", "largest deviation", "of", "tool at end [m]", "success", "recorded", "contacts")
     for episode in episodes:
         replay, pictures = replay_episode(root, episode, _PICTURES if config.sheet else 0)
         table.add_row(

@@ -85,14 +85,14 @@ class PickPlaceScript:
 
         return [
             phase("stage", stage, distance=0.10, angle=0.30),
-            phase("above", cube + [0, 0, 0.14], distance=0.02, angle=0.10),
-            phase("descend", cube + [0, 0, 0.004], distance=0.010, angle=0.10, pace=0.4, patience=8.0),
-            phase("grasp", cube + [0, 0, 0.004], distance=1.0, angle=3.2, gripper=1.0, dwell=1.2),
-            phase("lift", cube + [0, 0, 0.22], distance=0.04, angle=0.3, gripper=1.0, pace=0.6),
+            phase("above", _above(cube, 0.14), distance=0.02, angle=0.10),
+            phase("descend", _above(cube, 0.004), distance=0.010, angle=0.10, pace=0.4, patience=8.0),
+            phase("grasp", _above(cube, 0.004), distance=1.0, angle=3.2, gripper=1.0, dwell=1.2),
+            phase("lift", _above(cube, 0.22), distance=0.04, angle=0.3, gripper=1.0, pace=0.6),
         ]
 
     def _carry(self, pick: _Place, place: _Place, down: FloatArray, lane: float) -> list[Phase]:
-        """Pull the cube back until the base is behind the floor obstacles, cross, and go up to the other table."""
+        """Pull back until the base is behind the floor obstacles, cross, and go up to the other table."""
         height = max(pick.thing[2], place.thing[2]) + 0.30
         hand_lane = lane + _AHEAD
 
@@ -111,11 +111,11 @@ class PickPlaceScript:
         ]
 
     def _place(self, place: _Place, down: FloatArray, height: float) -> list[Phase]:
-        rim = place.thing + [0, 0, height]
+        rim = _above(place.thing, height)
         base = self._stand(place)
 
         def phase(name: str, rise: float, **options: float) -> Phase:
-            return Phase(name, Pose(rim + [0, 0, rise], down), base, **options)  # type: ignore[arg-type]
+            return Phase(name, Pose(_above(rim, rise), down), base, **options)  # type: ignore[arg-type]
 
         return [
             phase("over", 0.18, gripper=1.0, distance=0.03, angle=0.3),
@@ -151,6 +151,10 @@ class PickPlaceScript:
         return float(min(behind, default=0.0)) - self._model.description.base_size[0] / 2 - _CLEARANCE
 
 
+def _above(position: FloatArray, height: float) -> FloatArray:
+    return position + np.array([0.0, 0.0, height])
+
+
 def _front_edge(task: TaskState, table: str) -> float:
     """Return the x of a table's edge that faces the robot [m]."""
     item = task.object(table)
@@ -158,7 +162,7 @@ def _front_edge(task: TaskState, table: str) -> float:
 
 
 def grasp_rotation(tool: FloatArray, cube: FloatArray) -> FloatArray:
-    """Return the rotation that points the tool down, fingers square to the cube, nearest to the tool's now, (3, 3)."""
+    """Return the rotation nearest to the tool's that points it down, fingers square to the cube, (3, 3)."""
     yaw = np.arctan2(cube[1, 0], cube[0, 0])
     candidates = []
     for angle in yaw + np.pi / 2 * np.arange(4):

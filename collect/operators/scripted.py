@@ -40,8 +40,8 @@ class ScriptedOperator:
         model: RobotModel,
         script: Script,
         mode: TeleopMode,
-        human: HumanSettings = HumanSettings(),
-        gains: Gains = Gains(),
+        human: HumanSettings,
+        gains: Gains,
     ) -> None:
         self._script = script
         self._map = InputMap(model, mode, gains)

@@ -1,0 +1,39 @@
+# setup: a Python environment in .venv     demo: record five real episodes     test: the tests
+# check: everything that CI checks          format: put the code in order      constraints: pin what is installed
+# Another Python than the one found: make setup PYTHON=/path/to/python3.12
+
+.PHONY: setup demo test check format constraints
+.DELETE_ON_ERROR:
+.DEFAULT_GOAL := setup
+
+BIN := .venv/bin
+STAMP := .venv/.handrail-is-set-up
+DEMO := outputs/demo
+
+export HF_HUB_OFFLINE ?= 1
+
+setup: $(STAMP)
+
+$(STAMP): pyproject.toml constraints.txt .ci/setup
+	PYTHON="$(PYTHON)" sh .ci/setup
+	@touch $@
+
+demo: $(STAMP)
+	$(BIN)/handrail-demo --root $(DEMO) --overwrite
+
+test: $(STAMP)
+	$(BIN)/python -m pytest
+
+check: $(STAMP)
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/pyright
+	$(BIN)/python -m pytest
+	bash .ci/check_wheel
+
+format: $(STAMP)
+	$(BIN)/ruff check --fix-only .
+	$(BIN)/ruff format .
+
+constraints: $(STAMP)
+	$(BIN)/python .ci/constraints.py
