@@ -19,7 +19,8 @@ def roots() -> list[Requirement]:
     """Return what pyproject.toml asks for, all extras and the build's needs included."""
     data = tomllib.loads((ROOT / "pyproject.toml").read_text())
     extras = data["project"]["optional-dependencies"].values()
-    texts = [*data["project"]["dependencies"], *data["build-system"]["requires"], *(t for e in extras for t in e)]
+    texts = data["project"]["dependencies"] + data["build-system"]["requires"]
+    texts += [text for extra in extras for text in extra]
     return [Requirement(text) for text in texts]
 
 
@@ -27,7 +28,7 @@ def closure(requirements: list[Requirement]) -> dict[str, str]:
     """Return the installed version of every distribution that the requirements lead to."""
     versions: dict[str, str] = {}
     seen: set[tuple[str, str]] = set()
-    waiting = [(requirement.name, extra) for requirement in requirements for extra in ("", *requirement.extras)]
+    waiting = [(needed.name, extra) for needed in requirements for extra in ("", *needed.extras)]
     while waiting:
         name, extra = waiting.pop()
         name = canonicalize_name(name)
@@ -35,7 +36,7 @@ def closure(requirements: list[Requirement]) -> dict[str, str]:
             continue
         seen.add((name, extra))
         distribution = metadata.distribution(name)
-        versions[name] = distribution.version.split("+")[0]  # a local build such as +cpu is the reader's choice
+        versions[name] = distribution.version.split("+")[0]  # a build such as +cpu is the reader's choice
         for text in distribution.requires or []:
             needed = Requirement(text)
             if needed.marker is None or needed.marker.evaluate({"extra": extra}):

@@ -1,6 +1,7 @@
 """Checks an installed wheel from outside the repository: every module and every data file is there.
 
-python use_wheel.py REPOSITORY: compare with the repository; python use_wheel.py --commands: print the commands.
+python use_wheel.py REPOSITORY    compare with the repository
+python use_wheel.py --commands    print the commands
 """
 
 import importlib

@@ -9,19 +9,20 @@ from handrail.controllers.arrays import FloatArray
 from handrail.controllers.description import Gripper
 
 _STEEL, _RUBBER = (0.30, 0.31, 0.33, 1.0), (0.10, 0.10, 0.11, 1.0)
-_PALM_LENGTH = 0.155  # of the drawn palm, along the frame's z [m]
 _REFLECTED = 1.0  # inertia of the motor behind each finger, seen through its gear [kg]
 
 
 def add_gripper(spec: MjSpec, gripper: Gripper, mount: MjsBody, frame: pin.SE3) -> None:
     """Add palm mass, fingers, their servo and the wrist camera to the body that carries the frame."""
     palm = mount.add_body(name="gripper", gravcomp=1.0, **geometry.pose(frame.translation, frame.rotation))
-    size = np.array([0.12, 0.08, _PALM_LENGTH])
+    length = gripper.tip - gripper.finger_size[2]
+    size = np.array([gripper.stroke, gripper.stroke, length])
     palm.explicitinertial = True
-    palm.mass, palm.ipos, palm.iquat = gripper.mass, [0.0, 0.0, _PALM_LENGTH / 2], [1.0, 0.0, 0.0, 0.0]
+    palm.mass, palm.ipos, palm.iquat = gripper.mass, [0.0, 0.0, length / 2], [1.0, 0.0, 0.0, 0.0]
     palm.inertia = geometry.box_inertia(gripper.mass, size)
     _add_finger(palm, gripper, "finger_left", -1.0)
     _add_finger(palm, gripper, "finger_right", 1.0)
+    _add_rail(palm, gripper)
     _couple(spec)
     _add_servo(spec, gripper)
     palm.add_camera(name="wrist", fovy=70.0, **_camera_pose(gripper))
@@ -59,20 +60,17 @@ def _add_finger(palm: MjsBody, gripper: Gripper, name: str, side: float) -> None
         group=geometry.VISIBLE_GROUP,
         rgba=_RUBBER,
     )
-    _add_carriage(finger, gripper, name)
 
 
-def _add_carriage(finger: MjsBody, gripper: Gripper, name: str) -> None:
-    """Draw what joins the finger to the palm."""
+def _add_rail(palm: MjsBody, gripper: Gripper) -> None:
+    """Draw what the fingers slide on."""
     width, depth, length = gripper.finger_size
-    gap = gripper.tip - length - _PALM_LENGTH
-    if gap <= 0:
-        return
-    finger.add_geom(
-        name=f"{name}_carriage",
+    thickness = min(0.025, (gripper.tip - length) / 2)
+    palm.add_geom(
+        name="rail",
         type=mujoco.mjtGeom.mjGEOM_BOX,
-        size=[width / 2, depth / 2, gap / 2],
-        pos=[0.0, 0.0, -(length + gap) / 2],
+        size=[gripper.stroke / 2 + width, depth / 2, thickness / 2],
+        pos=[0.0, 0.0, gripper.tip - length - thickness / 2],
         contype=0,
         conaffinity=0,
         group=geometry.VISIBLE_GROUP,

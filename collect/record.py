@@ -148,6 +148,9 @@ def _summary(config: RecordConfig, outcomes: list[Outcome]) -> Table:
         "contacts": str(sum(outcome.contacts for outcome in outcomes)),
         "braked updates": str(sum(outcome.brakes for outcome in outcomes)),
     }
+    spent = {part: sum(outcome.spent.get(part, 0.0) for outcome in outcomes) for part in outcomes[0].spent}
+    frames = sum(outcome.frames for outcome in outcomes)
+    rows["time a frame"] = ", ".join(f"{part} {1e3 * time / frames:.2f} ms" for part, time in spent.items())
     table = Table(show_header=False, box=None)
     for name, value in rows.items():
         table.add_row(name, value)

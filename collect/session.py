@@ -1,7 +1,8 @@
 """The one loop that runs task, operator, controller and recorder: observe, ask, complete, act, record."""
 
+import contextlib
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -30,6 +31,7 @@ class Outcome:
         late: periods that a real-time loop overran.
         contacts: forbidden contacts.
         smallest_distance: smallest signed distance, tool against work surfaces left out [m].
+        spent: where the wall time went, by part of the loop [s].
     """
 
     seed: int
@@ -42,6 +44,7 @@ class Outcome:
     late: int
     contacts: int
     smallest_distance: float
+    spent: Mapping[str, float]
 
 
 class Observer(Protocol):
@@ -97,10 +100,13 @@ class Session:
         done = False
         while not done:
             wall_clock = time.time()
-            intent = self._operator.act(self._view())
-            command = self._controller.update(self.env.state(), intent)
+            with tally.timed("operator"):
+                intent = self._operator.act(self._view())
+            with tally.timed("controller"):
+                command = self._controller.update(self.env.state(), intent)
             action = action_of(command, 1.0 / self.env.fps)
-            following, _, terminated, truncated, info = self.env.step(action)
+            with tally.timed("environment"):
+                following, _, terminated, truncated, info = self.env.step(action)
             moment = Moment(
                 state=observation["agent_pos"],
                 environment=observation["environment_state"],
@@ -111,8 +117,9 @@ class Session:
                 contacts=info["contacts"],
                 wall_clock=wall_clock,
             )
-            for observer in self._observers:
-                observer.see(moment)
+            with tally.timed("observers"):
+                for observer in self._observers:
+                    observer.see(moment)
             tally.add(moment)
             observation, done = following, terminated or truncated
             if self._realtime:
@@ -138,6 +145,14 @@ class _Tally:
         self._start = time.perf_counter()
         self._frames = self._brakes = self._late = self._contacts = 0
         self._smallest = np.inf
+        self._spent: dict[str, float] = {}
+
+    @contextlib.contextmanager
+    def timed(self, part: str) -> Iterator[None]:
+        """Add the time of a block to a part of the loop."""
+        start = time.perf_counter()
+        yield
+        self._spent[part] = self._spent.get(part, 0.0) + time.perf_counter() - start
 
     def add(self, moment: Moment) -> None:
         self._frames += 1
@@ -165,4 +180,5 @@ class _Tally:
             late=self._late,
             contacts=self._contacts,
             smallest_distance=float(self._smallest),
+            spent=dict(self._spent),
         )

@@ -3,9 +3,31 @@
 A file is written under a temporary name on the same file system, synced, renamed, and the folder synced.
 """
 
+import contextlib
 import os
 import shutil
+from collections.abc import Iterator
 from pathlib import Path
+
+from handrail.controllers.errors import HandrailError
+
+
+@contextlib.contextmanager
+def explained(what: str) -> Iterator[None]:
+    """Turn an error of the operating system into one line that says what failed.
+
+    Raises:
+        HandrailError: For every OSError.
+    """
+    try:
+        yield
+    except OSError as error:
+        raise HandrailError(f"{what}: {reason(error)}") from error
+
+
+def reason(error: Exception) -> str:
+    """Return why something failed, in the words of the operating system where it has any."""
+    return getattr(error, "strerror", None) or str(error)
 
 
 def write_synced(path: Path, data: bytes) -> None:

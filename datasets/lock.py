@@ -3,6 +3,7 @@
 import contextlib
 import fcntl
 import os
+from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO
 
@@ -39,6 +40,15 @@ class DatasetLock:
                 self._path.parent.rmdir()
         finally:
             file.close()
+
+    @contextlib.contextmanager
+    def released_on_error(self) -> Iterator[None]:
+        """Give the lock back if what is done under it fails."""
+        try:
+            yield
+        except BaseException:
+            self.release()
+            raise
 
     def _acquire(self) -> BinaryIO:
         while True:

@@ -15,8 +15,8 @@ import pyarrow.parquet as pq
 
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.arrow import numbers
-from handrail.datasets.atomic import make_folder, write_synced
-from handrail.datasets.folder import check_target, clear_staging
+from handrail.datasets.atomic import explained, make_folder, write_synced
+from handrail.datasets.folder import check_target
 from handrail.datasets.layout import Layout
 from handrail.datasets.lock import DatasetLock
 from handrail.datasets.manifest import read_manifest
@@ -41,7 +41,7 @@ def pack(root: str | Path, output_root: str | Path) -> None:
     source, target = (Layout(Path(path).expanduser().absolute()) for path in (root, output_root))
     manifest = read_manifest(source)
     check_target(target, overwrite=False)
-    try:
+    with explained(f"cannot pack into {str(target.root)!r}"):
         lock = DatasetLock(source.staging)
         try:
             _, totals = repair_locked(source, manifest, thorough=False)
@@ -52,10 +52,7 @@ def pack(root: str | Path, output_root: str | Path) -> None:
             _copy_videos(source, target, video_keys(manifest.features), totals.episodes)
             _write_summary(target, totals, info_bytes(manifest, totals))
         finally:
-            clear_staging(source)
             lock.release()
-    except OSError as error:
-        raise HandrailError(f"cannot pack into {str(target.root)!r}: {error.strerror or error}") from error
 
 
 def _pack_data(source: Layout, target: Layout, episodes: int) -> list[int]:

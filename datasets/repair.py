@@ -15,8 +15,7 @@ from pathlib import Path
 
 import pyarrow as pa
 
-from handrail.controllers.errors import HandrailError
-from handrail.datasets.atomic import remove, replace, sync_folder
+from handrail.datasets.atomic import explained, remove, replace, sync_folder
 from handrail.datasets.folder import clear_staging, set_aside
 from handrail.datasets.layout import Layout, episode_of
 from handrail.datasets.lock import DatasetLock
@@ -86,16 +85,12 @@ def repair(root: str | Path, thorough: bool = True) -> RepairReport:
     """
     layout = Layout(Path(root).expanduser().absolute())
     manifest = read_manifest(layout)
-    try:
+    with explained(f"cannot repair dataset {str(layout.root)!r}"):
         lock = DatasetLock(layout.staging)
         try:
             return repair_locked(layout, manifest, thorough)[0]
         finally:
             lock.release()
-    except OSError as error:
-        raise HandrailError(
-            f"cannot repair dataset {str(layout.root)!r}: {error.strerror or error}"
-        ) from error
 
 
 def repair_locked(layout: Layout, manifest: Manifest, thorough: bool) -> tuple[RepairReport, Totals]:

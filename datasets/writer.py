@@ -12,12 +12,21 @@ commit**, then `info.json` and `stats.json`. A disk that fills up is noticed bef
 import contextlib
 import json
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Self
 
 from handrail.controllers.errors import HandrailError
-from handrail.datasets.atomic import make_folder, move, remove, replace, sync_folder, write_synced
+from handrail.datasets.atomic import (
+    explained,
+    make_folder,
+    move,
+    reason,
+    remove,
+    replace,
+    sync_folder,
+    write_synced,
+)
 from handrail.datasets.columns import ColumnTypes, Scalar, column_types, fit_columns, plain_columns
 from handrail.datasets.episode import OpenEpisode, numeric_stats
 from handrail.datasets.folder import check_target, clear_dataset, clear_staging
@@ -85,9 +94,9 @@ class EpisodeWriter:
         manifest = Manifest(repo_id, fps, robot_type, dict(features), dict(versions or {}))
         manifest.check()
         check_target(layout, overwrite)
-        with _explained(f"cannot create dataset {str(layout.root)!r}"):
+        with explained(f"cannot create dataset {str(layout.root)!r}"):
             lock = DatasetLock(layout.staging)
-            with _released_on_error(lock):
+            with lock.released_on_error():
                 check_target(layout, overwrite)  # again: another recorder may have been faster
                 clear_dataset(layout)
                 replace(layout.manifest, manifest.to_bytes(), layout.staging)
@@ -123,9 +132,9 @@ class EpisodeWriter:
         manifest = Manifest(repo_id, fps, robot_type, dict(features), dict(versions or {}))
         manifest.check()
         manifest.check_continues(existing, layout.root)
-        with _explained(f"cannot resume dataset {str(layout.root)!r}"):
+        with explained(f"cannot resume dataset {str(layout.root)!r}"):
             lock = DatasetLock(layout.staging)
-            with _released_on_error(lock):
+            with lock.released_on_error():
                 _, totals = repair_locked(layout, existing, thorough=False)
                 last = layout.row(totals.episodes - 1) if totals.episodes else None
                 types = None if last is None else read_column_types(last)
@@ -203,9 +212,7 @@ class EpisodeWriter:
         self._types, self._totals, episode = types, totals, self.num_episodes
         self._episode = OpenEpisode(self._layout, self._manifest)
         self._unusable = ""
-        with _explained(
-            f"episode {episode} is saved, but the summary files are late; `repair` rebuilds them"
-        ):
+        with explained(f"episode {episode} is saved, but the summary files are late; `repair` rebuilds them"):
             self._publish_summary(episode)
         return episode
 
@@ -221,7 +228,7 @@ class EpisodeWriter:
         with contextlib.suppress(OSError):  # the next `resume` or `repair` removes what is left
             self._discard()
         self._unusable = "is closed"
-        with _explained(f"cannot close dataset {str(self.root)!r}"):
+        with explained(f"cannot close dataset {str(self.root)!r}"):
             self._lock.release()
 
     def __enter__(self) -> Self:
@@ -285,8 +292,8 @@ class EpisodeWriter:
                 remove(path)
             self._discard()
         self._unusable = ""
-        reason = error if isinstance(error, HandrailError) else _reason(error)
-        return HandrailError(f"episode {number} in {str(self.root)!r} could not be saved: {reason}; {saved}")
+        why = error if isinstance(error, HandrailError) else reason(error)
+        return HandrailError(f"episode {number} in {str(self.root)!r} could not be saved: {why}; {saved}")
 
     def _discard(self) -> None:
         self._episode.cancel()
@@ -296,25 +303,3 @@ class EpisodeWriter:
     def _check_usable(self) -> None:
         if self._unusable:
             raise HandrailError(f"writer of {str(self.root)!r} {self._unusable}: resume the dataset instead")
-
-
-@contextlib.contextmanager
-def _explained(what: str) -> Iterator[None]:
-    """Turn an error of the operating system into one line."""
-    try:
-        yield
-    except OSError as error:
-        raise HandrailError(f"{what}: {_reason(error)}") from error
-
-
-@contextlib.contextmanager
-def _released_on_error(lock: DatasetLock) -> Iterator[None]:
-    try:
-        yield
-    except BaseException:
-        lock.release()
-        raise
-
-
-def _reason(error: Exception) -> str:
-    return getattr(error, "strerror", None) or str(error)

@@ -9,11 +9,11 @@ from datasets_helpers import FPS, REPO, ROBOT, record
 from handrail.datasets.metrics import sparc
 from handrail.datasets.reader import read_episodes, read_frames, read_info
 from handrail.datasets.schema import Feature
-from handrail.datasets.summary import HEADINGS, summarize
+from handrail.datasets.summary import HEADINGS, TOOL, summarize
 from handrail.datasets.writer import EpisodeWriter
 
 FEATURES = {
-    "observation.state": Feature("float32", (4,), ("x", "tool_x", "tool_y", "tool_z")),
+    "observation.state": Feature("float32", (4,), ("x", *TOOL)),
     "action": Feature("float32", (2,), ("v_x", "gripper")),
     "teleop.mode": Feature("string"),
     "controller.smallest_distance": Feature("float32"),

@@ -1,0 +1,153 @@
+"""The scripted operator's laws: a perfect hand is transparent, a human one is late, noisy and repeatable."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from handrail.collect.operators.human import HumanHand, HumanSettings
+from handrail.collect.operators.modes import MODES, InputMap, Wish, find_mode
+from handrail.collect.operators.pick_place_script import grasp_rotation
+from handrail.collect.operators.standing import standing_point
+from handrail.collect.operators.steering import Gains, base_twist, hand_twist
+from handrail.controllers.errors import HandrailError
+from handrail.controllers.model import Pose, load_model
+
+MODEL = load_model()
+HOME = MODEL.description.home
+FULL = np.array([0.5, 0.5, 1.0])
+PERIOD = 0.05
+
+
+def signal(steps=200):
+    times = PERIOD * np.arange(steps)
+    return times, 0.4 * np.sin(np.outer(times, [1.0, 0.7, 0.3]))
+
+
+def run(settings, wanted, times, seed=0):
+    hand = HumanHand(settings, FULL)
+    hand.reset(np.random.default_rng(seed))
+    return np.array([hand.move(row, time) for row, time in zip(wanted, times, strict=True)])
+
+
+def test_a_perfect_hand_is_transparent():
+    times, wanted = signal()
+    np.testing.assert_array_equal(run(HumanSettings.perfect(), wanted, times), wanted)
+    np.testing.assert_array_equal(run(HumanSettings().scaled(0.0), wanted, times), wanted)
+
+
+def test_delay_is_a_shift():
+    times, wanted = signal()
+    late = run(HumanSettings(0.2, 0, 0, 0, 0, 0, 0), wanted, times)
+    np.testing.assert_allclose(late[4:], wanted[:-4])
+    np.testing.assert_array_equal(late[:4], 0.0)
+
+
+def test_corrections_are_intermittent():
+    times, wanted = signal()
+    held = run(HumanSettings(0, 0.35, 0, 0, 0, 0, 0), wanted, times)
+    moves = np.flatnonzero(np.any(np.diff(held, axis=0), axis=1))
+    assert len(moves) > 10
+    assert np.min(np.diff(times[moves])) >= 0.35 - 1e-9
+
+
+def test_letting_go_is_immediate():
+    times = PERIOD * np.arange(5)
+    wanted = np.array([[0.3, 0, 0]] * 2 + [[0.0, 0, 0]] * 3)
+    held = run(HumanSettings(0, 10.0, 0, 0, 0, 0, 0), wanted, times)
+    np.testing.assert_array_equal(held[2:], 0.0)
+
+
+def test_noise_grows_with_the_signal_and_rests_at_rest():
+    times = PERIOD * np.arange(4000)
+    settings = HumanSettings(0, 0, 0, 0.1, 0.0, 0.5, 0)
+    small = run(settings, np.tile([0.1, 0, 0], (4000, 1)), times)
+    large = run(settings, np.tile([0.4, 0, 0], (4000, 1)), times)
+    assert np.std(small[:, 0]) == pytest.approx(0.01, rel=0.2)
+    assert np.std(large[:, 0]) == pytest.approx(0.04, rel=0.2)
+    np.testing.assert_array_equal(small[:, 1:], 0.0)
+
+
+def test_the_same_seed_is_the_same_hand():
+    times, wanted = signal()
+    first, again, other = (run(HumanSettings(), wanted, times, seed) for seed in (1, 1, 2))
+    np.testing.assert_array_equal(first, again)
+    assert not np.array_equal(first, other)
+
+
+def test_the_hand_never_leaves_the_stick():
+    times, _ = signal()
+    wanted = np.tile(FULL, (len(times), 1))
+    moved = run(HumanSettings(0, 0, 0, 1.0, 1.0, 0.5, 0), wanted, times)
+    assert np.all(np.abs(moved) <= FULL)
+
+
+@pytest.mark.parametrize("value", [-0.1, np.nan, np.inf])
+def test_wrong_settings_are_refused(value):
+    with pytest.raises(HandrailError, match=r"--human\.noise: expected a finite number"):
+        HumanSettings(noise=value)
+
+
+def wish(focus="hand"):
+    return Wish(np.array([0.1, -0.05, 0.1, 0.1, 0.0, -0.2]), np.array([0.2, 0.1, 0.1]), focus)
+
+
+@pytest.mark.parametrize("name", sorted(MODES))
+@pytest.mark.parametrize("focus", ["hand", "base"])
+def test_a_mode_speaks_only_on_its_channels(name, focus):
+    inputs = InputMap(MODEL, find_mode(name), Gains())
+    mask = inputs.mask(focus)
+    values = inputs.values(wish(focus), HOME)
+    assert np.any(values[mask])
+    np.testing.assert_array_equal(values[~mask], 0.0)
+    assert np.all(np.abs(values) <= inputs.full)
+
+
+def test_switching_follows_the_focus():
+    inputs = InputMap(MODEL, find_mode("switching"), Gains())
+    np.testing.assert_array_equal(inputs.mask("hand"), inputs.channels.mask("ee"))
+    np.testing.assert_array_equal(inputs.mask("base"), inputs.channels.mask("base"))
+
+
+def test_joint_inputs_move_the_hand_as_wished():
+    inputs = InputMap(MODEL, find_mode("direct"), Gains())
+    velocities = inputs.values(wish(), HOME)[inputs.channels.joint_slice]
+    twist = MODEL.jacobian(HOME) @ velocities
+    np.testing.assert_allclose(twist, wish().hand, atol=0.02)
+
+
+def test_steering_points_at_the_goal():
+    rng = np.random.default_rng(0)
+    for _ in range(20):
+        goal = Pose(rng.uniform(-1, 1, 3), Rotation.random(rng=rng).as_matrix())
+        tool = Pose(rng.uniform(-1, 1, 3), Rotation.random(rng=rng).as_matrix())
+        twist = hand_twist(tool, goal, Gains())
+        h = 1e-3
+        nearer = Rotation.from_rotvec(h * twist[3:]).as_matrix() @ tool.rotation
+        assert np.linalg.norm(goal.position - tool.position - h * twist[:3]) < np.linalg.norm(
+            goal.position - tool.position
+        )
+        assert np.trace(goal.rotation @ nearer.T) > np.trace(goal.rotation @ tool.rotation.T)
+    np.testing.assert_allclose(hand_twist(tool, tool, Gains()), 0.0, atol=1e-12)
+
+
+def test_driving_is_in_the_base_frame():
+    q = np.array(HOME)
+    q[2] = np.pi / 2
+    goal = np.array([q[0], q[1] + 5.0, np.pi / 2])  # straight ahead
+    np.testing.assert_allclose(base_twist(q, goal, Gains()), [Gains().base_speed, 0, 0], atol=1e-12)
+
+
+def test_the_base_stands_where_the_place_is_in_reach():
+    place = np.array([0.5, 0.4, 0.7])
+    spot = standing_point(MODEL, place)
+    assert 0.8 < np.linalg.norm(place[:2] - spot[:2]) < 1.5
+
+
+def test_grasps_point_down_and_are_square_to_the_cube():
+    for yaw in np.linspace(-np.pi, np.pi, 17):
+        cube = Rotation.from_euler("z", yaw).as_matrix()
+        grasp = grasp_rotation(MODEL.pose(HOME).rotation, cube)
+        np.testing.assert_allclose(grasp[:, 2], [0, 0, -1], atol=1e-12)
+        assert np.linalg.det(grasp) == pytest.approx(1.0)
+        across = cube.T @ grasp[:, 0]
+        assert np.max(np.abs(across)) == pytest.approx(1.0)
