@@ -47,14 +47,13 @@ def count_frames(path: Path) -> int:
     """Return how many pictures an mp4 really holds; every packet is read.
 
     Raises:
-        HandrailError: The file is not a whole mp4.
-        OSError: It cannot be opened.
+        HandrailError: The file is not there or not a whole mp4.
     """
     try:
         with av.open(str(path)) as container:
             sizes = [packet.size for packet in container.demux(video=0)]
         return sum(size > 0 for size in sizes)
-    except (av.error.InvalidDataError, av.error.EOFError, IndexError) as error:
+    except (av.error.FFmpegError, IndexError) as error:
         raise HandrailError(f"video {str(path)!r}: expected a whole mp4, got {error}") from error
 
 

@@ -146,11 +146,6 @@ class EpisodeWriter:
         return self._layout.root
 
     @property
-    def repo_id(self) -> str:
-        """The dataset's name."""
-        return self._manifest.repo_id
-
-    @property
     def features(self) -> Mapping[str, Feature]:
         """The columns that each frame must have."""
         return self._manifest.features
@@ -257,9 +252,8 @@ class EpisodeWriter:
         write_synced(staging / "tasks.parquet", tasks_bytes(totals.tasks))
         write_synced(staging / "info.json", info_bytes(self._manifest, totals))
         write_synced(staging / "stats.json", stats_bytes(totals.stats or {}))
-        for _, path in self._streams():
+        for path in (self._layout.row(self.num_episodes), *(path for _, path in self._streams())):
             make_folder(path.parent)
-        make_folder(self._layout.row(self.num_episodes).parent)
         return totals
 
     def _streams(self) -> list[tuple[Path, Path]]:
@@ -285,9 +279,7 @@ class EpisodeWriter:
     def _abandoned(self, error: Exception) -> HandrailError:
         """Drop the episode that could not be saved and return the error that says so."""
         number, saved = self.num_episodes, f"the {self.num_episodes} saved episodes are whole"
-        with contextlib.suppress(
-            OSError
-        ):  # leftovers are overwritten by the next save, or removed by `repair`
+        with contextlib.suppress(OSError):  # the next save overwrites leftovers, `repair` removes them
             for _, path in self._streams():
                 remove(path)
             self._discard()
