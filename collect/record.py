@@ -5,6 +5,7 @@ import signal
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from types import FrameType
+from typing import Self
 
 import numpy as np
 from rich.console import Console
@@ -109,17 +110,21 @@ def _record_all(
     console: Console,
 ) -> None:
     """Record until the number is reached, the operator interrupts, or the disk or an encoder fails."""
-    with _progress(console) as progress, _termination_interrupts():
+    with _progress(console) as progress, _Interrupts() as interrupts:
         bar = progress.add_task("recording", total=config.dataset.num_episodes, success="–")
         try:
             while len(log.outcomes) < config.dataset.num_episodes:
                 outcome = session.run(episode_seed(config.seed, writer.num_episodes))
-                recorder.save(outcome)
-                log.outcomes.append(outcome)
+                with interrupts.deferred():
+                    recorder.save(outcome)
+                    log.outcomes.append(outcome)
                 rate = f"{log.successes}/{len(log.outcomes)} succeeded"
                 progress.update(bar, advance=1, success=rate)
         except KeyboardInterrupt:
-            log.trouble, log.exit_code = "interrupted: the open episode is dropped", INTERRUPTED
+            log.trouble, log.exit_code = (
+                "interrupted; the open episode is dropped, the saved ones are whole",
+                INTERRUPTED,
+            )
         except HandrailError as error:
             log.trouble, log.exit_code = str(error), FAILED
 
@@ -178,15 +183,32 @@ def _progress(console: Console) -> Progress:
     )
 
 
-@contextlib.contextmanager
-def _termination_interrupts() -> Iterator[None]:
-    """Let SIGTERM end a recording as Ctrl-C does."""
+class _Interrupts:
+    """Ends a recording on Ctrl-C or SIGTERM: at once between saves, after it during one."""
 
-    def interrupt(number: int, frame: FrameType | None) -> None:
-        raise KeyboardInterrupt
+    _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
-    previous = signal.signal(signal.SIGTERM, interrupt)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, previous)
+    def __enter__(self) -> Self:
+        self._deferring = self._asked = False
+        self._previous = {number: signal.signal(number, self._interrupt) for number in self._SIGNALS}
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for number, handler in self._previous.items():
+            signal.signal(number, handler)
+
+    @contextlib.contextmanager
+    def deferred(self) -> Iterator[None]:
+        """Let the block finish before an interrupt takes effect."""
+        self._deferring = True
+        try:
+            yield
+        finally:
+            self._deferring = False
+        if self._asked:
+            raise KeyboardInterrupt
+
+    def _interrupt(self, number: int, frame: FrameType | None) -> None:
+        self._asked = True
+        if not self._deferring:
+            raise KeyboardInterrupt

@@ -43,6 +43,7 @@ class Recorder:
                 "success": outcome.success,
                 "failure_reason": outcome.failure_reason,
                 "seed": outcome.seed,
+                "started": outcome.started,
                 "wall_time": outcome.wall_time,
                 "brakes": outcome.brakes,
                 "late": outcome.late,

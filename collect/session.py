@@ -32,6 +32,7 @@ class Outcome:
         contacts: forbidden contacts.
         smallest_distance: smallest signed distance, tool against work surfaces left out [m].
         spent: where the wall time went, by part of the loop [s].
+        started: Unix time at its beginning [s].
     """
 
     seed: int
@@ -45,6 +46,7 @@ class Outcome:
     contacts: int
     smallest_distance: float
     spent: Mapping[str, float]
+    started: float
 
 
 class Observer(Protocol):
@@ -99,7 +101,7 @@ class Session:
         tally = _Tally(seed, 1.0 / self.env.fps)
         done = False
         while not done:
-            wall_clock = time.time()
+            wall_clock = tally.elapsed
             with tally.timed("operator"):
                 intent = self._operator.act(self._view())
             with tally.timed("controller"):
@@ -142,10 +144,16 @@ class _Tally:
     def __init__(self, seed: int, period: float) -> None:
         self._seed = seed
         self._period = period
+        self._started = time.time()
         self._start = time.perf_counter()
         self._frames = self._brakes = self._late = self._contacts = 0
         self._smallest = np.inf
         self._spent: dict[str, float] = {}
+
+    @property
+    def elapsed(self) -> float:
+        """Wall time since the episode began [s]."""
+        return time.perf_counter() - self._start
 
     @contextlib.contextmanager
     def timed(self, part: str) -> Iterator[None]:
@@ -175,10 +183,11 @@ class _Tally:
             failure_reason=str(info["failure_reason"]),
             frames=self._frames,
             seconds=self._frames * self._period,
-            wall_time=time.perf_counter() - self._start,
+            wall_time=self.elapsed,
             brakes=self._brakes,
             late=self._late,
             contacts=self._contacts,
             smallest_distance=float(self._smallest),
             spent=dict(self._spent),
+            started=self._started,
         )

@@ -24,7 +24,7 @@ class Moment:
         action: what was commanded: velocities at the end of the period and the gripper, (n + 1,).
         health: of the controller.
         contacts: forbidden contacts in the period.
-        wall_clock: Unix time at its beginning [s].
+        wall_clock: wall time since the episode began [s].
     """
 
     state: FloatArray

@@ -45,8 +45,7 @@ def text(document: str) -> str:
 def command_lines(document: str) -> list[str]:
     """Return the lines of the shell blocks, continued lines joined, comments left out."""
     blocks = re.findall(r"^```(?:sh|bash|console)\n(.*?)^```", text(document), flags=re.DOTALL | re.MULTILINE)
-    lines = "\n".join(blocks).replace("\\\n", " ").splitlines()
-    return [" ".join(shlex.split(line, comments=True)) and line for line in lines if line.strip()]
+    return "\n".join(blocks).replace("\\\n", " ").splitlines()
 
 
 def commands(prefix: str) -> list[list[str]]:
@@ -57,7 +56,11 @@ def commands(prefix: str) -> list[list[str]]:
 def table(heading: str) -> set[str]:
     """Return the code words of the first column of the README's table under a heading."""
     section = text("README.md").split(f"\n## {heading}\n")[1].split("\n## ")[0]
-    return {name for row in re.findall(r"^\| (`.*?) \|", section, re.MULTILINE) for name in re.findall("`(.*?)`", row)}
+    return {
+        name
+        for row in re.findall(r"^\| (`.*?) \|", section, re.MULTILINE)
+        for name in re.findall("`(.*?)`", row)
+    }
 
 
 def test_every_command_is_known_and_shown():

@@ -51,7 +51,9 @@ def test_every_data_file_is_listed():
         path
         for package, patterns in SETUPTOOLS["package-data"].items()
         for pattern in patterns
-        for path in ROOT.joinpath(*package.split(".")[1:]).glob(pattern + ("/*" if pattern.endswith("**") else ""))
+        for path in ROOT.joinpath(*package.split(".")[1:]).glob(
+            pattern + ("/*" if pattern.endswith("**") else "")
+        )
     }
     data = {
         path
