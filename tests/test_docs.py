@@ -1,4 +1,4 @@
-"""What the documents say is true: their commands parse, their links lead somewhere, their tables are complete."""
+"""What the documents say is true: commands parse, links lead somewhere, tables are complete."""
 
 import json
 import re
@@ -6,6 +6,7 @@ import shlex
 import subprocess
 import sys
 import tomllib
+from collections.abc import Sequence
 from dataclasses import fields, is_dataclass
 from pathlib import Path
 
@@ -42,7 +43,7 @@ def text(document: str) -> str:
     return (ROOT / document).read_text()
 
 
-def command_lines(document: str) -> list[str]:
+def command_lines(document: str) -> Sequence[str]:
     """Return the lines of the shell blocks, continued lines joined, comments left out."""
     blocks = re.findall(r"^```(?:sh|bash|console)\n(.*?)^```", text(document), flags=re.DOTALL | re.MULTILINE)
     return "\n".join(blocks).replace("\\\n", " ").splitlines()
