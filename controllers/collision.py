@@ -51,6 +51,8 @@ class CollisionModel:
         }
         tools = {placed.name for placed in description.collision if placed.tool}
         scene = self._add_scene(obstacles)
+        self._obstacles = {obstacle.name: scene[obstacle.name] for obstacle in obstacles}
+        self._moving: list[tuple[pin.GeometryObject, Obstacle]] = []
         work_surfaces = {obstacle.name for obstacle in obstacles if obstacle.work_surface}
         self.pairs = (
             *description.self_pairs,
@@ -67,29 +69,56 @@ class CollisionModel:
         self._geometry_data = pin.GeometryData(self._geometry)
         self._moves = np.array([self._ancestors(pair) for pair in self._geometry.collisionPairs])  # (P, 2, n)
         self._results = _ResultReader(self)
+        self.observe(obstacles)
 
     @property
     def size(self) -> int:
         """Number of pairs P."""
         return len(self.pairs)
 
-    def distances(self, q: FloatArray, reach: float = np.inf) -> Distances:
+    def distances(
+        self, q: FloatArray, reach: FloatArray | float = np.inf, times: FloatArray | None = None
+    ) -> Distances:
         """Return the signed distances along a trajectory, and gradients of those below `reach`.
 
         Args:
             q: configurations, (K, n).
-            reach: the largest distance whose gradient is wanted [m].
+            reach: the largest distance whose gradient is wanted, for all pairs or each, (P,) [m].
+            times: of the configurations from now on, (K,) [s]; moving obstacles are where they will be then.
         """
         witnesses = np.empty((len(q), self.size, 9))
         jacobians = np.empty((len(q), 6, self._model.nv))
         for node, configuration in enumerate(q):
-            self.compute(configuration)
-            jacobians[node] = pin.computeJointJacobians(self._model, self._data)
+            self.compute(configuration, 0.0 if times is None else times[node])
             witnesses[node] = self._results.read()
-        normal, first, second = witnesses[..., 0:3], witnesses[..., 3:6], witnesses[..., 6:9]
-        values = np.einsum("kpi,kpi->kp", normal, second - first)
+            jacobians[node] = pin.computeJointJacobians(self._model, self._data)
+        values = _signed(witnesses)
         near = np.argwhere(values < reach)
         return Distances(values, near, self._gradients(witnesses, jacobians, near))
+
+    def values(self, q: FloatArray, times: FloatArray | None = None) -> FloatArray:
+        """Return the signed distances at configurations (K, n) and times (K,), (K, P) [m]."""
+        witnesses = np.empty((len(q), self.size, 9))
+        for node, configuration in enumerate(q):
+            self.compute(configuration, 0.0 if times is None else times[node])
+            witnesses[node] = self._results.read()
+        return _signed(witnesses)
+
+    def observe(self, obstacles: tuple[Obstacle, ...]) -> None:
+        """Take where the obstacles are now and how fast they move.
+
+        Raises:
+            HandrailError: they are not the obstacles that the model was built with.
+        """
+        names = tuple(obstacle.name for obstacle in obstacles)
+        if names != tuple(self._obstacles):
+            raise HandrailError(f"obstacles: expected {', '.join(self._obstacles)}, got {', '.join(names)}")
+        self._moving = []
+        for obstacle in obstacles:
+            geometry = self._geometry.geometryObjects[self._obstacles[obstacle.name]]
+            geometry.placement = pin.SE3(np.array(obstacle.rotation), np.array(obstacle.position))
+            if obstacle.velocity.any():
+                self._moving.append((geometry, obstacle))
 
     def _gradients(self, witnesses: FloatArray, jacobians: FloatArray, near: IntArray) -> FloatArray:
         node, pair = near[:, 0], near[:, 1]
@@ -101,8 +130,11 @@ class CollisionModel:
         rows = (wrenches @ jacobians[node]) * self._moves[pair]
         return rows[:, 1] - rows[:, 0]
 
-    def compute(self, q: FloatArray) -> None:
-        """Let coal compute every pair at q."""
+    def compute(self, q: FloatArray, time: float = 0.0) -> None:
+        """Let coal compute every pair at q, with moving obstacles where they are after a time [s]."""
+        for geometry, obstacle in self._moving:
+            position = obstacle.position + time * obstacle.velocity
+            geometry.placement = pin.SE3(np.array(obstacle.rotation), position)
         pin.computeDistances(self._model, self._data, self._geometry, self._geometry_data, q)
 
     @property
@@ -174,6 +206,11 @@ class _ResultReader:
     @staticmethod
     def _one_by_one(results: pin.StdVec_DistanceResult) -> FloatArray:
         return np.array([[*r.normal, *r.getNearestPoint1(), *r.getNearestPoint2()] for r in results])
+
+
+def _signed(witnesses: FloatArray) -> FloatArray:
+    """Return n·(p₂ - p₁) of the rows (n, p₁, p₂), (…, 9) → (…)."""
+    return np.einsum("...i,...i->...", witnesses[..., 0:3], witnesses[..., 6:9] - witnesses[..., 3:6])
 
 
 def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
