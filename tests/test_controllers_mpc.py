@@ -125,7 +125,7 @@ def test_a_failed_solve_brakes(monkeypatch):
     positions, velocities, _ = roll(MPC, [asked] * 10)
 
     def infeasible(hessian, *rest):
-        return np.zeros(len(hessian)), 0.0, -1, {"iterations": 3}
+        return np.zeros(len(hessian)), 0.0, -1, {"iterations": 3, "lam": np.zeros(len(hessian))}
 
     monkeypatch.setattr(daqp, "solve", infeasible)
     beyond = asking(np.full(18, -2.0), "ee")  # at the acceleration limits, so that the QP has to be solved
