@@ -27,16 +27,18 @@ class StopCertificate:
         self._collision = collision
         self._floors = floors
 
-    def shortfall(self, q: FloatArray, v: FloatArray, now: FloatArray, delay: float = 0.0) -> float:
+    def shortfall(
+        self, q: FloatArray, v: FloatArray, now: tuple[FloatArray, FloatArray], delay: float = 0.0
+    ) -> float:
         """Return how far the stop from (q, v) falls short of what is asked; 0 when it is safe [m].
 
         Args:
             q: where it begins, (n,).
             v: how fast, (n,).
-            now: the distances now, (P,).
+            now: the position now, (n,), and its distances, (P,).
             delay: time until it begins [s].
         """
         path, times = self._limiter.stop(q, v, _SAMPLES)
-        distances = self._collision.values(path, delay + times)
-        asked = np.minimum(self._floors, now - _ERROR)
+        distances = self._collision.values(path, delay + times, now)
+        asked = np.minimum(self._floors, now[1] - _ERROR)
         return float(np.max(asked - distances, initial=0.0))

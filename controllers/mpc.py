@@ -174,10 +174,9 @@ class MaskedMpc:
 
     def _stops_safely(self, plan: Plan) -> bool:
         """Whether the robot can stop after the plan's first stage, or better then than now."""
-        shortfall = self._certificate.shortfall(plan.q[1], plan.v[1], plan.distances, self.settings.dt)
-        return shortfall <= 0.0 or shortfall < self._certificate.shortfall(
-            plan.q[0], plan.v[0], plan.distances
-        )
+        now = plan.q[0], plan.distances
+        shortfall = self._certificate.shortfall(plan.q[1], plan.v[1], now, self.settings.dt)
+        return shortfall <= 0.0 or shortfall < self._certificate.shortfall(plan.q[0], plan.v[0], now)
 
     def _start_velocity(self, state: State) -> FloatArray:
         """Return the velocity that the plan starts from: the commanded one, if the robot follows it."""
