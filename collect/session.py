@@ -13,6 +13,7 @@ from handrail.collect.operators.operator import Operator, View
 from handrail.controllers.command import Command, Status
 from handrail.controllers.controller import Controller
 from handrail.controllers.model import RobotModel
+from handrail.controllers.threads import single_threaded
 from handrail.datasets.frames import Moment
 
 
@@ -93,6 +94,10 @@ class Session:
 
     def run(self, seed: int) -> Outcome:
         """Run one episode and return how it went; the same seed gives the same episode."""
+        with single_threaded():
+            return self._run(seed)
+
+    def _run(self, seed: int) -> Outcome:
         observation, info = self.env.reset(seed=seed)
         self._controller.reset(self.env.obstacles())
         self._operator.reset(self._view(), np.random.default_rng([seed, 1]))

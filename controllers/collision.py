@@ -12,6 +12,7 @@ from handrail.controllers.model import RobotModel
 from handrail.controllers.shape import Obstacle, Shape
 
 FLOOR = "floor"
+_FAR = 0.15  # a pair that stays farther apart than this need not be measured exactly [m]
 
 
 @dataclass(frozen=True)
@@ -51,6 +52,8 @@ class CollisionModel:
         }
         tools = {placed.name for placed in description.collision if placed.tool}
         scene = self._add_scene(obstacles)
+        self._obstacles = {obstacle.name: scene[obstacle.name] for obstacle in obstacles}
+        self._moving: list[tuple[pin.GeometryObject, Obstacle]] = []
         work_surfaces = {obstacle.name for obstacle in obstacles if obstacle.work_surface}
         self.pairs = (
             *description.self_pairs,
@@ -64,32 +67,111 @@ class CollisionModel:
         other = np.full(len(self.pairs) - len(description.self_pairs), np.inf)
         self.largest_margin: FloatArray = frozen(np.concatenate([description.self_margins, other]))
         self._data = self._model.createData()
-        self._geometry_data = pin.GeometryData(self._geometry)
-        self._moves = np.array([self._ancestors(pair) for pair in self._geometry.collisionPairs])  # (P, 2, n)
-        self._results = _ResultReader(self)
+        self._moves = self._pair_moves()  # (P, 2, n)
+        self._levers = self._pair_levers(model)  # (n, P)
+        neutral = pin.neutral(self._model)
+        self._all, self._near = (_PairData(self._model, self._data, self._geometry, neutral) for _ in range(2))
+        self._selected = np.ones(self.size, dtype=bool)
+        self.observe(obstacles)
 
     @property
     def size(self) -> int:
         """Number of pairs P."""
         return len(self.pairs)
 
-    def distances(self, q: FloatArray, reach: float = np.inf) -> Distances:
+    def distances(
+        self, q: FloatArray, reach: FloatArray | float = np.inf, times: FloatArray | None = None
+    ) -> Distances:
         """Return the signed distances along a trajectory, and gradients of those below `reach`.
+
+        A pair that cannot come below its reach on the way is measured at the first configuration only; at the
+        others its value is a lower bound: `d(q_k) ≥ d(q_0) - Σ_j L_j |q_k - q_0|_j - |v_obstacle| t_k`.
 
         Args:
             q: configurations, (K, n).
-            reach: the largest distance whose gradient is wanted [m].
+            reach: the largest distance whose gradient is wanted, for all pairs or each, (P,) [m].
+            times: of the configurations from now on, (K,) [s]; moving obstacles are where they will be then.
         """
+        times = np.zeros(len(q)) if times is None else times
         witnesses = np.empty((len(q), self.size, 9))
         jacobians = np.empty((len(q), 6, self._model.nv))
-        for node, configuration in enumerate(q):
-            self.compute(configuration)
+        self._measure(self._all, q[0], times[0], witnesses[0])
+        jacobians[0] = pin.computeJointJacobians(self._model, self._data)
+        values = _signed(witnesses[0]) - self._travel(q, times)  # (K, P)
+        near = self._select((values < reach).any(axis=0))
+        for node in range(1, len(q)):
+            self._measure(self._near, q[node], times[node], witnesses[node])
             jacobians[node] = pin.computeJointJacobians(self._model, self._data)
-            witnesses[node] = self._results.read()
-        normal, first, second = witnesses[..., 0:3], witnesses[..., 3:6], witnesses[..., 6:9]
-        values = np.einsum("kpi,kpi->kp", normal, second - first)
-        near = np.argwhere(values < reach)
-        return Distances(values, near, self._gradients(witnesses, jacobians, near))
+        values[1:, near] = _signed(witnesses[1:, near])
+        below = np.argwhere(values < reach)
+        return Distances(values, below, self._gradients(witnesses, jacobians, below))
+
+    def values(
+        self, q: FloatArray, times: FloatArray | None = None, now: tuple[FloatArray, FloatArray] | None = None
+    ) -> FloatArray:
+        """Return the signed distances at configurations (K, n) and times (K,), (K, P) [m].
+
+        Args:
+            q: configurations.
+            times: from now on [s].
+            now: a configuration, (n,), and its distances, (P,), if they are known: pairs that are far from
+                each other then get a lower bound instead, infinitely cheaper.
+        """
+        times = np.zeros(len(q)) if times is None else times
+        witnesses = np.empty((len(q), self.size, 9))
+        if now is None:
+            for node in range(len(q)):
+                self._measure(self._all, q[node], times[node], witnesses[node])
+            return _signed(witnesses)
+        path = np.vstack([now[0], q])
+        values = now[1] - self._travel(path, np.append(0.0, times))[1:]
+        near = self._select((values < _FAR).any(axis=0))
+        for node in range(len(q) if len(near) else 0):
+            self._measure(self._near, q[node], times[node], witnesses[node])
+        values[:, near] = _signed(witnesses[:, near])
+        return values
+
+    def _measure(self, data: "_PairData", q: FloatArray, time: float, out: FloatArray) -> None:
+        """Let coal compute the pairs of `data` at q, with moving obstacles where they are after a time."""
+        for geometry, obstacle in self._moving:
+            geometry.placement = pin.SE3(np.array(obstacle.rotation), obstacle.position + time * obstacle.velocity)
+        pin.computeDistances(self._model, self._data, self._geometry, data.geometry, q)
+        out[:] = data.results.read()
+
+    def _travel(self, q: FloatArray, times: FloatArray) -> FloatArray:
+        """Return how much nearer each pair can have come since the first configuration, (K, P) [m]."""
+        travel = np.abs(q - q[0]) @ self._levers
+        if self._moving:
+            travel += times[:, None] * self._speeds
+        return travel
+
+    def _select(self, wanted: BoolArray) -> IntArray:
+        """Make `_near` measure just these pairs; return their indices."""
+        for pair in np.flatnonzero(wanted != self._selected).tolist():
+            if wanted[pair]:
+                self._near.geometry.activateCollisionPair(pair)
+            else:
+                self._near.geometry.deactivateCollisionPair(pair)
+        self._selected = wanted
+        return np.flatnonzero(wanted)
+
+    def observe(self, obstacles: tuple[Obstacle, ...]) -> None:
+        """Take where the obstacles are now and how fast they move.
+
+        Raises:
+            HandrailError: they are not the obstacles that the model was built with.
+        """
+        names = tuple(obstacle.name for obstacle in obstacles)
+        if names != tuple(self._obstacles):
+            raise HandrailError(f"obstacles: expected {', '.join(self._obstacles)}, got {', '.join(names)}")
+        self._moving = []
+        for obstacle in obstacles:
+            geometry = self._geometry.geometryObjects[self._obstacles[obstacle.name]]
+            geometry.placement = pin.SE3(np.array(obstacle.rotation), np.array(obstacle.position))
+            if obstacle.velocity.any():
+                self._moving.append((geometry, obstacle))
+        speeds = {obstacle.name: float(np.linalg.norm(obstacle.velocity)) for obstacle in obstacles}
+        self._speeds = np.array([speeds.get(second, 0.0) for _, second in self.pairs])
 
     def _gradients(self, witnesses: FloatArray, jacobians: FloatArray, near: IntArray) -> FloatArray:
         node, pair = near[:, 0], near[:, 1]
@@ -100,15 +182,6 @@ class CollisionModel:
         wrenches[:, 1, 3:] = _cross(second, normal)
         rows = (wrenches @ jacobians[node]) * self._moves[pair]
         return rows[:, 1] - rows[:, 0]
-
-    def compute(self, q: FloatArray) -> None:
-        """Let coal compute every pair at q."""
-        pin.computeDistances(self._model, self._data, self._geometry, self._geometry_data, q)
-
-    @property
-    def results(self) -> pin.StdVec_DistanceResult:
-        """Coal's results of the last `compute`."""
-        return self._geometry_data.distanceResults
 
     def _add_scene(self, obstacles: tuple[Obstacle, ...]) -> dict[str, int]:
         names = [obstacle.name for obstacle in obstacles]
@@ -131,6 +204,19 @@ class CollisionModel:
         thing = pin.GeometryObject(name, parent.parentJoint, parent.placement * local, _coal_shape(shape))
         return self._geometry.addGeometryObject(thing)
 
+    def _pair_moves(self) -> FloatArray:
+        moves = [self._ancestors(pair) for pair in self._geometry.collisionPairs]
+        return np.array(moves).reshape(-1, 2, self._model.nv)
+
+    def _pair_levers(self, model: RobotModel) -> FloatArray:
+        """Return how far a unit of each coordinate can bring a pair together at most, (n, P) [m].
+
+        A coordinate that moves both shapes alike does not; a prismatic one moves by 1, a revolute one by the
+        reach of what hangs on it.
+        """
+        either = self._moves[:, 0] != self._moves[:, 1] if self.size else np.zeros((0, model.size), dtype=bool)
+        return either.T * lever_arms(model)[:, None]
+
     def _ancestors(self, pair: pin.CollisionPair) -> FloatArray:
         """Return which coordinates move the two shapes of a pair, (2, n)."""
         moves = np.zeros((2, self._model.nv))
@@ -142,38 +228,68 @@ class CollisionModel:
         return moves
 
 
+class _PairData:
+    """Coal's working data for some pairs, with a reader of its results."""
+
+    def __init__(
+        self, model: pin.Model, data: pin.Data, geometry: pin.GeometryModel, neutral: FloatArray
+    ) -> None:
+        self.geometry = pin.GeometryData(geometry)
+        pin.computeDistances(model, data, geometry, self.geometry, neutral)
+        self.results = _ResultReader(self.geometry.distanceResults)
+
+
 class _ResultReader:
     """Reads normals and nearest points of all pairs at once.
 
     Coal's results lie in one C++ vector, each with normal and both nearest points side by side, and the
     binding hands out views of that memory: one strided view reads them all. Where a build lays them out
     otherwise, they are read one by one.
+
+    Args:
+        results: of pairs that have been computed at least once.
     """
 
-    def __init__(self, collision: CollisionModel) -> None:
-        self._collision = collision
-        collision.compute(pin.neutral(collision._model))
-        self._view = self._strided(collision.results)
+    def __init__(self, results: pin.StdVec_DistanceResult) -> None:
+        self._results = results
+        self._view = self._strided(results)
 
     def read(self) -> FloatArray:
         """Return normals, first and second nearest points in the world, side by side, (P, 9)."""
-        return self._one_by_one(self._collision.results) if self._view is None else self._view
+        return self._one_by_one() if self._view is None else self._view
 
-    @classmethod
-    def _strided(cls, results: pin.StdVec_DistanceResult) -> FloatArray | None:
+    def _strided(self, results: pin.StdVec_DistanceResult) -> FloatArray | None:
         normals = [result.normal for result in results]
         addresses = np.array([normal.__array_interface__["data"][0] for normal in normals])
         strides = np.unique(np.diff(addresses))
-        if normals[0].flags.owndata or strides.size != 1 or strides[0] < 72:
+        if not normals or normals[0].flags.owndata or strides.size != 1 or strides[0] < 72:
             return None
         view = np.lib.stride_tricks.as_strided(
             normals[0], (len(normals), 9), (int(strides[0]), 8), writeable=False
         )
-        return view if np.array_equal(view, cls._one_by_one(results)) else None
+        return view if np.array_equal(view, self._one_by_one()) else None
 
-    @staticmethod
-    def _one_by_one(results: pin.StdVec_DistanceResult) -> FloatArray:
-        return np.array([[*r.normal, *r.getNearestPoint1(), *r.getNearestPoint2()] for r in results])
+    def _one_by_one(self) -> FloatArray:
+        rows = [[*r.normal, *r.getNearestPoint1(), *r.getNearestPoint2()] for r in self._results]
+        return np.array(rows).reshape(-1, 9)
+
+
+def lever_arms(model: RobotModel) -> FloatArray:
+    """Return bounds on how far a point of the robot moves per unit of each coordinate, (n,) [m]."""
+    pinocchio, arms = model.pinocchio, np.ones(model.size)
+    sizes = [np.linalg.norm(s.placement.translation) + s.shape.size.sum() for s in model.description.collision]
+    reach = float(max(sizes, default=0.0))
+    for joint in range(pinocchio.njoints - 1, 0, -1):
+        index = pinocchio.joints[joint].idx_v
+        if not pinocchio.joints[joint].shortname().startswith("JointModelP"):
+            arms[index] = reach
+        reach += float(np.linalg.norm(pinocchio.jointPlacements[joint].translation))
+    return arms
+
+
+def _signed(witnesses: FloatArray) -> FloatArray:
+    """Return n·(p₂ - p₁) of the rows (n, p₁, p₂), (…, 9) → (…)."""
+    return np.einsum("...i,...i->...", witnesses[..., 0:3], witnesses[..., 6:9] - witnesses[..., 3:6])
 
 
 def _cross(a: FloatArray, b: FloatArray) -> FloatArray:

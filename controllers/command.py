@@ -17,6 +17,7 @@ class Status(StrEnum):
     INVALID_STATE = "invalid_state"
     STALE_INTENT = "stale_intent"
     SOLVER_FAILED = "solver_failed"
+    BACKUP = "backup"  # the plan's stop was not safe: the backup plan, a full stop, took over
 
     @property
     def brakes(self) -> bool:
@@ -34,6 +35,9 @@ class Health:
         slack: largest violation of a soft limit in the plan, in its own unit.
         smallest_distance: smallest signed distance now, tool against work surfaces left out [m].
         work_distance: smallest signed distance of the tool against work surfaces now [m].
+        tracking_error: norm of the commanded channels' error at the end of the plan [m/s, rad/s].
+        over_determined: whether more was commanded than the robot has freedom for.
+        phases: where the update's time went [s].
     """
 
     status: Status = Status.OK
@@ -41,6 +45,9 @@ class Health:
     slack: float = 0.0
     smallest_distance: float = np.inf
     work_distance: float = np.inf
+    tracking_error: float = 0.0
+    over_determined: bool = False
+    phases: tuple[tuple[str, float], ...] = ()
 
 
 @dataclass(frozen=True)

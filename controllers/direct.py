@@ -73,7 +73,7 @@ class DirectController:
     def _health(self, state: State, status: Status, solve_time: float) -> Health:
         if status is Status.INVALID_STATE:
             return Health(status, solve_time)
-        distances = self._collision.distances(state.q[None, :], reach=-np.inf).values[0]
+        distances = self._collision.values(state.q[None, :])[0]
         work = self._collision.work
         return Health(
             status=status,

@@ -3,6 +3,7 @@
 from handrail.controllers.channels import Channels
 from handrail.controllers.command import Status
 from handrail.controllers.controller import State
+from handrail.controllers.errors import HandrailError
 from handrail.controllers.intent import Intent
 
 
@@ -21,6 +22,10 @@ def check_inputs(state: State, intent: Intent, channels: Channels, timeout: floa
     if intent.values.shape != (channels.size,) or intent.mask.shape != (channels.size,):
         return Status.INVALID_INTENT
     if not intent.is_finite:
+        return Status.INVALID_INTENT
+    try:
+        intent.frames.check()
+    except HandrailError:
         return Status.INVALID_INTENT
     if state.time - intent.time > timeout:
         return Status.STALE_INTENT

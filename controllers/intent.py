@@ -1,12 +1,13 @@
 """What the operator asks for: values on channels, and a mask of those that are commanded."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from handrail.controllers.arrays import BoolArray, FloatArray, frozen
 from handrail.controllers.channels import Channels
 from handrail.controllers.errors import HandrailError
+from handrail.controllers.frames import Frames
 
 
 @dataclass(frozen=True)
@@ -20,6 +21,7 @@ class Intent:
         gripper: 0 open, 1 closed.
         mode: name of the teleop mode that made it.
         time: when the operator asked [s], on the clock of the state.
+        frames: in which frames the twists are meant, and for which point of the tool.
     """
 
     values: FloatArray
@@ -27,6 +29,7 @@ class Intent:
     gripper: float = 0.0
     mode: str = ""
     time: float = 0.0
+    frames: Frames = field(default_factory=Frames)
 
     def __post_init__(self) -> None:
         """Copy the arrays and make them read-only."""

@@ -50,6 +50,19 @@ class Limiter:
         speed = np.maximum(np.abs(velocity) - self._limits.acceleration * times, 0.0)
         return np.sign(velocity) * speed
 
+    def stop(self, q: FloatArray, v: FloatArray, shares: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return configurations along the fastest stop, (K, n), and their times, (K,) [s].
+
+        Args:
+            q: where it begins, (n,).
+            v: how fast, (n,).
+            shares: of the time until every joint rests, (K,).
+        """
+        rest = np.abs(v) / self._limits.acceleration  # (n,)
+        times = shares * rest.max()
+        moving = np.minimum(times[:, None], rest)
+        return q + v * moving - 0.5 * np.sign(v) * self._limits.acceleration * moving**2, times
+
     def _braking_range(self, q: FloatArray) -> tuple[FloatArray, FloatArray]:
         above = np.maximum(self._limits.position_upper - q, 0.0)
         below = np.maximum(q - self._limits.position_lower, 0.0)

@@ -1,81 +1,36 @@
 """The masked model predictive controller: the operator steers a part, the optimum completes the rest."""
 
-from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from time import perf_counter
 
 import numpy as np
 
-from handrail.controllers.arrays import FloatArray
+from handrail.controllers.arrays import BoolArray, FloatArray
+from handrail.controllers.backup import StopCertificate
 from handrail.controllers.channels import Channels
 from handrail.controllers.collision import CollisionModel
 from handrail.controllers.command import Command, Health, Status
 from handrail.controllers.controller import State
+from handrail.controllers.errors import unknown_name
 from handrail.controllers.guard import check_inputs
 from handrail.controllers.intent import Intent
 from handrail.controllers.limiter import Limiter
 from handrail.controllers.model import RobotModel
-from handrail.controllers.objective import (
-    Objective,
-    StageResiduals,
+from handrail.controllers.objective import Objective
+from handrail.controllers.objectives.regularisation import (
     acceleration_regularisation,
     posture,
-    tracking,
     velocity_regularisation,
 )
+from handrail.controllers.objectives.tracking import tracking
+from handrail.controllers.prediction import Prediction, constant
 from handrail.controllers.problem import Plan, Problem
 from handrail.controllers.real_time import RealTimeSolver
+from handrail.controllers.residuals import StageResiduals
+from handrail.controllers.settings import MpcSettings
 from handrail.controllers.shape import Obstacle
 
 _LARGEST_INTENT = 10.0  # [m/s, rad/s]; beyond any robot's limits, and keeps the QP well scaled
-
-Prediction = Callable[[Intent, int], FloatArray]
-"""Ψ: the intent and a number of stages N → predicted values on every channel, (N, m)."""
-
-
-def constant_prediction(intent: Intent, horizon: int) -> FloatArray:
-    """Hold the command over the horizon (the paper's choice), (N, m)."""
-    return np.tile(intent.values, (horizon, 1))
-
-
-@dataclass(frozen=True)
-class MpcSettings:
-    """Settings of the masked MPC; weights are per squared unit of their residual.
-
-    Attributes:
-        horizon: stages N.
-        dt: length of a stage [s].
-        decay: γ; stage k tracks the intent with weight γᵏ.
-        tracking: weight of the commanded channels.
-        base_velocity: weight of base velocities that nobody commands.
-        arm_velocity: weight of arm velocities that nobody commands.
-        acceleration: weight of all accelerations.
-        posture: weight that draws the arm to its home posture while the tool is steered.
-        margin: signed distance kept between shapes [m].
-        work_margin: the same between tool shapes and work surfaces [m].
-        reach: distance beyond the margin at which a pair enters the problem [m].
-        slack_linear: linear penalty of the slack.
-        slack_quadratic: quadratic penalty of the slack.
-        intent_timeout: age from which an intent is stale [s].
-        velocity_tolerance: how far the measured velocity may be from the commanded one before the plan
-            starts from the measured one, relative to the velocity limit.
-    """
-
-    horizon: int = 10
-    dt: float = 0.1
-    decay: float = 0.9
-    tracking: float = 1000.0
-    base_velocity: float = 0.01
-    arm_velocity: float = 0.1
-    acceleration: float = 0.01
-    posture: float = 0.05
-    margin: float = 0.10
-    work_margin: float = 0.008
-    reach: float = 0.30
-    slack_linear: float = 1e5
-    slack_quadratic: float = 1e5
-    intent_timeout: float = 0.25
-    velocity_tolerance: float = 0.1
 
 
 @dataclass
@@ -88,16 +43,11 @@ class _Memory:
 
 
 @dataclass(frozen=True)
-class _Setup:
-    """What is built once a robot."""
+class _Masked:
+    """What depends on the mask alone."""
 
-    model: RobotModel
-    settings: MpcSettings
-    channels: Channels
-    residuals: StageResiduals
-    solver: RealTimeSolver
-    limiter: Limiter
-    predict: Prediction = field(default=constant_prediction)
+    weights: FloatArray  # (N, r)
+    over_determined: bool
 
 
 class MaskedMpc:
@@ -113,23 +63,22 @@ class MaskedMpc:
     def __init__(
         self,
         model: RobotModel,
-        settings: MpcSettings = MpcSettings(),
+        settings: MpcSettings | None = None,
         objectives: tuple[Objective, ...] = (),
-        predict: Prediction = constant_prediction,
+        predict: Prediction = constant,
     ) -> None:
-        channels = Channels.of(model.description)
-        built_in = built_in_objectives(model, channels, settings)
-        residuals = StageResiduals(model, (*built_in, *objectives), settings.horizon)
-        solver = RealTimeSolver(residuals, settings.horizon, model.size, settings.dt)
-        limiter = Limiter(model.description)
-        self._setup = _Setup(model, settings, channels, residuals, solver, limiter, predict)
-        self._discounts = settings.decay ** np.arange(settings.horizon)
+        self.model = model
+        self.settings = settings or MpcSettings()
+        self.channels = Channels.of(model.description)
+        built_in = built_in_objectives(model, self.channels, self.settings)
+        horizon = self.settings.horizon
+        self.residuals = StageResiduals(model, (*built_in, *objectives), horizon)
+        self.solver = RealTimeSolver(self.residuals, horizon, model.size, self.settings.dt)
+        self._limiter = Limiter(model.description)
+        self._predict = predict
+        self._times = self.settings.dt * np.arange(1, horizon + 1)
+        self._masked: dict[bytes, _Masked] = {}
         self.reset()
-
-    @property
-    def channels(self) -> Channels:
-        """The robot's command channels."""
-        return self._setup.channels
 
     @property
     def plan(self) -> Plan | None:
@@ -138,47 +87,70 @@ class MaskedMpc:
 
     def reset(self, obstacles: tuple[Obstacle, ...] = ()) -> None:
         """Forget warm start and last command; take the obstacles of a new episode."""
-        settings = self._setup.settings
-        self._collision = CollisionModel(self._setup.model, obstacles)
+        settings = self.settings
+        self._collision = CollisionModel(self.model, obstacles)
         wanted = np.where(self._collision.work, settings.work_margin, settings.margin)
         self._margins = np.minimum(wanted, self._collision.largest_margin)
+        floors = settings.floor * self._margins
+        self._certificate = StopCertificate(self._limiter, self._collision, floors)
+        self._parameters = self.residuals.parameters
         self._memory = _Memory()
+        self.solver.reset()
+        getattr(self._predict, "reset", lambda: None)()
+
+    def observe(self, obstacles: tuple[Obstacle, ...]) -> None:
+        """Take where the obstacles are now and how fast they move."""
+        self._collision.observe(obstacles)
+
+    def set_parameters(self, objective: str, values: FloatArray) -> None:
+        """Change an objective's parameters from the next update on.
+
+        Raises:
+            HandrailError: there is no such objective.
+        """
+        names = [entry.name for entry in self.residuals.objectives]
+        if objective not in names:
+            raise unknown_name("objective", objective, names)
+        self._parameters[self.residuals.parameter_slice(objective)] = values
 
     def update(self, state: State, intent: Intent) -> Command:
-        """Return the command from now on; brakes when an input is invalid or stale, or the solver fails."""
+        """Return the command from now on; brakes when an input is bad, the solver fails, or a stop is unsafe."""
         start = perf_counter()
-        setup = self._setup
-        status = check_inputs(state, intent, setup.channels, setup.settings.intent_timeout)
+        status = check_inputs(state, intent, self.channels, self.settings.intent_timeout)
         plan = None
         if status is Status.OK:
             problem = self.problem(state, intent)
-            plan = setup.solver.solve(problem, self._guess(state.time))
+            plan = self.solver.solve(problem, self._guess(state.time))
             if not plan.is_solution(problem):
-                status, plan = Status.SOLVER_FAILED, None
-        health = self._health(state, status, plan)
-        velocities = self._brake(state, status) if plan is None else plan.v
+                status = Status.SOLVER_FAILED
+            elif not self._stops_safely(plan):
+                status = Status.BACKUP
+        health = self._health(state, intent, status, plan)
+        velocities = plan.v if plan is not None and status is Status.OK else self._brake(state, status)
         gripper = intent.gripper if np.isfinite(intent.gripper) else self._last_gripper()
-        command = Command(velocities, setup.settings.dt, float(np.clip(gripper, 0.0, 1.0)), health)
-        time = state.time if np.isfinite(state.time) else self._memory.time
-        self._memory = _Memory(plan, time, command)
-        return replace(command, health=replace(health, solve_time=perf_counter() - start))
+        kept = plan if status is Status.OK else None
+        health = replace(health, solve_time=perf_counter() - start)
+        command = Command(velocities, self.settings.dt, min(max(float(gripper), 0.0), 1.0), health)
+        self._memory = _Memory(kept, state.time if np.isfinite(state.time) else self._memory.time, command)
+        return command
 
     def problem(self, state: State, intent: Intent) -> Problem:
         """Return the optimal control problem of a state and an intent."""
-        setup, settings = self._setup, self._setup.settings
-        predicted = np.where(intent.mask, setup.predict(intent, settings.horizon), 0.0)
-        predicted = np.clip(predicted, -_LARGEST_INTENT, _LARGEST_INTENT)
-        reference = np.tile(setup.residuals.reference, (settings.horizon, 1))
-        reference[:, : setup.channels.size] = predicted
-        weights = np.tile(setup.residuals.weights(np.asarray(intent.mask)), (settings.horizon, 1))
-        weights[:, : setup.channels.size] *= self._discounts[:, None]
+        settings, size = self.settings, self.channels.size
+        masked = self._of_mask(np.asarray(intent.mask), state.q)
+        reference = np.tile(self.residuals.reference, (settings.horizon, 1))
+        predicted = np.where(intent.mask, self._predict(intent, self._times), 0.0)
+        reference[:, :size] = np.minimum(np.maximum(predicted, -_LARGEST_INTENT), _LARGEST_INTENT)
+        self._parameters[self.residuals.parameter_slice("tracking")] = intent.frames.parameters
         return Problem(
             q=state.q,
             v=self._start_velocity(state),
             dt=settings.dt,
             reference=reference,
-            weights=weights,
-            limits=setup.model.description.limits,
+            weights=masked.weights,
+            parameters=self._parameters.copy(),
+            channels=size,
+            limits=self.model.description.limits,
             collision=self._collision,
             margins=self._margins,
             reach=settings.reach,
@@ -186,59 +158,83 @@ class MaskedMpc:
             slack_quadratic=settings.slack_quadratic,
         )
 
+    def _of_mask(self, mask: BoolArray, q: FloatArray) -> _Masked:
+        """Return what depends on the mask alone, remembered for every mask met."""
+        key = mask.tobytes()
+        if key not in self._masked:
+            weights = np.tile(self.residuals.weights(mask), (self.settings.horizon, 1))
+            weights[:, : self.channels.size] *= self.settings.discounts[:, None]
+            velocity = slice(self.channels.size, self.channels.size + self.model.size)
+            idle = weights[-1, velocity] > 0
+            weights[-1, velocity] += self.settings.terminal_velocity * idle
+            rows = channel_matrix(self.model, self.channels, q)[mask]
+            freedom = np.linalg.matrix_rank(rows) if len(rows) else 0
+            self._masked[key] = _Masked(weights, len(rows) > freedom)
+        return self._masked[key]
+
+    def _stops_safely(self, plan: Plan) -> bool:
+        """Whether the robot can stop after the plan's first stage, or better then than now."""
+        now = plan.q[0], plan.distances
+        shortfall = self._certificate.shortfall(plan.q[1], plan.v[1], now, self.settings.dt)
+        return shortfall <= 0.0 or shortfall < self._certificate.shortfall(plan.q[0], plan.v[0], now)
+
     def _start_velocity(self, state: State) -> FloatArray:
         """Return the velocity that the plan starts from: the commanded one, if the robot follows it."""
         command = self._memory.command
         if command is None:
             return state.v
-        tolerance = self._setup.settings.velocity_tolerance * self._setup.model.description.limits.velocity
+        tolerance = self.settings.velocity_tolerance * self.model.description.limits.velocity
         commanded = command.velocity(state.time - self._memory.time)
-        return np.clip(commanded, state.v - tolerance, state.v + tolerance)
+        return np.minimum(np.maximum(commanded, state.v - tolerance), state.v + tolerance)
 
     def _guess(self, time: float) -> FloatArray:
         """Return the last plan's accelerations, shifted by the time that has passed, (N, n)."""
-        settings = self._setup.settings
-        plan = self._memory.plan
+        horizon, plan = self.settings.horizon, self._memory.plan
         if plan is None:
-            return np.zeros((settings.horizon, self._setup.model.size))
-        shift = max(time - self._memory.time, 0.0) / settings.dt
-        padded = np.vstack([plan.u, np.zeros((1, plan.u.shape[1]))])
-        stages = np.minimum(np.arange(settings.horizon) + shift, settings.horizon)
-        lower = np.floor(stages).astype(int)
-        upper = np.minimum(lower + 1, settings.horizon)
-        weight = (stages - lower)[:, None]
-        return (1.0 - weight) * padded[lower] + weight * padded[upper]
+            return np.zeros((horizon, self.model.size))
+        shift = max(time - self._memory.time, 0.0) / self.settings.dt
+        whole, part = int(min(shift, horizon)), min(shift, horizon) % 1.0
+        padded = np.zeros((2 * horizon + 2, self.model.size))
+        padded[:horizon] = plan.u
+        return (1.0 - part) * padded[whole : whole + horizon] + part * padded[whole + 1 : whole + horizon + 1]
 
     def _brake(self, state: State, status: Status) -> FloatArray:
-        settings = self._setup.settings
         trusted = status is not Status.INVALID_STATE
         velocity = self._start_velocity(state) if trusted else self._last_velocity(state.time)
-        return self._setup.limiter.brake(velocity, settings.dt, settings.horizon)
+        return self._limiter.brake(velocity, self.settings.dt, self.settings.horizon)
 
     def _last_velocity(self, time: float) -> FloatArray:
         """Return what is commanded at a time, which may be no number, (n,)."""
         command = self._memory.command
         if command is None:
-            return np.zeros(self._setup.model.size)
+            return np.zeros(self.model.size)
         elapsed = time - self._memory.time
         return command.velocity(elapsed) if np.isfinite(elapsed) else command.velocities[1]
 
     def _last_gripper(self) -> float:
         return 0.0 if self._memory.command is None else self._memory.command.gripper
 
-    def _health(self, state: State, status: Status, plan: Plan | None) -> Health:
+    def _health(self, state: State, intent: Intent, status: Status, plan: Plan | None) -> Health:
         if plan is not None:
             distances = plan.distances
-        elif state.is_finite and state.q.shape == (self._setup.model.size,):
-            distances = self._collision.distances(state.q[None, :], reach=-np.inf).values[0]
+        elif state.is_finite and state.q.shape == (self.model.size,):
+            distances = self._collision.values(state.q[None, :])[0]
         else:
             return Health(status)
         work = self._collision.work
-        return Health(
+        health = Health(
             status=status,
-            slack=0.0 if plan is None else max(plan.collision_slack, plan.limit_slack),
             smallest_distance=float(np.min(distances[~work], initial=np.inf)),
             work_distance=float(np.min(distances[work], initial=np.inf)),
+        )
+        if plan is None:
+            return health
+        return replace(
+            health,
+            slack=max(plan.collision_slack, plan.limit_slack),
+            tracking_error=plan.tracking_error,
+            over_determined=self._of_mask(np.asarray(intent.mask), state.q).over_determined,
+            phases=plan.phases,
         )
 
 
@@ -255,3 +251,14 @@ def built_in_objectives(
         acceleration_regularisation(np.full(model.size, settings.acceleration)),
         posture(channels, model.description.home, settings.posture * arm),
     )
+
+
+def channel_matrix(model: RobotModel, channels: Channels, q: FloatArray) -> FloatArray:
+    """Return the channels' velocities as a matrix times v, (m, n)."""
+    rows = [model.jacobian(q), np.eye(model.size)]
+    if channels.base:
+        c, s = np.cos(q[2]), np.sin(q[2])
+        base = np.zeros((3, model.size))
+        base[:, :3] = [[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]
+        rows.insert(0, base)
+    return np.vstack(rows)

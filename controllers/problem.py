@@ -11,10 +11,11 @@ from handrail.controllers.description import Limits
 
 @dataclass(frozen=True)
 class Problem:
-    """`min Σ_k ½ ‖r(q_k, v_k, u_k) - ref_k‖²_W_k + ρ₁ s + ½ ρ₂ s²` over N stages.
+    """`min Σ_k ½ ‖r(q_k, v_k, u_k; p) - ref_k‖²_W_k + ρ₁ s + ½ ρ₂ s²` over N stages.
 
     Dynamics: `v_k = v_{k-1} + dt u_k`, `q_k = q_{k-1} + dt v_{k-1} + ½ dt² u_k`. Hard: `|u| ≤ a_max`.
-    Soft, with slack s: velocity and position limits, and `d_p(q_k) ≥ margin_p` for every pair.
+    Soft, with slack s: velocity and position limits, and `d_p(q_k) ≥ margin_p` for every pair. The terminal
+    set X_f asks the same of the stop from the last node: `q_N + ½ v_N |v_N| / a_max`, half way and at rest.
 
     Attributes:
         q: position now, (n,).
@@ -22,6 +23,8 @@ class Problem:
         dt: length of a stage [s].
         reference: of every residual row, (N, r).
         weights: of every residual row, (N, r).
+        parameters: p of the objectives, (k,).
+        channels: number of channels m; their rows come first.
         limits: of the robot.
         collision: the pairs that keep apart.
         margins: smallest distance wanted of each pair [m], (P,).
@@ -35,6 +38,8 @@ class Problem:
     dt: float
     reference: FloatArray
     weights: FloatArray
+    parameters: FloatArray
+    channels: int
     limits: Limits
     collision: CollisionModel
     margins: FloatArray
@@ -49,8 +54,16 @@ class Problem:
 
     def rollout(self, u: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return positions and velocities at the N + 1 nodes under accelerations u, (N, n)."""
-        v = np.vstack([self.v, self.v + self.dt * np.cumsum(u, axis=0)])
-        q = np.vstack([self.q, self.q + self.dt * np.cumsum(0.5 * (v[:-1] + v[1:]), axis=0)])
+        v = np.empty((len(u) + 1, len(self.v)))
+        v[0] = self.v
+        np.cumsum(u, axis=0, out=v[1:])
+        v[1:] *= self.dt
+        v[1:] += self.v
+        q = np.empty_like(v)
+        q[0] = self.q
+        np.cumsum(v[:-1] + v[1:], axis=0, out=q[1:])
+        q[1:] *= 0.5 * self.dt
+        q[1:] += self.q
         return q, v
 
 
@@ -67,6 +80,9 @@ class Plan:
         distances: signed distances now, (P,).
         solved: whether the solver reports a solution.
         iterations: of the solver.
+        tracking_error: norm of the commanded channels' error at the last tracked stage.
+        rows: inequality rows of the last QP, bounds left out.
+        phases: where the time went: `residuals`, `distances`, `solve` [s].
     """
 
     q: FloatArray
@@ -77,16 +93,20 @@ class Plan:
     distances: FloatArray
     solved: bool
     iterations: int
+    tracking_error: float = 0.0
+    rows: int = 0
+    phases: tuple[tuple[str, float], ...] = ()
 
     def __post_init__(self) -> None:
-        """Copy the arrays and make them read-only."""
+        """Make the arrays read-only copies."""
         for name in ("q", "v", "u", "distances"):
             object.__setattr__(self, name, frozen(getattr(self, name)))
 
     def is_solution(self, problem: Problem, tolerance: float = 1e-6) -> bool:
         """Whether the plan is finite, obeys the dynamics from the state and the hard acceleration limits."""
-        if not self.solved or not np.all(np.isfinite(self.u)):
+        if not self.solved or not np.isfinite(self.u).all():
             return False
         q, v = problem.rollout(self.u)
-        inside = np.abs(self.u) <= problem.limits.acceleration * (1.0 + tolerance) + tolerance
-        return bool(np.all(inside) and np.allclose(q, self.q) and np.allclose(v, self.v))
+        if np.any(np.abs(self.u) > problem.limits.acceleration * (1.0 + tolerance) + tolerance):
+            return False
+        return bool(np.abs(q - self.q).max() <= tolerance and np.abs(v - self.v).max() <= tolerance)

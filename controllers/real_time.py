@@ -1,156 +1,189 @@
 """The real-time solver: Gauss-Newton, states condensed out, one dense warm-started QP an update."""
 
-from dataclasses import dataclass, field
+from time import perf_counter
 
 import daqp
 import numpy as np
+from scipy.linalg.lapack import dposv
 
-from handrail.controllers.arrays import FloatArray
-from handrail.controllers.objective import StageResiduals
+from handrail.controllers.arrays import FloatArray, IntArray
+from handrail.controllers.condensing import CondensedCost
 from handrail.controllers.problem import Plan, Problem
+from handrail.controllers.residuals import StageResiduals
+from handrail.controllers.rows import LimitRows, Nodes, Rows, distance_rows
 
 _INFINITE = 1e30
-_ROUNDS = 4  # of adding violated limit rows
-_LIMIT_TOLERANCE = 1e-5  # relative
-
-
-@dataclass
-class _Rows:
-    """Rows `A δ + S s ≤ upper` of the QP, gathered before it is built."""
-
-    matrices: list[FloatArray] = field(default_factory=list)
-    slacks: list[FloatArray] = field(default_factory=list)
-    uppers: list[FloatArray] = field(default_factory=list)
-
-    def add(self, matrix: FloatArray, slack: FloatArray, upper: FloatArray) -> None:
-        self.matrices.append(np.hstack([matrix, slack]))
-        self.uppers.append(upper)
+_ROUNDS = 6  # of adding violated rows
+_CLOSE = 0.05  # a distance row this near to its bound is in the QP from the start [m]
+_TOLERANCE = 1e-6  # of a row
+_UPPER, _LOWER = 1, 3  # DAQP's marks of a row that is active at its upper or lower bound
 
 
 class RealTimeSolver:
     """One Gauss-Newton step around a guess.
 
     Variables of the QP: the changes δ of the accelerations, (N n,), a slack of the distances [m] and a
-    slack of the limits (relative). With `z = z̄ + C δ` for z = (q, v, u) of a stage, the cost is
-    `½ Σ ‖r̄ + J C δ - ref‖²_W`. Rows of velocity and position limits enter when they are violated.
+    slack of the limits (relative). Where the unconstrained step obeys everything, it is the solution;
+    otherwise DAQP solves the QP, beginning with the rows that were active in the last update.
     """
 
     def __init__(self, residuals: StageResiduals, horizon: int, size: int, dt: float) -> None:
-        self._residuals = residuals
+        self._cost = CondensedCost(residuals, horizon, size, dt)
         self._shape = (horizon, size)
-        self._coefficients = _coefficients(horizon, dt)  # (N, 3, N)
-        pairs = np.einsum("kaj,kbl->jlkab", self._coefficients, self._coefficients)
-        self._pairs = pairs.reshape(horizon * horizon, -1)
+        self.reset()
+
+    @property
+    def cost(self) -> CondensedCost:
+        """The cost that the QP is made of."""
+        return self._cost
+
+    def reset(self) -> None:
+        """Forget which rows were active."""
+        self._active: dict[int, int] = {}
+        self._active_bounds = np.zeros(self._shape[0] * self._shape[1] + 2, dtype=np.int32)
 
     def solve(self, problem: Problem, guess: FloatArray) -> Plan:
         """Return the plan after one step from the accelerations `guess`, (N, n)."""
-        guess = np.clip(guess, -problem.limits.acceleration, problem.limits.acceleration)
+        start = perf_counter()
+        limit = problem.limits.acceleration
+        guess = np.minimum(np.maximum(guess, -limit), limit)
         q, v = problem.rollout(guess)
-        hessian, gradient = self._cost(problem, q, v, guess)
-        rows, distances = self._distance_rows(problem, q)
-        change, slack, flag, iterations = self._solve_limited(problem, guess, q, v, hessian, gradient, rows)
-        u = np.clip(guess + change, -problem.limits.acceleration, problem.limits.acceleration)
+        hessian, gradient = self._cost.build(problem, q[1:], v[1:], guess)
+        built = perf_counter()
+        nodes = Nodes(problem, q, v, self._cost.coefficients)
+        distances = problem.collision.distances(nodes.q, problem.margins + problem.reach, nodes.times)
+        rows = distance_rows(problem, nodes, distances)
+        limits = LimitRows(problem, q[1:], v[1:], self._cost.coefficients)
+        measured = perf_counter()
+        qp = _Qp(problem, guess, hessian, gradient, rows)
+        change, slack, solved, iterations, count = self._solve(qp, limits)
+        u = np.minimum(np.maximum(guess + change, -limit), limit)
         q, v = problem.rollout(u)
-        return Plan(q, v, u, float(slack[0]), float(slack[1]), distances, flag > 0, iterations)
+        done = perf_counter()
+        phases = (("residuals", built - start), ("distances", measured - built), ("solve", done - measured))
+        return Plan(
+            q=q,
+            v=v,
+            u=u,
+            collision_slack=float(slack[0]),
+            limit_slack=float(slack[1]),
+            distances=distances.values[0],
+            solved=solved,
+            iterations=iterations,
+            tracking_error=self._cost.tracking_error(problem, change),
+            rows=count,
+            phases=phases,
+        )
 
-    def _cost(
-        self, problem: Problem, q: FloatArray, v: FloatArray, u: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
-        """Return Hessian (N n + 2, N n + 2) and gradient (N n + 2,)."""
-        horizon, size = self._shape
-        values, transposed = self._residuals.evaluate(q[1:], v[1:], u)
-        weighted = transposed * problem.weights[:, None, :]
-        blocks = (weighted @ transposed.transpose(0, 2, 1)).reshape(horizon, 3, size, 3, size)
-        flat = blocks.transpose(0, 1, 3, 2, 4).reshape(9 * horizon, size * size)
-        hessian = np.zeros((horizon * size + 2,) * 2)
-        condensed = (self._pairs @ flat).reshape(horizon, horizon, size, size)
-        hessian[:-2, :-2] = condensed.transpose(0, 2, 1, 3).reshape(horizon * size, horizon * size)
-        hessian[-2, -2] = hessian[-1, -1] = problem.slack_quadratic
-        slopes = (weighted @ (values - problem.reference)[:, :, None]).reshape(3 * horizon, size)
-        gradient = np.full(horizon * size + 2, problem.slack_linear)
-        gradient[:-2] = (self._coefficients.reshape(3 * horizon, horizon).T @ slopes).ravel()
-        return hessian, gradient
-
-    def _distance_rows(self, problem: Problem, q: FloatArray) -> tuple[_Rows, FloatArray]:
-        """Linearise `d ≥ bound` at the nodes after now; a pair inside its margin recovers gradually."""
-        horizon, size = self._shape
-        distances = problem.collision.distances(q, float(problem.margins.max()) + problem.reach)
-        now = distances.values[0]
-        keep = distances.near[:, 0] > 0
-        node, pair = distances.near[keep].T
-        deficit = np.maximum(problem.margins - now, 0.0)
-        bound = problem.margins[pair] - deficit[pair] * 0.8**node
-        coefficients = self._coefficients[node - 1, 0]  # (R, N)
-        matrix = coefficients[:, :, None] * distances.gradients[keep][:, None, :]
-        slack = np.tile([-1.0, 0.0], (len(node), 1))
-        rows = _Rows()
-        rows.add(-matrix.reshape(len(node), horizon * size), slack, distances.values[node, pair] - bound)
-        return rows, now
-
-    def _solve_limited(
-        self,
-        problem: Problem,
-        guess: FloatArray,
-        q: FloatArray,
-        v: FloatArray,
-        hessian: FloatArray,
-        gradient: FloatArray,
-        rows: _Rows,
-    ) -> tuple[FloatArray, FloatArray, int, int]:
-        """Solve; add the velocity and position limits that the solution breaks; solve again."""
-        acceleration = np.tile(problem.limits.acceleration, (self._shape[0], 1))
-        lower = np.concatenate([(-acceleration - guess).ravel(), [0.0, 0.0]])
-        upper = np.concatenate([(acceleration - guess).ravel(), [_INFINITE, _INFINITE]])
-        limits = _LimitRows(problem, self._coefficients, q[1:], v[1:])
-        limits.add_violated(rows, np.zeros(self._shape), 0.0)
+    def _solve(self, qp: "_Qp", limits: LimitRows) -> tuple[FloatArray, FloatArray, bool, int, int]:
+        """Solve with the rows that matter; add those that the solution breaks; solve again."""
+        free = qp.unconstrained()
+        if free is not None and limits.violated(free.reshape(self._shape), 0.0) is None:
+            self.reset()
+            return free.reshape(self._shape), np.zeros(2), True, 0, 0
+        qp.begin(limits.near(), self._active)
         total = 0
         for _ in range(_ROUNDS):
-            matrix = np.vstack(rows.matrices)
-            high = np.concatenate([upper, *rows.uppers])
-            low = np.concatenate([lower, np.full(len(matrix), -_INFINITE)])
-            solution, _, flag, info = daqp.solve(hessian, gradient, matrix, high, low)
-            total += info["iterations"]
+            solution, flag, multipliers, iterations = qp.solve(self._active_bounds, self._active)
+            total += iterations
             change, slack = solution[:-2].reshape(self._shape), solution[-2:]
-            if flag <= 0 or not limits.add_violated(rows, change, slack[1]):
+            if flag <= 0:
+                self.reset()
+                return change, slack, False, total, qp.size
+            self._remember(qp, multipliers)
+            broken = qp.broken(solution)
+            more = limits.violated(change, slack[1])
+            if more is None and not broken:
                 break
-        return change, slack, flag, total
+            qp.extend(more)
+        return change, slack, True, total, qp.size
+
+    def _remember(self, qp: "_Qp", multipliers: FloatArray) -> None:
+        bounds = len(self._active_bounds)
+        marks = np.where(multipliers > 0, _UPPER, np.where(multipliers < 0, _LOWER, 0)).astype(np.int32)
+        self._active_bounds = marks[:bounds]
+        held = np.flatnonzero(marks[bounds:])
+        self._active = dict.fromkeys(qp.keys[held].tolist(), _UPPER)
 
 
-class _LimitRows:
-    """Velocity and position limits at the nodes, each added to the QP once, when violated."""
+class _Qp:
+    """`min ½ xᵀ H x + gᵀ x` with bounds and rows, x = (δ, s)."""
 
-    def __init__(self, problem: Problem, coefficients: FloatArray, q: FloatArray, v: FloatArray) -> None:
-        limits = problem.limits
-        middle = 0.5 * (limits.position_upper + limits.position_lower)
-        half = 0.5 * (limits.position_upper - limits.position_lower)
-        self._coefficients = coefficients[:, :2]  # (N, 2, N): of q and v
-        self._scales = np.stack([half, limits.velocity])  # (2, n)
-        self._offsets = np.stack([q - middle, v], axis=1) / self._scales  # (N, 2, n), within ±1
-        self._taken = np.zeros((*self._offsets.shape, 2), dtype=bool)
+    def __init__(
+        self, problem: Problem, guess: FloatArray, hessian: FloatArray, gradient: FloatArray, rows: Rows
+    ) -> None:
+        size = len(gradient)
+        self._free_hessian, self._free_gradient = hessian, gradient
+        self._slack = (problem.slack_linear, problem.slack_quadratic)
+        acceleration = np.broadcast_to(problem.limits.acceleration, guess.shape)
+        self._lower = np.zeros(size + 2)
+        self._upper = np.full(size + 2, _INFINITE)
+        self._lower[:-2] = (-acceleration - guess).ravel()
+        self._upper[:-2] = (acceleration - guess).ravel()
+        self._candidates = rows
+        self._used = np.zeros(len(rows.upper), dtype=bool)
+        self._limits: list[Rows] = []
+        self._parts: list[Rows] = []
 
-    def add_violated(self, rows: _Rows, change: FloatArray, slack: float) -> bool:
-        """Add rows for the limits that a change (N, n) breaks beyond the slack; return whether any."""
-        values = self._offsets + np.einsum("kaj,jn->kan", self._coefficients, change) / self._scales
-        over = np.stack([values, -values], axis=-1) > 1.0 + slack + _LIMIT_TOLERANCE
-        new = np.argwhere(over & ~self._taken)
-        if not len(new):
-            return False
-        self._taken |= over
-        horizon, _, size = self._offsets.shape
-        matrix = np.zeros((len(new), horizon, size))
-        node, kind, joint, side = new.T
-        sign = 1.0 - 2.0 * side
-        matrix[np.arange(len(new)), :, joint] = (
-            sign[:, None] * self._coefficients[node, kind] / self._scales[kind, joint][:, None]
-        )
-        slacks = np.tile([0.0, -1.0], (len(new), 1))
-        rows.add(matrix.reshape(len(new), -1), slacks, 1.0 - sign * self._offsets[node, kind, joint])
-        return True
+    @property
+    def size(self) -> int:
+        """Number of rows in use."""
+        return sum(len(part.upper) for part in self._parts)
 
+    @property
+    def keys(self) -> IntArray:
+        """Keys of the rows in use, (R,)."""
+        return np.concatenate([part.keys for part in self._parts])
 
-def _coefficients(horizon: int, dt: float) -> FloatArray:
-    """Return how (q, v, u) of stage k depend on the acceleration of stage j, (N, 3, N)."""
-    stage, earlier = np.mgrid[:horizon, :horizon]
-    past = stage >= earlier
-    position = dt * dt * (stage - earlier + 0.5) * past
-    return np.stack([position, dt * past, np.eye(horizon)], axis=1)
+    def unconstrained(self) -> FloatArray | None:
+        """Return the step without bounds and rows, (N n,), if it obeys them all."""
+        _, step, info = dposv(self._free_hessian, -self._free_gradient, lower=1)
+        if info or (step < self._lower[:-2]).any() or (step > self._upper[:-2]).any():
+            return None
+        rows = self._candidates
+        return None if (rows.matrix[:, :-2] @ step > rows.upper).any() else step
+
+    def begin(self, limits: Rows | None, active: dict[int, int]) -> None:
+        """Take the rows that are close to their bound or were active, and some limits."""
+        rows = self._candidates
+        self._used = rows.upper < _CLOSE
+        if active:
+            self._used |= np.isin(rows.keys, list(active))
+        self.extend(limits)
+
+    def broken(self, solution: FloatArray) -> bool:
+        """Take the distance rows that a solution breaks; return whether there were any."""
+        rows = self._candidates
+        broken = (rows.matrix @ solution > rows.upper + _TOLERANCE) & ~self._used
+        self._used |= broken
+        return bool(broken.any())
+
+    def extend(self, limits: Rows | None) -> None:
+        """Take more limits, if any; the next `solve` is with all rows taken so far."""
+        if limits is not None:
+            self._limits.append(limits)
+        self._parts = [self._candidates.take(self._used), *self._limits]
+
+    def solve(self, bounds: IntArray, active: dict[int, int]) -> tuple[FloatArray, int, FloatArray, int]:
+        """Return solution, DAQP's exit flag, multipliers and iterations, begun from rows held active."""
+        hessian, gradient = self._with_slack()
+        matrix = np.concatenate([part.matrix for part in self._parts])
+        upper = np.concatenate([self._upper, *(part.upper for part in self._parts)])
+        lower = np.full(len(upper), -_INFINITE)
+        lower[: len(self._lower)] = self._lower
+        sense = np.zeros(len(upper), dtype=np.int32)
+        sense[: len(bounds)] = bounds
+        if active:
+            sense[len(bounds) :] = [active.get(key, 0) for key in self.keys.tolist()]
+        x, _, flag, info = daqp.solve(hessian, gradient, matrix, upper, lower, sense)
+        if flag <= 0:
+            x, _, flag, info = daqp.solve(hessian, gradient, matrix, upper, lower)
+        return x, flag, info["lam"], info["iterations"]
+
+    def _with_slack(self) -> tuple[FloatArray, FloatArray]:
+        linear, quadratic = self._slack
+        size = len(self._free_gradient)
+        hessian = np.zeros((size + 2, size + 2))
+        hessian[:size, :size] = self._free_hessian
+        hessian[size, size] = hessian[size + 1, size + 1] = quadratic
+        return hessian, np.append(self._free_gradient, [linear, linear])

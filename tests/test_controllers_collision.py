@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from handrail.controllers.collision import CollisionModel, _ResultReader
+from handrail.controllers.collision import CollisionModel
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.model import load_model
 from handrail.controllers.shape import Obstacle, Shape
@@ -27,7 +27,7 @@ def test_gradients_are_the_derivatives_of_the_distances():
         q = rng.uniform(-1.5, 1.5, MODEL.size)
         distances = collision.distances(q[None])
         steps = h * np.eye(MODEL.size)
-        after, before = collision.distances(q + steps).values, collision.distances(q - steps).values
+        after, before = collision.values(q + steps), collision.values(q - steps)
         slopes = ((after - before) / (2 * h)).T  # (P, n)
         pair = distances.near[:, 1]
         apart = distances.values[0, pair] > 0.02
@@ -40,9 +40,43 @@ def test_gradients_are_the_derivatives_of_the_distances():
 
 def test_bulk_reading_is_reading_one_by_one():
     collision = CollisionModel(MODEL, scene(np.random.default_rng(1)))
+    reader = collision._all.results
+    assert reader._view is not None, "coal lays its results out differently: updates will be slow"
     for q in np.random.default_rng(2).uniform(-2, 2, (10, MODEL.size)):
-        collision.compute(q)
-        np.testing.assert_array_equal(collision._results.read(), _ResultReader._one_by_one(collision.results))
+        collision.values(q[None])
+        np.testing.assert_array_equal(reader.read(), reader._one_by_one())
+
+
+def test_what_is_skipped_is_far():
+    """Values that are not measured are lower bounds, and never of a pair within reach."""
+    rng = np.random.default_rng(4)
+    collision = CollisionModel(MODEL, scene(rng))
+    for _ in range(30):
+        start = rng.uniform(-1.5, 1.5, MODEL.size)
+        path = start + np.cumsum(rng.uniform(-0.05, 0.05, (8, MODEL.size)), axis=0)
+        exact = collision.values(path)
+        distances = collision.distances(path, reach=0.3)
+        assert np.all(distances.values <= exact + 1e-5)
+        near = exact < 0.3
+        np.testing.assert_allclose(distances.values[near], exact[near], atol=1e-5)
+        cheap = collision.values(path, None, (path[0], exact[0]))
+        assert np.all(cheap <= exact + 1e-5)
+        np.testing.assert_allclose(cheap[exact < 0.15], exact[exact < 0.15], atol=1e-5)
+
+
+def test_moving_obstacles_are_where_they_will_be():
+    ball = Obstacle("ball", Shape("sphere", [0.1]), [2.0, 0.0, 0.14], velocity=[-0.5, 0.0, 0.0])
+    collision = CollisionModel(MODEL, (ball,))
+    q, times = np.tile(MODEL.description.home, (3, 1)), np.array([0.0, 1.0, 2.0])
+    row = collision.pairs.index(("chassis", "ball"))
+    expected = 2.0 - 0.5 * times - 0.1 - (-1.5 + 0.48)
+    np.testing.assert_allclose(collision.values(q, times)[:, row], expected, atol=1e-6)
+    np.testing.assert_allclose(collision.distances(q, np.inf, times).values[:, row], expected, atol=1e-6)
+    nearer = Obstacle("ball", ball.shape, [1.0, 0.0, 0.14])
+    collision.observe((nearer,))
+    np.testing.assert_allclose(collision.values(q, times)[:, row], expected[0] - 1.0, atol=1e-6)
+    with pytest.raises(HandrailError, match="obstacles: expected ball, got none"):
+        collision.observe((Obstacle("none", ball.shape, [1, 0, 0]),))
 
 
 def test_the_distance_to_a_wall_is_the_gap():
@@ -52,7 +86,7 @@ def test_the_distance_to_a_wall_is_the_gap():
     q = np.array(MODEL.description.home)
     q[0] = -0.5
     row = collision.pairs.index(("chassis", "wall"))
-    assert collision.distances(q[None]).values[0, row] == pytest.approx(0.9 - (-0.5 + 0.48), abs=1e-6)
+    assert collision.values(q[None])[0, row] == pytest.approx(0.9 - (-0.5 + 0.48), abs=1e-6)
 
 
 def test_only_near_pairs_have_gradients():

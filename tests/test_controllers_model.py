@@ -8,7 +8,9 @@ from handrail.controllers.channels import Channels
 from handrail.controllers.description import load_description
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.model import load_model
-from handrail.controllers.objective import Stage, channel_velocities
+from handrail.controllers.frames import Frames
+from handrail.controllers.objective import Stage
+from handrail.controllers.objectives.tracking import channel_velocities
 from handrail.controllers.symbolic import symbolic_pose
 
 MODEL = load_model()
@@ -34,12 +36,12 @@ def test_channel_velocities_are_what_moves():
     """Base twist in the base frame and tool twist in the world, against finite differences of poses."""
     channels = Channels.of(MODEL.description)
     q, v, u = ca.SX.sym("q", N), ca.SX.sym("v", N), ca.SX.sym("u", N)
-    stage = Stage(q, v, u, symbolic_pose(MODEL, q))
-    function = ca.Function("c", [q, v], [channel_velocities(stage, channels)])
+    stage, p = Stage(MODEL, q, v, u), ca.SX.sym("p", 5)
+    function = ca.Function("c", [q, v, p], [channel_velocities(stage, channels, p)])
     rng = np.random.default_rng(1)
     for _ in range(20):
         x, rate, h = rng.uniform(-2, 2, N), rng.uniform(-1, 1, N), 1e-6
-        values = np.array(function(x, rate)).ravel()
+        values = np.array(function(x, rate, Frames().parameters)).ravel()
         now, later = MODEL.pose(x, "planar_base"), MODEL.pose(x + h * rate, "planar_base")
         linear = now.rotation.T @ (later.position - now.position) / h
         np.testing.assert_allclose(values[:2], linear[:2], atol=1e-4)

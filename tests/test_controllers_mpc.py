@@ -9,9 +9,11 @@ from hypothesis.extra.numpy import arrays
 
 from handrail.controllers.command import Status
 from handrail.controllers.controller import State
+from handrail.controllers.frames import Frames
 from handrail.controllers.intent import Intent
 from handrail.controllers.model import load_model
-from handrail.controllers.mpc import MaskedMpc, MpcSettings
+from handrail.controllers.mpc import MaskedMpc
+from handrail.controllers.settings import MpcSettings
 from handrail.controllers.shape import Obstacle, Shape
 
 MODEL = load_model()
@@ -123,10 +125,11 @@ def test_a_failed_solve_brakes(monkeypatch):
     positions, velocities, _ = roll(MPC, [asked] * 10)
 
     def infeasible(hessian, *rest):
-        return np.zeros(len(hessian)), 0.0, -1, {"iterations": 3}
+        return np.zeros(len(hessian)), 0.0, -1, {"iterations": 3, "lam": np.zeros(len(hessian))}
 
     monkeypatch.setattr(daqp, "solve", infeasible)
-    command = MPC.update(State(positions[-1], velocities[-1], 0.5), asked(0.5))
+    beyond = asking(np.full(18, -2.0), "ee")  # at the acceleration limits, so that the QP has to be solved
+    command = MPC.update(State(positions[-1], velocities[-1], 0.5), beyond(0.5))
     assert command.health.status is Status.SOLVER_FAILED
     np.testing.assert_allclose(command.velocities[0], velocities[-1], atol=1e-9)
     assert np.all(np.abs(command.velocities[-1]) < 1e-9 + np.abs(velocities[-1]))
@@ -199,19 +202,19 @@ def test_the_condensed_cost_is_the_cost():
     rng = np.random.default_rng(7)
     mask = CHANNELS.mask("ee", "base")
     state = State(HOME + rng.uniform(-0.2, 0.2, 9), rng.uniform(-0.2, 0.2, 9))
-    problem = MPC.problem(state, Intent(rng.uniform(-0.3, 0.3, 18), mask))
-    setup = MPC._setup
+    frames = Frames("world", "tool", [0.1, -0.2, 0.05])
+    problem = MPC.problem(state, Intent(rng.uniform(-0.3, 0.3, 18), mask, frames=frames))
     u = rng.uniform(-0.5, 0.5, (10, 9))
-    residual = setup.residuals.expression
+    residual = MPC.residuals.expression
 
     def residuals(u):
         q, v = problem.rollout(u)
         z = np.hstack([q[1:], v[1:], u])
-        r = np.array([np.array(residual(row)).ravel() for row in z])
+        r = np.array([np.array(residual(row, problem.parameters)).ravel() for row in z])
         return np.sqrt(problem.weights) * (r - problem.reference)
 
     q, v = problem.rollout(u)
-    hessian, gradient = setup.solver._cost(problem, q, v, u)
+    hessian, gradient = MPC.solver.cost.build(problem, q[1:], v[1:], u)
     h, jacobian = 1e-6, []
     for index in range(90):
         step = np.zeros(90)
@@ -219,8 +222,8 @@ def test_the_condensed_cost_is_the_cost():
         step = step.reshape(10, 9)
         jacobian.append(((residuals(u + step) - residuals(u - step)) / (2 * h)).ravel())
     jacobian = np.array(jacobian).T
-    np.testing.assert_allclose(gradient[:90], jacobian.T @ residuals(u).ravel(), rtol=1e-4, atol=1e-3)
-    np.testing.assert_allclose(hessian[:90, :90], jacobian.T @ jacobian, rtol=1e-4, atol=1e-2)
+    np.testing.assert_allclose(gradient, jacobian.T @ residuals(u).ravel(), rtol=1e-4, atol=1e-3)
+    np.testing.assert_allclose(hessian, jacobian.T @ jacobian, rtol=1e-4, atol=1e-2)
 
 
 def test_a_plan_knows_whether_it_is_a_solution():
@@ -243,14 +246,20 @@ def test_a_longer_horizon_is_a_setting():
 
 
 def test_derivatives_come_from_casadi():
-    """Evaluated Jacobians against CasADi's own, one stage at a time."""
-    residuals = MPC._setup.residuals
+    """Evaluated Jacobians against CasADi's own, one stage at a time; affine rows are constant."""
+    residuals = MPC.residuals
     rng = np.random.default_rng(11)
     q, v, u = (rng.uniform(-1, 1, (10, 9)) for _ in range(3))
-    values, transposed = residuals.evaluate(q, v, u)
+    p = Frames("world", "tool", [0.1, 0.0, 0.2]).parameters
+    values, jacobians = residuals.evaluate(q, v, u, p)
     z = ca.SX.sym("z", 27)
-    jacobian = ca.Function("j", [z], [ca.jacobian(residuals.expression(z), z)])
+    jacobian = ca.Function("j", [z], [ca.densify(ca.jacobian(residuals.expression(z, p), z))])
+    affine = residuals.affine
+    assert set(affine.index) | set(residuals.curved) == set(range(residuals.size))
     for k in range(10):
         stage = np.concatenate([q[k], v[k], u[k]])
-        np.testing.assert_allclose(values[k], np.array(residuals.expression(stage)).ravel(), atol=1e-9)
-        np.testing.assert_allclose(transposed[k].T, np.array(jacobian(stage)), atol=1e-9)
+        expected = np.array(residuals.expression(stage, p)).ravel()
+        np.testing.assert_allclose(values[k], expected[residuals.curved], atol=1e-9)
+        np.testing.assert_allclose(affine.jacobian @ stage + affine.offset, expected[affine.index], atol=1e-9)
+        np.testing.assert_allclose(jacobians[k], np.array(jacobian(stage))[residuals.curved], atol=1e-9)
+        np.testing.assert_allclose(affine.jacobian, np.array(jacobian(stage))[affine.index], atol=1e-9)

@@ -1,0 +1,49 @@
+"""In which frames an operator means the twists, and for which point of the tool."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from handrail.controllers.arrays import FloatArray, frozen
+from handrail.controllers.errors import HandrailError, unknown_name
+
+_REACH = 5.0  # farthest tool point from the tool frame [m]
+
+
+@dataclass(frozen=True)
+class Frames:
+    """How twists are meant.
+
+    Attributes:
+        base: frame of the base twist: `base` or `world`.
+        tool: frame of the end-effector twist: `world` or `tool`.
+        point: the tool point, in the tool frame [m], (3,).
+    """
+
+    base: str = "base"
+    tool: str = "world"
+    point: FloatArray = field(default_factory=lambda: np.zeros(3))
+
+    def __post_init__(self) -> None:
+        """Copy the array and make it read-only."""
+        object.__setattr__(self, "point", frozen(self.point))
+
+    def check(self) -> None:
+        """Check the names and the point.
+
+        Raises:
+            HandrailError: a frame that does not exist, or a point that is none.
+        """
+        if self.base not in ("base", "world"):
+            raise unknown_name("frame of the base twist", self.base, ("base", "world"))
+        if self.tool not in ("world", "tool"):
+            raise unknown_name("frame of the end-effector twist", self.tool, ("world", "tool"))
+        if self.point.shape != (3,) or not np.all(np.abs(self.point) <= _REACH):
+            raise HandrailError(
+                f"tool point: expected 3 numbers within {_REACH} m, got {self.point.tolist()}"
+            )
+
+    @property
+    def parameters(self) -> FloatArray:
+        """The parameters of the tracking objective, (5,): base in world, tool in tool, point."""
+        return np.array([self.base == "world", self.tool == "tool", *self.point], dtype=float)

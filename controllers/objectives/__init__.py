@@ -1,0 +1,1 @@
+"""Objectives: what the robot does with the freedom that the operator leaves."""

@@ -1,0 +1,91 @@
+"""Intent prediction Ψ: what the operator will ask for over the horizon (the paper's equation 4)."""
+
+from collections import deque
+from collections.abc import Callable
+
+import numpy as np
+
+from handrail.controllers.arrays import FloatArray
+from handrail.controllers.intent import Intent
+
+Prediction = Callable[[Intent, FloatArray], FloatArray]
+"""The intent now and times ahead, (N,) [s] → predicted values on every channel, (N, m).
+
+Any callable will do; one that remembers has a `reset()`, called when an episode begins.
+"""
+
+
+def constant(intent: Intent, times: FloatArray) -> FloatArray:
+    """Hold the command, `û(t) = u` (the paper's choice), (N, m)."""
+    return np.broadcast_to(intent.values, (len(times), len(intent.values)))
+
+
+class Decaying:
+    """Let the command die away, `û(t) = exp(-t / τ) u`.
+
+    Args:
+        time_constant: τ [s].
+    """
+
+    def __init__(self, time_constant: float = 0.5) -> None:
+        self._time_constant = time_constant
+
+    def __call__(self, intent: Intent, times: FloatArray) -> FloatArray:
+        """Return the predicted values, (N, m)."""
+        return np.exp(-times / self._time_constant)[:, None] * intent.values
+
+
+class Extrapolated:
+    """Go on with the recent trend, `û(t) = u + s τ (1 - exp(-t / τ))`.
+
+    s is the least-squares slope over the window; it fades with τ, so that the prediction levels off. The
+    history begins anew when the mask changes.
+
+    Args:
+        window: how far back the trend is taken from [s].
+        fade: τ [s].
+    """
+
+    def __init__(self, window: float = 0.3, fade: float = 0.2) -> None:
+        self._window = window
+        self._fade = fade
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget the history."""
+        self._history: deque[Intent] = deque()
+
+    def __call__(self, intent: Intent, times: FloatArray) -> FloatArray:
+        """Return the predicted values, (N, m)."""
+        self._remember(intent)
+        gain = self._fade * (1.0 - np.exp(-times / self._fade))
+        return intent.values + gain[:, None] * self._slope()
+
+    def _remember(self, intent: Intent) -> None:
+        if self._history and not np.array_equal(self._history[-1].mask, intent.mask):
+            self._history.clear()
+        self._history.append(intent)
+        while self._history[0].time < intent.time - self._window:
+            self._history.popleft()
+
+    def _slope(self) -> FloatArray:
+        times = np.array([intent.time for intent in self._history])
+        values = np.array([np.where(intent.mask, intent.values, 0.0) for intent in self._history])
+        centred = times - times.mean()
+        spread = float(centred @ centred)
+        return centred @ values / spread if spread > 0 else np.zeros(values.shape[1])
+
+
+class Preview:
+    """Follow a plan that is known, `û(t) = plan(now + t)`.
+
+    Args:
+        plan: time [s] → values on every channel, (m,).
+    """
+
+    def __init__(self, plan: Callable[[float], FloatArray]) -> None:
+        self._plan = plan
+
+    def __call__(self, intent: Intent, times: FloatArray) -> FloatArray:
+        """Return the predicted values, (N, m)."""
+        return np.array([self._plan(intent.time + time) for time in times])

@@ -1,0 +1,76 @@
+"""Settings of the masked MPC."""
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from handrail.controllers.errors import HandrailError
+
+
+@dataclass(frozen=True)
+class MpcSettings:
+    """Settings of the masked MPC; weights are per squared unit of their residual.
+
+    Attributes:
+        horizon: stages N.
+        dt: length of a stage [s].
+        decay: γ; stage k tracks the intent with weight γᵏ.
+        tracked_stages: stages M at which the intent is tracked; 0 for all.
+        tracking: weight of the commanded channels.
+        base_velocity: weight of base velocities that nobody commands.
+        arm_velocity: weight of arm velocities that nobody commands.
+        acceleration: weight of all accelerations.
+        posture: weight that draws the arm to its home posture while the tool is steered.
+        terminal_velocity: weight of the last velocity that nobody commands: the terminal cost V_f.
+        margin: signed distance kept between shapes [m].
+        work_margin: the same between tool shapes and work surfaces [m].
+        floor: signed distance below which a stop must never come, as a share of the margin.
+        reach: distance beyond the margin at which a pair enters the problem [m].
+        slack_linear: linear penalty of the slack.
+        slack_quadratic: quadratic penalty of the slack.
+        intent_timeout: age from which an intent is stale [s].
+        velocity_tolerance: how far the measured velocity may be from the commanded one before the plan
+            starts from the measured one, relative to the velocity limit.
+    """
+
+    horizon: int = 10
+    dt: float = 0.1
+    decay: float = 0.9
+    tracked_stages: int = 0
+    tracking: float = 1000.0
+    base_velocity: float = 0.01
+    arm_velocity: float = 0.1
+    acceleration: float = 0.01
+    posture: float = 0.05
+    terminal_velocity: float = 0.1
+    margin: float = 0.10
+    work_margin: float = 0.008
+    floor: float = 0.3
+    reach: float = 0.30
+    slack_linear: float = 1e5
+    slack_quadratic: float = 1e5
+    intent_timeout: float = 0.25
+    velocity_tolerance: float = 0.1
+
+    def __post_init__(self) -> None:
+        """Check the numbers.
+
+        Raises:
+            HandrailError: one is negative or not finite, or the horizon is empty.
+        """
+        for entry in fields(self):
+            value = getattr(self, entry.name)
+            if not np.isfinite(value) or value < 0:
+                raise HandrailError(f"MPC setting {entry.name}: expected a finite number >= 0, got {value}")
+        if self.horizon < 2 or self.dt <= 0 or not 0 < self.decay <= 1:
+            raise HandrailError(
+                "MPC settings horizon, dt, decay: expected horizon >= 2, dt > 0, 0 < decay <= 1, "
+                f"got {self.horizon}, {self.dt}, {self.decay}"
+            )
+
+    @property
+    def discounts(self) -> np.ndarray:
+        """Share of the tracking weight at every stage: γᵏ while tracked, (N,)."""
+        stages = np.arange(self.horizon)
+        tracked = self.tracked_stages or self.horizon
+        return self.decay**stages * (stages < tracked)
