@@ -1,5 +1,7 @@
 """The demo: a few demonstrations, a table, a picture, and what to try next."""
 
+import shutil
+import sys
 from pathlib import Path
 
 from rich.console import Console
@@ -7,18 +9,18 @@ from rich.console import Console
 from handrail.collect.config import DatasetConfig, DemoConfig, RecordConfig
 from handrail.collect.contact_sheet import save_sheet
 from handrail.collect.gl import graphics_trouble
-from handrail.collect.record import record
+from handrail.collect.record import PLAIN, record
 from handrail.collect.replay import replay_episode
 from handrail.collect.tables import summary_table
 from handrail.controllers.errors import HandrailError
 
 _REPO = "handrail/demo"
 _NEXT = """Next:
-  handrail-inspect --dataset.root {root}
-  handrail-replay  --dataset.root {root}
-  handrail-record  --dataset.root {root} --resume --dataset.num_episodes 5 --mode switching{cameras}
-  lerobot-dataset-viz --repo-id {repo} --root {root} --episode-index 0    (pip install 'handrail[display]')
-  handrail-record --help"""
+  {bin}handrail-inspect --dataset.root {root}
+  {bin}handrail-replay --dataset.root {root}
+  {bin}handrail-record --dataset.root {root} --resume --dataset.num_episodes 5 --mode switching{cameras}
+  {bin}lerobot-dataset-viz --repo-id {repo} --root {root} --episode-index 0    (pip install 'handrail[display]')
+  {bin}handrail-record --help"""
 
 
 def demo(config: DemoConfig) -> int:
@@ -32,7 +34,7 @@ def demo(config: DemoConfig) -> int:
         raise HandrailError(f"--episodes {config.episodes}: expected 1 or more")
     trouble = graphics_trouble()
     if trouble:
-        console.print(f"Without pictures: {trouble}", highlight=False, soft_wrap=True)
+        console.print(f"Without pictures: {trouble}", **PLAIN)
     cameras = "" if trouble else "wrist,scene"
     root = Path(config.root) / "dataset"
     dataset = DatasetConfig(repo_id=_REPO, root=str(root), num_episodes=config.episodes)
@@ -44,8 +46,17 @@ def demo(config: DemoConfig) -> int:
     if not trouble:
         sheet = Path(config.root) / "episode_0.png"
         save_sheet(replay_episode(root, 0, pictures=8)[1], sheet)
-        console.print(f"Picture: {sheet}", highlight=False, soft_wrap=True)
-    console.print(f"Dataset: {root}", highlight=False, soft_wrap=True)
+        console.print(f"Picture: {sheet}", **PLAIN)
+    console.print(f"Dataset: {root}", **PLAIN)
     flags = f" --cameras {cameras}" if cameras else ""
-    console.print(_NEXT.format(root=root, repo=_REPO, cameras=flags), highlight=False, soft_wrap=True)
+    console.print(_NEXT.format(root=root, repo=_REPO, cameras=flags, bin=_command_prefix()), **PLAIN)
     return 0
+
+
+def _command_prefix() -> str:
+    """Return what to write before a command: nothing where the shell finds it, else the folder it is in."""
+    if shutil.which("handrail-record"):
+        return ""
+    folder = Path(sys.executable).parent
+    here = Path.cwd()
+    return f"{folder.relative_to(here) if folder.is_relative_to(here) else folder}/"

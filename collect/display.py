@@ -1,6 +1,5 @@
 """Shows a session in rerun: robot, cameras, intent against motion, distances."""
 
-import contextlib
 from pathlib import Path
 
 import numpy as np
@@ -120,8 +119,9 @@ class Display:
 
     def close(self) -> None:
         """Write out what is still buffered."""
-        with contextlib.suppress(AttributeError):
-            self._rr.get_global_data_recording().flush()
+        recording = self._rr.get_global_data_recording()
+        if recording is not None:
+            recording.flush()
 
 
 def _check_file(path: Path) -> None:

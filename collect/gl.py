@@ -6,12 +6,21 @@ State-only environments never need a graphics library.
 
 import ctypes
 import os
+import subprocess
 import sys
 from typing import Any
 
 from handrail.controllers.errors import HandrailError
 
 _LIBRARIES = {"egl": ("libEGL.so.1",), "osmesa": ("libOSMesa.so.8", "libOSMesa.so.6", "libOSMesa.so")}
+
+_PROBE = """
+import mujoco
+context = mujoco.GLContext(16, 16)
+context.make_current()
+model = mujoco.MjModel.from_xml_string("<mujoco><worldbody><geom size='1'/></worldbody></mujoco>")
+mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100)
+"""
 
 
 def _loads(backend: str) -> bool:
@@ -48,6 +57,18 @@ def missing_graphics(reason: object) -> HandrailError:
     )
 
 
+def graphics_trouble() -> str:
+    """Return why there can be no pictures on this machine, in one line; empty if there can.
+
+    A small picture is drawn in a process of its own, since a broken driver ends the process.
+    """
+    done = subprocess.run([sys.executable, "-c", _PROBE], capture_output=True, text=True, timeout=120)
+    if done.returncode == 0:
+        return ""
+    lines = done.stderr.strip().splitlines()
+    return str(missing_graphics(lines[-1] if lines else f"exit code {done.returncode}"))
+
+
 choose_backend()
 
 import mujoco as _mujoco  # noqa: E402
@@ -66,6 +87,7 @@ __all__ = [
     "MjrContext",
     "MjsBody",
     "choose_backend",
+    "graphics_trouble",
     "missing_graphics",
     "mujoco",
 ]

@@ -5,7 +5,7 @@ import signal
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from types import FrameType
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from rich.console import Console
@@ -29,6 +29,7 @@ from handrail.datasets.writer import EpisodeWriter
 
 INTERRUPTED = 130
 FAILED = 1
+PLAIN: dict[str, Any] = {"highlight": False, "markup": False, "soft_wrap": True}
 
 
 @dataclass
@@ -131,7 +132,7 @@ def _record_all(
 
 def _report(config: RecordConfig, writer: EpisodeWriter, log: _Log, console: Console) -> None:
     if log.trouble:
-        console.print(f"error: {log.trouble}", style="bold red", highlight=False, soft_wrap=True)
+        console.print(f"error: {log.trouble}", style="bold red", **PLAIN)
     if log.outcomes:
         console.print(_summary(config, log.outcomes))
     console.print(

@@ -13,8 +13,8 @@ _ERROR = 1e-3  # of the signed distances that is no loss [m]
 class StopCertificate:
     """Measures the stop that follows a command, at full deceleration of every joint.
 
-    From (q, v): `q_j(t) = q_j + v_j t - ½ sign(v_j) a_j t²` until `t_j = |v_j| / a_j`. The stop is safe when no
-    pair comes below its floor, or, where one is below already, no closer than now.
+    From (q, v): `q_j(t) = q_j + v_j t - ½ sign(v_j) a_j t²` until `t_j = |v_j| / a_j`. The stop is safe when
+    no pair comes below its floor, or, where one is below already, no closer than now.
 
     Args:
         limiter: knows the deceleration.

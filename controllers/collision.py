@@ -70,7 +70,9 @@ class CollisionModel:
         self._moves = self._pair_moves()  # (P, 2, n)
         self._levers = self._pair_levers(model)  # (n, P)
         neutral = pin.neutral(self._model)
-        self._all, self._near = (_PairData(self._model, self._data, self._geometry, neutral) for _ in range(2))
+        self._all, self._near = (
+            _PairData(self._model, self._data, self._geometry, neutral) for _ in range(2)
+        )
         self._selected = np.ones(self.size, dtype=bool)
         self.observe(obstacles)
 
@@ -98,7 +100,7 @@ class CollisionModel:
         self._measure(self._all, q[0], times[0], witnesses[0])
         jacobians[0] = pin.computeJointJacobians(self._model, self._data)
         values = _signed(witnesses[0]) - self._travel(q, times)  # (K, P)
-        near = self._select((values < reach).any(axis=0))
+        near = self._select(np.any(values < reach, axis=0))
         for node in range(1, len(q)):
             self._measure(self._near, q[node], times[node], witnesses[node])
             jacobians[node] = pin.computeJointJacobians(self._model, self._data)
@@ -125,7 +127,7 @@ class CollisionModel:
             return _signed(witnesses)
         path = np.vstack([now[0], q])
         values = now[1] - self._travel(path, np.append(0.0, times))[1:]
-        near = self._select((values < _FAR).any(axis=0))
+        near = self._select(np.any(values < _FAR, axis=0))
         for node in range(len(q) if len(near) else 0):
             self._measure(self._near, q[node], times[node], witnesses[node])
         values[:, near] = _signed(witnesses[:, near])
@@ -134,7 +136,9 @@ class CollisionModel:
     def _measure(self, data: "_PairData", q: FloatArray, time: float, out: FloatArray) -> None:
         """Let coal compute the pairs of `data` at q, with moving obstacles where they are after a time."""
         for geometry, obstacle in self._moving:
-            geometry.placement = pin.SE3(np.array(obstacle.rotation), obstacle.position + time * obstacle.velocity)
+            geometry.placement = pin.SE3(
+                np.array(obstacle.rotation), obstacle.position + time * obstacle.velocity
+            )
         pin.computeDistances(self._model, self._data, self._geometry, data.geometry, q)
         out[:] = data.results.read()
 
@@ -214,7 +218,9 @@ class CollisionModel:
         A coordinate that moves both shapes alike does not; a prismatic one moves by 1, a revolute one by the
         reach of what hangs on it.
         """
-        either = self._moves[:, 0] != self._moves[:, 1] if self.size else np.zeros((0, model.size), dtype=bool)
+        either = (
+            self._moves[:, 0] != self._moves[:, 1] if self.size else np.zeros((0, model.size), dtype=bool)
+        )
         return either.T * lever_arms(model)[:, None]
 
     def _ancestors(self, pair: pin.CollisionPair) -> FloatArray:
@@ -277,7 +283,9 @@ class _ResultReader:
 def lever_arms(model: RobotModel) -> FloatArray:
     """Return bounds on how far a point of the robot moves per unit of each coordinate, (n,) [m]."""
     pinocchio, arms = model.pinocchio, np.ones(model.size)
-    sizes = [np.linalg.norm(s.placement.translation) + s.shape.size.sum() for s in model.description.collision]
+    sizes = [
+        np.linalg.norm(s.placement.translation) + s.shape.size.sum() for s in model.description.collision
+    ]
     reach = float(max(sizes, default=0.0))
     for joint in range(pinocchio.njoints - 1, 0, -1):
         index = pinocchio.joints[joint].idx_v

@@ -11,10 +11,11 @@ import numpy as np
 from handrail.controllers.arrays import FloatArray, frozen
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.rotation import matrix_from_rpy, matrix_to_axis
-from handrail.controllers.shape import Shape
+from handrail.controllers.shape import Shape, ShapeKind
 
 _FOLDER = Path(__file__).parent / "robots"
 _PLANAR = ("x", "y", "theta")
+_SIMPLE: tuple[ShapeKind, ...] = ("box", "sphere", "cylinder")
 
 
 @dataclass(frozen=True)
@@ -176,7 +177,8 @@ def _check(description: RobotDescription) -> None:
 
 
 def _gripper(data: dict[str, Any]) -> Gripper:
-    return Gripper(**{key: tuple(value) if isinstance(value, list) else value for key, value in data.items()})
+    values: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in data.items()}
+    return Gripper(**values)
 
 
 def _placement(data: dict[str, Any], key: str = "translation") -> Placement:
@@ -188,7 +190,7 @@ def _placed_shape(data: dict[str, Any]) -> PlacedShape:
     if "capsule" in data:
         shape, placement = _capsule(data)
     else:
-        kind = next((kind for kind in ("box", "sphere", "cylinder") if kind in data), None)
+        kind: ShapeKind | None = next((kind for kind in _SIMPLE if kind in data), None)
         if kind is None:
             raise HandrailError(
                 f"shape {data.get('name', data)}: expected one of box, capsule, cylinder, sphere"

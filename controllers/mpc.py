@@ -114,7 +114,7 @@ class MaskedMpc:
         self._parameters[self.residuals.parameter_slice(objective)] = values
 
     def update(self, state: State, intent: Intent) -> Command:
-        """Return the command from now on; brakes when an input is bad, the solver fails, or a stop is unsafe."""
+        """Return the command from now on; brakes on a bad input, a failed solve or an unsafe stop."""
         start = perf_counter()
         status = check_inputs(state, intent, self.channels, self.settings.intent_timeout)
         plan = None

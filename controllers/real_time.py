@@ -4,7 +4,7 @@ from time import perf_counter
 
 import daqp
 import numpy as np
-from scipy.linalg.lapack import dposv
+from scipy.linalg.lapack import dposv  # pyright: ignore[reportAttributeAccessIssue]  (made at build time)
 
 from handrail.controllers.arrays import FloatArray, IntArray
 from handrail.controllers.condensing import CondensedCost

@@ -73,7 +73,7 @@ class StageResiduals:
     def evaluate(
         self, q: FloatArray, v: FloatArray, u: FloatArray, parameters: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """Return the curved rows' residuals (N, c) and Jacobians by (q, v, u), (N, c, 3n); views, overwritten.
+        """Return the curved rows' residuals (N, c) and Jacobians by (q, v, u), (N, c, 3n); views.
 
         Args:
             q: positions after the stages, (N, n).
@@ -104,7 +104,9 @@ class StageResiduals:
 
 def _parameter_slices(objectives: tuple[Objective, ...]) -> dict[str, slice]:
     ends = np.cumsum([len(objective.parameters) for objective in objectives])
-    return {o.name: slice(int(end) - len(o.parameters), int(end)) for o, end in zip(objectives, ends, strict=True)}
+    return {
+        o.name: slice(int(end) - len(o.parameters), int(end)) for o, end in zip(objectives, ends, strict=True)
+    }
 
 
 def _check_rows(objectives: tuple[Objective, ...], parts: list[ca.SX]) -> None:

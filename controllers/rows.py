@@ -114,5 +114,5 @@ class LimitRows:
         blocks[np.arange(len(new)), :, joint] = scale * self._coefficients[node, kind]
         matrix[:, :-2] = blocks.reshape(len(new), horizon * size)
         matrix[:, -1] = -1.0
-        keys = 1_000_000 + np.ravel_multi_index(new.T, (*self._offsets.shape, 2))
+        keys = 1_000_000 + np.asarray(np.ravel_multi_index(tuple(new.T), (*self._offsets.shape, 2)))
         return Rows(matrix, 1.0 - sign * self._offsets[node, kind, joint], keys)

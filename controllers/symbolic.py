@@ -42,13 +42,14 @@ def symbolic_pose(model: RobotModel, q: ca.SX, frame: str = "tool") -> SymbolicP
     """
     target = model.pinocchio.frames[model.frame_id(frame)]
     joints = [_joint(model, index) for index in range(1, model.pinocchio.njoints)]
-    poses = _joint_poses(joints, q)
+    poses: list[tuple[ca.SX, ca.SX]] = _joint_poses(joints, q)
     origin, rotation = poses[target.parentJoint]
     position = origin + rotation @ target.placement.translation
     columns = [ca.SX.zeros(6, 1)] * len(joints)
     index = target.parentJoint
     while index > 0:
-        columns[index - 1] = _column(joints[index - 1], *poses[index], position)
+        joint_origin, joint_rotation = poses[index]
+        columns[index - 1] = _column(joints[index - 1], joint_origin, joint_rotation, position)
         index = joints[index - 1].parent
     return SymbolicPose(position, rotation @ target.placement.rotation, ca.horzcat(*columns))
 

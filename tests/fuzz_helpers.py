@@ -16,7 +16,15 @@ from handrail.controllers.intent import Intent
 from handrail.controllers.mpc import MaskedMpc
 from handrail.controllers.shape import Shape
 
-GROUPS = [("ee",), ("base",), ("joint",), ("base", "ee"), ("ee.vx", "ee.vy", "ee.vz"), ("joint.elbow_joint",), ()]
+GROUPS = [
+    ("ee",),
+    ("base",),
+    ("joint",),
+    ("base", "ee"),
+    ("ee.vx", "ee.vy", "ee.vz"),
+    ("joint.elbow_joint",),
+    (),
+]
 CLEARANCE = 0.15  # of the robot at the start [m]
 
 
@@ -72,7 +80,7 @@ def _thing(name, q, rng):
 
 
 class RudeOperator:
-    """Full-speed, jerky, switching intents; now and then garbage, huge, stale or in frames that do not exist."""
+    """Full-speed, jerky, switching intents; now and then garbage, huge, stale or in no known frame."""
 
     def __init__(self, channels, limits, rng):
         self._channels, self._limits, self._rng = channels, limits, rng
@@ -82,12 +90,16 @@ class RudeOperator:
         rng, size = self._rng, self._channels.size
         if time >= self._until:
             self._until = time + rng.uniform(0.05, 2.0)
-            self._mask = self._channels.mask(*GROUPS[rng.integers(len(GROUPS))]) if rng.random() < 0.8 else (
-                rng.random(size) < 0.4
+            self._mask = (
+                self._channels.mask(*GROUPS[rng.integers(len(GROUPS))])
+                if rng.random() < 0.8
+                else (rng.random(size) < 0.4)
             )
             full = np.concatenate([[1, 1, 0.4], [1, 1, 1, 2, 2, 2], self._limits.velocity])
             self._values = full * rng.choice([-1.0, 1.0, 0.0, 0.5], size)
-            self._frames = Frames(rng.choice(["base", "world"]), rng.choice(["world", "tool"]), rng.uniform(-0.3, 0.3, 3))
+            self._frames = Frames(
+                rng.choice(["base", "world"]), rng.choice(["world", "tool"]), rng.uniform(-0.3, 0.3, 3)
+            )
         values, mask, frames, stamp = self._values, self._mask, self._frames, time
         trouble = rng.random()
         if trouble < 0.02:

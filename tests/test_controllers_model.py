@@ -7,8 +7,8 @@ import pytest
 from handrail.controllers.channels import Channels
 from handrail.controllers.description import load_description
 from handrail.controllers.errors import HandrailError
-from handrail.controllers.model import load_model
 from handrail.controllers.frames import Frames
+from handrail.controllers.model import load_model
 from handrail.controllers.objective import Stage
 from handrail.controllers.objectives.tracking import channel_velocities
 from handrail.controllers.symbolic import symbolic_pose
@@ -77,7 +77,7 @@ def test_a_wrong_description_says_what_is_wrong(tmp_path, change, words):
     text = (description._FOLDER / "ridgeback_ur10.toml").read_text()
     assert change[0] in text
     path = tmp_path / "robot.toml"
-    path.write_text(text.replace(*change, 1))
+    path.write_text(text.replace(change[0], change[1], 1))
     with pytest.raises(HandrailError, match=words.replace("[", r"\[")) as error:
         load_description(path)
     assert "\n" not in str(error.value)

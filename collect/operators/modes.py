@@ -136,7 +136,7 @@ class InputMap:
         if len(base):
             rows.append(_BASE_WEIGHT * np.eye(len(base), self._model.size))
             targets.append(_BASE_WEIGHT * base)
-        solution = np.linalg.lstsq(np.vstack(rows), np.concatenate(targets), rcond=None)[0]
+        solution: FloatArray = np.linalg.lstsq(np.vstack(rows), np.concatenate(targets), rcond=None)[0]
         return solution / max(1.0, float(np.max(np.abs(solution) / self.full[self.channels.joint_slice])))
 
     def _base_world(self, wish: Wish, q: FloatArray) -> FloatArray:
