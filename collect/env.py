@@ -195,7 +195,9 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         wanted = min(max(gripper, 0.0), 1.0) if usable else self._gripper
         self._gripper = wanted
         target = action[:size] if usable else np.full(size, np.nan)
-        velocity, clipped = self._limiter.limit(self.simulation.commanded, target, 1.0 / self.fps)
+        velocity, clipped = self._limiter.limit(
+            self.simulation.commanded, target, 1.0 / self.fps, self.simulation.state().q
+        )
         return velocity, clipped or wanted != gripper
 
     def _observe(self, state: TaskState) -> Observation:

@@ -30,8 +30,6 @@ from handrail.controllers.residuals import StageResiduals
 from handrail.controllers.settings import MpcSettings
 from handrail.controllers.shape import Obstacle
 
-_LARGEST_INTENT = 10.0  # [m/s, rad/s]; beyond any robot's limits, and keeps the QP well scaled
-
 
 @dataclass
 class _Memory:
@@ -78,6 +76,7 @@ class MaskedMpc:
         self._predict = predict
         self._times = self.settings.dt * np.arange(1, horizon + 1)
         self._masked: dict[bytes, _Masked] = {}
+        self._largest = self._largest_intent()
         self.reset()
 
     @property
@@ -140,7 +139,7 @@ class MaskedMpc:
         masked = self._of_mask(np.asarray(intent.mask), state.q)
         reference = np.tile(self.residuals.reference, (settings.horizon, 1))
         predicted = np.where(intent.mask, self._predict(intent, self._times), 0.0)
-        reference[:, :size] = np.minimum(np.maximum(predicted, -_LARGEST_INTENT), _LARGEST_INTENT)
+        reference[:, :size] = np.minimum(np.maximum(predicted, -self._largest), self._largest)
         self._parameters[self.residuals.parameter_slice("tracking")] = intent.frames.parameters
         return Problem(
             q=state.q,
@@ -157,6 +156,12 @@ class MaskedMpc:
             slack_linear=settings.slack_linear,
             slack_quadratic=settings.slack_quadratic,
         )
+
+    def _largest_intent(self) -> FloatArray:
+        """Return what a command of each channel is cut to, (m,): nothing faster is possible, or wise."""
+        velocity = self.model.description.limits.velocity
+        tool = [self.settings.largest_speed] * 3 + [self.settings.largest_rate] * 3
+        return np.concatenate([velocity[: len(self.channels.base)], tool, velocity])
 
     def _of_mask(self, mask: BoolArray, q: FloatArray) -> _Masked:
         """Return what depends on the mask alone, remembered for every mask met."""

@@ -7,6 +7,7 @@ import numpy as np
 from scipy.linalg.lapack import dposv  # pyright: ignore[reportAttributeAccessIssue]  (made at build time)
 
 from handrail.controllers.arrays import FloatArray, IntArray
+from handrail.controllers.collision import Distances
 from handrail.controllers.condensing import CondensedCost
 from handrail.controllers.problem import Plan, Problem
 from handrail.controllers.residuals import StageResiduals
@@ -46,21 +47,18 @@ class RealTimeSolver:
         """Return the plan after one step from the accelerations `guess`, (N, n)."""
         start = perf_counter()
         limit = problem.limits.acceleration
-        guess = np.minimum(np.maximum(guess, -limit), limit)
-        q, v = problem.rollout(guess)
-        hessian, gradient = self._cost.build(problem, q[1:], v[1:], guess)
-        built = perf_counter()
-        nodes = Nodes(problem, q, v, self._cost.coefficients)
-        distances = problem.collision.distances(nodes.q, problem.margins + problem.reach, nodes.times)
+        guess, q, v, nodes, distances = self._linearisation(problem, guess)
         rows = distance_rows(problem, nodes, distances)
         limits = LimitRows(problem, q[1:], v[1:], self._cost.coefficients)
         measured = perf_counter()
+        hessian, gradient = self._cost.build(problem, q[1:], v[1:], guess)
+        built = perf_counter()
         qp = _Qp(problem, guess, hessian, gradient, rows)
         change, slack, solved, iterations, count = self._solve(qp, limits)
         u = np.minimum(np.maximum(guess + change, -limit), limit)
         q, v = problem.rollout(u)
         done = perf_counter()
-        phases = (("residuals", built - start), ("distances", measured - built), ("solve", done - measured))
+        phases = (("distances", measured - start), ("residuals", built - measured), ("solve", done - built))
         return Plan(
             q=q,
             v=v,
@@ -74,6 +72,25 @@ class RealTimeSolver:
             rows=count,
             phases=phases,
         )
+
+    def _linearisation(
+        self, problem: Problem, guess: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray, Nodes, Distances]:
+        """Return what to linearise around: the guess, or a full stop where the guess runs into something.
+
+        Inside an obstacle the nearest way out may be the far side, so a colliding guess would be pulled
+        through; the stop is free of collision, since the last update made sure that it is.
+        """
+        limit = problem.limits.acceleration
+        for candidate in (guess, None):
+            u = _stop(problem) if candidate is None else np.minimum(np.maximum(candidate, -limit), limit)
+            q, v = problem.rollout(u)
+            nodes = Nodes(problem, q, v, self._cost.coefficients)
+            distances = problem.collision.distances(nodes.q, problem.margins + problem.reach, nodes.times)
+            worst = np.min(distances.values - np.minimum(distances.values[0], 0.0), initial=np.inf)
+            if worst >= 0.0:
+                break
+        return u, q, v, nodes, distances
 
     def _solve(self, qp: "_Qp", limits: LimitRows) -> tuple[FloatArray, FloatArray, bool, int, int]:
         """Solve with the rows that matter; add those that the solution breaks; solve again."""
@@ -104,6 +121,14 @@ class RealTimeSolver:
         self._active_bounds = marks[:bounds]
         held = np.flatnonzero(marks[bounds:])
         self._active = dict.fromkeys(qp.keys[held].tolist(), _UPPER)
+
+
+def _stop(problem: Problem) -> FloatArray:
+    """Return the accelerations of the fastest stop, (N, n)."""
+    limit = problem.limits.acceleration * problem.dt
+    stages = np.arange(problem.horizon)[:, None]
+    left = np.maximum(np.abs(problem.v) - stages * limit, 0.0)
+    return -np.sign(problem.v) * np.minimum(left, limit) / problem.dt
 
 
 class _Qp:

@@ -10,6 +10,7 @@ from handrail.controllers.problem import Problem
 
 _RECOVERY = 0.8  # of a distance deficit that is left after each node
 _TOLERANCE = 1e-5  # of a limit, relative
+_VELOCITY_SLACK = 1e-3  # share of the slack that velocity limits get: they can always be kept
 _NEAR = 0.9  # of a limit from which its row is in the QP from the start
 
 
@@ -95,9 +96,8 @@ class LimitRows:
     def violated(self, change: FloatArray, slack: float) -> Rows | None:
         """Return new rows for the limits that a change, (N, n), breaks beyond the slack; None if none."""
         values = self._offsets + (self._coefficients @ change) / self._scales
-        if np.abs(values).max() <= 1.0 + slack + _TOLERANCE:
-            return None
-        over = np.stack([values, -values], axis=-1) > 1.0 + slack + _TOLERANCE
+        allowed = 1.0 + slack * np.array([1.0, _VELOCITY_SLACK])[:, None, None] + _TOLERANCE
+        over = np.stack([values, -values], axis=-1) > allowed
         return self._rows(over & ~self._taken)
 
     def _rows(self, wanted: np.ndarray) -> Rows | None:
@@ -113,6 +113,6 @@ class LimitRows:
         scale = (sign / self._scales[kind, joint])[:, None]
         blocks[np.arange(len(new)), :, joint] = scale * self._coefficients[node, kind]
         matrix[:, :-2] = blocks.reshape(len(new), horizon * size)
-        matrix[:, -1] = -1.0
+        matrix[:, -1] = np.where(kind == 1, -_VELOCITY_SLACK, -1.0)
         keys = 1_000_000 + np.asarray(np.ravel_multi_index(tuple(new.T), (*self._offsets.shape, 2)))
         return Rows(matrix, 1.0 - sign * self._offsets[node, kind, joint], keys)

@@ -28,6 +28,8 @@ class MpcSettings:
         reach: distance beyond the margin at which a pair enters the problem [m].
         slack_linear: linear penalty of the slack.
         slack_quadratic: quadratic penalty of the slack.
+        largest_speed: speed above which a commanded translation of the tool is taken as this [m/s].
+        largest_rate: the same for its rotation [rad/s].
         intent_timeout: age from which an intent is stale [s].
         velocity_tolerance: how far the measured velocity may be from the commanded one before the plan
             starts from the measured one, relative to the velocity limit.
@@ -47,8 +49,10 @@ class MpcSettings:
     work_margin: float = 0.008
     floor: float = 0.3
     reach: float = 0.30
-    slack_linear: float = 1e5
-    slack_quadratic: float = 1e5
+    slack_linear: float = 1e6
+    slack_quadratic: float = 1e6
+    largest_speed: float = 2.0
+    largest_rate: float = 4.0
     intent_timeout: float = 0.25
     velocity_tolerance: float = 0.1
 
