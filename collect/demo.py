@@ -19,7 +19,7 @@ _NEXT = """Next:
   {bin}handrail-inspect --dataset.root {root}
   {bin}handrail-replay --dataset.root {root}
   {bin}handrail-record --dataset.root {root} --resume --dataset.num_episodes 5 --mode switching{cameras}
-  {bin}lerobot-dataset-viz --repo-id {repo} --root {root} --episode-index 0    (pip install 'handrail[display]')
+  {bin}lerobot-dataset-viz --repo-id {repo} --root {root} --episode-index 0    (extra: display)
   {bin}handrail-record --help"""
 
 
