@@ -38,7 +38,9 @@ def meet(obstacle, values, groups, seconds=8.0):
 
 
 def pillar(position, velocity, height=1.0, radius=0.2):
-    return Obstacle("walker", Shape("cylinder", [radius, height]), [*position, height / 2], velocity=[*velocity, 0.0])
+    return Obstacle(
+        "walker", Shape("cylinder", [radius, height]), [*position, height / 2], velocity=[*velocity, 0.0]
+    )
 
 
 @pytest.mark.parametrize("start", [-2.0, -1.6, -1.2])

@@ -93,7 +93,10 @@ def test_the_jacobian_is_the_derivative(objective):
         value, jacobian = (np.array(part) for part in evaluate(z, p))
         assert value.shape == (len(objective.reference), 1)
         numeric = np.array(
-            [(np.array(evaluate(z + s, p)[0]) - np.array(evaluate(z - s, p)[0])) / (2 * h) for s in h * np.eye(27)]
+            [
+                (np.array(evaluate(z + s, p)[0]) - np.array(evaluate(z - s, p)[0])) / (2 * h)
+                for s in h * np.eye(27)
+            ]
         )[:, :, 0].T
         np.testing.assert_allclose(jacobian, numeric, atol=2e-5 * (1 + np.abs(numeric).max()))
         assert np.abs(numeric).max() > 1e-3
@@ -127,7 +130,9 @@ def test_the_tray_s_acceleration_is_that_of_the_hand():
     np.testing.assert_allclose(np.array(symbolic(*state)).ravel(), numeric, atol=1e-5)
 
 
-@pytest.mark.parametrize("groups", [("ee",), ("ee.vx", "ee.vy", "ee.vz"), ("base",), ("joint",), ("base.vx", "ee.vz")])
+@pytest.mark.parametrize(
+    "groups", [("ee",), ("ee.vx", "ee.vy", "ee.vz"), ("base",), ("joint",), ("base.vx", "ee.vz")]
+)
 def test_objectives_do_not_overwrite_a_command(groups):
     """Ten times the weight of everything autonomous changes the commanded channels by less than 1 %."""
     rng = np.random.default_rng(2)
@@ -249,7 +254,11 @@ def test_centring_leads_away_from_a_limit():
     creep = {"base.vx": 0.1}
     without, _ = roll([], ("base",), lambda time: creep, q=twisted, steps=60)
     centred, _ = roll(
-        [limit_centring(CHANNELS, LIMITS, np.full(9, 0.2))], ("base",), lambda time: creep, q=twisted, steps=60
+        [limit_centring(CHANNELS, LIMITS, np.full(9, 0.2))],
+        ("base",),
+        lambda time: creep,
+        q=twisted,
+        steps=60,
     )
     assert without[-1][8] > 5.8
     assert centred[-1][8] < 5.3
