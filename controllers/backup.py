@@ -6,7 +6,7 @@ from handrail.controllers.arrays import FloatArray
 from handrail.controllers.collision import CollisionModel
 from handrail.controllers.limiter import Limiter
 
-_SAMPLES = np.array([0.0, 0.25, 0.5, 0.75, 1.0])  # of the time that a stop takes
+_SAMPLES = np.array([0.25, 0.5, 0.75, 1.0])  # of the time that a stop takes
 _ERROR = 1e-3  # of the signed distances that is no loss [m]
 
 

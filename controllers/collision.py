@@ -7,6 +7,7 @@ import numpy as np
 import pinocchio as pin
 
 from handrail.controllers.arrays import BoolArray, FloatArray, IntArray, frozen
+from handrail.controllers.description import PlacedShape
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.model import RobotModel
 from handrail.controllers.shape import Obstacle, Shape
@@ -215,13 +216,16 @@ class CollisionModel:
     def _pair_levers(self, model: RobotModel) -> FloatArray:
         """Return how far a unit of each coordinate can bring a pair together at most, (n, P) [m].
 
-        A coordinate that moves both shapes alike does not; a prismatic one moves by 1, a revolute one by the
-        reach of what hangs on it.
+        A coordinate that moves both shapes alike does not; of one that moves a single shape it is the
+        shape's lever arm.
         """
+        arms = {shape.name: lever_arms(model, shape) for shape in model.description.collision}
+        none = np.zeros(model.size)
         either = (
             self._moves[:, 0] != self._moves[:, 1] if self.size else np.zeros((0, model.size), dtype=bool)
         )
-        return either.T * lever_arms(model)[:, None]
+        longer = [np.maximum(arms.get(a, none), arms.get(b, none)) for a, b in self.pairs]
+        return (either * np.array(longer).reshape(-1, model.size)).T
 
     def _ancestors(self, pair: pin.CollisionPair) -> FloatArray:
         """Return which coordinates move the two shapes of a pair, (2, n)."""
@@ -280,18 +284,24 @@ class _ResultReader:
         return np.array(rows).reshape(-1, 9)
 
 
-def lever_arms(model: RobotModel) -> FloatArray:
-    """Return bounds on how far a point of the robot moves per unit of each coordinate, (n,) [m]."""
-    pinocchio, arms = model.pinocchio, np.ones(model.size)
-    sizes = [
-        np.linalg.norm(s.placement.translation) + s.shape.size.sum() for s in model.description.collision
-    ]
-    reach = float(max(sizes, default=0.0))
-    for joint in range(pinocchio.njoints - 1, 0, -1):
-        index = pinocchio.joints[joint].idx_v
-        if not pinocchio.joints[joint].shortname().startswith("JointModelP"):
-            arms[index] = reach
+def lever_arms(model: RobotModel, placed: PlacedShape) -> FloatArray:
+    """Return bounds on how far a point of a shape moves per unit of each coordinate, (n,) [m].
+
+    1 for a prismatic joint; for a revolute one the length of the chain from its axis to the shape, and the
+    shape's own size; 0 for a joint that does not move it.
+    """
+    pinocchio, arms = model.pinocchio, np.zeros(model.size)
+    frame = pinocchio.frames[model.frame_id(placed.frame)]
+    size = float(np.linalg.norm(placed.shape.size)) if placed.shape.kind == "box" else placed.shape.size.sum()
+    reach = size + float(
+        np.linalg.norm(frame.placement.translation + frame.placement.rotation @ placed.placement.translation)
+    )
+    joint = frame.parentJoint
+    while joint > 0:
+        prismatic = pinocchio.joints[joint].shortname().startswith("JointModelP")
+        arms[pinocchio.joints[joint].idx_v] = 1.0 if prismatic else reach
         reach += float(np.linalg.norm(pinocchio.jointPlacements[joint].translation))
+        joint = pinocchio.parents[joint]
     return arms
 
 

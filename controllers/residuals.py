@@ -6,6 +6,7 @@ import casadi as ca
 import numpy as np
 
 from handrail.controllers.arrays import BoolArray, FloatArray, IntArray
+from handrail.controllers.compiled import compiled
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.model import RobotModel
 from handrail.controllers.objective import Objective, Stage
@@ -90,12 +91,12 @@ class StageResiduals:
     def _compile(self, residual: ca.SX, z: ca.SX, p: ca.SX, horizon: int, n: int) -> None:
         curved = residual[self.curved.tolist()]
         outputs = [ca.densify(curved), ca.densify(ca.jacobian(curved, z))]
-        compiled = ca.Function("stage", [z, p], outputs).map(horizon)
+        stage = compiled(ca.Function("stage", [z, p], outputs)).map(horizon)
         self._z = np.zeros((horizon, 3 * n))
         self._p = np.zeros((horizon, p.shape[0]))
         self._values = np.zeros((horizon, len(self.curved)))
         self._jacobians = np.zeros((horizon, 3 * n, len(self.curved)))  # column-major in CasADi
-        self._buffer, self._evaluate = compiled.buffer()
+        self._buffer, self._evaluate = stage.buffer()
         self._buffer.set_arg(0, memoryview(self._z))
         self._buffer.set_arg(1, memoryview(self._p))
         self._buffer.set_res(0, memoryview(self._values))

@@ -48,7 +48,7 @@ class MpcSettings:
     margin: float = 0.10
     work_margin: float = 0.008
     floor: float = 0.3
-    reach: float = 0.30
+    reach: float = 0.15
     slack_linear: float = 1e6
     slack_quadratic: float = 1e6
     largest_speed: float = 2.0

@@ -1,0 +1,36 @@
+"""The safety fuzz: rude intents in random clutter, in physics. No contact, no limit exceeded, no exception."""
+
+import numpy as np
+import pytest
+from fuzz_helpers import run
+
+from collect_helpers import environment
+from handrail.controllers.mpc import MaskedMpc
+from handrail.controllers.threads import single_threaded
+
+
+def check(seeds, seconds):
+    with environment("Reach") as env, single_threaded():
+        controller = MaskedMpc(env.model)
+        results = [run(env, controller, seed, seconds) for seed in seeds]
+    smallest = np.array([result.smallest for result in results])
+    contacts = {seed: r.contact_names for seed, r in zip(seeds, results, strict=True) if r.contacts}
+    statuses = {}
+    for result in results:
+        for name, count in result.statuses.items():
+            statuses[name] = statuses.get(name, 0) + count
+    print(f"smallest distance: {np.quantile(smallest, [0, 0.05, 0.5]).round(3)}, {statuses}")
+    assert not contacts
+    assert smallest.min() > 0.0
+    assert max(result.excess for result in results) < 1e-3
+    return statuses
+
+
+def test_rude_intents_in_clutter():
+    statuses = check(range(1000, 1004), seconds=5.0)
+    assert {"ok", "invalid_intent"} <= set(statuses)
+
+
+@pytest.mark.slow
+def test_rude_intents_in_clutter_at_length():
+    check(range(200), seconds=20.0)
