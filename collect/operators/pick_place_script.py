@@ -9,6 +9,7 @@ from handrail.collect.operators.operator import View
 from handrail.collect.operators.phases import Phase, PhaseRunner
 from handrail.collect.operators.standing import standing_point
 from handrail.collect.operators.steering import Gains, pose_errors
+from handrail.collect.scene import SceneObject
 from handrail.collect.tasks.task import TaskState
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.model import Pose, RobotModel
@@ -74,6 +75,11 @@ class PickPlaceScript:
         if self._drives:
             drive = self._drive(view.state.q[:3], self._stand(pick), phases[0].hand, lane, 0.0)
             phases = drive + phases
+        elif self._blocked(task, view.state.q[:2], self._stand(pick)[:2]):
+            height = cube.position[2] + 0.30
+            around = Pose(np.array([lane + _AHEAD, cube.position[1], height]), down)
+            base = np.array([lane, cube.position[1], 0.0])
+            phases.insert(0, Phase("approach", around, base, distance=0.15, angle=0.5))
         return phases
 
     def _pick(self, pick: _Place, down: FloatArray) -> list[Phase]:
@@ -144,11 +150,26 @@ class PickPlaceScript:
             for point in points
         ]
 
+    def _blocked(self, task: TaskState, start: FloatArray, goal: FloatArray) -> bool:
+        """Return whether something on the floor is in the way of the chassis between two places, (2,) each."""
+        width = np.hypot(*self._model.description.base_size) / 2 + _CLEARANCE / 2
+        for item in _floor_obstacles(task):
+            along = np.clip(
+                (item.position[:2] - start) @ (goal - start) / max(np.sum((goal - start) ** 2), 1e-9), 0, 1
+            )
+            gap = np.linalg.norm(item.position[:2] - start - along * (goal - start))
+            if gap < width + np.hypot(*item.shape.size[:2]) / 2:
+                return True
+        return False
+
     def _lane(self, task: TaskState) -> float:
         """Return the x of the lane in which the base passes behind everything on the floor [m]."""
-        bodies = [item for item in task.episode.scene.objects if item.name.startswith("obstacle")]
-        behind = [item.position[0] - np.hypot(*item.shape.size[:2]) / 2 for item in bodies]
+        behind = [item.position[0] - np.hypot(*item.shape.size[:2]) / 2 for item in _floor_obstacles(task)]
         return float(min(behind, default=0.0)) - self._model.description.base_size[0] / 2 - _CLEARANCE
+
+
+def _floor_obstacles(task: TaskState) -> list[SceneObject]:
+    return [item for item in task.episode.scene.objects if item.name.startswith("obstacle")]
 
 
 def _above(position: FloatArray, height: float) -> FloatArray:
