@@ -222,7 +222,7 @@ def test_an_interrupt_keeps_the_saved_episodes(number, tmp_path):
 def test_kill_at_random_moments_loses_at_most_the_open_episode(tmp_path):
     """The real command, killed 20 times, resumed each time."""
     rng = np.random.default_rng(0)
-    root, kept = tmp_path / "d", {}
+    root, kept, saved = tmp_path / "d", {}, 0
     arguments = [*RECORD, "--task", "reach", "--dataset.num_episodes", "500", "--dataset.root", str(root)]
     for kill in range(20):
         process = subprocess.Popen(
@@ -230,12 +230,15 @@ def test_kill_at_random_moments_loses_at_most_the_open_episode(tmp_path):
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
         )
-        saved_after(root, len(kept) + 1, process)
-        time.sleep(rng.uniform(0.0, 0.6))
-        os.kill(process.pid, signal.SIGKILL)
-        process.wait()
+        try:
+            saved_after(root, saved + 1, process)
+            time.sleep(rng.uniform(0.0, 0.6))
+        finally:
+            os.kill(process.pid, signal.SIGKILL)
+            process.wait()
         rows = sorted(root.glob("meta/episodes/*/*.parquet"))
-        assert len(rows) > len(kept)
+        assert len(rows) > saved
+        saved = len(rows)
         for path, content in kept.items():
             assert path.read_bytes() == content
         kept = {

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from collect_helpers import environment
 from fuzz_helpers import run
 
-from collect_helpers import environment
 from handrail.controllers.mpc import MaskedMpc
 from handrail.controllers.threads import single_threaded
 
