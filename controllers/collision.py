@@ -10,6 +10,7 @@ from handrail.controllers.arrays import BoolArray, FloatArray, IntArray, frozen
 from handrail.controllers.description import PlacedShape
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.model import RobotModel
+from handrail.controllers.pair_data import PairData
 from handrail.controllers.shape import Obstacle, Shape
 
 FLOOR = "floor"
@@ -71,10 +72,9 @@ class CollisionModel:
         self._moves = self._pair_moves()  # (P, 2, n)
         self._levers = self._pair_levers(model)  # (n, P)
         neutral = pin.neutral(self._model)
-        self._all, self._near = (
-            _PairData(self._model, self._data, self._geometry, neutral) for _ in range(2)
+        self._all, self._along, self._after = (
+            PairData(self._model, self._data, self._geometry, neutral) for _ in range(3)
         )
-        self._selected = np.ones(self.size, dtype=bool)
         self.observe(obstacles)
 
     @property
@@ -101,9 +101,9 @@ class CollisionModel:
         self._measure(self._all, q[0], times[0], witnesses[0])
         jacobians[0] = pin.computeJointJacobians(self._model, self._data)
         values = _signed(witnesses[0]) - self._travel(q, times)  # (K, P)
-        near = self._select(np.any(values < reach, axis=0))
+        near = self._along.select(np.any(values < reach, axis=0))
         for node in range(1, len(q)):
-            self._measure(self._near, q[node], times[node], witnesses[node])
+            self._measure(self._along, q[node], times[node], witnesses[node])
             jacobians[node] = pin.computeJointJacobians(self._model, self._data)
         values[1:, near] = _signed(witnesses[1:, near])
         below = np.argwhere(values < reach)
@@ -128,13 +128,13 @@ class CollisionModel:
             return _signed(witnesses)
         path = np.vstack([now[0], q])
         values = now[1] - self._travel(path, np.append(0.0, times))[1:]
-        near = self._select(np.any(values < _FAR, axis=0))
+        near = self._after.select(np.any(values < _FAR, axis=0))
         for node in range(len(q) if len(near) else 0):
-            self._measure(self._near, q[node], times[node], witnesses[node])
+            self._measure(self._after, q[node], times[node], witnesses[node])
         values[:, near] = _signed(witnesses[:, near])
         return values
 
-    def _measure(self, data: "_PairData", q: FloatArray, time: float, out: FloatArray) -> None:
+    def _measure(self, data: "PairData", q: FloatArray, time: float, out: FloatArray) -> None:
         """Let coal compute the pairs of `data` at q, with moving obstacles where they are after a time."""
         for geometry, obstacle in self._moving:
             geometry.placement = pin.SE3(
@@ -149,16 +149,6 @@ class CollisionModel:
         if self._moving:
             travel += times[:, None] * self._speeds
         return travel
-
-    def _select(self, wanted: BoolArray) -> IntArray:
-        """Make `_near` measure just these pairs; return their indices."""
-        for pair in np.flatnonzero(wanted != self._selected).tolist():
-            if wanted[pair]:
-                self._near.geometry.activateCollisionPair(pair)
-            else:
-                self._near.geometry.deactivateCollisionPair(pair)
-        self._selected = wanted
-        return np.flatnonzero(wanted)
 
     def observe(self, obstacles: tuple[Obstacle, ...]) -> None:
         """Take where the obstacles are now and how fast they move.
@@ -236,52 +226,6 @@ class CollisionModel:
                 moves[row, self._model.joints[joint].idx_v] = 1.0
                 joint = self._model.parents[joint]
         return moves
-
-
-class _PairData:
-    """Coal's working data for some pairs, with a reader of its results."""
-
-    def __init__(
-        self, model: pin.Model, data: pin.Data, geometry: pin.GeometryModel, neutral: FloatArray
-    ) -> None:
-        self.geometry = pin.GeometryData(geometry)
-        pin.computeDistances(model, data, geometry, self.geometry, neutral)
-        self.results = _ResultReader(self.geometry.distanceResults)
-
-
-class _ResultReader:
-    """Reads normals and nearest points of all pairs at once.
-
-    Coal's results lie in one C++ vector, each with normal and both nearest points side by side, and the
-    binding hands out views of that memory: one strided view reads them all. Where a build lays them out
-    otherwise, they are read one by one.
-
-    Args:
-        results: of pairs that have been computed at least once.
-    """
-
-    def __init__(self, results: pin.StdVec_DistanceResult) -> None:
-        self._results = results
-        self._view = self._strided(results)
-
-    def read(self) -> FloatArray:
-        """Return normals, first and second nearest points in the world, side by side, (P, 9)."""
-        return self._one_by_one() if self._view is None else self._view
-
-    def _strided(self, results: pin.StdVec_DistanceResult) -> FloatArray | None:
-        normals = [result.normal for result in results]
-        addresses = np.array([normal.__array_interface__["data"][0] for normal in normals])
-        strides = np.unique(np.diff(addresses))
-        if not normals or normals[0].flags.owndata or strides.size != 1 or strides[0] < 72:
-            return None
-        view = np.lib.stride_tricks.as_strided(
-            normals[0], (len(normals), 9), (int(strides[0]), 8), writeable=False
-        )
-        return view if np.array_equal(view, self._one_by_one()) else None
-
-    def _one_by_one(self) -> FloatArray:
-        rows = [[*r.normal, *r.getNearestPoint1(), *r.getNearestPoint2()] for r in self._results]
-        return np.array(rows).reshape(-1, 9)
 
 
 def lever_arms(model: RobotModel, placed: PlacedShape) -> FloatArray:

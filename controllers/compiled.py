@@ -1,7 +1,7 @@
-"""Compiles a CasADi function to machine code where a C compiler is at hand; several times faster than CasADi's own.
+"""Compiles a CasADi function to machine code where a C compiler is at hand; many times faster.
 
-The C code is CasADi's; floating-point contraction is off, so that both give the same numbers, bit for bit. The
-library is kept in the user's cache folder under the hash of its source. Without a compiler, or with
+The C code is CasADi's own; floating-point contraction is off, so that both give the same numbers, bit for
+bit. The library is kept in the user's cache folder under the hash of its source. Without a compiler, or with
 `HANDRAIL_COMPILE=0`, the function is returned as it came.
 """
 

@@ -104,7 +104,7 @@ def test_the_jacobian_is_the_derivative(objective):
 
 @pytest.mark.parametrize("objective", everything(), ids=NAMES)
 def test_residuals_are_finite_where_they_are_kinked(objective):
-    """At rest, on target, on the optical axis, with the arm stretched out: values and Jacobians are numbers."""
+    """At rest, on target, on the optical axis, with the arm stretched out."""
     evaluate = function(objective)
     stretched = np.array(HOME)
     stretched[5] = 0.0

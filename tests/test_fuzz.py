@@ -1,4 +1,4 @@
-"""The safety fuzz: rude intents in random clutter, in physics. No contact, no limit exceeded, no exception."""
+"""The safety fuzz: rude intents in random clutter, in physics: no contact, no limit exceeded."""
 
 import numpy as np
 import pytest

@@ -151,7 +151,7 @@ class PickPlaceScript:
         ]
 
     def _blocked(self, task: TaskState, start: FloatArray, goal: FloatArray) -> bool:
-        """Return whether something on the floor is in the way of the chassis between two places, (2,) each."""
+        """Return whether something on the floor is in the chassis' way between two places, (2,) each."""
         width = np.hypot(*self._model.description.base_size) / 2 + _CLEARANCE / 2
         for item in _floor_obstacles(task):
             along = np.clip(

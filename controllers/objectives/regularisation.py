@@ -5,6 +5,7 @@ import numpy as np
 from handrail.controllers.arrays import BoolArray, FloatArray
 from handrail.controllers.channels import Channels
 from handrail.controllers.objective import Objective
+from handrail.controllers.objectives.ownership import commanded_joints
 
 
 def velocity_regularisation(channels: Channels, weights: FloatArray) -> Objective:
@@ -35,12 +36,3 @@ def posture(channels: Channels, reference: FloatArray, weights: FloatArray) -> O
         return weights * ~commanded_joints(channels, mask) * steered
 
     return Objective("posture", lambda stage, p: stage.q, np.array(reference), masked)
-
-
-def commanded_joints(channels: Channels, mask: BoolArray) -> BoolArray:
-    """Return which joints have a command of their own, through a joint or a base channel, (n,)."""
-    joints = mask[channels.joint_slice].copy()
-    if channels.base:
-        joints[:2] |= mask[:2].any()
-        joints[2] |= mask[2]
-    return joints

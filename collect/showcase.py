@@ -1,0 +1,52 @@
+"""The showcase: the paper's three cases with one controller; a video, a figure and the figures as JSON."""
+
+import contextlib
+import json
+from dataclasses import replace
+from typing import Any
+
+from handrail.collect.env import HandrailEnv
+from handrail.collect.gl import graphics_trouble
+from handrail.collect.showcase_cases import Case, cases
+from handrail.collect.showcase_config import ShowcaseConfig
+from handrail.collect.showcase_figure import save_figure
+from handrail.collect.showcase_metrics import summary
+from handrail.collect.showcase_run import FPS, ShowcaseTask, Trace, build_controller, run_case
+from handrail.collect.showcase_video import SIZE, Filmer
+from handrail.controllers.errors import HandrailError
+from handrail.controllers.model import load_model
+from handrail.controllers.mpc import MaskedMpc
+
+
+def showcase(config: ShowcaseConfig) -> dict[str, Any]:
+    """Run a case and write `<case>.mp4`, `<case>.png` and `<case>.json`; return what the JSON says.
+
+    Without OpenGL there is no video, and `video` says why.
+
+    Raises:
+        HandrailError: a setting is wrong, or the folder cannot be written.
+    """
+    config.check()
+    case = cases()[config.case]
+    case = replace(case, seconds=config.seconds or case.seconds)
+    try:
+        config.folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise HandrailError(f"--output {config.output}: cannot be made: {error.strerror}") from error
+    mpc = build_controller(load_model())
+    trouble = graphics_trouble() if config.video else "not asked for"
+    trace = _run(case, mpc, config, film=not trouble)
+    save_figure(trace, mpc.model, mpc.settings.margin, config.folder / f"{case.name}.png")
+    result = summary(trace) | {"video": f"{case.name}.mp4" if not trouble else f"none: {trouble}"}
+    (config.folder / f"{case.name}.json").write_text(json.dumps(result, indent=2) + "\n")
+    return result
+
+
+def _run(case: Case, mpc: MaskedMpc, config: ShowcaseConfig, film: bool) -> Trace:
+    with contextlib.ExitStack() as stack:
+        mode = "rgb_array" if film else None
+        env = HandrailEnv(ShowcaseTask(case), fps=FPS, render_mode=mode, render_size=SIZE)
+        stack.callback(env.close)
+        path = config.folder / f"{case.name}.mp4"
+        filmers = (stack.enter_context(Filmer(case, path, FPS)),) if film else ()
+        return run_case(case, env, mpc, filmers)

@@ -1,0 +1,73 @@
+"""The video of a case: the scene camera's pictures with a caption."""
+
+from fractions import Fraction
+from pathlib import Path
+from types import TracebackType
+
+import av
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, ImageDraw, ImageFont
+
+from handrail.collect.env import HandrailEnv
+from handrail.collect.showcase_cases import Case
+from handrail.datasets.frames import Moment
+
+SIZE = (540, 960)  # height, width [px]
+_BAR = 64  # height of the caption [px]; both even, as h264 wants
+
+
+class Filmer:
+    """Encodes one picture a control period; an observer, and a context that closes the file."""
+
+    def __init__(self, case: Case, path: Path, fps: int) -> None:
+        self._case = case
+        self._container = av.open(str(path), "w", format="mp4")
+        self._stream = self._container.add_stream(
+            "libx264", rate=fps, options={"crf": "20", "preset": "medium", "x264-params": "log=-1"}
+        )
+        self._stream.height, self._stream.width = SIZE[0] + _BAR, SIZE[1]
+        self._stream.pix_fmt, self._stream.time_base = "yuv420p", Fraction(1, fps)
+        self._count = 0
+        self._fps = fps
+        self._large, self._small = (ImageFont.load_default(size) for size in (20, 16))
+
+    def __enter__(self) -> "Filmer":
+        """Begin."""
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Write what the encoder still holds and close the file."""
+        self._container.mux(self._stream.encode(None))
+        self._container.close()
+
+    def begin(self, env: HandrailEnv, seed: int) -> None:
+        """Take note of the environment."""
+        self._env = env
+
+    def see(self, moment: Moment) -> None:
+        """Add the picture of this moment."""
+        picture = self._env.render()
+        if picture is None:
+            return
+        frame = av.VideoFrame.from_ndarray(self._captioned(picture, moment), format="rgb24")
+        frame.pts, frame.time_base = self._count, Fraction(1, self._fps)
+        self._container.mux(self._stream.encode(frame))
+        self._count += 1
+
+    def _captioned(self, picture: NDArray[np.uint8], moment: Moment) -> NDArray[np.uint8]:
+        """Return the picture on top of a bar that says what is steered and how near things are."""
+        height, width = picture.shape[:2]
+        image = Image.new("RGB", (width, height + _BAR), (24, 26, 30))
+        image.paste(Image.fromarray(picture))
+        draw = ImageDraw.Draw(image)
+        draw.text((16, height + 9), self._case.title, font=self._large, fill=(245, 245, 245))
+        health = moment.health
+        words = (
+            f"{moment.intent.time:5.1f} s     commanded: {', '.join(self._case.channels)}     "
+            f"nearest: {health.smallest_distance:.3f} m     update: {1e3 * health.solve_time:.1f} ms"
+        )
+        draw.text((16, height + 37), words, font=self._small, fill=(190, 195, 205))
+        return np.array(image)

@@ -1,0 +1,65 @@
+"""Carry a tray: upright, and never faster round a corner than friction allows."""
+
+import casadi as ca
+import numpy as np
+
+from handrail.controllers.arrays import BoolArray, FloatArray
+from handrail.controllers.channels import Channels
+from handrail.controllers.objective import Objective, Stage
+from handrail.controllers.objectives.ownership import leaves_freedom, leaves_hand
+from handrail.controllers.objectives.smooth import hinge, norm
+
+GRAVITY = 9.81  # [m/s²]
+_WIDTH = 0.05  # of the smooth length [m/s²]
+_SHARPNESS = 0.1  # width of the smooth hinge
+_INSIDE = 0.3  # share of the tangential force that counts inside the cone
+
+
+def tray_levelling(
+    channels: Channels,
+    up: FloatArray,
+    level: float = 2.0,
+    slip: float = 0.5,
+    friction: float = 0.2,
+    frame: str = "tool",
+    name: str = "tray",
+) -> Objective:
+    """Keep a tray level and what stands on it in place.
+
+    With the tray's normal `n = R up`: `‖n - e_z‖²`. With the specific force `f = a + g e_z`, where
+    `a = J u + J̇ v`, its tangential part `t = f - (f·n) n`, and the smooth hinge h:
+    `‖(c + h(1 - μ f·n / ‖t‖)) t‖²`, which is how far the force is outside the friction cone, and a share c
+    of what is inside: a step from rest has to know the cone before it is left.
+
+    Args:
+        channels: of the robot.
+        up: the tray's normal in the frame, a unit vector, (3,).
+        level: weight of the tilt [1/rad²].
+        slip: weight of the tangential acceleration beyond the cone [s⁴/m²].
+        friction: μ.
+        frame: of the robot that the tray is fixed to, at its origin.
+        name: of the objective.
+    """
+    axis = np.array(up, dtype=float) / np.linalg.norm(up)
+
+    def residual(stage: Stage, p: ca.SX) -> ca.SX:
+        normal = stage.pose(frame).rotation @ axis
+        force = acceleration(stage, frame) + ca.DM([0.0, 0.0, GRAVITY])
+        pressing = ca.dot(force, normal)
+        sliding = force - pressing * normal
+        beyond = hinge(1.0 - friction * pressing / norm(sliding, _WIDTH), _SHARPNESS)
+        return ca.vertcat(normal - ca.DM([0.0, 0.0, 1.0]), (_INSIDE + beyond) * sliding)
+
+    def weights(mask: BoolArray) -> FloatArray:
+        tool, free = mask[channels.tool_slice], leaves_hand(channels, mask)
+        tilts = free and not tool[3:5].any()
+        slips = leaves_freedom(channels, mask) and not tool[:3].all()
+        return np.repeat([level * tilts, slip * slips], 3)
+
+    return Objective(name, residual, np.zeros(6), weights)
+
+
+def acceleration(stage: Stage, frame: str) -> ca.SX:
+    """Return the linear acceleration of a frame's origin, `J u + J̇ v`, (3, 1) [m/s²]."""
+    linear = stage.pose(frame).jacobian[:3, :]
+    return linear @ stage.u + ca.jtimes(linear @ stage.v, stage.q, stage.v)

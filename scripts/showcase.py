@@ -1,0 +1,49 @@
+"""`handrail-showcase`: the paper's three cases with one controller."""
+
+from typing import Any
+
+from handrail.collect.showcase_config import ShowcaseConfig
+from handrail.scripts import cli
+
+
+def main() -> None:
+    """Run the command."""
+    cli.run(lambda: _showcase(cli.parse(ShowcaseConfig, "handrail-showcase")))
+
+
+def _showcase(config: ShowcaseConfig) -> int:
+    config.check()
+    from rich.console import Console
+
+    from handrail.collect.showcase import showcase
+
+    console = Console(highlight=False, soft_wrap=True)
+    console.print(f"Running case {config.case.upper()} …")
+    result = showcase(config)
+    for line in _lines(result):
+        console.print(line)
+    if result["video"].startswith("none: ") and config.video:
+        console.print(f"Without a video: {result['video'].removeprefix('none: ')}")
+    console.print(f"Written: {config.folder}/{config.case}.*")
+    return 0
+
+
+def _lines(result: dict[str, Any]) -> list[str]:
+    tracking, nearest, solve = result["tracking"], result["smallest_distance"], result["solve_time_ms"]
+    lines = [
+        result["title"],
+        f"tracking error   {tracking['share']:.2%} of {tracking['cruising_speed']:.2f} m/s in the mean, "
+        f"{1e3 * tracking['max']:.1f} mm/s at most",
+        f"nearest          {nearest['value']:.3f} m ({' – '.join(nearest['pair'])}), "
+        f"contacts {result['contacts']}, brakes {result['brakes']}",
+        f"update           {solve['median']:.2f} ms median, {solve['p99']:.2f} ms p99",
+    ]
+    if "hold" in result:
+        hold = result["hold"]
+        mean, most = 1e3 * hold["mean"], 1e3 * hold["max"]
+        lines.append(f"hand held        {mean:.1f} mm off in the mean, {most:.1f} mm at most")
+    return lines
+
+
+if __name__ == "__main__":
+    main()
