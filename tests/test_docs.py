@@ -15,6 +15,7 @@ import pytest
 from handrail.collect.build import build_env, session_features
 from handrail.collect.config import DemoConfig, InspectConfig, RecordConfig, ReplayConfig, SessionConfig
 from handrail.collect.operators.modes import MODES
+from handrail.collect.showcase_config import ShowcaseConfig
 from handrail.controllers.command import Status
 from handrail.scripts import cli
 
@@ -25,6 +26,7 @@ CONFIGS = {
     "handrail-replay": ReplayConfig,
     "handrail-inspect": InspectConfig,
     "handrail-demo": DemoConfig,
+    "handrail-showcase": ShowcaseConfig,
 }
 _LEROBOT = """
 import json, sys
