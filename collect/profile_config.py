@@ -1,0 +1,37 @@
+"""What `handrail-profile` measures, as typed settings; light to import."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from handrail.controllers.errors import HandrailError
+
+
+@dataclass(frozen=True)
+class ProfileConfig:
+    """Measure the controller's update against IPOPT, FATROP and mink, all in one interleaved run."""
+
+    updates: int = 400
+    """Timed updates of every case."""
+    seed: int = 0
+    """Of scenes and intents."""
+    rivals: bool = True
+    """Also measure IPOPT, FATROP and mink."""
+    growth: bool = True
+    """Also measure longer horizons, more pairs and another robot."""
+    solves: int = 40
+    """Converged solves of IPOPT and FATROP a case."""
+    json: str = ""
+    """Write everything measured to this file."""
+
+    def check(self) -> None:
+        """Check the settings.
+
+        Raises:
+            HandrailError: one is wrong.
+        """
+        for name, least in (("updates", 10), ("solves", 1), ("seed", 0)):
+            value = getattr(self, name)
+            if value < least:
+                raise HandrailError(f"--{name} {value}: expected a whole number >= {least}")
+        if self.json and not Path(self.json).expanduser().absolute().parent.is_dir():
+            raise HandrailError(f"--json {self.json}: expected a file in an existing folder")

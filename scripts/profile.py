@@ -1,0 +1,27 @@
+"""`handrail-profile`: time the controller's update against IPOPT, FATROP and mink."""
+
+from handrail.collect.profile_config import ProfileConfig
+from handrail.scripts import cli
+
+
+def main() -> None:
+    """Run the command."""
+    cli.run(lambda: _profile(cli.parse(ProfileConfig, "handrail-profile")))
+
+
+def _profile(config: ProfileConfig) -> int:
+    config.check()
+    from rich.console import Console
+
+    from handrail.collect.profile import Profile, save
+    from handrail.collect.profile_tables import profile_tables
+
+    results = Profile(config).run()
+    if config.json:
+        save(results, config.json)
+    Console().print(profile_tables(results))
+    return 0
+
+
+if __name__ == "__main__":
+    main()
