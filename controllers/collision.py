@@ -95,6 +95,8 @@ class CollisionModel:
             reach: the largest distance whose gradient is wanted, for all pairs or each, (P,) [m].
             times: of the configurations from now on, (K,) [s]; moving obstacles are where they will be then.
         """
+        if not self.size:
+            return _nothing(len(q), self._model.nv)
         times = np.zeros(len(q)) if times is None else times
         witnesses = np.empty((len(q), self.size, 9))
         jacobians = np.empty((len(q), 6, self._model.nv))
@@ -102,7 +104,7 @@ class CollisionModel:
         jacobians[0] = pin.computeJointJacobians(self._model, self._data)
         values = _signed(witnesses[0]) - self._travel(q, times)  # (K, P)
         near = self._along.select(np.any(values < reach, axis=0))
-        for node in range(1, len(q)):
+        for node in range(1, len(q)) if len(near) else ():
             self._measure(self._along, q[node], times[node], witnesses[node])
             jacobians[node] = pin.computeJointJacobians(self._model, self._data)
         values[1:, near] = _signed(witnesses[1:, near])
@@ -226,6 +228,11 @@ class CollisionModel:
                 moves[row, self._model.joints[joint].idx_v] = 1.0
                 joint = self._model.parents[joint]
         return moves
+
+
+def _nothing(count: int, size: int) -> Distances:
+    """Return the distances of no pairs at all at `count` configurations."""
+    return Distances(np.zeros((count, 0)), np.zeros((0, 2), dtype=int), np.zeros((0, size)))
 
 
 def lever_arms(model: RobotModel, placed: PlacedShape) -> FloatArray:

@@ -43,6 +43,18 @@ class CondensedCost:
             self._last = (used, roots, error, rows)
         return hessian, gradient
 
+    def value(self, problem: Problem, q: FloatArray, v: FloatArray, u: FloatArray) -> float:
+        """Return the cost itself, `½ Σ ‖r(q, v, u) - ref‖²_W`; q and v are after the stages, (N, n)."""
+        affine, index = self.residuals.affine, self.residuals.curved
+        error = np.hstack([q, v, u]) @ affine.jacobian.T + affine.offset - problem.reference[:, affine.index]
+        total = np.vdot(problem.weights[:, affine.index], error * error)
+        weights = problem.weights[:, index]
+        if weights[0].any():
+            values, _ = self.residuals.evaluate(q, v, u, problem.parameters)
+            error = values - problem.reference[:, index]
+            total += np.vdot(weights, error * error)
+        return 0.5 * float(total)
+
     def tracking_error(self, problem: Problem, change: FloatArray) -> float:
         """Return the norm of the commanded twists' error at the last tracked stage, after a change (N, n).
 

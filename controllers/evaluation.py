@@ -7,7 +7,7 @@ import numpy as np
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.problem import Problem
 from handrail.controllers.residuals import StageResiduals
-from handrail.controllers.rows import _RECOVERY, _VELOCITY_SLACK, Nodes
+from handrail.controllers.rows import RECOVERY, VELOCITY_SLACK, Nodes
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ def distance_bounds(problem: Problem, now: FloatArray, count: int) -> FloatArray
     `margin - max(margin - d_now, 0) 0.8ᵏ`: a pair inside its margin recovers gradually.
     """
     deficit = np.maximum(problem.margins - now, 0.0)
-    return problem.margins - deficit * _RECOVERY ** np.arange(count)[:, None]
+    return problem.margins - deficit * RECOVERY ** np.arange(count)[:, None]
 
 
 def collision_slack(problem: Problem, q: FloatArray, v: FloatArray) -> float:
@@ -88,4 +88,4 @@ def limit_slack(problem: Problem, q: FloatArray, v: FloatArray) -> float:
     half = 0.5 * (limits.position_upper - limits.position_lower)
     position = float(np.abs((q[1:] - middle) / half).max()) - 1.0
     velocity = float(np.abs(v[1:] / limits.velocity).max()) - 1.0
-    return max(position, velocity / _VELOCITY_SLACK, 0.0)
+    return max(position, velocity / VELOCITY_SLACK, 0.0)

@@ -12,7 +12,7 @@ from handrail.controllers.evaluation import limit_slack
 from handrail.controllers.linear_distances import LinearDistances
 from handrail.controllers.problem import Problem
 from handrail.controllers.residuals import StageResiduals
-from handrail.controllers.rows import _VELOCITY_SLACK
+from handrail.controllers.rows import VELOCITY_SLACK
 
 _INSIDE = 1e-3  # how far within the bounds the slacks begin
 STOPS = 2  # nodes of the final stop, measured after the last stage
@@ -168,7 +168,7 @@ class _Symbols:
     def limit_rows(self, x: ca.MX) -> ca.MX:
         """Return how far positions and velocities are from the middle of their range, ≤ 1, (4n, 1)."""
         values = (x[: 2 * self.size] - self.middle) / self.scale
-        share = np.repeat([1.0, _VELOCITY_SLACK], self.size)
+        share = np.repeat([1.0, VELOCITY_SLACK], self.size)
         return ca.vertcat(values, -values) - x[2 * self.size + 1] * np.tile(share, 2)
 
 

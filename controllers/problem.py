@@ -76,7 +76,8 @@ class Plan:
         v: velocities at the nodes, (N + 1, n).
         u: accelerations of the stages, (N, n).
         collision_slack: largest shortfall of a distance against its margin in the plan [m].
-        limit_slack: largest excess over a velocity or position limit, relative to that limit.
+        limit_slack: largest excess over a position limit, relative to half its range; velocity limits share
+            it with a thousandth of its size.
         distances: signed distances now, (P,).
         solved: whether the solver reports a solution.
         iterations: of the solver.

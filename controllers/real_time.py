@@ -1,5 +1,6 @@
 """The real-time solver: Gauss-Newton, states condensed out, one dense warm-started QP an update."""
 
+from dataclasses import replace
 from time import perf_counter
 
 import daqp
@@ -17,6 +18,9 @@ _INFINITE = 1e30
 _ROUNDS = 6  # of adding violated rows
 _CLOSE = 0.05  # a distance row this near to its bound is in the QP from the start [m]
 _TOLERANCE = 1e-6  # of a row
+_MORE_STEPS = 2  # at most, in one update
+_LARGE = 0.2  # change of an acceleration that asks for another step, relative to its limit
+_HALVINGS = 4  # of a step that makes the cost rise
 _UPPER, _LOWER = 1, 3  # DAQP's marks of a row that is active at its upper or lower bound
 
 
@@ -44,7 +48,23 @@ class RealTimeSolver:
         self._active_bounds = np.zeros(self._shape[0] * self._shape[1] + 2, dtype=np.int32)
 
     def solve(self, problem: Problem, guess: FloatArray) -> Plan:
-        """Return the plan after one step from the accelerations `guess`, (N, n)."""
+        """Return the plan after one step from the accelerations `guess`, (N, n).
+
+        Right after the intent or the scene has jumped, the guess is far off; a step that is still large is
+        followed by another.
+        """
+        plan, change = self._step(problem, guess)
+        for _ in range(_MORE_STEPS):
+            if not plan.solved or np.max(np.abs(change) / problem.limits.acceleration) < _LARGE:
+                break
+            spent = plan.phases
+            plan, change = self._step(problem, plan.u)
+            phases = [(name, a + b) for (name, a), (_, b) in zip(spent, plan.phases, strict=True)]
+            plan = replace(plan, phases=tuple(phases))
+        return plan
+
+    def _step(self, problem: Problem, guess: FloatArray) -> tuple[Plan, FloatArray]:
+        """Return the plan after one step, and the step itself, (N, n)."""
         start = perf_counter()
         limit = problem.limits.acceleration
         guess, q, v, nodes, distances = self._linearisation(problem, guess)
@@ -55,11 +75,14 @@ class RealTimeSolver:
         built = perf_counter()
         qp = _Qp(problem, guess, hessian, gradient, rows)
         change, slack, solved, iterations, count = self._solve(qp, limits)
+        if solved:
+            before = np.array([max(0.0, -float(rows.upper.min(initial=0.0))), limits.excess])
+            change = self._damped(problem, (guess, q, v), change, before, slack)
         u = np.minimum(np.maximum(guess + change, -limit), limit)
         q, v = problem.rollout(u)
         done = perf_counter()
         phases = (("distances", measured - start), ("residuals", built - measured), ("solve", done - built))
-        return Plan(
+        plan = Plan(
             q=q,
             v=v,
             u=u,
@@ -72,6 +95,7 @@ class RealTimeSolver:
             rows=count,
             phases=phases,
         )
+        return plan, change
 
     def _linearisation(
         self, problem: Problem, guess: FloatArray
@@ -91,6 +115,39 @@ class RealTimeSolver:
             if worst >= 0.0:
                 break
         return u, q, v, nodes, distances
+
+    def _damped(
+        self,
+        problem: Problem,
+        start: tuple[FloatArray, FloatArray, FloatArray],
+        change: FloatArray,
+        before: FloatArray,
+        after: FloatArray,
+    ) -> FloatArray:
+        """Return the change, halved until the cost itself falls: Gauss-Newton alone may go round in circles.
+
+        The QP's constraints are convex, so that with slacks s₀ before and s₁ after the whole change a share α
+        of it needs no more than `(1 - α) s₀ + α s₁`.
+
+        Args:
+            problem: of this update.
+            start: accelerations, positions and velocities of the guess.
+            change: of the accelerations, (N, n).
+            before: slacks that the guess needs, (2,).
+            after: slacks of the QP's solution, (2,).
+        """
+        guess, q, v = start
+        limit = problem.limits.acceleration
+        allowed = self._cost.value(problem, q[1:], v[1:], guess) + _penalty(problem, before)
+        share = 1.0
+        for _ in range(_HALVINGS):
+            u = np.minimum(np.maximum(guess + share * change, -limit), limit)
+            q, v = problem.rollout(u)
+            cost = self._cost.value(problem, q[1:], v[1:], u)
+            if cost + _penalty(problem, (1.0 - share) * before + share * after) <= allowed:
+                break
+            share *= 0.5
+        return share * change
 
     def _solve(self, qp: "_Qp", limits: LimitRows) -> tuple[FloatArray, FloatArray, bool, int, int]:
         """Solve with the rows that matter; add those that the solution breaks; solve again."""
@@ -121,6 +178,10 @@ class RealTimeSolver:
         self._active_bounds = marks[:bounds]
         held = np.flatnonzero(marks[bounds:])
         self._active = dict.fromkeys(qp.keys[held].tolist(), _UPPER)
+
+
+def _penalty(problem: Problem, slack: FloatArray) -> float:
+    return float(problem.slack_linear * slack.sum() + 0.5 * problem.slack_quadratic * (slack @ slack))
 
 
 def _stop(problem: Problem) -> FloatArray:

@@ -8,9 +8,9 @@ from handrail.controllers.arrays import BoolArray, FloatArray, IntArray
 from handrail.controllers.collision import Distances
 from handrail.controllers.problem import Problem
 
-_RECOVERY = 0.8  # of a distance deficit that is left after each node
+RECOVERY = 0.8  # of a distance deficit that is left after each node
 _TOLERANCE = 1e-5  # of a limit, relative
-_VELOCITY_SLACK = 1e-3  # share of the slack that velocity limits get: they can always be kept
+VELOCITY_SLACK = 1e-3  # share of the slack that velocity limits get: they can always be kept
 _NEAR = 0.9  # of a limit from which its row is in the QP from the start
 
 
@@ -68,7 +68,7 @@ def distance_rows(problem: Problem, nodes: Nodes, distances: Distances) -> Rows:
     keep = distances.near[:, 0] > 0
     node, pair = distances.near[keep].T
     deficit = np.maximum(problem.margins - distances.values[0], 0.0)
-    bound = problem.margins[pair] - deficit[pair] * _RECOVERY**node
+    bound = problem.margins[pair] - deficit[pair] * RECOVERY**node
     count = len(node)
     matrix = np.zeros((count, problem.horizon * problem.q.size + 2))
     blocks = nodes.sensitivity(node) * distances.gradients[keep][:, None, :]
@@ -89,6 +89,12 @@ class LimitRows:
         self._offsets = np.stack([q - middle, v], axis=1) / self._scales  # (N, 2, n), within ±1
         self._taken = np.zeros((*self._offsets.shape, 2), dtype=bool)
 
+    @property
+    def excess(self) -> float:
+        """How far the guess exceeds a position limit, or a velocity limit by its share, relative."""
+        over = np.abs(self._offsets).max(axis=(0, 2)) - 1.0  # (2,)
+        return max(0.0, float(over[0]), float(over[1]) / VELOCITY_SLACK)
+
     def near(self) -> Rows | None:
         """Return the rows of limits that the guess comes close to; None when there are none."""
         return self._rows(np.stack([self._offsets, -self._offsets], axis=-1) > _NEAR)
@@ -96,7 +102,7 @@ class LimitRows:
     def violated(self, change: FloatArray, slack: float) -> Rows | None:
         """Return new rows for the limits that a change, (N, n), breaks beyond the slack; None if none."""
         values = self._offsets + (self._coefficients @ change) / self._scales
-        allowed = 1.0 + slack * np.array([1.0, _VELOCITY_SLACK])[:, None, None] + _TOLERANCE
+        allowed = 1.0 + slack * np.array([1.0, VELOCITY_SLACK])[:, None, None] + _TOLERANCE
         over = np.stack([values, -values], axis=-1) > allowed
         return self._rows(over & ~self._taken)
 
@@ -113,6 +119,6 @@ class LimitRows:
         scale = (sign / self._scales[kind, joint])[:, None]
         blocks[np.arange(len(new)), :, joint] = scale * self._coefficients[node, kind]
         matrix[:, :-2] = blocks.reshape(len(new), horizon * size)
-        matrix[:, -1] = np.where(kind == 1, -_VELOCITY_SLACK, -1.0)
+        matrix[:, -1] = np.where(kind == 1, -VELOCITY_SLACK, -1.0)
         keys = 1_000_000 + np.asarray(np.ravel_multi_index(tuple(new.T), (*self._offsets.shape, 2)))
         return Rows(matrix, 1.0 - sign * self._offsets[node, kind, joint], keys)

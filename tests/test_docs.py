@@ -15,6 +15,7 @@ import pytest
 from handrail.collect.build import build_env, session_features
 from handrail.collect.config import DemoConfig, InspectConfig, RecordConfig, ReplayConfig, SessionConfig
 from handrail.collect.operators.modes import MODES
+from handrail.collect.profile_config import ProfileConfig
 from handrail.collect.showcase_config import ShowcaseConfig
 from handrail.controllers.command import Status
 from handrail.scripts import cli
@@ -27,6 +28,7 @@ CONFIGS = {
     "handrail-inspect": InspectConfig,
     "handrail-demo": DemoConfig,
     "handrail-showcase": ShowcaseConfig,
+    "handrail-profile": ProfileConfig,
 }
 _LEROBOT = """
 import json, sys
