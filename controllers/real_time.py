@@ -15,7 +15,7 @@ from handrail.controllers.residuals import StageResiduals
 from handrail.controllers.rows import LimitRows, Nodes, Rows, distance_rows
 
 _INFINITE = 1e30
-_ROUNDS = 6  # of adding violated rows
+_ROUNDS = 12  # of adding violated rows
 _CLOSE = 0.05  # a distance row this near to its bound is in the QP from the start [m]
 _TOLERANCE = 1e-6  # of a row
 _MORE_STEPS = 2  # at most, in one update
@@ -126,8 +126,8 @@ class RealTimeSolver:
     ) -> FloatArray:
         """Return the change, halved until the cost itself falls: Gauss-Newton alone may go round in circles.
 
-        The QP's constraints are convex, so that with slacks s₀ before and s₁ after the whole change a share α
-        of it needs no more than `(1 - α) s₀ + α s₁`.
+        The QP's constraints are convex, so that with no slack before and s after the whole change a share α
+        of it needs no more than `α s`.
 
         Args:
             problem: of this update.
@@ -136,15 +136,17 @@ class RealTimeSolver:
             before: slacks that the guess needs, (2,).
             after: slacks of the QP's solution, (2,).
         """
+        if before.any():  # a guess that breaks a limit is left behind whole
+            return change
         guess, q, v = start
         limit = problem.limits.acceleration
-        allowed = self._cost.value(problem, q[1:], v[1:], guess) + _penalty(problem, before)
+        allowed = self._cost.value(problem, q[1:], v[1:], guess)
         share = 1.0
         for _ in range(_HALVINGS):
             u = np.minimum(np.maximum(guess + share * change, -limit), limit)
             q, v = problem.rollout(u)
             cost = self._cost.value(problem, q[1:], v[1:], u)
-            if cost + _penalty(problem, (1.0 - share) * before + share * after) <= allowed:
+            if cost + _penalty(problem, share * after) <= allowed:
                 break
             share *= 0.5
         return share * change
