@@ -21,9 +21,10 @@ from rich.table import Table
 
 from handrail.collect.build import build_env, build_session, session_features, software_versions
 from handrail.collect.config import RecordConfig
+from handrail.collect.display import Display
 from handrail.collect.env import HandrailEnv
 from handrail.collect.recorder import Recorder
-from handrail.collect.session import Observer, Outcome, Session
+from handrail.collect.session import Outcome, Session
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.writer import EpisodeWriter
 
@@ -56,6 +57,7 @@ def record(config: RecordConfig) -> int:
     """
     console = Console(stderr=True)
     env = build_env(config, config.dataset.fps)
+    displays: list[Display] = []
     try:
         displays = _displays(config)
         build_session(config, env)  # a wrong mask, or cameras without GL, show before anything is written
@@ -68,6 +70,8 @@ def record(config: RecordConfig) -> int:
             _record_all(config, session, recorder, writer, log, console)
             _report(config, writer, log, console)
     finally:
+        for display in displays:
+            display.close()
         env.close()
     return log.exit_code
 
@@ -163,11 +167,9 @@ def _summary(config: RecordConfig, outcomes: list[Outcome]) -> Table:
     return table
 
 
-def _displays(config: RecordConfig) -> list[Observer]:
+def _displays(config: RecordConfig) -> list[Display]:
     if not (config.display_data or config.display_save):
         return []
-    from handrail.collect.display import Display  # rerun is an extra
-
     return [Display(spawn=config.display_data, save=config.display_save)]
 
 
