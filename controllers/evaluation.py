@@ -5,9 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray
+from handrail.controllers.constraints import VELOCITY_SLACK
+from handrail.controllers.nodes import Nodes
 from handrail.controllers.problem import Problem
 from handrail.controllers.residuals import StageResiduals
-from handrail.controllers.rows import RECOVERY, VELOCITY_SLACK, Nodes
+from handrail.controllers.rows import RECOVERY
 
 
 @dataclass(frozen=True)
@@ -59,11 +61,6 @@ class Evaluator:
         return float(np.linalg.norm(error[weights[tracked[-1]] > 0]))
 
 
-def nodes_of(problem: Problem, q: FloatArray, v: FloatArray) -> Nodes:
-    """Return the configurations at which the distances of a trajectory are asked for."""
-    return Nodes(problem, q, v, np.zeros((problem.horizon, 3, problem.horizon)))
-
-
 def distance_bounds(problem: Problem, now: FloatArray, count: int) -> FloatArray:
     """Return what every pair must keep at the nodes from now on, given its distance now, (K, P) [m].
 
@@ -75,7 +72,7 @@ def distance_bounds(problem: Problem, now: FloatArray, count: int) -> FloatArray
 
 def collision_slack(problem: Problem, q: FloatArray, v: FloatArray) -> float:
     """Return the largest shortfall of a distance at the nodes after now [m]."""
-    nodes = nodes_of(problem, q, v)
+    nodes = Nodes(problem, q, v)
     values = problem.collision.values(nodes.q, nodes.times)
     bounds = distance_bounds(problem, values[0], len(values))
     return float(np.max(bounds[1:] - values[1:], initial=0.0))

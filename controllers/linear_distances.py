@@ -5,7 +5,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray, IntArray
-from handrail.controllers.evaluation import distance_bounds, nodes_of
+from handrail.controllers.evaluation import distance_bounds
+from handrail.controllers.nodes import Nodes
 from handrail.controllers.problem import Problem
 
 _BLOCK = 8  # the rows at a node are a multiple of this, so that few programs have to be built
@@ -42,7 +43,7 @@ class LinearDistances:
     def anchored(self, problem: Problem, u: FloatArray) -> "LinearDistances":
         """Return rows that are exact at other accelerations, with the same gradients."""
         q, v = problem.rollout(u)
-        nodes = nodes_of(problem, q, v)
+        nodes = Nodes(problem, q, v)
         return self._exact(problem, problem.collision.values(nodes.q, nodes.times), q, v)
 
     def _exact(self, problem: Problem, values: FloatArray, q: FloatArray, v: FloatArray) -> "LinearDistances":
@@ -58,7 +59,7 @@ def linear_distances(problem: Problem, u: FloatArray) -> LinearDistances:
     `2 c |v_N| / a_max`.
     """
     q, v = problem.rollout(u)
-    nodes = nodes_of(problem, q, v)
+    nodes = Nodes(problem, q, v)
     found = problem.collision.distances(nodes.q, problem.margins + problem.reach, nodes.times)
     keep = found.near[:, 0] > 0
     node, pair = found.near[keep].T
@@ -68,8 +69,7 @@ def linear_distances(problem: Problem, u: FloatArray) -> LinearDistances:
     pairs, by_q = np.full(shape, _NOBODY), np.zeros((*shape, len(problem.q)))
     pairs[place], by_q[place] = pair, found.gradients[keep]
     by_v = np.zeros_like(by_q)
-    gains = 2.0 * np.array(nodes.STOPS)[:, None] * np.abs(v[-1]) / problem.limits.acceleration
-    by_v[problem.horizon :] = by_q[problem.horizon :] * gains[:, None, :]
+    by_v[problem.horizon :] = by_q[problem.horizon :] * nodes.gains[:, None, :]
     empty = LinearDistances(pairs, by_q, by_v, np.zeros(shape))
     if not empty.rows:
         return empty

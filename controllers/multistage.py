@@ -12,7 +12,7 @@ from handrail.controllers.evaluation import limit_slack
 from handrail.controllers.linear_distances import LinearDistances
 from handrail.controllers.problem import Problem
 from handrail.controllers.residuals import StageResiduals
-from handrail.controllers.rows import VELOCITY_SLACK
+from handrail.controllers.constraints import VELOCITY_SLACK
 
 _INSIDE = 1e-3  # how far within the bounds the slacks begin
 STOPS = 2  # nodes of the final stop, measured after the last stage

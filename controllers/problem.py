@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray, frozen
+from handrail.controllers.basis import rollout
 from handrail.controllers.collision import CollisionModel
 from handrail.controllers.description import Limits
 
@@ -54,16 +55,9 @@ class Problem:
 
     def rollout(self, u: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return positions and velocities at the N + 1 nodes under accelerations u, (N, n)."""
-        v = np.empty((len(u) + 1, len(self.v)))
-        v[0] = self.v
-        np.cumsum(u, axis=0, out=v[1:])
-        v[1:] *= self.dt
-        v[1:] += self.v
-        q = np.empty_like(v)
-        q[0] = self.q
-        np.cumsum(v[:-1] + v[1:], axis=0, out=q[1:])
-        q[1:] *= 0.5 * self.dt
-        q[1:] += self.q
+        shape = (len(u) + 1, len(self.v))
+        q, v = np.empty(shape), np.empty(shape)
+        rollout(self.q, self.v, self.dt, u, q, v)
         return q, v
 
 

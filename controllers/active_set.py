@@ -1,0 +1,138 @@
+"""A dual active-set method for the banded QP of one update.
+
+    min ½ sᵀ H s + gᵀ s + Σ_i (ρ₁ σ_i + ½ ρ₂ σ_i²)   subject to   c_pᵀ s - a_p σ_i(p) ≤ b_p,  σ ≥ 0
+
+with `H = L Lᵀ` banded and two slacks σ. In `y = (Lᵀ s, √ρ₂ σ)` the objective is `½ ‖y + f‖²`, so that the
+solution is the nearest point to `-f` within the rows `m_p = (L⁻¹ c_p, -a_p / √ρ₂)`. Rows become active one by
+one, the most violated first, while all multipliers stay ≥ 0 (D. Goldfarb, A. Idnani, Mathematical Programming
+27, 1983). Only rows that are met are ever transformed: one that is far from binding costs a comparison. Begun
+with the rows that were active in the last update, it needs few changes.
+"""
+
+import numpy as np
+
+from handrail.controllers.active_rows import append, drop, lower_solve, project, upper_solve
+from handrail.controllers.banded import backward, forward
+from handrail.controllers.basis import to_motion
+from handrail.controllers.constraints import SLACKS, most_violated, write_row
+from handrail.controllers.jit import jit
+
+_DEPENDENT = 1e-11  # squared sine to the active rows, below which a row is a combination of them
+
+
+@jit
+def solve(band, gradient, penalty, rows, warm, limit, held, motion):  # noqa: ANN001, ANN201
+    """Solve the QP; return s (N n,), σ (2,), whether that is the solution, changes made, active rows.
+
+    Args:
+        band: L, (N n, 3n); see banded.py.
+        gradient: g, (N n,).
+        penalty: ρ₁ and ρ₂.
+        rows: the constraints.
+        warm: keys of rows to begin with, (k,).
+        limit: of the number of changes.
+        held: room; the active rows' keys and multipliers are left in it.
+        motion: filled with the changes of (q, v, u) after every stage, (N, 3, n).
+    """
+    size = len(gradient)
+    root = penalty[1] ** 0.5
+    free = np.empty(size + SLACKS)
+    free[:size] = gradient
+    forward(band, free[:size], 0)
+    free[size:] = penalty[0] / root
+    y, new, normal = np.empty_like(free), np.empty_like(free), np.empty_like(free)
+    shares = np.empty((2, len(free) + 1))
+    s, slack = np.empty(size), np.empty(SLACKS)
+    count = _begin(band, root, rows, warm, free, held, y, new, normal, shares)
+    changes, refined = 0, 0
+    while True:
+        s[:] = y[:size]
+        backward(band, s)
+        slack[:] = y[size:] / root
+        to_motion(rows.matrix, s, motion)
+        key = most_violated(rows, s, motion, slack, held.keys[:count])
+        if key < 0:
+            if refined == changes:
+                return s, slack, True, changes, count
+            refined = changes  # rounding errors of the changes
+            _refine(free, held, count, shares, y)
+            continue
+        upper = _transform(band, root, rows, key, new)
+        multiplier = 0.0
+        while True:
+            changes += 1
+            if changes > limit or count == len(free):
+                return s, slack, False, changes, count
+            square = project(held, count, new, shares, normal)
+            step, blocking = _step(held, count, new, upper, shares, square, y)
+            if step == np.inf:
+                return s, slack, False, changes, count
+            for i in range(count):
+                held.multipliers[i] -= step * shares[1, i]
+            multiplier += step
+            for t in range(len(y)):
+                y[t] -= step * normal[t]
+            if blocking < 0:
+                count = append(held, count, new, shares, square, key, upper, multiplier)
+                break
+            count = drop(held, count, blocking)
+
+
+@jit
+def _begin(band, root, rows, warm, free, held, y, new, normal, shares):  # noqa: ANN001, ANN202
+    """Make the warm rows active, less those with a negative multiplier; write y; return their number."""
+    count = 0
+    for index in range(len(warm)):
+        upper = _transform(band, root, rows, warm[index], new)
+        square = project(held, count, new, shares, normal)
+        if count < len(free) and square > _DEPENDENT * np.dot(new, new):
+            count = append(held, count, new, shares, square, warm[index], upper, 0.0)
+    while True:
+        held.multipliers[:count] = 0.0
+        y[:] = -free
+        _refine(free, held, count, shares, y)
+        worst = -1
+        for i in range(count):
+            if held.multipliers[i] < (held.multipliers[worst] if worst >= 0 else 0.0):
+                worst = i
+        if worst < 0:
+            return count
+        count = drop(held, count, worst)
+
+
+@jit
+def _transform(band, root, rows, key, new):  # noqa: ANN001, ANN202
+    """Write m_p of a row; return its right-hand side."""
+    upper, first = write_row(rows, key, new)
+    size = len(band)
+    forward(band, new[:size], first)
+    new[size:] /= root
+    return upper
+
+
+@jit
+def _step(held, count, new, upper, shares, square, y):  # noqa: ANN001, ANN202
+    """Return how far the new row's multiplier grows, and the active row that stops it; -1 if none."""
+    length = np.dot(new, new)
+    step, blocking = np.inf, -1
+    if square > _DEPENDENT * length:
+        step = (np.dot(new, y) - upper) / square
+    for i in range(count):
+        if shares[1, i] > 0.0 and held.multipliers[i] < step * shares[1, i]:
+            step, blocking = held.multipliers[i] / shares[1, i], i
+    return step, blocking
+
+
+@jit
+def _refine(free, held, count, shares, y):  # noqa: ANN001, ANN202
+    """Correct the multipliers by what the active rows miss at y, and y with them."""
+    for i in range(count):
+        shares[0, i] = np.dot(held.rows[i], y) - held.upper[i]
+    lower_solve(held, count, shares[0])
+    upper_solve(held, count, shares[0])
+    for i in range(count):
+        held.multipliers[i] += shares[0, i]
+    y[:] = -free
+    for i in range(count):
+        for t in range(len(y)):
+            y[t] -= held.multipliers[i] * held.rows[i, t]
