@@ -1,4 +1,7 @@
-"""The active rows of the dual method and the Cholesky factor of their products, `M Mᵀ = T Tᵀ`."""
+"""The active rows of the dual method, as `M = T Q`: T lower triangular, the rows of Q orthonormal.
+
+Rows of neighbouring nodes are nearly parallel; products `M Mᵀ` would square that, so that Q is kept.
+"""
 
 from typing import NamedTuple
 
@@ -8,19 +11,21 @@ from handrail.controllers.arrays import FloatArray, IntArray
 from handrail.controllers.constraints import SLACKS
 from handrail.controllers.jit import jit
 
+_CANCELLED = 0.25  # share of a row's square below which rounding makes a second projection worth while
+
 
 class ActiveRows(NamedTuple):
     """Room for as many rows as there are variables; kept from update to update.
 
     Attributes:
-        rows: M, transformed rows, (A, N n + 2).
-        triangle: T, lower, (A, A).
+        directions: Q, (A, N n + 2).
+        triangle: T, (A, A).
         multipliers: λ, (A,).
         keys: which rows they are, (A,).
-        upper: their right-hand sides, (A,).
+        upper: their right-hand sides as seen from the free minimum, (A,).
     """
 
-    rows: FloatArray
+    directions: FloatArray
     triangle: FloatArray
     multipliers: FloatArray
     keys: IntArray
@@ -31,7 +36,7 @@ def active_rows(horizon: int, size: int) -> ActiveRows:
     """Return room for a problem of N stages and n coordinates."""
     count = horizon * size + SLACKS
     return ActiveRows(
-        rows=np.zeros((count, count)),
+        directions=np.zeros((count, count)),
         triangle=np.zeros((count, count)),
         multipliers=np.zeros(count),
         keys=np.zeros(count, dtype=np.int64),
@@ -40,41 +45,43 @@ def active_rows(horizon: int, size: int) -> ActiveRows:
 
 
 @jit
-def project(held, count, new, shares, normal):  # noqa: ANN001, ANN201
-    """Split a row into a combination of the active ones and what is normal to them; return its square.
+def project(held, count, new, along, shares, normal):  # noqa: ANN001, ANN201
+    """Split a row m into a combination of the active ones and what is normal to them; return its square.
 
     Args:
         held: the active rows.
         count: of them.
-        new: the row m, (N n + 2,).
-        shares: filled with `T⁻¹ M m` and, in its second row, `(M Mᵀ)⁻¹ M m`, (2, A).
-        normal: filled with the rest, (N n + 2,).
+        new: m, (N n + 2,).
+        along: filled with Q m, (A,).
+        shares: filled with the combination, `T⁻ᵀ Q m`, (A,).
+        normal: filled with the rest, `m - Qᵀ Q m`, (N n + 2,).
     """
-    size = len(new)
-    for i in range(count):
-        total = 0.0
-        for t in range(size):
-            total += held.rows[i, t] * new[t]
-        shares[0, i] = total
-    lower_solve(held, count, shares[0])
-    shares[1, :count] = shares[0, :count]
-    upper_solve(held, count, shares[1])
     normal[:] = new
-    for i in range(count):
-        for t in range(size):
-            normal[t] -= shares[1, i] * held.rows[i, t]
-    square = 0.0
-    for t in range(size):
-        square += normal[t] * normal[t]
+    along[:count] = 0.0
+    before = np.dot(new, new)
+    while True:
+        for i in range(count):
+            share = np.dot(held.directions[i], normal)
+            along[i] += share
+            for t in range(len(normal)):
+                normal[t] -= share * held.directions[i, t]
+        square = np.dot(normal, normal)
+        if square > _CANCELLED * before or square < 1e-30 * np.dot(new, new):
+            break
+        before = square
+    shares[:count] = along[:count]
+    upper_solve(held, count, shares)
     return square
 
 
 @jit
-def append(held, count, new, shares, square, key, upper, multiplier):  # noqa: ANN001, ANN201
+def append(held, count, along, normal, square, key, upper, multiplier):  # noqa: ANN001, ANN201
     """Make a row active that `project` has split; return how many are."""
-    held.rows[count] = new
-    held.triangle[count, :count] = shares[0, :count]
-    held.triangle[count, count] = square**0.5
+    length = square**0.5
+    for t in range(len(normal)):
+        held.directions[count, t] = normal[t] / length
+    held.triangle[count, :count] = along[:count]
+    held.triangle[count, count] = length
     held.keys[count] = key
     held.upper[count] = upper
     held.multipliers[count] = multiplier
@@ -83,14 +90,13 @@ def append(held, count, new, shares, square, key, upper, multiplier):  # noqa: A
 
 @jit
 def drop(held, count, index):  # noqa: ANN001, ANN201
-    """Make a row inactive; return how many are left. Rotations make the factor triangular again."""
+    """Make a row inactive; return how many are left. Rotations make T triangular again."""
+    T, Q = held.triangle, held.directions
     for i in range(index, count - 1):
-        held.rows[i] = held.rows[i + 1]
         held.keys[i] = held.keys[i + 1]
         held.upper[i] = held.upper[i + 1]
         held.multipliers[i] = held.multipliers[i + 1]
-        held.triangle[i, : i + 2] = held.triangle[i + 1, : i + 2]
-    T = held.triangle
+        T[i, : i + 2] = T[i + 1, : i + 2]
     for i in range(index, count - 1):
         length = (T[i, i] ** 2 + T[i, i + 1] ** 2) ** 0.5
         c, s = T[i, i] / length, T[i, i + 1] / length
@@ -99,17 +105,30 @@ def drop(held, count, index):  # noqa: ANN001, ANN201
             left, right = T[row, i], T[row, i + 1]
             T[row, i] = c * left + s * right
             T[row, i + 1] = c * right - s * left
+        for t in range(Q.shape[1]):
+            first, second = Q[i, t], Q[i + 1, t]
+            Q[i, t] = c * first + s * second
+            Q[i + 1, t] = c * second - s * first
     return count - 1
 
 
 @jit
-def lower_solve(held, count, x):  # noqa: ANN001, ANN201
-    """Replace x by `T⁻¹ x`, (A,)."""
+def settle(held, count, free, shares, y):  # noqa: ANN001, ANN201
+    """Write the nearest point to `-free` at which all active rows hold, and their multipliers.
+
+    `y = -f + Qᵀ w` with `T w = b + M f`, and `λ = -T⁻ᵀ w`.
+    """
     for i in range(count):
-        total = x[i]
+        total = held.upper[i]
         for t in range(i):
-            total -= held.triangle[i, t] * x[t]
-        x[i] = total / held.triangle[i, i]
+            total -= held.triangle[i, t] * shares[t]
+        shares[i] = total / held.triangle[i, i]
+    y[:] = -free
+    for i in range(count):
+        for t in range(len(y)):
+            y[t] += shares[i] * held.directions[i, t]
+    held.multipliers[:count] = -shares[:count]
+    upper_solve(held, count, held.multipliers)
 
 
 @jit

@@ -11,13 +11,13 @@ with the rows that were active in the last update, it needs few changes.
 
 import numpy as np
 
-from handrail.controllers.active_rows import append, drop, lower_solve, project, upper_solve
+from handrail.controllers.active_rows import append, drop, project, settle
 from handrail.controllers.banded import backward, forward
 from handrail.controllers.basis import to_motion
 from handrail.controllers.constraints import SLACKS, most_violated, write_row
 from handrail.controllers.jit import jit
 
-_DEPENDENT = 1e-11  # squared sine to the active rows, below which a row is a combination of them
+_DEPENDENT = 1e-12  # squared sine to the active rows, below which a row is a combination of them
 
 
 @jit
@@ -41,10 +41,10 @@ def solve(band, gradient, penalty, rows, warm, limit, held, motion):  # noqa: AN
     forward(band, free[:size], 0)
     free[size:] = penalty[0] / root
     y, new, normal = np.empty_like(free), np.empty_like(free), np.empty_like(free)
-    shares = np.empty((2, len(free) + 1))
+    along, shares = np.empty_like(free), np.empty_like(free)
     s, slack = np.empty(size), np.empty(SLACKS)
-    count = _begin(band, root, rows, warm, free, held, y, new, normal, shares)
-    changes, refined = 0, 0
+    count = _begin(band, root, rows, warm, free, held, y, new, along, shares, normal)
+    changes, settled = 0, 0
     while True:
         s[:] = y[:size]
         backward(band, s)
@@ -52,45 +52,43 @@ def solve(band, gradient, penalty, rows, warm, limit, held, motion):  # noqa: AN
         to_motion(rows.matrix, s, motion)
         key = most_violated(rows, s, motion, slack, held.keys[:count])
         if key < 0:
-            if refined == changes:
+            if settled == changes:
                 return s, slack, True, changes, count
-            refined = changes  # rounding errors of the changes
-            _refine(free, held, count, shares, y)
+            settled = changes  # without the rounding errors of the changes
+            settle(held, count, free, shares, y)
             continue
         upper = _transform(band, root, rows, key, new)
         multiplier = 0.0
         while True:
             changes += 1
-            if changes > limit or count == len(free):
-                return s, slack, False, changes, count
-            square = project(held, count, new, shares, normal)
+            square = project(held, count, new, along, shares, normal)
             step, blocking = _step(held, count, new, upper, shares, square, y)
-            if step == np.inf:
+            if step == np.inf or changes > limit:
                 return s, slack, False, changes, count
             for i in range(count):
-                held.multipliers[i] -= step * shares[1, i]
+                held.multipliers[i] -= step * shares[i]
             multiplier += step
-            for t in range(len(y)):
-                y[t] -= step * normal[t]
+            if square > _DEPENDENT * np.dot(new, new):
+                for t in range(len(y)):
+                    y[t] -= step * normal[t]
             if blocking < 0:
-                count = append(held, count, new, shares, square, key, upper, multiplier)
+                upper += np.dot(new, free)
+                count = append(held, count, along, normal, square, key, upper, multiplier)
                 break
             count = drop(held, count, blocking)
 
 
 @jit
-def _begin(band, root, rows, warm, free, held, y, new, normal, shares):  # noqa: ANN001, ANN202
+def _begin(band, root, rows, warm, free, held, y, new, along, shares, normal):  # noqa: ANN001, ANN202
     """Make the warm rows active, less those with a negative multiplier; write y; return their number."""
     count = 0
     for index in range(len(warm)):
-        upper = _transform(band, root, rows, warm[index], new)
-        square = project(held, count, new, shares, normal)
-        if count < len(free) and square > _DEPENDENT * np.dot(new, new):
-            count = append(held, count, new, shares, square, warm[index], upper, 0.0)
+        upper = _transform(band, root, rows, warm[index], new) + np.dot(new, free)
+        square = project(held, count, new, along, shares, normal)
+        if square > _DEPENDENT * np.dot(new, new):
+            count = append(held, count, along, normal, square, warm[index], upper, 0.0)
     while True:
-        held.multipliers[:count] = 0.0
-        y[:] = -free
-        _refine(free, held, count, shares, y)
+        settle(held, count, free, shares, y)
         worst = -1
         for i in range(count):
             if held.multipliers[i] < (held.multipliers[worst] if worst >= 0 else 0.0):
@@ -113,26 +111,10 @@ def _transform(band, root, rows, key, new):  # noqa: ANN001, ANN202
 @jit
 def _step(held, count, new, upper, shares, square, y):  # noqa: ANN001, ANN202
     """Return how far the new row's multiplier grows, and the active row that stops it; -1 if none."""
-    length = np.dot(new, new)
     step, blocking = np.inf, -1
-    if square > _DEPENDENT * length:
-        step = (np.dot(new, y) - upper) / square
+    if square > _DEPENDENT * np.dot(new, new):
+        step = max(np.dot(new, y) - upper, 0.0) / square
     for i in range(count):
-        if shares[1, i] > 0.0 and held.multipliers[i] < step * shares[1, i]:
-            step, blocking = held.multipliers[i] / shares[1, i], i
+        if shares[i] > 0.0 and held.multipliers[i] < step * shares[i]:
+            step, blocking = max(held.multipliers[i], 0.0) / shares[i], i
     return step, blocking
-
-
-@jit
-def _refine(free, held, count, shares, y):  # noqa: ANN001, ANN202
-    """Correct the multipliers by what the active rows miss at y, and y with them."""
-    for i in range(count):
-        shares[0, i] = np.dot(held.rows[i], y) - held.upper[i]
-    lower_solve(held, count, shares[0])
-    upper_solve(held, count, shares[0])
-    for i in range(count):
-        held.multipliers[i] += shares[0, i]
-    y[:] = -free
-    for i in range(count):
-        for t in range(len(y)):
-            y[t] -= held.multipliers[i] * held.rows[i, t]
