@@ -59,3 +59,11 @@ def rollout(q, v, dt, u, positions, velocities):  # noqa: ANN001, ANN201
             after = velocities[k, j] + dt * u[k, j]
             velocities[k + 1, j] = after
             positions[k + 1, j] = positions[k, j] + 0.5 * dt * (velocities[k, j] + after)
+
+
+@jit
+def clipped_sum(first, second, limit, out):  # noqa: ANN001, ANN201
+    """Write the sum of two arrays, (N, n), within ± limit, (n,)."""
+    for k in range(out.shape[0]):
+        for j in range(out.shape[1]):
+            out[k, j] = min(max(first[k, j] + second[k, j], -limit[j]), limit[j])

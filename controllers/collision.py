@@ -12,6 +12,7 @@ from handrail.controllers.errors import HandrailError
 from handrail.controllers.model import RobotModel
 from handrail.controllers.pair_data import PairData
 from handrail.controllers.shape import Obstacle, Shape
+from handrail.controllers.witnesses import gradients, lower_bounds, measured
 
 FLOOR = "floor"
 _FAR = 0.15  # a pair that stays farther apart than this need not be measured exactly [m]
@@ -35,8 +36,7 @@ class Distances:
 class CollisionModel:
     """The pairs that must keep apart: robot shapes with each other, the floor and the obstacles.
 
-    For a pair with nearest points p₁, p₂ and unit normal n from the first to the second,
-    `d = n·(p₂ - p₁)` and `∂d/∂q = n·(J(p₂) - J(p₁))`.
+    See witnesses.py for the distance of a pair and its gradient.
 
     Attributes:
         pairs: names of the two shapes of each pair, (P,) of (str, str).
@@ -70,7 +70,9 @@ class CollisionModel:
         self.largest_margin: FloatArray = frozen(np.concatenate([description.self_margins, other]))
         self._data = self._model.createData()
         self._moves = self._pair_moves()  # (P, 2, n)
-        self._levers = self._pair_levers(model)  # (n, P)
+        self._levers = np.ascontiguousarray(self._pair_levers(model))  # (n, P)
+        self._every = np.arange(len(self.pairs))
+        self._far = np.full(len(self.pairs), _FAR)
         neutral = pin.neutral(self._model)
         self._all, self._along, self._after = (
             PairData(self._model, self._data, self._geometry, neutral) for _ in range(3)
@@ -98,18 +100,21 @@ class CollisionModel:
         if not self.size:
             return _nothing(len(q), self._model.nv)
         times = np.zeros(len(q)) if times is None else times
+        reaches = np.broadcast_to(np.asarray(reach, dtype=np.float64), (self.size,)).copy()
         witnesses = np.empty((len(q), self.size, 9))
         jacobians = np.empty((len(q), 6, self._model.nv))
         self._measure(self._all, q[0], times[0], witnesses[0])
         jacobians[0] = pin.computeJointJacobians(self._model, self._data)
-        values = _signed(witnesses[0]) - self._travel(q, times)  # (K, P)
-        near = self._along.select(np.any(values < reach, axis=0))
-        for node in range(1, len(q)) if len(near) else ():
+        now = np.empty((1, self.size))
+        measured(witnesses, self._every, now)
+        values, close = lower_bounds(now[0], q, times, self._levers, self._speeds, reaches)
+        chosen = self._along.select(close)
+        for node in range(1, len(q)) if len(chosen) else ():
             self._measure(self._along, q[node], times[node], witnesses[node])
             jacobians[node] = pin.computeJointJacobians(self._model, self._data)
-        values[1:, near] = _signed(witnesses[1:, near])
-        below = np.argwhere(values < reach)
-        return Distances(values, below, self._gradients(witnesses, jacobians, below))
+        measured(witnesses, chosen, values)
+        near, rows = gradients(witnesses, jacobians, self._moves, values, reaches)
+        return Distances(values, near, rows)
 
     def values(
         self, q: FloatArray, times: FloatArray | None = None, now: tuple[FloatArray, FloatArray] | None = None
@@ -125,15 +130,15 @@ class CollisionModel:
         times = np.zeros(len(q)) if times is None else times
         witnesses = np.empty((len(q), self.size, 9))
         if now is None:
-            for node in range(len(q)):
-                self._measure(self._all, q[node], times[node], witnesses[node])
-            return _signed(witnesses)
-        path = np.vstack([now[0], q])
-        values = now[1] - self._travel(path, np.append(0.0, times))[1:]
-        near = self._after.select(np.any(values < _FAR, axis=0))
-        for node in range(len(q) if len(near) else 0):
-            self._measure(self._after, q[node], times[node], witnesses[node])
-        values[:, near] = _signed(witnesses[:, near])
+            data, chosen, values = self._all, self._every, np.empty((len(q), self.size))
+        else:
+            path, data = np.vstack([now[0], q]), self._after
+            later = np.append(0.0, times)
+            bounds, close = lower_bounds(now[1], path, later, self._levers, self._speeds, self._far)
+            chosen, values = data.select(close), bounds[1:]
+        for node in range(len(q) if len(chosen) else 0):
+            self._measure(data, q[node], times[node], witnesses[node])
+        measured(witnesses, chosen, values)
         return values
 
     def _measure(self, data: "PairData", q: FloatArray, time: float, out: FloatArray) -> None:
@@ -144,13 +149,6 @@ class CollisionModel:
             )
         pin.computeDistances(self._model, self._data, self._geometry, data.geometry, q)
         out[:] = data.results.read()
-
-    def _travel(self, q: FloatArray, times: FloatArray) -> FloatArray:
-        """Return how much nearer each pair can have come since the first configuration, (K, P) [m]."""
-        travel = np.abs(q - q[0]) @ self._levers
-        if self._moving:
-            travel += times[:, None] * self._speeds
-        return travel
 
     def observe(self, obstacles: tuple[Obstacle, ...]) -> None:
         """Take where the obstacles are now and how fast they move.
@@ -169,16 +167,6 @@ class CollisionModel:
                 self._moving.append((geometry, obstacle))
         speeds = {obstacle.name: float(np.linalg.norm(obstacle.velocity)) for obstacle in obstacles}
         self._speeds = np.array([speeds.get(second, 0.0) for _, second in self.pairs])
-
-    def _gradients(self, witnesses: FloatArray, jacobians: FloatArray, near: IntArray) -> FloatArray:
-        node, pair = near[:, 0], near[:, 1]
-        normal, first, second = np.split(witnesses[node, pair], 3, axis=1)  # (R, 3) each
-        wrenches = np.empty((len(near), 2, 6))
-        wrenches[:, :, :3] = normal[:, None, :]
-        wrenches[:, 0, 3:] = _cross(first, normal)
-        wrenches[:, 1, 3:] = _cross(second, normal)
-        rows = (wrenches @ jacobians[node]) * self._moves[pair]
-        return rows[:, 1] - rows[:, 0]
 
     def _add_scene(self, obstacles: tuple[Obstacle, ...]) -> dict[str, int]:
         names = [obstacle.name for obstacle in obstacles]
@@ -254,16 +242,6 @@ def lever_arms(model: RobotModel, placed: PlacedShape) -> FloatArray:
         reach += float(np.linalg.norm(pinocchio.jointPlacements[joint].translation))
         joint = pinocchio.parents[joint]
     return arms
-
-
-def _signed(witnesses: FloatArray) -> FloatArray:
-    """Return n·(p₂ - p₁) of the rows (n, p₁, p₂), (…, 9) → (…)."""
-    return np.einsum("...i,...i->...", witnesses[..., 0:3], witnesses[..., 6:9] - witnesses[..., 3:6])
-
-
-def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
-    """Return row-wise cross products, several times faster than numpy's for few rows."""
-    return a[:, [1, 2, 0]] * b[:, [2, 0, 1]] - a[:, [2, 0, 1]] * b[:, [1, 2, 0]]
 
 
 def _coal_shape(shape: Shape) -> coal.ShapeBase:

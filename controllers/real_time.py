@@ -10,6 +10,7 @@ from handrail.controllers import active_set
 from handrail.controllers.active_rows import active_rows
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.banded import factor
+from handrail.controllers.basis import clipped_sum
 from handrail.controllers.collision import Distances
 from handrail.controllers.constraints import SLACKS
 from handrail.controllers.nodes import Nodes
@@ -74,14 +75,11 @@ class RealTimeSolver:
         begin = self._linearisation(problem, guess)
         rows = rows_around(problem, begin[:3], begin.nodes, begin.distances, self.cost.matrix)
         measured = perf_counter()
-        quadratic = self.cost.expand(problem, begin.q[1:], begin.v[1:], begin.u)
+        quadratic = self.cost.expand(problem, *begin[:3])
         built = perf_counter()
         slack, solved, iterations = self._solve(problem, quadratic, rows)
-        change = self._motion[:, 2]
-        if not rows.needed.any() and solved:  # a guess that breaks a limit is left behind whole
-            change = self._damped(problem, begin.u, change, quadratic.value, slack)
-        u, q, v = _moved(problem, begin.u, change)
-        tracking_error = self.cost.tracking_error(problem, q[1:], v[1:], u)
+        change, (q, v, u) = self._damped(problem, begin.u, quadratic.value, slack, rows.needed)
+        tracking_error = self.cost.tracking_error(problem)
         done = perf_counter()
         plan = Plan(
             q=q,
@@ -104,12 +102,12 @@ class RealTimeSolver:
         Inside an obstacle the nearest way out may be the far side, so a colliding guess would be pulled
         through; the stop is free of collision, since the last update made sure that it is.
         """
-        limit = problem.limits.acceleration
-        begin = _measured(problem, np.minimum(np.maximum(guess, -limit), limit))
+        begin = _measured(problem, *_moved(problem, guess, np.zeros_like(guess)))
         values = begin.distances.values
-        if np.min(values - np.minimum(values[0], 0.0), initial=np.inf) >= 0.0:
+        if not values.size or (values >= np.minimum(values[0], 0.0)).all():
             return begin
-        return _measured(problem, _stop(problem))
+        stop = _stop(problem)
+        return _measured(problem, *_moved(problem, stop, np.zeros_like(stop)))
 
     def _solve(self, problem: Problem, quadratic: Quadratic, rows: Rows) -> tuple[FloatArray, bool, int]:
         """Solve the QP and leave the change in `_motion`; return its slacks, whether it did, and changes."""
@@ -136,45 +134,48 @@ class RealTimeSolver:
         return slack, False, changes
 
     def _damped(
-        self, problem: Problem, guess: FloatArray, change: FloatArray, allowed: float, slack: FloatArray
-    ) -> FloatArray:
-        """Return the change, halved until the cost itself falls: Gauss-Newton alone may go round in circles.
+        self, problem: Problem, guess: FloatArray, allowed: float, slack: FloatArray, needed: FloatArray
+    ) -> tuple[FloatArray, tuple[FloatArray, ...]]:
+        """Return the change, halved until the cost itself falls, and the motion (q, v, u) that it leads to.
 
-        The QP's constraints are convex, so that from a guess within them a share α of the change needs no
-        more slack than α times that of the whole.
+        Gauss-Newton alone may go round in circles. The QP's constraints are convex, so that from a guess
+        within them a share α of the change needs no more slack than α times that of the whole; a guess that
+        breaks a limit is left behind whole.
 
         Args:
             problem: of this update.
             guess: accelerations, (N, n).
-            change: of them, (N, n).
             allowed: cost of the guess.
             slack: of the QP's solution, (2,).
+            needed: by the guess, (2,).
         """
-        share = 1.0
-        for _ in range(_HALVINGS):
-            u, q, v = _moved(problem, guess, share * change)
-            if self.cost.value(problem, q[1:], v[1:], u) + _penalty(problem, share * slack) <= allowed:
+        change = self._motion[:, 2].copy()
+        for halvings in range(_HALVINGS + 1):
+            motion = _moved(problem, guess, change)
+            cost = self.cost.value(problem, *motion) + _penalty(problem, 0.5**halvings * slack)
+            if needed.any() or cost <= allowed or halvings == _HALVINGS:
                 break
-            share *= 0.5
-        return share * change
+            change *= 0.5
+        return change, motion
 
 
 def _moved(problem: Problem, guess: FloatArray, change: FloatArray) -> tuple[FloatArray, ...]:
-    """Return accelerations, within their limits, and the positions and velocities that follow."""
-    limit = problem.limits.acceleration
-    u = np.minimum(np.maximum(guess + change, -limit), limit)
-    return u, *problem.rollout(u)
+    """Return positions and velocities at the nodes, and accelerations within their limits."""
+    u = np.empty_like(guess)
+    clipped_sum(guess, change, problem.limits.acceleration, u)
+    return *problem.rollout(u), u
 
 
-def _measured(problem: Problem, u: FloatArray) -> _Guess:
-    q, v = problem.rollout(u)
+def _measured(problem: Problem, q: FloatArray, v: FloatArray, u: FloatArray) -> _Guess:
     nodes = Nodes(problem, q, v)
     distances = problem.collision.distances(nodes.q, problem.margins + problem.reach, nodes.times)
     return _Guess(q, v, u, nodes, distances)
 
 
 def _penalty(problem: Problem, slack: FloatArray) -> float:
-    return float(problem.slack_linear * slack.sum() + 0.5 * problem.slack_quadratic * (slack @ slack))
+    first, second = slack
+    squares = first * first + second * second
+    return float(problem.slack_linear * (first + second) + 0.5 * problem.slack_quadratic * squares)
 
 
 def _stop(problem: Problem) -> FloatArray:

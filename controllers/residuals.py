@@ -1,5 +1,6 @@
 """All objectives' residuals at all stages: constant rows kept as matrices, the others compiled by CasADi."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import casadi as ca
@@ -56,6 +57,7 @@ class StageResiduals:
         self.reference = np.concatenate([objective.reference for objective in objectives])
         self.expression = ca.Function("residual", [z, p], [residual])
         self.affine, self.curved = _split(residual, z, p)
+        self._buffers: dict[str, object] = {}  # they own what the compiled functions read and write
         self._compile(residual, z, p, horizon, n)
 
     @property
@@ -73,8 +75,8 @@ class StageResiduals:
 
     def evaluate(
         self, q: FloatArray, v: FloatArray, u: FloatArray, parameters: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
-        """Return the curved rows' residuals (N, c) and Jacobians by (q, v, u), (N, c, 3n); views.
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return z (N, 3n), and the curved rows' residuals (N, c) and Jacobians by z, (N, 3n, c); views.
 
         Args:
             q: positions after the stages, (N, n).
@@ -82,25 +84,43 @@ class StageResiduals:
             u: accelerations during them, (N, n).
             parameters: of all objectives, (k,).
         """
+        self._take(q, v, u, parameters)
+        self._evaluate_all()
+        return self._z, self._values, self._jacobians
+
+    def values(
+        self, q: FloatArray, v: FloatArray, u: FloatArray, parameters: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return z (N, 3n) and the curved rows' residuals (N, c), as views; arguments as for `evaluate`."""
+        self._take(q, v, u, parameters)
+        self._evaluate_values()
+        return self._z, self._values
+
+    def _take(self, q: FloatArray, v: FloatArray, u: FloatArray, parameters: FloatArray) -> None:
         n = q.shape[1]
         self._z[:, :n], self._z[:, n : 2 * n], self._z[:, 2 * n :] = q, v, u
         self._p[:] = parameters
-        self._evaluate()
-        return self._values, self._jacobians.transpose(0, 2, 1)
 
     def _compile(self, residual: ca.SX, z: ca.SX, p: ca.SX, horizon: int, n: int) -> None:
-        curved = residual[self.curved.tolist()]
-        outputs = [ca.densify(curved), ca.densify(ca.jacobian(curved, z))]
-        stage = compiled(ca.Function("stage", [z, p], outputs)).map(horizon)
+        curved = ca.densify(residual[self.curved.tolist()])
         self._z = np.zeros((horizon, 3 * n))
         self._p = np.zeros((horizon, p.shape[0]))
         self._values = np.zeros((horizon, len(self.curved)))
         self._jacobians = np.zeros((horizon, 3 * n, len(self.curved)))  # column-major in CasADi
-        self._buffer, self._evaluate = stage.buffer()
-        self._buffer.set_arg(0, memoryview(self._z))
-        self._buffer.set_arg(1, memoryview(self._p))
-        self._buffer.set_res(0, memoryview(self._values))
-        self._buffer.set_res(1, memoryview(self._jacobians))
+        jacobian = ca.densify(ca.jacobian(curved, z))
+        self._evaluate_values = self._bound("values", [z, p], [curved])
+        self._evaluate_all = self._bound("stage", [z, p], [curved, jacobian])
+
+    def _bound(self, name: str, inputs: list[ca.SX], outputs: list[ca.SX]) -> Callable[[], None]:
+        """Return a function of all stages, compiled, that reads and writes this object's arrays."""
+        function = compiled(ca.Function(name, inputs, outputs)).map(len(self._z))
+        buffer, evaluate = function.buffer()
+        buffer.set_arg(0, memoryview(self._z))
+        buffer.set_arg(1, memoryview(self._p))
+        for index, result in enumerate((self._values, self._jacobians)[: len(outputs)]):
+            buffer.set_res(index, memoryview(result))
+        self._buffers[name] = buffer
+        return evaluate
 
 
 def _parameter_slices(objectives: tuple[Objective, ...]) -> dict[str, slice]:

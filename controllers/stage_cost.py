@@ -46,18 +46,14 @@ class StageCost:
         self._constant: dict[bytes, FloatArray] = {}
 
     def expand(self, problem: Problem, q: FloatArray, v: FloatArray, u: FloatArray) -> Quadratic:
-        """Return the quadratic around a guess; q and v are after the stages, (N, n)."""
+        """Return the quadratic around a guess: q and v at the nodes, (N + 1, n), and u, (N, n)."""
         self._band[:] = self._constant_band(problem.weights)
         self._gradient[:] = 0.0
-        values, jacobians = self.residuals.evaluate(q, v, u, problem.parameters)
-        value = _add_affine(
-            self._affine, self.matrix, q, v, u, problem.weights, problem.reference, self._gradient
-        )
-        value += _add_curved(
-            self._curved,
+        z, values, jacobians = self.residuals.evaluate(q[1:], v[1:], u, problem.parameters)
+        value = _expand(
+            (self._affine, self._curved),
             self.matrix,
-            values,
-            jacobians,
+            (z, values, jacobians),
             problem.weights,
             problem.reference,
             self._gradient,
@@ -66,25 +62,19 @@ class StageCost:
         return Quadratic(value, self._gradient, self._band)
 
     def value(self, problem: Problem, q: FloatArray, v: FloatArray, u: FloatArray) -> float:
-        """Return the cost itself; q and v are after the stages, (N, n)."""
-        values, _ = self.residuals.evaluate(q, v, u, problem.parameters)
-        value = _affine_value(self._affine, q, v, u, problem.weights, problem.reference)
-        return value + _curved_value(self._curved, values, problem.weights, problem.reference)
+        """Return the cost itself of q and v at the nodes, (N + 1, n), and u, (N, n)."""
+        z, values = self.residuals.values(q[1:], v[1:], u, problem.parameters)
+        self._last = values
+        return _value(self._affine, self._curved, z, values, problem.weights, problem.reference)
 
-    def tracking_error(self, problem: Problem, q: FloatArray, v: FloatArray, u: FloatArray) -> float:
-        """Return the norm of the commanded twists' error at the last tracked stage.
+    def tracking_error(self, problem: Problem) -> float:
+        """Return the norm of the commanded twists' error at the last tracked stage, where `value` was last.
 
         Joint channels, which are always met when free, are left out.
         """
-        values, _ = self.residuals.evaluate(q, v, u, problem.parameters)
-        index = self._curved
-        tracked = index < problem.channels
-        weights = problem.weights[:, index[tracked]]
-        stages = np.flatnonzero(weights.any(axis=1))
-        if not len(stages):
-            return 0.0
-        error = values[stages[-1], tracked] - problem.reference[stages[-1], index[tracked]]
-        return float(np.linalg.norm(error[weights[stages[-1]] > 0.0]))
+        return _tracking_error(
+            self._curved, self._last, problem.weights, problem.reference, problem.channels
+        )
 
     def _constant_band(self, weights: FloatArray) -> FloatArray:
         key = weights.tobytes()
@@ -100,7 +90,7 @@ class StageCost:
                 index,
                 self.matrix,
                 zeros,
-                jacobians.transpose(0, 2, 1),
+                jacobians,
                 weights,
                 np.zeros_like(weights),
                 np.zeros_like(self._gradient),
@@ -127,48 +117,14 @@ def _affine_error(affine, row, z, reference):  # noqa: ANN001, ANN202
 
 
 @jit
-def _affine_value(affine, q, v, u, weights, reference):  # noqa: ANN001, ANN202
-    horizon, n = q.shape
-    z = np.empty(3 * n)
+def _value(affine, curved, z, values, weights, reference):  # noqa: ANN001, ANN202
     total = 0.0
     index = affine[4]
-    for k in range(horizon):
-        z[:n], z[n : 2 * n], z[2 * n :] = q[k], v[k], u[k]
+    for k in range(len(z)):
         for row in range(len(index)):
             weight = weights[k, index[row]]
             if weight > 0.0:
-                total += weight * _affine_error(affine, row, z, reference[k]) ** 2
-    return 0.5 * total
-
-
-@jit
-def _add_affine(affine, matrix, q, v, u, weights, reference, gradient):  # noqa: ANN001, ANN202
-    """Add the gradient of the affine rows; return their cost."""
-    begins, columns, values, _, index = affine
-    horizon, n = q.shape
-    z, slope, row_slope = np.empty(3 * n), np.empty(3 * n), np.empty(3 * n)
-    total = 0.0
-    for k in range(horizon):
-        z[:n], z[n : 2 * n], z[2 * n :] = q[k], v[k], u[k]
-        slope[:] = 0.0
-        for row in range(len(index)):
-            weight = weights[k, index[row]]
-            if weight > 0.0:
-                error = _affine_error(affine, row, z, reference[k])
-                total += weight * error * error
-                for entry in range(begins[row], begins[row + 1]):
-                    slope[columns[entry]] += weight * error * values[entry]
-        to_variables(matrix, slope[:n], slope[n : 2 * n], slope[2 * n :], row_slope)
-        start = (k - 2) * n
-        for column in range(max(0, -start), 3 * n):
-            gradient[start + column] += row_slope[column]
-    return 0.5 * total
-
-
-@jit
-def _curved_value(curved, values, weights, reference):  # noqa: ANN001, ANN202
-    total = 0.0
-    for k in range(len(values)):
+                total += weight * _affine_error(affine, row, z[k], reference[k]) ** 2
         for row in range(len(curved)):
             weight = weights[k, curved[row]]
             if weight > 0.0:
@@ -177,11 +133,59 @@ def _curved_value(curved, values, weights, reference):  # noqa: ANN001, ANN202
 
 
 @jit
-def _add_curved(index, matrix, values, jacobians, weights, reference, gradient, band):  # noqa: ANN001, ANN202
-    """Add gradient and Gauss-Newton Hessian of rows with a Jacobian at every stage; return their cost."""
-    horizon, rows, width = jacobians.shape
+def _tracking_error(curved, values, weights, reference, channels):  # noqa: ANN001, ANN202
+    for k in range(len(values) - 1, -1, -1):
+        tracked, total = False, 0.0
+        for row in range(len(curved)):
+            if curved[row] < channels and weights[k, curved[row]] > 0.0:
+                tracked = True
+                total += (values[k, row] - reference[k, curved[row]]) ** 2
+        if tracked:
+            return total**0.5
+    return 0.0
+
+
+@jit
+def _expand(indices, matrix, motion, weights, reference, gradient, band):  # noqa: ANN001, ANN202
+    affine, curved = indices
+    z, values, jacobians = motion
+    value = _add_affine(affine, matrix, z, weights, reference, gradient)
+    return value + _add_curved(curved, matrix, values, jacobians, weights, reference, gradient, band)
+
+
+@jit
+def _add_affine(affine, matrix, z, weights, reference, gradient):  # noqa: ANN001, ANN202
+    """Add the gradient of the affine rows; return their cost."""
+    begins, columns, values, _, index = affine
+    horizon, width = z.shape
     n = width // 3
-    row_of_variables = np.empty(width)
+    slope, by_variables = np.empty(width), np.empty(width)
+    total = 0.0
+    for k in range(horizon):
+        slope[:] = 0.0
+        for row in range(len(index)):
+            weight = weights[k, index[row]]
+            if weight > 0.0:
+                error = _affine_error(affine, row, z[k], reference[k])
+                total += weight * error * error
+                for entry in range(begins[row], begins[row + 1]):
+                    slope[columns[entry]] += weight * error * values[entry]
+        to_variables(matrix, slope[:n], slope[n : 2 * n], slope[2 * n :], by_variables)
+        start = (k - 2) * n
+        for column in range(max(0, -start), width):
+            gradient[start + column] += by_variables[column]
+    return 0.5 * total
+
+
+@jit
+def _add_curved(index, matrix, values, jacobians, weights, reference, gradient, band):  # noqa: ANN001, ANN202
+    """Add gradient and Gauss-Newton Hessian of rows with a Jacobian at every stage; return their cost.
+
+    The Jacobians are column by column, as CasADi writes them: (N, 3n, rows).
+    """
+    horizon, width, rows = jacobians.shape
+    n = width // 3
+    by_variables = np.empty(width)
     total = 0.0
     for k in range(horizon):
         start = (k - 2) * n
@@ -191,14 +195,12 @@ def _add_curved(index, matrix, values, jacobians, weights, reference, gradient, 
             if weight > 0.0:
                 error = values[k, row] - reference[k, index[row]]
                 total += weight * error * error
-                jacobian = jacobians[k, row]
-                to_variables(
-                    matrix, jacobian[:n], jacobian[n : 2 * n], jacobian[2 * n :], row_of_variables
-                )
+                columns = jacobians[k, :, row]
+                to_variables(matrix, columns[:n], columns[n : 2 * n], columns[2 * n :], by_variables)
                 for a in range(first, width):
-                    share = weight * row_of_variables[a]
+                    share = weight * by_variables[a]
                     if share != 0.0:
                         gradient[start + a] += share * error
                         for b in range(a, width):
-                            band[start + a, b - a] += share * row_of_variables[b]
+                            band[start + a, b - a] += share * by_variables[b]
     return 0.5 * total

@@ -1,0 +1,101 @@
+"""What a pair's nearest points say: its distance and gradient.
+
+A witness is `(n, p₁, p₂)`, (9,): the unit normal from the first shape to the second and their nearest points.
+"""
+
+import numpy as np
+
+from handrail.controllers.jit import jit
+
+
+@jit
+def signed(witness):  # noqa: ANN001, ANN201
+    """Return `n·(p₂ - p₁)` [m]."""
+    total = 0.0
+    for axis in range(3):
+        total += witness[axis] * (witness[6 + axis] - witness[3 + axis])
+    return total
+
+
+@jit
+def lower_bounds(now, path, times, levers, speeds, reach):  # noqa: ANN001, ANN201
+    """Return how near each pair can be along a path, (K, P) [m], and whether it can come below its reach.
+
+    `d_p(q_k) ≥ d_p(q_0) - Σ_j L_jp |q_k - q_0|_j - |v_p| t_k`.
+
+    Args:
+        now: distances at the first configuration, (P,) [m].
+        path: configurations, (K, n).
+        times: of them [s], (K,).
+        levers: L, (n, P).
+        speeds: of moving obstacles, (P,) [m/s].
+        reach: (P,) [m].
+    """
+    pairs = len(now)
+    bounds = np.empty((len(path), pairs))
+    close = np.zeros(pairs, dtype=np.bool_)
+    for k in range(len(path)):
+        for p in range(pairs):
+            bounds[k, p] = now[p] - speeds[p] * times[k]
+        for j in range(path.shape[1]):
+            moved = abs(path[k, j] - path[0, j])
+            if moved > 0.0:
+                for p in range(pairs):
+                    bounds[k, p] -= levers[j, p] * moved
+        for p in range(pairs):
+            if bounds[k, p] < reach[p]:
+                close[p] = True
+    return bounds, close
+
+
+@jit
+def measured(witnesses, pairs, values):  # noqa: ANN001, ANN201
+    """Write the distances of some pairs, (K, P), where they have been measured, (K, P, 9)."""
+    for k in range(len(values)):
+        for p in pairs:
+            values[k, p] = signed(witnesses[k, p])
+
+
+@jit
+def gradients(witnesses, jacobians, moves, values, reach):  # noqa: ANN001, ANN201
+    """Return the entries (node, pair) below their reach, (R, 2), and their gradients, (R, n).
+
+    `∂d/∂q = n·(J(p₂) - J(p₁))` with `J(p) = J_v + J_ω × p` of the joints that move the shape.
+
+    Args:
+        witnesses: (K, P, 9).
+        jacobians: spatial, in the world, (K, 6, n).
+        moves: which joints move the two shapes of a pair: 1 or 0, (P, 2, n).
+        values: distances, (K, P) [m].
+        reach: (P,) [m].
+    """
+    count = 0
+    for k in range(values.shape[0]):
+        for p in range(values.shape[1]):
+            count += values[k, p] < reach[p]
+    near = np.empty((count, 2), dtype=np.int64)
+    rows = np.zeros((count, moves.shape[2]))
+    row = 0
+    for k in range(values.shape[0]):
+        for p in range(values.shape[1]):
+            if values[k, p] < reach[p]:
+                near[row, 0], near[row, 1] = k, p
+                for shape in range(2):
+                    _add_gradient(
+                        witnesses[k, p], 3 + 3 * shape, jacobians[k], moves[p, shape], 2.0 * shape - 1.0, rows[row]
+                    )
+                row += 1
+    return near, rows
+
+
+@jit
+def _add_gradient(witness, start, jacobian, moves, sign, out):  # noqa: ANN001, ANN202
+    """Add the sign times the derivative of `n·p` for the nearest point that begins at `start`."""
+    nx, ny, nz = witness[0], witness[1], witness[2]
+    px, py, pz = witness[start], witness[start + 1], witness[start + 2]
+    mx, my, mz = py * nz - pz * ny, pz * nx - px * nz, px * ny - py * nx
+    for j in range(len(out)):
+        if moves[j] > 0.0:
+            linear = nx * jacobian[0, j] + ny * jacobian[1, j] + nz * jacobian[2, j]
+            angular = mx * jacobian[3, j] + my * jacobian[4, j] + mz * jacobian[5, j]
+            out[j] += sign * (linear + angular)
