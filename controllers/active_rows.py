@@ -45,7 +45,7 @@ def active_rows(horizon: int, size: int) -> ActiveRows:
 
 
 @jit
-def project(held, count, new, along, shares, normal):  # noqa: ANN001, ANN201
+def project(held, count, new, along, shares, normal):
     """Split a row m into a combination of the active ones and what is normal to them; return its square.
 
     Args:
@@ -75,7 +75,7 @@ def project(held, count, new, along, shares, normal):  # noqa: ANN001, ANN201
 
 
 @jit
-def append(held, count, along, normal, square, key, upper, multiplier):  # noqa: ANN001, ANN201
+def append(held, count, along, normal, square, key, upper, multiplier):
     """Make a row active that `project` has split; return how many are."""
     length = square**0.5
     for t in range(len(normal)):
@@ -89,7 +89,7 @@ def append(held, count, along, normal, square, key, upper, multiplier):  # noqa:
 
 
 @jit
-def drop(held, count, index):  # noqa: ANN001, ANN201
+def drop(held, count, index):
     """Make a row inactive; return how many are left. Rotations make T triangular again."""
     T, Q = held.triangle, held.directions
     for i in range(index, count - 1):
@@ -113,7 +113,7 @@ def drop(held, count, index):  # noqa: ANN001, ANN201
 
 
 @jit
-def settle(held, count, free, shares, y):  # noqa: ANN001, ANN201
+def settle(held, count, free, shares, y):
     """Write the nearest point to `-free` at which all active rows hold, and their multipliers.
 
     `y = -f + Qᵀ w` with `T w = b + M f`, and `λ = -T⁻ᵀ w`.
@@ -132,7 +132,7 @@ def settle(held, count, free, shares, y):  # noqa: ANN001, ANN201
 
 
 @jit
-def upper_solve(held, count, x):  # noqa: ANN001, ANN201
+def upper_solve(held, count, x):
     """Replace x by `T⁻ᵀ x`, (A,)."""
     for i in range(count - 1, -1, -1):
         value = x[i] / held.triangle[i, i]

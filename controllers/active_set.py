@@ -21,7 +21,7 @@ _DEPENDENT = 1e-12  # squared sine to the active rows, below which a row is a co
 
 
 @jit
-def solve(band, gradient, penalty, rows, warm, limit, held, motion):  # noqa: ANN001, ANN201
+def solve(band, gradient, penalty, rows, warm, limit, held, motion):
     """Solve the QP; return s (N n,), σ (2,), whether that is the solution, changes made, active rows.
 
     Args:
@@ -79,7 +79,7 @@ def solve(band, gradient, penalty, rows, warm, limit, held, motion):  # noqa: AN
 
 
 @jit
-def _begin(band, root, rows, warm, free, held, y, new, along, shares, normal):  # noqa: ANN001, ANN202
+def _begin(band, root, rows, warm, free, held, y, new, along, shares, normal):
     """Make the warm rows active, less those with a negative multiplier; write y; return their number."""
     count = 0
     for index in range(len(warm)):
@@ -99,7 +99,7 @@ def _begin(band, root, rows, warm, free, held, y, new, along, shares, normal):  
 
 
 @jit
-def _transform(band, root, rows, key, new):  # noqa: ANN001, ANN202
+def _transform(band, root, rows, key, new):
     """Write m_p of a row; return its right-hand side."""
     upper, first = write_row(rows, key, new)
     size = len(band)
@@ -109,7 +109,7 @@ def _transform(band, root, rows, key, new):  # noqa: ANN001, ANN202
 
 
 @jit
-def _step(held, count, new, upper, shares, square, y):  # noqa: ANN001, ANN202
+def _step(held, count, new, upper, shares, square, y):
     """Return how far the new row's multiplier grows, and the active row that stops it; -1 if none."""
     step, blocking = np.inf, -1
     if square > _DEPENDENT * np.dot(new, new):

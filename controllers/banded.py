@@ -1,14 +1,14 @@
 """Cholesky factor of a symmetric matrix with a band: `A = L Lᵀ`.
 
-Storage: `band[j, i - j] = A[i, j]` for `j ≤ i < j + w`, (m, w); what would lie beyond the last row is 0. Cost:
-`m w²` for the factor, `2 m w` for a solution.
+Storage: `band[j, i - j] = A[i, j]` for `j ≤ i < j + w`, (m, w); what would lie beyond the last row is 0.
+Cost: `m w²` for the factor, `2 m w` for a solution.
 """
 
 from handrail.controllers.jit import jit
 
 
 @jit
-def factor(band):  # noqa: ANN001, ANN201
+def factor(band):
     """Replace A by L; return whether A is positive definite."""
     size, width = band.shape
     for j in range(size):
@@ -25,7 +25,7 @@ def factor(band):  # noqa: ANN001, ANN201
 
 
 @jit
-def forward(band, x, start):  # noqa: ANN001, ANN201
+def forward(band, x, start):
     """Replace x by `L⁻¹ x`; its entries before `start` are 0."""
     size, width = band.shape
     for j in range(start, size):
@@ -36,7 +36,7 @@ def forward(band, x, start):  # noqa: ANN001, ANN201
 
 
 @jit
-def backward(band, x):  # noqa: ANN001, ANN201
+def backward(band, x):
     """Replace x by `L⁻ᵀ x`."""
     size, width = band.shape
     for j in range(size - 1, -1, -1):

@@ -24,7 +24,7 @@ def stage_matrix(dt: float) -> FloatArray:
 
 
 @jit
-def to_variables(matrix, q, v, u, out):  # noqa: ANN001, ANN201
+def to_variables(matrix, q, v, u, out):
     """Write a row of (q, v, u), (n,) each, as a row of a stage's variables, (3n,)."""
     n = len(q)
     for a in range(REACH):
@@ -33,7 +33,7 @@ def to_variables(matrix, q, v, u, out):  # noqa: ANN001, ANN201
 
 
 @jit
-def to_motion(matrix, s, out):  # noqa: ANN001, ANN201
+def to_motion(matrix, s, out):
     """Write the changes of (q, v, u) after every stage, (N, 3, n), of variables s, (N n,)."""
     horizon, _, n = out.shape
     for k in range(horizon):
@@ -48,7 +48,7 @@ def to_motion(matrix, s, out):  # noqa: ANN001, ANN201
 
 
 @jit
-def rollout(q, v, dt, u, positions, velocities):  # noqa: ANN001, ANN201
+def rollout(q, v, dt, u, positions, velocities):
     """Write positions and velocities, (N + 1, n), from (q, v) under accelerations u, (N, n)."""
     horizon, n = u.shape
     for j in range(n):
@@ -62,7 +62,7 @@ def rollout(q, v, dt, u, positions, velocities):  # noqa: ANN001, ANN201
 
 
 @jit
-def clipped_sum(first, second, limit, out):  # noqa: ANN001, ANN201
+def clipped_sum(first, second, limit, out):
     """Write the sum of two arrays, (N, n), within ± limit, (n,)."""
     for k in range(out.shape[0]):
         for j in range(out.shape[1]):

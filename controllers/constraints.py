@@ -1,8 +1,8 @@
 """The inequality rows of one update's QP, in variables of local support, and which of them a point breaks.
 
-A row `c_pᵀ s - a_p σ ≤ b_p` has a number, its key: first the two slacks (σ ≥ 0), then the accelerations' bounds
-(hard), the limits of velocity and position (slack 1), and the distances (slack 0). Only distances are kept as
-coefficients; the others have one entry each in (q, v, u) of their stage.
+A row `c_pᵀ s - a_p σ ≤ b_p` has a number, its key: first the two slacks (σ ≥ 0), then the accelerations'
+bounds (hard), the limits of velocity and position (slack 1), and the distances (slack 0). Only distances are
+kept as coefficients; the others have one entry each in (q, v, u) of their stage.
 """
 
 from typing import NamedTuple
@@ -43,13 +43,13 @@ class Constraints(NamedTuple):
 
 
 @jit
-def first_distance(horizon, n):  # noqa: ANN001, ANN201
+def first_distance(horizon, n):
     """Return the key of the first distance row."""
     return SLACKS + 6 * horizon * n
 
 
 @jit
-def most_violated(rows, s, motion, slack, active):  # noqa: ANN001, ANN201
+def most_violated(rows, s, motion, slack, active):
     """Return the key of the row that a point breaks most, those already active left out; -1 if none.
 
     Args:
@@ -85,14 +85,14 @@ def most_violated(rows, s, motion, slack, active):  # noqa: ANN001, ANN201
     base = first_distance(horizon, n)
     for row in range(len(rows.upper)):
         excess = _change(rows, row, n, s) - rows.upper[row] - slack[0]
-        if excess > _DISTANCE_TOLERANCE and _DISTANCE_SCALE * excess > worst:
-            if not _contains(active, base + row):
-                worst, worst_key = _DISTANCE_SCALE * excess, base + row
+        scaled = _DISTANCE_SCALE * excess
+        if excess > _DISTANCE_TOLERANCE and scaled > worst and not _contains(active, base + row):
+            worst, worst_key = scaled, base + row
     return worst_key
 
 
 @jit
-def write_row(rows, key, out):  # noqa: ANN001, ANN201
+def write_row(rows, key, out):
     """Write a row's coefficients of s and σ, (N n + 2,); return its right-hand side and first entry.
 
     The slacks' entries are written as they stand in the row: -1 for σ ≥ 0, else -a.
@@ -124,15 +124,15 @@ def write_row(rows, key, out):  # noqa: ANN001, ANN201
 
 
 @jit
-def _contains(keys, key):  # noqa: ANN001, ANN202
+def _contains(keys, key):
+    found = False
     for index in range(len(keys)):
-        if keys[index] == key:
-            return True
-    return False
+        found |= keys[index] == key
+    return found
 
 
 @jit
-def _change(rows, row, n, s):  # noqa: ANN001, ANN202
+def _change(rows, row, n, s):
     """Return by how much a step brings a pair together."""
     start = (rows.stage[row] - 2) * n
     total = 0.0
@@ -142,7 +142,7 @@ def _change(rows, row, n, s):  # noqa: ANN001, ANN202
 
 
 @jit
-def _write_entry(shares, k, j, n, scale, out):  # noqa: ANN001, ANN202
+def _write_entry(shares, k, j, n, scale, out):
     """Write the coefficients of one entry of (q, v, u) of stage k; return the first of them."""
     first = k * n + j
     for a in range(3):

@@ -7,12 +7,12 @@ import casadi as ca
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray
+from handrail.controllers.constraints import VELOCITY_SLACK
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.evaluation import limit_slack
 from handrail.controllers.linear_distances import LinearDistances
 from handrail.controllers.problem import Problem
 from handrail.controllers.residuals import StageResiduals
-from handrail.controllers.constraints import VELOCITY_SLACK
 
 _INSIDE = 1e-3  # how far within the bounds the slacks begin
 STOPS = 2  # nodes of the final stop, measured after the last stage

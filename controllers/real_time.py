@@ -92,7 +92,11 @@ class RealTimeSolver:
             iterations=iterations,
             tracking_error=tracking_error,
             rows=len(rows.names),
-            phases=(("distances", measured - start), ("residuals", built - measured), ("solve", done - built)),
+            phases=(
+                ("distances", measured - start),
+                ("residuals", built - measured),
+                ("solve", done - built),
+            ),
         )
         return plan, change
 

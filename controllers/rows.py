@@ -75,7 +75,7 @@ def rows_around(
 
 
 @jit
-def _rows(matrix, q, v, u, limits, near, gradients, values, margins, gains):  # noqa: ANN001, ANN202
+def _rows(matrix, q, v, u, limits, near, gradients, values, margins, gains):
     lower, upper, velocity, acceleration = limits
     horizon, n = u.shape
     guess, offsets, scales = np.empty((horizon, n)), np.empty((horizon, 2, n)), np.empty((2, n))

@@ -72,9 +72,7 @@ class StageCost:
 
         Joint channels, which are always met when free, are left out.
         """
-        return _tracking_error(
-            self._curved, self._last, problem.weights, problem.reference, problem.channels
-        )
+        return _tracking_error(self._curved, self._last, problem.weights, problem.reference, problem.channels)
 
     def _constant_band(self, weights: FloatArray) -> FloatArray:
         key = weights.tobytes()
@@ -108,7 +106,7 @@ def _sparse(matrix: FloatArray, offset: FloatArray, index: FloatArray) -> tuple[
 
 
 @jit
-def _affine_error(affine, row, z, reference):  # noqa: ANN001, ANN202
+def _affine_error(affine, row, z, reference):
     begins, columns, values, offset, index = affine
     error = offset[row] - reference[index[row]]
     for entry in range(begins[row], begins[row + 1]):
@@ -117,7 +115,7 @@ def _affine_error(affine, row, z, reference):  # noqa: ANN001, ANN202
 
 
 @jit
-def _value(affine, curved, z, values, weights, reference):  # noqa: ANN001, ANN202
+def _value(affine, curved, z, values, weights, reference):
     total = 0.0
     index = affine[4]
     for k in range(len(z)):
@@ -133,7 +131,7 @@ def _value(affine, curved, z, values, weights, reference):  # noqa: ANN001, ANN2
 
 
 @jit
-def _tracking_error(curved, values, weights, reference, channels):  # noqa: ANN001, ANN202
+def _tracking_error(curved, values, weights, reference, channels):
     for k in range(len(values) - 1, -1, -1):
         tracked, total = False, 0.0
         for row in range(len(curved)):
@@ -146,7 +144,7 @@ def _tracking_error(curved, values, weights, reference, channels):  # noqa: ANN0
 
 
 @jit
-def _expand(indices, matrix, motion, weights, reference, gradient, band):  # noqa: ANN001, ANN202
+def _expand(indices, matrix, motion, weights, reference, gradient, band):
     affine, curved = indices
     z, values, jacobians = motion
     value = _add_affine(affine, matrix, z, weights, reference, gradient)
@@ -154,7 +152,7 @@ def _expand(indices, matrix, motion, weights, reference, gradient, band):  # noq
 
 
 @jit
-def _add_affine(affine, matrix, z, weights, reference, gradient):  # noqa: ANN001, ANN202
+def _add_affine(affine, matrix, z, weights, reference, gradient):
     """Add the gradient of the affine rows; return their cost."""
     begins, columns, values, _, index = affine
     horizon, width = z.shape
@@ -178,7 +176,7 @@ def _add_affine(affine, matrix, z, weights, reference, gradient):  # noqa: ANN00
 
 
 @jit
-def _add_curved(index, matrix, values, jacobians, weights, reference, gradient, band):  # noqa: ANN001, ANN202
+def _add_curved(index, matrix, values, jacobians, weights, reference, gradient, band):
     """Add gradient and Gauss-Newton Hessian of rows with a Jacobian at every stage; return their cost.
 
     The Jacobians are column by column, as CasADi writes them: (N, 3n, rows).

@@ -9,7 +9,7 @@ from handrail.controllers.jit import jit
 
 
 @jit
-def signed(witness):  # noqa: ANN001, ANN201
+def signed(witness):
     """Return `n·(p₂ - p₁)` [m]."""
     total = 0.0
     for axis in range(3):
@@ -18,7 +18,7 @@ def signed(witness):  # noqa: ANN001, ANN201
 
 
 @jit
-def lower_bounds(now, path, times, levers, speeds, reach):  # noqa: ANN001, ANN201
+def lower_bounds(now, path, times, levers, speeds, reach):
     """Return how near each pair can be along a path, (K, P) [m], and whether it can come below its reach.
 
     `d_p(q_k) ≥ d_p(q_0) - Σ_j L_jp |q_k - q_0|_j - |v_p| t_k`.
@@ -49,7 +49,7 @@ def lower_bounds(now, path, times, levers, speeds, reach):  # noqa: ANN001, ANN2
 
 
 @jit
-def measured(witnesses, pairs, values):  # noqa: ANN001, ANN201
+def measured(witnesses, pairs, values):
     """Write the distances of some pairs, (K, P), where they have been measured, (K, P, 9)."""
     for k in range(len(values)):
         for p in pairs:
@@ -57,7 +57,7 @@ def measured(witnesses, pairs, values):  # noqa: ANN001, ANN201
 
 
 @jit
-def gradients(witnesses, jacobians, moves, values, reach):  # noqa: ANN001, ANN201
+def gradients(witnesses, jacobians, moves, values, reach):
     """Return the entries (node, pair) below their reach, (R, 2), and their gradients, (R, n).
 
     `∂d/∂q = n·(J(p₂) - J(p₁))` with `J(p) = J_v + J_ω × p` of the joints that move the shape.
@@ -82,14 +82,19 @@ def gradients(witnesses, jacobians, moves, values, reach):  # noqa: ANN001, ANN2
                 near[row, 0], near[row, 1] = k, p
                 for shape in range(2):
                     _add_gradient(
-                        witnesses[k, p], 3 + 3 * shape, jacobians[k], moves[p, shape], 2.0 * shape - 1.0, rows[row]
+                        witnesses[k, p],
+                        3 + 3 * shape,
+                        jacobians[k],
+                        moves[p, shape],
+                        2.0 * shape - 1.0,
+                        rows[row],
                     )
                 row += 1
     return near, rows
 
 
 @jit
-def _add_gradient(witness, start, jacobian, moves, sign, out):  # noqa: ANN001, ANN202
+def _add_gradient(witness, start, jacobian, moves, sign, out):
     """Add the sign times the derivative of `n·p` for the nearest point that begins at `start`."""
     nx, ny, nz = witness[0], witness[1], witness[2]
     px, py, pz = witness[start], witness[start + 1], witness[start + 2]

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
+from handrail.controllers.basis import to_motion
 from handrail.controllers.controller import State
 from handrail.controllers.converged import ConvergedSolver
 from handrail.controllers.errors import HandrailError
@@ -92,7 +93,8 @@ def test_both_backends_agree_where_limits_bind():
 
 
 def test_what_is_asked_of_distances_is_what_the_real_time_solver_asks():
-    from handrail.controllers.rows import Nodes, distance_rows
+    from handrail.controllers.nodes import Nodes
+    from handrail.controllers.rows import rows_around
 
     post = Obstacle("post", Shape("cylinder", [0.2, 1.2]), [0.4, 0.5, 0.6])
     mpc = MaskedMpc(load_model())
@@ -100,16 +102,21 @@ def test_what_is_asked_of_distances_is_what_the_real_time_solver_asks():
     problem = mpc.problem(State(DESCRIPTION.home, 0.2 * LIMITS.velocity), Intent.idle(mpc.channels))
     u = np.random.default_rng(2).uniform(-0.3, 0.3, (10, 9))
     q, v = problem.rollout(u)
-    nodes = Nodes(problem, q, v, mpc.solver.cost.coefficients)
+    nodes = Nodes(problem, q, v)
     found = problem.collision.distances(nodes.q, problem.margins + problem.reach, nodes.times)
-    rows = distance_rows(problem, nodes, found)
+    matrix = mpc.solver.cost.matrix
+    rows = rows_around(problem, (q, v, u), nodes, found, matrix).constraints
     node, pair = found.near[found.near[:, 0] > 0].T
     bounds = distance_bounds(problem, found.values[0], len(nodes.q))
     np.testing.assert_allclose(rows.upper, found.values[node, pair] - bounds[node, pair], atol=1e-12)
-    change = np.random.default_rng(3).uniform(-0.1, 0.1, (10, 9))  # and so is how they change
+    s, motion = np.random.default_rng(3).uniform(-0.1, 0.1, 90), np.zeros((10, 3, 9))
+    to_motion(matrix, s, motion)  # and so is how they change
+    change = motion[:, 2]
+    padded = np.append(np.zeros(18), s)  # nothing changes before the first stage
+    moved = [row @ padded[9 * k : 9 * k + 27] for row, k in zip(rows.coefficients, rows.stage, strict=True)]
     linear = linear_distances(problem, u)
     left = (linear.at(*problem.rollout(u + change)) - linear.lower)[linear.pairs >= 0]
-    expected = rows.upper - rows.matrix[:, :-2] @ change.ravel()
+    expected = rows.upper - moved
     np.testing.assert_allclose(np.sort(left), np.sort(expected), atol=1e-9)
 
 

@@ -118,17 +118,17 @@ def test_a_bad_state_brakes_from_the_last_command(state):
 
 
 def test_a_failed_solve_brakes(monkeypatch):
-    import daqp
+    from handrail.controllers import active_set
 
     MPC.reset()
     asked = asking(np.full(18, 0.3), "ee")
     positions, velocities, _ = roll(MPC, [asked] * 10)
 
-    def infeasible(hessian, *rest):
-        return np.zeros(len(hessian)), 0.0, -1, {"iterations": 3, "lam": np.zeros(len(hessian))}
+    def infeasible(band, gradient, *rest):
+        return np.zeros_like(gradient), np.zeros(2), False, 3, 0
 
-    monkeypatch.setattr(daqp, "solve", infeasible)
-    beyond = asking(np.full(18, -2.0), "ee")  # at the acceleration limits, so that the QP has to be solved
+    monkeypatch.setattr(active_set, "solve", infeasible)
+    beyond = asking(np.full(18, -2.0), "ee")
     command = MPC.update(State(positions[-1], velocities[-1], 0.5), beyond(0.5))
     assert command.health.status is Status.SOLVER_FAILED
     np.testing.assert_allclose(command.velocities[0], velocities[-1], atol=1e-9)
@@ -196,7 +196,7 @@ def test_a_blocked_base_stops_at_the_margin():
     assert np.abs(velocities[-1][0]) < 0.02
 
 
-def test_the_condensed_cost_is_the_cost():
+def test_the_quadratic_is_that_of_the_cost():
     """Gradient and Gauss-Newton Hessian of the QP against finite differences of the stage costs."""
     MPC.reset()
     rng = np.random.default_rng(7)
@@ -214,16 +214,26 @@ def test_the_condensed_cost_is_the_cost():
         return np.sqrt(problem.weights) * (r - problem.reference)
 
     q, v = problem.rollout(u)
-    hessian, gradient = MPC.solver.cost.build(problem, q[1:], v[1:], u)
+    cost = MPC.solver.cost
+    quadratic = cost.expand(problem, q, v, u)
     h, jacobian = 1e-6, []
+    motion = np.zeros((10, 3, 9))
     for index in range(90):
-        step = np.zeros(90)
-        step[index] = h
-        step = step.reshape(10, 9)
+        to_motion(cost.matrix, h * np.eye(90)[index], motion)  # a variable's accelerations
+        step = motion[:, 2]
         jacobian.append(((residuals(u + step) - residuals(u - step)) / (2 * h)).ravel())
     jacobian = np.array(jacobian).T
-    np.testing.assert_allclose(gradient, jacobian.T @ residuals(u).ravel(), rtol=1e-4, atol=1e-3)
-    np.testing.assert_allclose(hessian, jacobian.T @ jacobian, rtol=1e-4, atol=1e-2)
+    expected = jacobian.T @ jacobian
+    width = quadratic.band.shape[1]
+    assert not expected[np.tril_indices(90, -width)].any()  # nothing outside the band
+    found = np.array(
+        [[quadratic.band[j, i - j] for j in range(i - width + 1, i + 1)] for i in range(width, 90)]
+    )
+    band = np.array([[expected[i, j] for j in range(i - width + 1, i + 1)] for i in range(width, 90)])
+    np.testing.assert_allclose(quadratic.value, 0.5 * np.sum(residuals(u) ** 2), rtol=1e-9)
+    np.testing.assert_allclose(cost.value(problem, q, v, u), quadratic.value, rtol=1e-12)
+    np.testing.assert_allclose(quadratic.gradient, jacobian.T @ residuals(u).ravel(), rtol=1e-4, atol=1e-3)
+    np.testing.assert_allclose(found, band, rtol=1e-4, atol=1e-2)
 
 
 def test_a_plan_knows_whether_it_is_a_solution():
@@ -251,7 +261,8 @@ def test_derivatives_come_from_casadi():
     rng = np.random.default_rng(11)
     q, v, u = (rng.uniform(-1, 1, (10, 9)) for _ in range(3))
     p = Frames("world", "tool", [0.1, 0.0, 0.2]).parameters
-    values, jacobians = residuals.evaluate(q, v, u, p)
+    _, values, jacobians = (part.copy() for part in residuals.evaluate(q, v, u, p))
+    np.testing.assert_array_equal(residuals.values(q, v, u, p)[1], values)
     z = ca.SX.sym("z", 27)
     jacobian = ca.Function("j", [z], [ca.densify(ca.jacobian(residuals.expression(z, p), z))])
     affine = residuals.affine
@@ -261,5 +272,5 @@ def test_derivatives_come_from_casadi():
         expected = np.array(residuals.expression(stage, p)).ravel()
         np.testing.assert_allclose(values[k], expected[residuals.curved], atol=1e-9)
         np.testing.assert_allclose(affine.jacobian @ stage + affine.offset, expected[affine.index], atol=1e-9)
-        np.testing.assert_allclose(jacobians[k], np.array(jacobian(stage))[residuals.curved], atol=1e-9)
+        np.testing.assert_allclose(jacobians[k].T, np.array(jacobian(stage))[residuals.curved], atol=1e-9)
         np.testing.assert_allclose(affine.jacobian, np.array(jacobian(stage))[affine.index], atol=1e-9)
