@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from handrail.controllers.arrays import FloatArray
+from handrail.controllers.arrays import FloatArray, IntArray
 from handrail.controllers.basis import REACH, stage_matrix, to_variables
 from handrail.controllers.jit import jit
 from handrail.controllers.problem import Problem
@@ -98,7 +98,7 @@ class StageCost:
         return self._constant[key]
 
 
-def _sparse(matrix: FloatArray, offset: FloatArray, index: FloatArray) -> tuple[FloatArray, ...]:
+def _sparse(matrix: FloatArray, offset: FloatArray, index: IntArray) -> tuple[FloatArray | IntArray, ...]:
     """Return a matrix by its rows: where each begins, columns, values; offsets; and where the rows lie."""
     row, column = np.nonzero(matrix)
     begins = np.searchsorted(row, np.arange(len(matrix) + 1))

@@ -80,15 +80,8 @@ def gradients(witnesses, jacobians, moves, values, reach):
         for p in range(values.shape[1]):
             if values[k, p] < reach[p]:
                 near[row, 0], near[row, 1] = k, p
-                for shape in range(2):
-                    _add_gradient(
-                        witnesses[k, p],
-                        3 + 3 * shape,
-                        jacobians[k],
-                        moves[p, shape],
-                        2.0 * shape - 1.0,
-                        rows[row],
-                    )
+                _add_gradient(witnesses[k, p], 3, jacobians[k], moves[p, 0], -1.0, rows[row])
+                _add_gradient(witnesses[k, p], 6, jacobians[k], moves[p, 1], 1.0, rows[row])
                 row += 1
     return near, rows
 
