@@ -22,7 +22,7 @@ _DEPENDENT = 1e-12  # squared sine to the active rows, below which a row is a co
 
 @jit
 def solve(band, gradient, penalty, rows, warm, limit, held, motion):
-    """Solve the QP; return s (N n,), σ (2,), whether that is the solution, changes made, active rows.
+    """Solve the QP; return σ (2,), `gᵀ s + ½ sᵀ H s`, whether that is the solution, changes, active rows.
 
     Args:
         band: L, (N n, 3n); see banded.py.
@@ -53,7 +53,7 @@ def solve(band, gradient, penalty, rows, warm, limit, held, motion):
         key = most_violated(rows, s, motion, slack, held.keys[:count])
         if key < 0:
             if settled == changes:
-                return s, slack, True, changes, count
+                return slack, _descent(gradient, s, y), True, changes, count
             settled = changes  # without the rounding errors of the changes
             settle(held, count, free, shares, y)
             continue
@@ -64,7 +64,7 @@ def solve(band, gradient, penalty, rows, warm, limit, held, motion):
             square = project(held, count, new, along, shares, normal)
             step, blocking = _step(held, count, new, upper, shares, square, y)
             if step == np.inf or changes > limit:
-                return s, slack, False, changes, count
+                return slack, 0.0, False, changes, count
             for i in range(count):
                 held.multipliers[i] -= step * shares[i]
             multiplier += step
@@ -118,3 +118,12 @@ def _step(held, count, new, upper, shares, square, y):
         if shares[i] > 0.0 and held.multipliers[i] < step * shares[i]:
             step, blocking = max(held.multipliers[i], 0.0) / shares[i], i
     return step, blocking
+
+
+@jit
+def _descent(gradient, s, y):
+    """Return `gᵀ s + ½ sᵀ H s`."""
+    total = 0.0
+    for t in range(len(s)):
+        total += gradient[t] * s[t] + 0.5 * y[t] * y[t]
+    return total

@@ -67,3 +67,13 @@ def clipped_sum(first, second, limit, out):
     for k in range(out.shape[0]):
         for j in range(out.shape[1]):
             out[k, j] = min(max(first[k, j] + second[k, j], -limit[j]), limit[j])
+
+
+@jit
+def largest_share(change, limit):
+    """Return the largest absolute entry of an array, (N, n), relative to a limit, (n,)."""
+    worst = 0.0
+    for k in range(change.shape[0]):
+        for j in range(change.shape[1]):
+            worst = max(worst, abs(change[k, j]) / limit[j])
+    return worst

@@ -10,7 +10,7 @@ from handrail.controllers import active_set
 from handrail.controllers.active_rows import active_rows
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.banded import factor
-from handrail.controllers.basis import clipped_sum
+from handrail.controllers.basis import clipped_sum, largest_share
 from handrail.controllers.collision import Distances
 from handrail.controllers.constraints import SLACKS
 from handrail.controllers.nodes import Nodes
@@ -21,7 +21,8 @@ from handrail.controllers.stage_cost import Quadratic, StageCost
 
 _MORE_STEPS = 2  # at most, in one update
 _LARGE = 0.2  # change of an acceleration that asks for another step, relative to its limit
-_HALVINGS = 4  # of a step that makes the cost rise
+_COARSE = 0.01  # share of the promised descent by which a linearised cost may be wrong
+_SMALLEST_SHARE = 1.0 / 16.0  # of a step that makes the cost rise
 _CHANGES = 10  # of the active rows, for each variable: an answer that takes more is none
 _NOTHING_ACTIVE = np.arange(SLACKS)  # but that no slack is negative
 
@@ -56,41 +57,41 @@ class RealTimeSolver:
     def solve(self, problem: Problem, guess: FloatArray) -> Plan:
         """Return the plan after one step from the accelerations `guess`, (N, n).
 
-        Right after the intent or the scene has jumped, the guess is far off; a step that is still large is
-        followed by another.
+        Right after the intent or the scene has jumped, the guess is far off; a step that is still large, and
+        did not lead where its linearisation said, is followed by another.
         """
-        plan, change = self._step(problem, guess)
+        plan, again = self._step(problem, guess)
         for _ in range(_MORE_STEPS):
-            if not plan.solved or np.max(np.abs(change) / problem.limits.acceleration) < _LARGE:
+            if not again:
                 break
             spent = plan.phases
-            plan, change = self._step(problem, plan.u)
+            plan, again = self._step(problem, plan.u)
             phases = [(name, a + b) for (name, a), (_, b) in zip(spent, plan.phases, strict=True)]
             plan = replace(plan, phases=tuple(phases))
         return plan
 
-    def _step(self, problem: Problem, guess: FloatArray) -> tuple[Plan, FloatArray]:
-        """Return the plan after one step, and the step itself, (N, n)."""
+    def _step(self, problem: Problem, guess: FloatArray) -> tuple[Plan, bool]:
+        """Return the plan after one step, and whether another is worth while."""
         start = perf_counter()
         begin = self._linearisation(problem, guess)
         rows = rows_around(problem, begin[:3], begin.nodes, begin.distances, self.cost.matrix)
         measured = perf_counter()
         quadratic = self.cost.expand(problem, *begin[:3])
         built = perf_counter()
-        slack, solved, iterations = self._solve(problem, quadratic, rows)
-        change, (q, v, u) = self._damped(problem, begin.u, quadratic.value, slack, rows.needed)
-        tracking_error = self.cost.tracking_error(problem)
+        answer = self._solve(problem, quadratic, rows)
+        moved = self._damped(problem, begin.u, quadratic.value, answer.slack, rows.needed)
+        again = answer.solved and self._is_far(problem, quadratic.value, answer, moved)
         done = perf_counter()
         plan = Plan(
-            q=q,
-            v=v,
-            u=u,
-            collision_slack=float(slack[0]),
-            limit_slack=float(slack[1]),
+            q=moved.q,
+            v=moved.v,
+            u=moved.u,
+            collision_slack=float(answer.slack[0]),
+            limit_slack=float(answer.slack[1]),
             distances=begin.distances.values[0],
-            solved=solved,
-            iterations=iterations,
-            tracking_error=tracking_error,
+            solved=answer.solved,
+            iterations=answer.changes,
+            tracking_error=self.cost.tracking_error(problem),
             rows=len(rows.names),
             phases=(
                 ("distances", measured - start),
@@ -98,7 +99,15 @@ class RealTimeSolver:
                 ("solve", done - built),
             ),
         )
-        return plan, change
+        return plan, again
+
+    def _is_far(self, problem: Problem, before: float, answer: "_Answer", moved: "_Moved") -> bool:
+        """Whether a step was large and its linearisation too coarse: of distances, or of the cost."""
+        if largest_share(moved.change, problem.limits.acceleration) < _LARGE:
+            return False
+        if answer.near:
+            return True
+        return abs(moved.cost - before - answer.descent) > _COARSE * abs(answer.descent)
 
     def _linearisation(self, problem: Problem, guess: FloatArray) -> _Guess:
         """Return what to linearise around: the guess, or a full stop where the guess runs into something.
@@ -106,45 +115,44 @@ class RealTimeSolver:
         Inside an obstacle the nearest way out may be the far side, so a colliding guess would be pulled
         through; the stop is free of collision, since the last update made sure that it is.
         """
-        begin = _measured(problem, *_moved(problem, guess, np.zeros_like(guess)))
+        begin = _measured(problem, *_rolled_out(problem, guess, np.zeros_like(guess)))
         values = begin.distances.values
         if not values.size or (values >= np.minimum(values[0], 0.0)).all():
             return begin
         stop = _stop(problem)
-        return _measured(problem, *_moved(problem, stop, np.zeros_like(stop)))
+        return _measured(problem, *_rolled_out(problem, stop, np.zeros_like(stop)))
 
-    def _solve(self, problem: Problem, quadratic: Quadratic, rows: Rows) -> tuple[FloatArray, bool, int]:
-        """Solve the QP and leave the change in `_motion`; return its slacks, whether it did, and changes."""
-        if not factor(quadratic.band):
-            self.reset()
-            return np.zeros(SLACKS), False, 0
-        penalty = (problem.slack_linear, problem.slack_quadratic)
-        limit = _CHANGES * len(quadratic.gradient)
-        for warm in (rows.keys(self._active), _NOTHING_ACTIVE):
-            _, slack, solved, changes, active = active_set.solve(
-                quadratic.band,
-                quadratic.gradient,
-                penalty,
-                rows.constraints,
-                warm,
-                limit,
-                self._held,
-                self._motion,
-            )
-            if solved:
-                self._active = rows.named(self._held.keys[:active])
-                return slack, True, changes
+    def _solve(self, problem: Problem, quadratic: Quadratic, rows: Rows) -> "_Answer":
+        """Solve the QP; its step is left in `_motion`."""
+        changes = 0
+        if factor(quadratic.band):
+            penalty = (problem.slack_linear, problem.slack_quadratic)
+            limit = _CHANGES * len(quadratic.gradient)
+            for warm in (rows.keys(self._active), _NOTHING_ACTIVE):
+                slack, descent, solved, changes, count = active_set.solve(
+                    quadratic.band,
+                    quadratic.gradient,
+                    penalty,
+                    rows.constraints,
+                    warm,
+                    limit,
+                    self._held,
+                    self._motion,
+                )
+                if solved:
+                    keys = self._held.keys[:count]
+                    self._active = rows.named(keys)
+                    return _Answer(True, slack, descent, changes, rows.any_distance(keys))
         self.reset()
-        return slack, False, changes
+        return _Answer(False, np.zeros(SLACKS), 0.0, changes, False)
 
     def _damped(
         self, problem: Problem, guess: FloatArray, allowed: float, slack: FloatArray, needed: FloatArray
-    ) -> tuple[FloatArray, tuple[FloatArray, ...]]:
-        """Return the change, halved until the cost itself falls, and the motion (q, v, u) that it leads to.
+    ) -> "_Moved":
+        """Take the step, halved until the cost itself falls: Gauss-Newton alone may go round in circles.
 
-        Gauss-Newton alone may go round in circles. The QP's constraints are convex, so that from a guess
-        within them a share α of the change needs no more slack than α times that of the whole; a guess that
-        breaks a limit is left behind whole.
+        The QP's constraints are convex, so that from a guess within them a share α of the change needs no
+        more slack than α times that of the whole; a guess that breaks a limit is left behind whole.
 
         Args:
             problem: of this update.
@@ -153,17 +161,38 @@ class RealTimeSolver:
             slack: of the QP's solution, (2,).
             needed: by the guess, (2,).
         """
-        change = self._motion[:, 2].copy()
-        for halvings in range(_HALVINGS + 1):
-            motion = _moved(problem, guess, change)
-            cost = self.cost.value(problem, *motion) + _penalty(problem, 0.5**halvings * slack)
-            if needed.any() or cost <= allowed or halvings == _HALVINGS:
-                break
+        change, share = self._motion[:, 2].copy(), 1.0
+        while True:
+            q, v, u = _rolled_out(problem, guess, change)
+            cost = self.cost.value(problem, q, v, u)
+            lower = cost + _penalty(problem, share * slack) <= allowed
+            if lower or needed.any() or share <= _SMALLEST_SHARE:
+                return _Moved(q, v, u, change, cost)
             change *= 0.5
-        return change, motion
+            share *= 0.5
 
 
-def _moved(problem: Problem, guess: FloatArray, change: FloatArray) -> tuple[FloatArray, ...]:
+class _Answer(NamedTuple):
+    """Of the QP: whether it was solved, slacks, change of the cost, changes of rows, distances active."""
+
+    solved: bool
+    slack: FloatArray
+    descent: float
+    changes: int
+    near: bool
+
+
+class _Moved(NamedTuple):
+    """A step taken: the motion after it, the change of the accelerations, the cost."""
+
+    q: FloatArray
+    v: FloatArray
+    u: FloatArray
+    change: FloatArray
+    cost: float
+
+
+def _rolled_out(problem: Problem, guess: FloatArray, change: FloatArray) -> tuple[FloatArray, ...]:
     """Return positions and velocities at the nodes, and accelerations within their limits."""
     u = np.empty_like(guess)
     clipped_sum(guess, change, problem.limits.acceleration, u)

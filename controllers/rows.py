@@ -30,6 +30,10 @@ class Rows:
     names: IntArray
     needed: FloatArray
 
+    def any_distance(self, keys: IntArray) -> bool:
+        """Whether there are distance rows among some keys."""
+        return bool(len(keys)) and int(keys.max()) >= first_distance(*self.constraints.guess.shape)
+
     def keys(self, names: IntArray) -> IntArray:
         """Return the keys of rows that were named in an earlier update, as far as they still exist."""
         first = first_distance(*self.constraints.guess.shape)

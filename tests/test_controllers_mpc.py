@@ -126,7 +126,7 @@ def test_a_failed_solve_brakes(monkeypatch):
     positions, velocities, _ = roll(MPC, [asked] * 10)
 
     def infeasible(band, gradient, *rest):
-        return np.zeros_like(gradient), np.zeros(2), False, 3, 0
+        return np.zeros(2), 0.0, False, 3, 0
 
     monkeypatch.setattr(active_set, "solve", infeasible)
     beyond = asking(np.full(18, -2.0), "ee")
