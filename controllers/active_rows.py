@@ -9,7 +9,7 @@ import numpy as np
 
 from handrail.controllers.arrays import FloatArray, IntArray
 from handrail.controllers.constraints import SLACKS
-from handrail.controllers.jit import jit
+from handrail.controllers.jit import copy, jit
 
 _CANCELLED = 0.25  # share of a row's square below which rounding makes a second projection worth while
 
@@ -56,8 +56,9 @@ def project(held, count, new, along, shares, normal):
         shares: filled with the combination, `T⁻ᵀ Q m`, (A,).
         normal: filled with the rest, `m - Qᵀ Q m`, (N n + 2,).
     """
-    normal[:] = new
-    along[:count] = 0.0
+    copy(new, len(new), normal)
+    for i in range(count):
+        along[i] = 0.0
     before = np.dot(new, new)
     while True:
         for i in range(count):
@@ -69,7 +70,7 @@ def project(held, count, new, along, shares, normal):
         if square > _CANCELLED * before or square < 1e-30 * np.dot(new, new):
             break
         before = square
-    shares[:count] = along[:count]
+    copy(along, count, shares)
     upper_solve(held, count, shares)
     return square
 
@@ -80,7 +81,7 @@ def append(held, count, along, normal, square, key, upper, multiplier):
     length = square**0.5
     for t in range(len(normal)):
         held.directions[count, t] = normal[t] / length
-    held.triangle[count, :count] = along[:count]
+    copy(along, count, held.triangle[count])
     held.triangle[count, count] = length
     held.keys[count] = key
     held.upper[count] = upper
@@ -96,7 +97,7 @@ def drop(held, count, index):
         held.keys[i] = held.keys[i + 1]
         held.upper[i] = held.upper[i + 1]
         held.multipliers[i] = held.multipliers[i + 1]
-        T[i, : i + 2] = T[i + 1, : i + 2]
+        copy(T[i + 1], i + 2, T[i])
     for i in range(index, count - 1):
         length = (T[i, i] ** 2 + T[i, i + 1] ** 2) ** 0.5
         c, s = T[i, i] / length, T[i, i + 1] / length
@@ -123,11 +124,12 @@ def settle(held, count, free, shares, y):
         for t in range(i):
             total -= held.triangle[i, t] * shares[t]
         shares[i] = total / held.triangle[i, i]
-    y[:] = -free
+    for t in range(len(y)):
+        y[t] = -free[t]
     for i in range(count):
+        held.multipliers[i] = -shares[i]
         for t in range(len(y)):
             y[t] += shares[i] * held.directions[i, t]
-    held.multipliers[:count] = -shares[:count]
     upper_solve(held, count, held.multipliers)
 
 

@@ -15,7 +15,7 @@ from handrail.controllers.active_rows import append, drop, project, settle
 from handrail.controllers.banded import backward, forward
 from handrail.controllers.basis import to_motion
 from handrail.controllers.constraints import SLACKS, most_violated, write_row
-from handrail.controllers.jit import jit
+from handrail.controllers.jit import copy, jit
 
 _DEPENDENT = 1e-12  # squared sine to the active rows, below which a row is a combination of them
 
@@ -37,18 +37,20 @@ def solve(band, gradient, penalty, rows, warm, limit, held, motion):
     size = len(gradient)
     root = penalty[1] ** 0.5
     free = np.empty(size + SLACKS)
-    free[:size] = gradient
-    forward(band, free[:size], 0)
-    free[size:] = penalty[0] / root
+    copy(gradient, size, free)
+    forward(band, free, 0)
+    for index in range(SLACKS):
+        free[size + index] = penalty[0] / root
     y, new, normal = np.empty_like(free), np.empty_like(free), np.empty_like(free)
     along, shares = np.empty_like(free), np.empty_like(free)
     s, slack = np.empty(size), np.empty(SLACKS)
     count = _begin(band, root, rows, warm, free, held, y, new, along, shares, normal)
     changes, settled = 0, 0
     while True:
-        s[:] = y[:size]
+        copy(y, size, s)
         backward(band, s)
-        slack[:] = y[size:] / root
+        for index in range(SLACKS):
+            slack[index] = y[size + index] / root
         to_motion(rows.matrix, s, motion)
         key = most_violated(rows, s, motion, slack, held.keys[:count])
         if key < 0:
@@ -102,9 +104,9 @@ def _begin(band, root, rows, warm, free, held, y, new, along, shares, normal):
 def _transform(band, root, rows, key, new):
     """Write m_p of a row; return its right-hand side."""
     upper, first = write_row(rows, key, new)
-    size = len(band)
-    forward(band, new[:size], first)
-    new[size:] /= root
+    forward(band, new, first)
+    for index in range(len(band), len(new)):
+        new[index] /= root
     return upper
 
 

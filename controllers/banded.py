@@ -26,7 +26,7 @@ def factor(band):
 
 @jit
 def forward(band, x, start):
-    """Replace x by `L⁻¹ x`; its entries before `start` are 0."""
+    """Replace x by `L⁻¹ x`; its entries before `start` are 0, and those beyond the matrix are left alone."""
     size, width = band.shape
     for j in range(start, size):
         value = x[j] / band[j, 0]

@@ -99,7 +99,8 @@ def write_row(rows, key, out):
     """
     horizon, n = rows.guess.shape
     size = horizon * n
-    out[:] = 0.0
+    for index in range(len(out)):
+        out[index] = 0.0
     if key < SLACKS:
         out[size + key] = -1.0
         return 0.0, size

@@ -1,5 +1,6 @@
 """The one protocol behind which every controller stands."""
 
+import math
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -27,7 +28,7 @@ class State:
     @property
     def is_finite(self) -> bool:
         """Whether every entry is a number."""
-        return bool(np.all(np.isfinite(self.q)) and np.all(np.isfinite(self.v)) and np.isfinite(self.time))
+        return math.isfinite(self.time) and bool(np.isfinite(self.q).all() and np.isfinite(self.v).all())
 
 
 class Controller(Protocol):

@@ -1,5 +1,6 @@
 """What the operator asks for: values on channels, and a mask of those that are commanded."""
 
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -58,8 +59,5 @@ class Intent:
     @property
     def is_finite(self) -> bool:
         """Whether every commanded value, the gripper and the time are numbers."""
-        return bool(
-            np.all(np.isfinite(self.values[self.mask]))
-            and np.isfinite(self.gripper)
-            and np.isfinite(self.time)
-        )
+        scalars = math.isfinite(self.gripper) and math.isfinite(self.time)
+        return scalars and bool(np.isfinite(self.values[self.mask]).all())

@@ -10,4 +10,15 @@ _SUMS = {"reassoc", "contract", "nsz"}  # sums may be reordered, so that they ru
 
 def jit(function: Callable[..., Any]) -> Callable[..., Any]:
     """Compile a function of numbers and arrays at its first call; the machine code is kept on disk."""
-    return numba.njit(cache=True, fastmath=_SUMS, error_model="numpy")(function)
+    options = {"fastmath": _SUMS, "error_model": "numpy"}
+    try:
+        return numba.njit(cache=True, **options)(function)
+    except RuntimeError:  # no folder to keep it in: compiled anew in every process
+        return numba.njit(**options)(function)
+
+
+@jit
+def copy(source, count, target):
+    """Copy the first entries of a row; a loop compiles much faster than numba's own assignment."""
+    for t in range(count):
+        target[t] = source[t]

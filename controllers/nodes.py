@@ -3,6 +3,7 @@
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray
+from handrail.controllers.jit import copy, jit
 from handrail.controllers.problem import Problem
 
 
@@ -21,12 +22,24 @@ class Nodes:
     STOPS = (0.375, 0.5)
 
     def __init__(self, problem: Problem, q: FloatArray, v: FloatArray) -> None:
-        count = len(q)
-        stop = np.abs(v[-1]) / problem.limits.acceleration
-        self.gains = 2.0 * np.multiply.outer(self.STOPS, stop)
-        self.q = np.empty((count + 2, q.shape[1]))
-        self.q[:count] = q
-        self.q[count:] = q[-1] + 0.5 * self.gains * v[-1]
-        self.times = problem.dt * np.arange(count + 2)
-        longest = float(stop.max())
-        self.times[count:] = self.times[count - 1] + 0.5 * longest, self.times[count - 1] + longest
+        self.q, self.times, self.gains = _nodes(q, v, problem.limits.acceleration, problem.dt, self.STOPS)
+
+
+@jit
+def _nodes(q, v, acceleration, dt, shares):
+    count, n = q.shape
+    nodes, times = np.empty((count + len(shares), n)), np.empty(count + len(shares))
+    gains = np.empty((len(shares), n))
+    longest = 0.0
+    for k in range(count):
+        times[k] = dt * k
+        copy(q[k], n, nodes[k])
+    for j in range(n):
+        stop = abs(v[count - 1, j]) / acceleration[j]
+        longest = max(longest, stop)
+        for index, share in enumerate(shares):
+            gains[index, j] = 2.0 * share * stop
+            nodes[count + index, j] = q[count - 1, j] + share * stop * v[count - 1, j]
+    for index in range(len(shares)):
+        times[count + index] = times[count - 1] + longest * (index + 1) / len(shares)
+    return nodes, times, gains

@@ -160,7 +160,8 @@ def _add_affine(affine, matrix, z, weights, reference, gradient):
     slope, by_variables = np.empty(width), np.empty(width)
     total = 0.0
     for k in range(horizon):
-        slope[:] = 0.0
+        for column in range(width):
+            slope[column] = 0.0
         for row in range(len(index)):
             weight = weights[k, index[row]]
             if weight > 0.0:
