@@ -19,9 +19,10 @@ from handrail.controllers.residuals import StageResiduals
 from handrail.controllers.rows import Rows, rows_around
 from handrail.controllers.stage_cost import Quadratic, StageCost
 
-_MORE_STEPS = 2  # at most, in one update
-_LARGE = 0.2  # change of an acceleration that asks for another step, relative to its limit
-_COARSE = 0.01  # share of the promised descent by which a linearised cost may be wrong
+_MORE_STEPS = 3  # at most, in one update
+_LARGE = 0.2  # change of an acceleration near obstacles that asks for another step, relative to its limit
+_COARSE = 0.01  # share of the promised descent by which a linearised cost may be wrong,
+_SMALL = 0.1  # or of a descent that is this share of the cost
 _SMALLEST_SHARE = 1.0 / 16.0  # of a step that makes the cost rise
 _CHANGES = 10  # of the active rows, for each variable: an answer that takes more is none
 _NOTHING_ACTIVE = np.arange(SLACKS)  # but that no slack is negative
@@ -102,12 +103,11 @@ class RealTimeSolver:
         return plan, again
 
     def _is_far(self, problem: Problem, before: float, answer: "_Answer", moved: "_Moved") -> bool:
-        """Whether a step was large and its linearisation too coarse: of distances, or of the cost."""
-        if largest_share(moved.change, problem.limits.acceleration) < _LARGE:
-            return False
-        if answer.near:
+        """Whether a step's linearisation was too coarse: of the cost, or of distances after a large step."""
+        wrong = abs(moved.cost - before - answer.descent)
+        if wrong > _COARSE * max(abs(answer.descent), _SMALL * moved.cost):
             return True
-        return abs(moved.cost - before - answer.descent) > _COARSE * abs(answer.descent)
+        return answer.near and largest_share(moved.change, problem.limits.acceleration) > _LARGE
 
     def _linearisation(self, problem: Problem, guess: FloatArray) -> _Guess:
         """Return what to linearise around: the guess, or a full stop where the guess runs into something.
