@@ -1,7 +1,7 @@
 """The backup: what the robot does where no new plan may be sent."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -10,6 +10,8 @@ from handrail.controllers.certificate import StopCertificate
 from handrail.controllers.limiter import Limiter
 from handrail.controllers.problem import Plan
 from handrail.controllers.trajectory import Trajectory
+
+_SAMPLES = 2  # of a plan's stage
 
 
 @dataclass(frozen=True)
@@ -36,7 +38,7 @@ class Way:
     """Something that the robot may do now.
 
     Attributes:
-        motion: that it ends in rest with, if no later update finds anything better.
+        motion: what is done for sure, unless a later update finds something better; then a full stop.
         shortfall: of its safety; 0 when it is safe [m, rad].
         planned: whether it begins with the new plan.
     """
@@ -50,7 +52,8 @@ class Backup:
     """A ladder of ways, of which the robot takes the first that is safe.
 
     1. The new plan, if a full stop after its first stage is safe; that stage and stop are stored.
-    2. The new plan, if its own path and a full stop from its end are safe; these are stored.
+    2. The new plan, if its own path and a full stop from its end are safe, or from half way, or half of that;
+       these are stored.
     3. What is stored, from where it is now. Only while the robot follows it.
     4. A full stop at once.
 
@@ -94,35 +97,47 @@ class Backup:
 
     def brake(self, velocity: FloatArray) -> Trajectory:
         """Return a full stop from a velocity, (n,), which is stored unmeasured: nobody knows where we are."""
-        self._stored = self._stopping(velocity[None])
+        self._stored = self._braking(velocity)
         return self._stored
 
     def _ways(self, situation: Situation, plan: Plan | None, halt: bool) -> Iterator[Way]:
         now = situation.q, situation.distances
         if plan is not None:
-            stage = Trajectory(plan.v[:2], self._dt)
-            yield Way(stage, self._certificate.shortfall(plan.q[1], plan.v[1], now, self._dt), planned=True)
-            yield self._measured(self._stopping(plan.v), now, planned=True)
+            shortfall = self._certificate.shortfall(plan.q[1], plan.v[1], now, self._dt)
+            yield Way(Trajectory(plan.v[:2], self._dt), shortfall, planned=True)
+            yield from self._farther(plan, now)
         if halt:
             yield self._stop(situation)
         if self._stored is not None:
-            rest = self._stopping(self._stored.velocities, self._stored.elapsed).after(situation.elapsed)
+            rest = self._stopping(self._stored).after(situation.elapsed)
             if np.all(np.abs(situation.v - rest.velocity(0.0)) <= self._tolerance):
-                yield self._measured(rest, now)
+                shortfalls = self._certificate.along(*rest.path(situation.q), now)
+                yield Way(rest, float(shortfalls.max()))
         if not halt:
             yield self._stop(situation)
+
+    def _farther(self, plan: Plan, now: tuple[FloatArray, FloatArray]) -> Iterator[Way]:
+        """Yield the plan as far as its own path is safe, then a full stop; half as far; and so on."""
+        path = Trajectory(plan.v, self._dt).path(plan.q[0], _SAMPLES)
+        shortfalls = self._certificate.along(*path, now)
+        unsafe = np.flatnonzero(shortfalls > 0.0)
+        stages = len(plan.u) if not len(unsafe) else (int(unsafe[0]) - 1) // _SAMPLES
+        while stages > 1:
+            shortfall = self._certificate.shortfall(plan.q[stages], plan.v[stages], now, self._dt * stages)
+            yield Way(Trajectory(plan.v[: stages + 1], self._dt), shortfall, planned=True)
+            stages //= 2
 
     def _stop(self, situation: Situation) -> Way:
         now = situation.q, situation.distances
         shortfall = self._certificate.shortfall(situation.q, situation.start, now)
-        return Way(self._stopping(situation.start[None]), shortfall)
+        return Way(self._braking(situation.start), shortfall)
 
-    def _measured(self, motion: Trajectory, now: tuple[FloatArray, FloatArray], planned: bool = False) -> Way:
-        return Way(motion, self._certificate.along(*motion.path(now[0]), now), planned)
+    def _braking(self, velocity: FloatArray) -> Trajectory:
+        """Return a full stop from a velocity, (n,)."""
+        steps = max(1, int(np.ceil(self._limiter.stopping_time(velocity) / self._dt)))
+        return Trajectory(self._limiter.brake(velocity, self._dt, steps), self._dt)
 
-    def _stopping(self, velocities: FloatArray, elapsed: float = 0.0) -> Trajectory:
-        """Return velocities (k, n) and a full stop from the last of them."""
-        seconds = self._limiter.stopping_time(velocities[-1])
-        steps = max(1, int(np.ceil(seconds / self._dt)))
-        stop = self._limiter.brake(velocities[-1], self._dt, steps)
-        return Trajectory(np.vstack([velocities, stop[1:]]), self._dt, elapsed)
+    def _stopping(self, motion: Trajectory) -> Trajectory:
+        """Return a motion and a full stop from its end."""
+        stop = self._braking(motion.velocities[-1]).velocities
+        return replace(motion, velocities=np.vstack([motion.velocities, stop[1:]]))

@@ -47,15 +47,15 @@ class StopCertificate:
             delay: time until it begins [s].
         """
         path, times = self._limiter.stop(q, v, _SAMPLES)
-        return self.along(path, delay + times, now)
+        return float(self.along(path, delay + times, now).max())
 
-    def along(self, path: FloatArray, times: FloatArray, now: tuple[FloatArray, FloatArray]) -> float:
-        """Return the same of a motion through positions (K, n) at times from now, (K,)."""
+    def along(self, path: FloatArray, times: FloatArray, now: tuple[FloatArray, FloatArray]) -> FloatArray:
+        """Return the same at every point of a motion through positions (K, n) at times from now, (K,)."""
         distances = self._collision.values(path, times, now)
         asked = np.minimum(self._floors, now[1] - _ERROR)
-        short = float(np.max(asked - distances, initial=0.0))
+        short = np.max(asked - distances, axis=1, initial=0.0)
         asked = np.minimum(0.0, self._room(now[0])) - _BEYOND
-        return max(short, float(np.max(asked - self._room(path))))
+        return np.maximum(short, np.max(asked - self._room(path), axis=1))
 
     def _room(self, q: FloatArray) -> FloatArray:
         """Return how far each joint is inside its range, (…, n)."""

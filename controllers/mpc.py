@@ -33,7 +33,6 @@ from handrail.controllers.settings import MpcSettings
 from handrail.controllers.shape import Obstacle
 from handrail.controllers.trajectory import Trajectory
 
-
 _SOLVER_ERRORS = (HandrailError, ArithmeticError, RuntimeError, ValueError)  # of ours, numpy, CasADi, coal
 
 

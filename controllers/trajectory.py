@@ -42,16 +42,22 @@ class Trajectory:
         return Trajectory(self.velocities[whole:], self.dt, passed - whole * self.dt)
 
     def accelerations(self, count: int) -> FloatArray:
-        """Return the mean accelerations over `count` intervals dt from now, (count, n); zero after the end."""
+        """Return the mean accelerations over intervals dt from now on, (count, n); zero after the end."""
         return np.diff(self._held(self.dt * np.arange(count + 1)), axis=0) / self.dt
 
-    def path(self, q: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return where it leads from q, (n,): positions (K, n) now, at and half way between knots; times (K,)."""
-        ahead = 0.5 * self.dt * np.arange(2 * len(self.velocities) - 1) - self.elapsed
+    def path(self, q: FloatArray, samples: int = 1) -> tuple[FloatArray, FloatArray]:
+        """Return where it leads from q: positions, (K, n), and their times from now, (K,) [s].
+
+        Args:
+            q: where it begins now, (n,).
+            samples: in every interval between knots; the first is now.
+        """
+        step = self.dt / samples
+        ahead = step * np.arange(samples * (len(self.velocities) - 1) + 1) - self.elapsed
         times = np.append(0.0, ahead[ahead > 0.0])
         velocities = self._held(times)
-        steps = 0.5 * np.diff(times)[:, None] * (velocities[:-1] + velocities[1:])
-        return np.vstack([q, q + np.cumsum(steps, axis=0)]), times
+        moves = 0.5 * np.diff(times)[:, None] * (velocities[:-1] + velocities[1:])
+        return np.vstack([q, q + np.cumsum(moves, axis=0)]), times
 
     def _held(self, times: FloatArray) -> FloatArray:
         """Return the velocities at times from now, (K,), the last one held after the end, (K, n)."""
