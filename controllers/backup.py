@@ -111,8 +111,7 @@ class Backup:
         if self._stored is not None:
             rest = self._stopping(self._stored).after(situation.elapsed)
             if np.all(np.abs(situation.v - rest.velocity(0.0)) <= self._tolerance):
-                shortfalls = self._certificate.along(*rest.path(situation.q), now)
-                yield Way(rest, float(shortfalls.max()))
+                yield Way(rest, self._certificate.until_rest(*rest.path(situation.q), now))
         if not halt:
             yield self._stop(situation)
 

@@ -88,8 +88,13 @@ class MaskedMpc:
         wanted = np.where(self._collision.work, settings.work_margin, settings.margin)
         self._margins = np.minimum(wanted, self._collision.largest_margin)
         floors = settings.floor * self._margins
-        limits = self.model.description.limits
-        certificate = StopCertificate(self._limiter, self._collision, floors, limits)
+        certificate = StopCertificate(
+            self._limiter,
+            self._collision,
+            floors,
+            self.model.description.limits,
+            settings.horizon * settings.dt,
+        )
         self._backup = Backup(certificate, self._limiter, settings.dt, self._tolerance)
         self._parameters = self.residuals.parameters
         self._plan: Plan | None = None
