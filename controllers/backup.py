@@ -1,44 +1,142 @@
-"""The certificate that the robot can always stop: a command is sent only if the stop after it is safe."""
+"""The backup: what the robot does where no new plan may be sent."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray
-from handrail.controllers.collision import CollisionModel
+from handrail.controllers.certificate import StopCertificate
 from handrail.controllers.limiter import Limiter
+from handrail.controllers.problem import Plan
+from handrail.controllers.trajectory import Trajectory
 
-_SAMPLES = np.array([0.25, 0.5, 0.75, 1.0])  # of the time that a stop takes
-_ERROR = 1e-3  # of the signed distances that is no loss [m]
+_SAMPLES = 2  # of a plan's stage
 
 
-class StopCertificate:
-    """Measures the stop that follows a command, at full deceleration of every joint.
+@dataclass(frozen=True)
+class Situation:
+    """Where the robot is, and how the motion that was stored has gone on.
 
-    From (q, v): `q_j(t) = q_j + v_j t - ½ sign(v_j) a_j t²` until `t_j = |v_j| / a_j`. The stop is safe when
-    no pair comes below its floor, or, where one is below already, no closer than now.
-
-    Args:
-        limiter: knows the deceleration.
-        collision: the pairs.
-        floors: of each pair [m], (P,).
+    Attributes:
+        q: measured position, (n,).
+        v: measured velocity, (n,).
+        start: velocity that a command begins with, (n,).
+        distances: signed distances of all pairs, (P,) [m].
+        elapsed: time since the last update [s].
     """
 
-    def __init__(self, limiter: Limiter, collision: CollisionModel, floors: FloatArray) -> None:
-        self._limiter = limiter
-        self._collision = collision
-        self._floors = floors
+    q: FloatArray
+    v: FloatArray
+    start: FloatArray
+    distances: FloatArray
+    elapsed: float
 
-    def shortfall(
-        self, q: FloatArray, v: FloatArray, now: tuple[FloatArray, FloatArray], delay: float = 0.0
-    ) -> float:
-        """Return how far the stop from (q, v) falls short of what is asked; 0 when it is safe [m].
+
+@dataclass(frozen=True)
+class Way:
+    """Something that the robot may do now.
+
+    Attributes:
+        motion: what is done for sure, unless a later update finds something better; then a full stop.
+        shortfall: of its safety; 0 when it is safe [m, rad].
+        planned: whether it begins with the new plan.
+    """
+
+    motion: Trajectory
+    shortfall: float
+    planned: bool = False
+
+
+class Backup:
+    """A ladder of ways, of which the robot takes the first that is safe.
+
+    1. The new plan, if a full stop after its first stage is safe; that stage and stop are stored.
+    2. The new plan, if its own path and a full stop from its end are safe, or from half way, or half of that;
+       these are stored.
+    3. What is stored, from where it is now. Only while the robot follows it.
+    4. A full stop at once.
+
+    An operator who is gone or talks nonsense has no plan, and wants 4 before 3. Where no way is safe,
+    because an obstacle or the robot was moved by somebody else, it is the one that falls least short.
+
+    Args:
+        certificate: measures the ways.
+        limiter: knows the full stop.
+        dt: time between knots [s].
+        tolerance: difference of the measured velocity from the stored one up to which the robot follows,
+            (n,).
+    """
+
+    def __init__(
+        self, certificate: StopCertificate, limiter: Limiter, dt: float, tolerance: FloatArray
+    ) -> None:
+        self._certificate = certificate
+        self._limiter = limiter
+        self._dt = dt
+        self._tolerance = tolerance
+        self._stored: Trajectory | None = None
+
+    def choose(self, situation: Situation, plan: Plan | None, halt: bool = False) -> Way:
+        """Return the way to take, and store it.
 
         Args:
-            q: where it begins, (n,).
-            v: how fast, (n,).
-            now: the position now, (n,), and its distances, (P,).
-            delay: time until it begins [s].
+            situation: of the robot.
+            plan: of this update; None when there is none.
+            halt: whether a full stop is wanted, rather than what is stored.
         """
-        path, times = self._limiter.stop(q, v, _SAMPLES)
-        distances = self._collision.values(path, delay + times, now)
-        asked = np.minimum(self._floors, now[1] - _ERROR)
-        return float(np.max(asked - distances, initial=0.0))
+        refused: list[Way] = []
+        for way in self._ways(situation, plan, halt):
+            if way.shortfall <= 0.0:
+                break
+            refused.insert(0, way)
+        else:
+            way = min(refused, key=lambda refused: refused.shortfall)  # of equals the one farther down
+        self._stored = way.motion
+        return way
+
+    def brake(self, velocity: FloatArray) -> Trajectory:
+        """Return a full stop from a velocity, (n,), which is stored unmeasured: nobody knows where we are."""
+        self._stored = self._braking(velocity)
+        return self._stored
+
+    def _ways(self, situation: Situation, plan: Plan | None, halt: bool) -> Iterator[Way]:
+        now = situation.q, situation.distances
+        if plan is not None:
+            shortfall = self._certificate.shortfall(plan.q[1], plan.v[1], now, self._dt)
+            yield Way(Trajectory(plan.v[:2], self._dt), shortfall, planned=True)
+            yield from self._farther(plan, now)
+        if halt:
+            yield self._stop(situation)
+        if self._stored is not None:
+            rest = self._stopping(self._stored).after(situation.elapsed)
+            if np.all(np.abs(situation.v - rest.velocity(0.0)) <= self._tolerance):
+                yield Way(rest, self._certificate.until_rest(*rest.path(situation.q), now))
+        if not halt:
+            yield self._stop(situation)
+
+    def _farther(self, plan: Plan, now: tuple[FloatArray, FloatArray]) -> Iterator[Way]:
+        """Yield the plan as far as its own path is safe, then a full stop; half as far; and so on."""
+        path = Trajectory(plan.v, self._dt).path(plan.q[0], _SAMPLES)
+        shortfalls = self._certificate.along(*path, now)
+        unsafe = np.flatnonzero(shortfalls > 0.0)
+        stages = len(plan.u) if not len(unsafe) else (int(unsafe[0]) - 1) // _SAMPLES
+        while stages > 1:
+            shortfall = self._certificate.shortfall(plan.q[stages], plan.v[stages], now, self._dt * stages)
+            yield Way(Trajectory(plan.v[: stages + 1], self._dt), shortfall, planned=True)
+            stages //= 2
+
+    def _stop(self, situation: Situation) -> Way:
+        now = situation.q, situation.distances
+        shortfall = self._certificate.shortfall(situation.q, situation.start, now)
+        return Way(self._braking(situation.start), shortfall)
+
+    def _braking(self, velocity: FloatArray) -> Trajectory:
+        """Return a full stop from a velocity, (n,)."""
+        steps = max(1, int(np.ceil(self._limiter.stopping_time(velocity) / self._dt)))
+        return Trajectory(self._limiter.brake(velocity, self._dt, steps), self._dt)
+
+    def _stopping(self, motion: Trajectory) -> Trajectory:
+        """Return a motion and a full stop from its end."""
+        stop = self._braking(motion.velocities[-1]).velocities
+        return replace(motion, velocities=np.vstack([motion.velocities, stop[1:]]))

@@ -84,6 +84,11 @@ class CollisionModel:
         """Number of pairs P."""
         return len(self.pairs)
 
+    @property
+    def moves(self) -> bool:
+        """Whether any obstacle moves."""
+        return bool(self._moving)
+
     def distances(
         self, q: FloatArray, reach: FloatArray | float = np.inf, times: FloatArray | None = None
     ) -> Distances:

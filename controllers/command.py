@@ -6,6 +6,7 @@ from enum import StrEnum
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray, frozen
+from handrail.controllers.trajectory import Trajectory
 
 
 class Status(StrEnum):
@@ -17,7 +18,7 @@ class Status(StrEnum):
     INVALID_STATE = "invalid_state"
     STALE_INTENT = "stale_intent"
     SOLVER_FAILED = "solver_failed"
-    BACKUP = "backup"  # the plan's stop was not safe: the backup plan, a full stop, took over
+    BACKUP = "backup"  # neither the plan nor a stop out of it was safe: the stored backup is followed
 
     @property
     def brakes(self) -> bool:
@@ -55,30 +56,28 @@ class Command:
     """A velocity trajectory from now on, linear between its knots, at rest after the last.
 
     Attributes:
-        velocities: generalised velocities at times 0, dt, 2 dt, …, (k, n) [m/s, rad/s].
+        velocities: generalised velocities at times 0, dt, 2 dt, … since the first knot, (k, n) [m/s, rad/s].
         dt: time between knots [s].
         gripper: 0 open, 1 closed.
         health: how the controller fared.
+        elapsed: how long ago the first knot was [s]; zero but where an earlier plan is being followed.
     """
 
     velocities: FloatArray
     dt: float
     gripper: float = 0.0
     health: Health = field(default_factory=Health)
+    elapsed: float = 0.0
 
     def __post_init__(self) -> None:
         """Copy the array and make it read-only."""
         object.__setattr__(self, "velocities", frozen(self.velocities))
 
+    @property
+    def trajectory(self) -> Trajectory:
+        """The velocities as a trajectory."""
+        return Trajectory(self.velocities, self.dt, self.elapsed)
+
     def velocity(self, time: float) -> FloatArray:
         """Return the commanded velocity `time` [s] from the update on, (n,)."""
-        knot = max(time, 0.0) / self.dt
-        index = int(knot)
-        if index >= len(self.velocities) - 1:
-            return (
-                self.velocities[-1]
-                if np.isclose(knot, len(self.velocities) - 1)
-                else np.zeros_like(self.velocities[0])
-            )
-        weight = knot - index
-        return (1.0 - weight) * self.velocities[index] + weight * self.velocities[index + 1]
+        return self.trajectory.velocity(time)

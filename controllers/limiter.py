@@ -44,6 +44,10 @@ class Limiter:
         tolerance = _TOLERANCE * (maximum + step)
         return allowed, not valid or bool(np.any(np.abs(allowed - wanted) > tolerance))
 
+    def stopping_time(self, velocity: FloatArray) -> float:
+        """Return how long the fastest stop from a velocity takes, (n,) [s]."""
+        return float(np.max(np.abs(velocity) / self._limits.acceleration))
+
     def brake(self, velocity: FloatArray, dt: float, steps: int) -> FloatArray:
         """Return the velocities of the fastest stop, (steps + 1, n)."""
         times = dt * np.arange(steps + 1)[:, None]

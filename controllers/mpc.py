@@ -6,12 +6,14 @@ from time import perf_counter
 import numpy as np
 
 from handrail.controllers.arrays import BoolArray, FloatArray
-from handrail.controllers.backup import StopCertificate
+from handrail.controllers.backup import Backup, Situation
+from handrail.controllers.certificate import StopCertificate
 from handrail.controllers.channels import Channels
 from handrail.controllers.collision import CollisionModel
 from handrail.controllers.command import Command, Health, Status
 from handrail.controllers.controller import State
-from handrail.controllers.errors import unknown_name
+from handrail.controllers.errors import HandrailError, unknown_name
+from handrail.controllers.followed import Followed
 from handrail.controllers.guard import check_inputs
 from handrail.controllers.intent import Intent
 from handrail.controllers.limiter import Limiter
@@ -29,15 +31,9 @@ from handrail.controllers.real_time import RealTimeSolver
 from handrail.controllers.residuals import StageResiduals
 from handrail.controllers.settings import MpcSettings
 from handrail.controllers.shape import Obstacle
+from handrail.controllers.trajectory import Trajectory
 
-
-@dataclass
-class _Memory:
-    """What is carried from one update to the next."""
-
-    plan: Plan | None = None
-    time: float = 0.0
-    command: Command | None = None
+_SOLVER_ERRORS = (HandrailError, ArithmeticError, RuntimeError, ValueError)  # of ours, numpy, CasADi, coal
 
 
 @dataclass(frozen=True)
@@ -73,6 +69,7 @@ class MaskedMpc:
         self.residuals = StageResiduals(model, (*built_in, *objectives), horizon)
         self.solver = RealTimeSolver(self.residuals, horizon, model.size, self.settings.dt)
         self._limiter = Limiter(model.description)
+        self._tolerance = self.settings.velocity_tolerance * model.description.limits.velocity
         self._predict = predict
         self._times = self.settings.dt * np.arange(1, horizon + 1)
         self._masked: dict[bytes, _Masked] = {}
@@ -82,7 +79,7 @@ class MaskedMpc:
     @property
     def plan(self) -> Plan | None:
         """The plan of the last update; None after a brake."""
-        return self._memory.plan
+        return self._plan
 
     def reset(self, obstacles: tuple[Obstacle, ...] = ()) -> None:
         """Forget warm start and last command; take the obstacles of a new episode."""
@@ -91,9 +88,17 @@ class MaskedMpc:
         wanted = np.where(self._collision.work, settings.work_margin, settings.margin)
         self._margins = np.minimum(wanted, self._collision.largest_margin)
         floors = settings.floor * self._margins
-        self._certificate = StopCertificate(self._limiter, self._collision, floors)
+        certificate = StopCertificate(
+            self._limiter,
+            self._collision,
+            floors,
+            self.model.description.limits,
+            settings.horizon * settings.dt,
+        )
+        self._backup = Backup(certificate, self._limiter, settings.dt, self._tolerance)
         self._parameters = self.residuals.parameters
-        self._memory = _Memory()
+        self._plan: Plan | None = None
+        self._followed: Followed | None = None
         self.solver.reset()
         getattr(self._predict, "reset", lambda: None)()
 
@@ -113,24 +118,21 @@ class MaskedMpc:
         self._parameters[self.residuals.parameter_slice(objective)] = values
 
     def update(self, state: State, intent: Intent) -> Command:
-        """Return the command from now on; brakes on a bad input, a failed solve or an unsafe stop."""
+        """Return the command from now on: the plan, or what `Backup` has instead."""
         start = perf_counter()
         status = check_inputs(state, intent, self.channels, self.settings.intent_timeout)
-        plan = None
-        if status is Status.OK:
-            problem = self.problem(state, intent)
-            plan = self.solver.solve(problem, self._guess(state.time))
-            if not plan.is_solution(problem):
-                status = Status.SOLVER_FAILED
-            elif not self._stops_safely(plan):
-                status = Status.BACKUP
-        health = self._health(state, intent, status, plan)
-        velocities = plan.v if plan is not None and status is Status.OK else self._brake(state, status)
-        gripper = intent.gripper if np.isfinite(intent.gripper) else self._last_gripper()
-        kept = plan if status is Status.OK else None
+        plan = self._solve(state, intent) if status is Status.OK else None
+        if status is Status.OK and plan is None:
+            status = Status.SOLVER_FAILED
+        distances = self._distances(state, plan, status)
+        motion, planned = self._motion(state, plan, distances, status)
+        if plan is not None and not planned:
+            status = Status.BACKUP
+        health = self._health(state, intent, status, plan, distances)
         health = replace(health, solve_time=perf_counter() - start)
-        command = Command(velocities, self.settings.dt, min(max(float(gripper), 0.0), 1.0), health)
-        self._memory = _Memory(kept, state.time if np.isfinite(state.time) else self._memory.time, command)
+        command = Command(motion.velocities, motion.dt, self._gripper(intent), health, motion.elapsed)
+        self._plan = plan if planned else None
+        self._remember(command, state.time)
         return command
 
     def problem(self, state: State, intent: Intent) -> Problem:
@@ -177,54 +179,70 @@ class MaskedMpc:
             self._masked[key] = _Masked(weights, len(rows) > freedom)
         return self._masked[key]
 
-    def _stops_safely(self, plan: Plan) -> bool:
-        """Whether the robot can stop after the plan's first stage, or better then than now."""
-        now = plan.q[0], plan.distances
-        shortfall = self._certificate.shortfall(plan.q[1], plan.v[1], now, self.settings.dt)
-        return shortfall <= 0.0 or shortfall < self._certificate.shortfall(plan.q[0], plan.v[0], now)
+    def _solve(self, state: State, intent: Intent) -> Plan | None:
+        """Return the plan, or None where the solver fails in whatever way."""
+        problem = self.problem(state, intent)
+        try:
+            plan = self.solver.solve(problem, self._guess(state.time)).within(problem)
+        except _SOLVER_ERRORS:
+            self.solver.reset()
+            return None
+        return plan if plan.is_solution(problem) else None
+
+    def _motion(
+        self, state: State, plan: Plan | None, distances: FloatArray | None, status: Status
+    ) -> tuple[Trajectory, bool]:
+        """Return how the robot moves from now on, and whether that is the plan."""
+        if distances is None:
+            known = self._followed is not None
+            velocity = self._followed.velocity(state.time) if known else np.zeros(self.model.size)
+            return self._backup.brake(velocity), False
+        elapsed = 0.0 if self._followed is None else self._followed.elapsed(state.time)
+        situation = Situation(state.q, state.v, self._start_velocity(state), distances, elapsed)
+        halt = status in (Status.INVALID_INTENT, Status.STALE_INTENT)
+        way = self._backup.choose(situation, plan, halt)
+        if plan is not None and way.planned:
+            return Trajectory(plan.v, self.settings.dt), True
+        return way.motion, False
 
     def _start_velocity(self, state: State) -> FloatArray:
-        """Return the velocity that the plan starts from: the commanded one, if the robot follows it."""
-        command = self._memory.command
-        if command is None:
-            return state.v
-        tolerance = self.settings.velocity_tolerance * self.model.description.limits.velocity
-        commanded = command.velocity(state.time - self._memory.time)
-        return np.minimum(np.maximum(commanded, state.v - tolerance), state.v + tolerance)
+        """Return the velocity that a command starts from: the commanded one, if the robot follows it."""
+        velocity, limit = state.v, self.model.description.limits.velocity
+        if self._followed is not None:
+            commanded = self._followed.velocity(state.time)
+            velocity = np.minimum(
+                np.maximum(commanded, velocity - self._tolerance), velocity + self._tolerance
+            )
+        return np.minimum(np.maximum(velocity, -limit), limit)
 
     def _guess(self, time: float) -> FloatArray:
-        """Return the last plan's accelerations, shifted by the time that has passed, (N, n)."""
-        horizon, plan = self.settings.horizon, self._memory.plan
-        if plan is None:
-            return np.zeros((horizon, self.model.size))
-        shift = max(time - self._memory.time, 0.0) / self.settings.dt
-        whole, part = int(min(shift, horizon)), min(shift, horizon) % 1.0
-        padded = np.zeros((2 * horizon + 2, self.model.size))
-        padded[:horizon] = plan.u
-        return (1.0 - part) * padded[whole : whole + horizon] + part * padded[whole + 1 : whole + horizon + 1]
+        """Return the accelerations that are being followed from a time on, (N, n)."""
+        if self._followed is None:
+            return np.zeros((self.settings.horizon, self.model.size))
+        return self._followed.accelerations(time, self.settings.horizon)
 
-    def _brake(self, state: State, status: Status) -> FloatArray:
-        trusted = status is not Status.INVALID_STATE
-        velocity = self._start_velocity(state) if trusted else self._last_velocity(state.time)
-        return self._limiter.brake(velocity, self.settings.dt, self.settings.horizon)
-
-    def _last_velocity(self, time: float) -> FloatArray:
-        """Return what is commanded at a time, which may be no number, (n,)."""
-        command = self._memory.command
-        if command is None:
-            return np.zeros(self.model.size)
-        elapsed = time - self._memory.time
-        return command.velocity(elapsed) if np.isfinite(elapsed) else command.velocities[1]
-
-    def _last_gripper(self) -> float:
-        return 0.0 if self._memory.command is None else self._memory.command.gripper
-
-    def _health(self, state: State, intent: Intent, status: Status, plan: Plan | None) -> Health:
-        if plan is not None:
-            distances = plan.distances
-        elif state.is_finite and state.q.shape == (self.model.size,):
-            distances = self._collision.values(state.q[None, :])[0]
+    def _remember(self, command: Command, time: float) -> None:
+        if self._followed is not None:
+            self._followed = self._followed.then(command, time)
         else:
+            self._followed = Followed(command, time if np.isfinite(time) else 0.0, self.settings.dt)
+
+    def _gripper(self, intent: Intent) -> float:
+        """Return how far the gripper is closed: as asked, or as before where that is no number."""
+        last = 0.0 if self._followed is None else self._followed.command.gripper
+        asked = float(intent.gripper) if np.isfinite(intent.gripper) else last
+        return min(max(asked, 0.0), 1.0)
+
+    def _distances(self, state: State, plan: Plan | None, status: Status) -> FloatArray | None:
+        """Return the signed distances now, (P,); None where nobody knows where the robot is."""
+        if status is Status.INVALID_STATE:
+            return None
+        return self._collision.values(state.q[None, :])[0] if plan is None else plan.distances
+
+    def _health(
+        self, state: State, intent: Intent, status: Status, plan: Plan | None, distances: FloatArray | None
+    ) -> Health:
+        if distances is None:
             return Health(status)
         work = self._collision.work
         health = Health(

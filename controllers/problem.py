@@ -1,6 +1,6 @@
 """The masked optimal control problem of one update (the paper's equation 6), as a value."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -96,6 +96,19 @@ class Plan:
         """Make the arrays read-only copies."""
         for name in ("q", "v", "u", "distances"):
             object.__setattr__(self, name, frozen(getattr(self, name)))
+
+    def within(self, problem: Problem) -> "Plan":
+        """Return the plan with velocities cut to their limits; accelerations and positions follow.
+
+        Cutting is monotone, so that no acceleration becomes larger.
+        """
+        limit = problem.limits.velocity
+        if np.all(np.abs(self.v[1:]) <= limit):
+            return self
+        v = np.vstack([self.v[0], np.minimum(np.maximum(self.v[1:], -limit), limit)])
+        u = np.diff(v, axis=0) / problem.dt
+        q, v = problem.rollout(u)
+        return replace(self, q=q, v=v, u=u)
 
     def is_solution(self, problem: Problem, tolerance: float = 1e-6) -> bool:
         """Whether the plan is finite, obeys the dynamics from the state and the hard acceleration limits."""

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from handrail.controllers.backup import StopCertificate
+from handrail.controllers.certificate import StopCertificate
 from handrail.controllers.collision import CollisionModel
 from handrail.controllers.command import Status
 from handrail.controllers.controller import State
@@ -179,7 +179,9 @@ def test_the_certificate_measures_the_stop():
     for gap, safe in ((0.2, False), (0.5, True)):
         wall = Obstacle("wall", Shape("box", [0.2, 4.0, 0.2]), [HOME[0] + 0.48 + gap + 0.1, 0.0, 0.1])
         collision = CollisionModel(MODEL, (wall,))
-        certificate = StopCertificate(limiter, collision, np.full(collision.size, 0.03))
+        certificate = StopCertificate(
+            limiter, collision, np.full(collision.size, 0.03), MODEL.description.limits
+        )
         now = collision.values(HOME[None])[0]
         shortfall = certificate.shortfall(HOME, v, (HOME, now))
         assert (shortfall == 0.0) is safe

@@ -1,0 +1,83 @@
+"""The certificate that a motion is safe: no pair comes below its floor, no joint beyond its range."""
+
+import numpy as np
+
+from handrail.controllers.arrays import FloatArray
+from handrail.controllers.collision import CollisionModel
+from handrail.controllers.description import Limits
+from handrail.controllers.limiter import Limiter
+
+_SAMPLES = np.array([0.25, 0.5, 0.75, 1.0])  # of the time that a stop takes, or that the robot waits after it
+_ERROR = 1e-3  # of signed distances, that is no loss [m]
+_BEYOND = 0.01  # of its range that a joint may come to rest [m, rad]
+
+
+class StopCertificate:
+    """Measures motions by exact distances; moving obstacles go on at constant velocity.
+
+    A motion is safe when no pair comes below its floor and no joint leaves its range, or, where one is
+    beyond already, no farther than now.
+
+    Args:
+        limiter: knows the full stop.
+        collision: the pairs.
+        floors: of each pair [m], (P,).
+        limits: of the joints.
+        span: time for which the robot has to be safe, where obstacles move [s].
+    """
+
+    def __init__(
+        self,
+        limiter: Limiter,
+        collision: CollisionModel,
+        floors: FloatArray,
+        limits: Limits,
+        span: float,
+    ) -> None:
+        self._limiter = limiter
+        self._collision = collision
+        self._floors = floors
+        self._limits = limits
+        self._span = span
+
+    def shortfall(
+        self, q: FloatArray, v: FloatArray, now: tuple[FloatArray, FloatArray], delay: float = 0.0
+    ) -> float:
+        """Return how far the full stop from (q, v) falls short of safety; 0 when it is safe [m, rad].
+
+        At full deceleration of every joint: `q_j(t) = q_j + v_j t - ½ sign(v_j) a_j t²` until `|v_j| / a_j`.
+
+        Args:
+            q: where it begins, (n,).
+            v: how fast, (n,).
+            now: the position now, (n,), and its distances, (P,).
+            delay: time until it begins [s].
+        """
+        path, times = self._limiter.stop(q, v, _SAMPLES)
+        return self.until_rest(path, delay + times, now)
+
+    def until_rest(self, path: FloatArray, times: FloatArray, now: tuple[FloatArray, FloatArray]) -> float:
+        """Return the same of a motion that ends at rest, through positions (K, n) at times from now, (K,).
+
+        Where obstacles move, the robot has to be safe for some time, moving or waiting.
+        """
+        left = self._span - times[-1]
+        if self._collision.moves and left > 0.0:
+            path = np.vstack([path, np.broadcast_to(path[-1], (len(_SAMPLES), path.shape[1]))])
+            times = np.append(times, times[-1] + left * _SAMPLES)
+        return float(self.along(path, times, now).max())
+
+    def along(self, path: FloatArray, times: FloatArray, now: tuple[FloatArray, FloatArray]) -> FloatArray:
+        """Return the same at every point of a motion, (K,)."""
+        distances = self._collision.values(path, times, now)
+        asked = np.minimum(self._floors, now[1] - _ERROR)
+        short = np.max(asked - distances, axis=1, initial=0.0)
+        room = self._room(path) + _BEYOND
+        if room.min() < 0.0:
+            beyond = np.minimum(0.0, self._room(now[0])) - room
+            short = np.maximum(short, beyond.max(axis=1))
+        return short
+
+    def _room(self, q: FloatArray) -> FloatArray:
+        """Return how far each joint is inside its range, (…, n)."""
+        return np.minimum(q - self._limits.position_lower, self._limits.position_upper - q)

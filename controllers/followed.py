@@ -1,0 +1,40 @@
+"""What the robot follows: the command that was sent last, and since when."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from handrail.controllers.arrays import FloatArray
+from handrail.controllers.command import Command
+
+
+@dataclass(frozen=True)
+class Followed:
+    """A command that was sent.
+
+    Attributes:
+        command: it.
+        time: when [s].
+        period: time from the command before it [s].
+    """
+
+    command: Command
+    time: float
+    period: float
+
+    def elapsed(self, time: float) -> float:
+        """Return how long ago it was sent, at a time, which may be no number [s]: then, one period."""
+        return max(time - self.time, 0.0) if np.isfinite(time) else self.period
+
+    def velocity(self, time: float) -> FloatArray:
+        """Return what is commanded at a time, which may be no number, (n,)."""
+        return self.command.velocity(self.elapsed(time))
+
+    def accelerations(self, time: float, count: int) -> FloatArray:
+        """Return what is commanded over `count` intervals from a time on, (count, n); zero after the end."""
+        return self.command.trajectory.after(self.elapsed(time)).accelerations(count)
+
+    def then(self, command: Command, time: float) -> "Followed":
+        """Return what is followed after the next command, sent at a time, which may be no number."""
+        elapsed = self.elapsed(time)
+        return Followed(command, time if np.isfinite(time) else self.time + elapsed, elapsed)

@@ -1,0 +1,68 @@
+"""A velocity trajectory, linear between knots: what the robot is sent, and where that leads."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from handrail.controllers.arrays import FloatArray, frozen
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """Velocities that are linear between knots.
+
+    Attributes:
+        velocities: at the knots, (k, n) with k ≥ 2 [m/s, rad/s].
+        dt: time between knots [s].
+        elapsed: time that has passed since the first knot [s].
+    """
+
+    velocities: FloatArray
+    dt: float
+    elapsed: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Copy the array and make it read-only."""
+        object.__setattr__(self, "velocities", frozen(self.velocities))
+
+    def velocity(self, time: float) -> FloatArray:
+        """Return the velocity `time` [s] from now, (n,); zero after the last knot."""
+        knot = (max(time, 0.0) + self.elapsed) / self.dt
+        index, last = int(knot), len(self.velocities) - 1
+        if index >= last:
+            over = not np.isclose(knot, last)
+            return np.zeros_like(self.velocities[0]) if over else self.velocities[-1]
+        weight = knot - index
+        return (1.0 - weight) * self.velocities[index] + weight * self.velocities[index + 1]
+
+    def after(self, time: float) -> "Trajectory":
+        """Return what is left of it `time` [s] from now: the same curve, without knots long past."""
+        passed = self.elapsed + max(time, 0.0)
+        whole = min(int(passed / self.dt), len(self.velocities) - 2)
+        return Trajectory(self.velocities[whole:], self.dt, passed - whole * self.dt)
+
+    def accelerations(self, count: int) -> FloatArray:
+        """Return the mean accelerations over intervals dt from now on, (count, n); zero after the end."""
+        return np.diff(self._held(self.dt * np.arange(count + 1)), axis=0) / self.dt
+
+    def path(self, q: FloatArray, samples: int = 1) -> tuple[FloatArray, FloatArray]:
+        """Return where it leads from q: positions, (K, n), and their times from now, (K,) [s].
+
+        Args:
+            q: where it begins now, (n,).
+            samples: in every interval between knots; the first is now.
+        """
+        step = self.dt / samples
+        ahead = step * np.arange(samples * (len(self.velocities) - 1) + 1) - self.elapsed
+        times = np.append(0.0, ahead[ahead > 0.0])
+        velocities = self._held(times)
+        moves = 0.5 * np.diff(times)[:, None] * (velocities[:-1] + velocities[1:])
+        return np.vstack([q, q + np.cumsum(moves, axis=0)]), times
+
+    def _held(self, times: FloatArray) -> FloatArray:
+        """Return the velocities at times from now, (K,), the last one held after the end, (K, n)."""
+        last = len(self.velocities) - 1
+        knots = np.minimum((times + self.elapsed) / self.dt, last)
+        index = np.minimum(knots.astype(int), last - 1)
+        weight = (knots - index)[:, None]
+        return (1.0 - weight) * self.velocities[index] + weight * self.velocities[index + 1]
