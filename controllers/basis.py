@@ -77,3 +77,33 @@ def largest_share(change, limit):
         for j in range(change.shape[1]):
             worst = max(worst, abs(change[k, j]) / limit[j])
     return worst
+
+
+@jit
+def cut(values, limit, out):
+    """Write values, (N, m), within ± limit, (m,), to the first columns of an array."""
+    for k in range(values.shape[0]):
+        for j in range(values.shape[1]):
+            out[k, j] = min(max(values[k, j], -limit[j]), limit[j])
+
+
+@jit
+def is_motion(q, v, dt, u, positions, velocities, limit, tolerance):
+    """Whether accelerations u, (N, n), are finite, within ± limit, and lead from (q, v) where it is said."""
+    horizon, n = u.shape
+    for j in range(n):
+        position, velocity = q[j], v[j]
+        bound = limit[j] * (1.0 + tolerance) + tolerance
+        for k in range(horizon + 1):
+            near = (
+                abs(positions[k, j] - position) <= tolerance and abs(velocities[k, j] - velocity) <= tolerance
+            )
+            if not near:
+                return False
+            if k < horizon:
+                if not abs(u[k, j]) <= bound:
+                    return False
+                after = velocity + dt * u[k, j]
+                position += 0.5 * dt * (velocity + after)
+                velocity = after
+    return True

@@ -5,6 +5,7 @@ import numpy as np
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.collision import CollisionModel
 from handrail.controllers.description import Limits
+from handrail.controllers.jit import jit
 from handrail.controllers.limiter import Limiter
 
 _SAMPLES = np.array([0.25, 0.5, 0.75, 1.0])  # of the time that a stop takes, or that the robot waits after it
@@ -70,14 +71,19 @@ class StopCertificate:
     def along(self, path: FloatArray, times: FloatArray, now: tuple[FloatArray, FloatArray]) -> FloatArray:
         """Return the same at every point of a motion, (K,)."""
         distances = self._collision.values(path, times, now)
-        asked = np.minimum(self._floors, now[1] - _ERROR)
-        short = np.max(asked - distances, axis=1, initial=0.0)
-        room = self._room(path) + _BEYOND
-        if room.min() < 0.0:
-            beyond = np.minimum(0.0, self._room(now[0])) - room
-            short = np.maximum(short, beyond.max(axis=1))
-        return short
+        bounds = self._limits.position_lower, self._limits.position_upper
+        return _shortfalls(path, distances, *now, self._floors, *bounds)
 
-    def _room(self, q: FloatArray) -> FloatArray:
-        """Return how far each joint is inside its range, (…, n)."""
-        return np.minimum(q - self._limits.position_lower, self._limits.position_upper - q)
+
+@jit
+def _shortfalls(path, distances, start, now, floors, lower, upper):
+    short = np.zeros(len(path))
+    for k in range(len(path)):
+        for p in range(len(floors)):
+            short[k] = max(short[k], min(floors[p], now[p] - _ERROR) - distances[k, p])
+        for j in range(len(start)):
+            room = min(path[k, j] - lower[j], upper[j] - path[k, j]) + _BEYOND
+            if room < 0.0:
+                before = min(0.0, start[j] - lower[j], upper[j] - start[j])
+                short[k] = max(short[k], before - room)
+    return short

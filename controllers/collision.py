@@ -112,7 +112,7 @@ class CollisionModel:
         jacobians[0] = pin.computeJointJacobians(self._model, self._data)
         now = np.empty((1, self.size))
         measured(witnesses, self._every, now)
-        values, close = lower_bounds(now[0], q, times, self._levers, self._speeds, reaches)
+        values, close = lower_bounds(now[0], q[0], q, times, self._levers, self._speeds, reaches)
         chosen = self._along.select(close)
         for node in range(1, len(q)) if len(chosen) else ():
             self._measure(self._along, q[node], times[node], witnesses[node])
@@ -132,15 +132,16 @@ class CollisionModel:
             now: a configuration, (n,), and its distances, (P,), if they are known: pairs that are far from
                 each other then get a lower bound instead, infinitely cheaper.
         """
+        if not self.size:
+            return np.empty((len(q), 0))
         times = np.zeros(len(q)) if times is None else times
         witnesses = np.empty((len(q), self.size, 9))
         if now is None:
             data, chosen, values = self._all, self._every, np.empty((len(q), self.size))
         else:
-            path, data = np.vstack([now[0], q]), self._after
-            later = np.append(0.0, times)
-            bounds, close = lower_bounds(now[1], path, later, self._levers, self._speeds, self._far)
-            chosen, values = data.select(close), bounds[1:]
+            data, (start, there) = self._after, now
+            values, close = lower_bounds(there, start, q, times, self._levers, self._speeds, self._far)
+            chosen = data.select(close)
         for node in range(len(q) if len(chosen) else 0):
             self._measure(data, q[node], times[node], witnesses[node])
         measured(witnesses, chosen, values)

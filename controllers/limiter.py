@@ -4,6 +4,7 @@ import numpy as np
 
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.description import RobotDescription
+from handrail.controllers.jit import jit
 
 _TOLERANCE = 1e-5  # relative; rounding to float32 is no violation
 
@@ -62,13 +63,24 @@ class Limiter:
             v: how fast, (n,).
             shares: of the time until every joint rests, (K,).
         """
-        rest = np.abs(v) / self._limits.acceleration  # (n,)
-        times = shares * rest.max()
-        moving = np.minimum(times[:, None], rest)
-        return q + v * moving - 0.5 * np.sign(v) * self._limits.acceleration * moving**2, times
+        return _stop(q, v, self._limits.acceleration, shares)
 
     def _braking_range(self, q: FloatArray) -> tuple[FloatArray, FloatArray]:
         above = np.maximum(self._limits.position_upper - q, 0.0)
         below = np.maximum(q - self._limits.position_lower, 0.0)
         twice = 2.0 * self._limits.acceleration
         return -np.sqrt(twice * below), np.sqrt(twice * above)
+
+
+@jit
+def _stop(q, v, deceleration, shares):
+    longest = 0.0
+    for j in range(len(v)):
+        longest = max(longest, abs(v[j]) / deceleration[j])
+    path, times = np.empty((len(shares), len(q))), np.empty(len(shares))
+    for k in range(len(shares)):
+        times[k] = shares[k] * longest
+        for j in range(len(v)):
+            moving = min(times[k], abs(v[j]) / deceleration[j])
+            path[k, j] = q[j] + v[j] * moving - 0.5 * np.sign(v[j]) * deceleration[j] * moving**2
+    return path, times

@@ -7,6 +7,7 @@ import numpy as np
 
 from handrail.controllers.arrays import BoolArray, FloatArray
 from handrail.controllers.backup import Backup, Situation
+from handrail.controllers.basis import cut
 from handrail.controllers.certificate import StopCertificate
 from handrail.controllers.channels import Channels
 from handrail.controllers.collision import CollisionModel
@@ -32,6 +33,7 @@ from handrail.controllers.residuals import StageResiduals
 from handrail.controllers.settings import MpcSettings
 from handrail.controllers.shape import Obstacle
 from handrail.controllers.trajectory import Trajectory
+from handrail.controllers.witnesses import smallest_distances
 
 _SOLVER_ERRORS = (HandrailError, ArithmeticError, RuntimeError, ValueError)  # of ours, numpy, CasADi, coal
 
@@ -74,6 +76,8 @@ class MaskedMpc:
         self._times = self.settings.dt * np.arange(1, horizon + 1)
         self._masked: dict[bytes, _Masked] = {}
         self._largest = self._largest_intent()
+        self._reference = np.tile(self.residuals.reference, (horizon, 1))
+        self._frames = self.residuals.parameter_slice("tracking")
         self.reset()
 
     @property
@@ -139,10 +143,10 @@ class MaskedMpc:
         """Return the optimal control problem of a state and an intent."""
         settings, size = self.settings, self.channels.size
         masked = self._of_mask(np.asarray(intent.mask), state.q)
-        reference = np.tile(self.residuals.reference, (settings.horizon, 1))
+        reference = self._reference.copy()
         predicted = np.where(intent.mask, self._predict(intent, self._times), 0.0)
-        reference[:, :size] = np.minimum(np.maximum(predicted, -self._largest), self._largest)
-        self._parameters[self.residuals.parameter_slice("tracking")] = intent.frames.parameters
+        cut(predicted, self._largest, reference)
+        self._parameters[self._frames] = intent.frames.parameters
         return Problem(
             q=state.q,
             v=self._start_velocity(state),
@@ -245,15 +249,13 @@ class MaskedMpc:
         if distances is None:
             return Health(status)
         work = self._collision.work
-        health = Health(
-            status=status,
-            smallest_distance=float(np.min(distances[~work], initial=np.inf)),
-            work_distance=float(np.min(distances[work], initial=np.inf)),
-        )
+        smallest, at_work = smallest_distances(distances, work)
         if plan is None:
-            return health
-        return replace(
-            health,
+            return Health(status, smallest_distance=smallest, work_distance=at_work)
+        return Health(
+            status,
+            smallest_distance=smallest,
+            work_distance=at_work,
             slack=max(plan.collision_slack, plan.limit_slack),
             tracking_error=plan.tracking_error,
             over_determined=self._of_mask(np.asarray(intent.mask), state.q).over_determined,

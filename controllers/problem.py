@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray, frozen
-from handrail.controllers.basis import rollout
+from handrail.controllers.basis import is_motion, largest_share, rollout
 from handrail.controllers.collision import CollisionModel
 from handrail.controllers.description import Limits
 
@@ -103,7 +103,7 @@ class Plan:
         Cutting is monotone, so that no acceleration becomes larger.
         """
         limit = problem.limits.velocity
-        if np.all(np.abs(self.v[1:]) <= limit):
+        if largest_share(self.v[1:], limit) <= 1.0:
             return self
         v = np.vstack([self.v[0], np.minimum(np.maximum(self.v[1:], -limit), limit)])
         u = np.diff(v, axis=0) / problem.dt
@@ -112,9 +112,6 @@ class Plan:
 
     def is_solution(self, problem: Problem, tolerance: float = 1e-6) -> bool:
         """Whether the plan is finite, obeys the dynamics from the state and the hard acceleration limits."""
-        if not self.solved or not np.isfinite(self.u).all():
-            return False
-        q, v = problem.rollout(self.u)
-        if np.any(np.abs(self.u) > problem.limits.acceleration * (1.0 + tolerance) + tolerance):
-            return False
-        return bool(np.abs(q - self.q).max() <= tolerance and np.abs(v - self.v).max() <= tolerance)
+        limit = problem.limits.acceleration
+        motion = problem.q, problem.v, problem.dt, self.u, self.q, self.v
+        return self.solved and is_motion(*motion, limit, tolerance)

@@ -19,7 +19,7 @@ from handrail.controllers.residuals import StageResiduals
 from handrail.controllers.rows import Rows, rows_around
 from handrail.controllers.stage_cost import Quadratic, StageCost
 
-_MORE_STEPS = 3  # at most, in one update
+_MORE_STEPS = 2  # at most, in one update
 _LARGE = 0.2  # change of an acceleration near obstacles that asks for another step, relative to its limit
 _COARSE = 0.01  # share of the promised descent by which a linearised cost may be wrong,
 _SMALL = 0.1  # or of a descent that is this share of the cost

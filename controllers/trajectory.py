@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray, frozen
+from handrail.controllers.jit import jit
 
 
 @dataclass(frozen=True)
@@ -43,7 +44,8 @@ class Trajectory:
 
     def accelerations(self, count: int) -> FloatArray:
         """Return the mean accelerations over intervals dt from now on, (count, n); zero after the end."""
-        return np.diff(self._held(self.dt * np.arange(count + 1)), axis=0) / self.dt
+        velocities = self._held(self.dt * np.arange(count + 1))
+        return (velocities[1:] - velocities[:-1]) / self.dt
 
     def path(self, q: FloatArray, samples: int = 1) -> tuple[FloatArray, FloatArray]:
         """Return where it leads from q: positions, (K, n), and their times from now, (K,) [s].
@@ -61,8 +63,17 @@ class Trajectory:
 
     def _held(self, times: FloatArray) -> FloatArray:
         """Return the velocities at times from now, (K,), the last one held after the end, (K, n)."""
-        last = len(self.velocities) - 1
-        knots = np.minimum((times + self.elapsed) / self.dt, last)
-        index = np.minimum(knots.astype(int), last - 1)
-        weight = (knots - index)[:, None]
-        return (1.0 - weight) * self.velocities[index] + weight * self.velocities[index + 1]
+        return _held(self.velocities, (times + self.elapsed) / self.dt)
+
+
+@jit
+def _held(velocities, knots):
+    last, n = len(velocities) - 1, velocities.shape[1]
+    result = np.empty((len(knots), n))
+    for k in range(len(knots)):
+        knot = min(knots[k], float(last))
+        index = min(int(knot), last - 1)
+        weight = knot - index
+        for j in range(n):
+            result[k, j] = (1.0 - weight) * velocities[index, j] + weight * velocities[index + 1, j]
+    return result

@@ -18,13 +18,14 @@ def signed(witness):
 
 
 @jit
-def lower_bounds(now, path, times, levers, speeds, reach):
+def lower_bounds(now, start, path, times, levers, speeds, reach):
     """Return how near each pair can be along a path, (K, P) [m], and whether it can come below its reach.
 
-    `d_p(q_k) ≥ d_p(q_0) - Σ_j L_jp |q_k - q_0|_j - |v_p| t_k`.
+    `d_p(q_k) ≥ d_p(q) - Σ_j L_jp |q_k - q|_j - |v_p| t_k`.
 
     Args:
-        now: distances at the first configuration, (P,) [m].
+        now: distances at the start, (P,) [m].
+        start: q, (n,).
         path: configurations, (K, n).
         times: of them [s], (K,).
         levers: L, (n, P).
@@ -38,7 +39,7 @@ def lower_bounds(now, path, times, levers, speeds, reach):
         for p in range(pairs):
             bounds[k, p] = now[p] - speeds[p] * times[k]
         for j in range(path.shape[1]):
-            moved = abs(path[k, j] - path[0, j])
+            moved = abs(path[k, j] - start[j])
             if moved > 0.0:
                 for p in range(pairs):
                     bounds[k, p] -= levers[j, p] * moved
@@ -97,3 +98,20 @@ def _add_gradient(witness, start, jacobian, moves, sign, out):
             linear = nx * jacobian[0, j] + ny * jacobian[1, j] + nz * jacobian[2, j]
             angular = mx * jacobian[3, j] + my * jacobian[4, j] + mz * jacobian[5, j]
             out[j] += sign * (linear + angular)
+
+
+@jit
+def smallest_distances(distances, work):
+    """Return the smallest of all pairs but tools against work surfaces, and of those; infinite if none [m].
+
+    Args:
+        distances: (P,) [m].
+        work: which pairs are a tool against a work surface, (P,).
+    """
+    smallest, at_work = np.inf, np.inf
+    for p in range(len(distances)):
+        if work[p]:
+            at_work = min(at_work, distances[p])
+        else:
+            smallest = min(smallest, distances[p])
+    return smallest, at_work
