@@ -23,7 +23,7 @@ def filter_settings(period: float = 0.05, steps: int = 5, decay: float = 0.85) -
 
     `‖u_L - u_0‖² + Σ_{h=1}^{M-1} wʰ ‖û_h - v_h‖²`, u_L the command now and û_h the predicted ones, held
     constant unless the MPC is given another prediction. After the M tracked stages nothing but the limits
-    counts: they are the way to a stop. Many steps make the filter step in earlier and chatter less; with
+    counts: they are the way to a stop. Many steps let the filter step in earlier, to chatter less; with
     `steps=1` it is the classical one-step filter.
 
     Args:

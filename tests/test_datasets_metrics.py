@@ -103,6 +103,7 @@ def test_corrections_are_counted_when_they_switch():
     assert corrections(asked, commanded, owned & [False, True]) == 4
     assert corrections(asked, commanded, owned & False) == 0
     assert corrections(asked[:3], commanded[:3], owned[:3]) == 1  # the end switches nothing off
+    assert corrections(asked[1:3], commanded[1:3], owned[1:3]) == 1  # and before the beginning it is off
     assert corrections(asked, asked + 0.009, owned) == 0
 
 

@@ -6,12 +6,13 @@ from collect_helpers import environment
 from fuzz_helpers import run
 
 from handrail.controllers.mpc import MaskedMpc
+from handrail.controllers.safety_filter import safety_filter
 from handrail.controllers.threads import single_threaded
 
 
-def check(seeds, seconds):
+def check(seeds, seconds, make=MaskedMpc):
     with environment("Reach") as env, single_threaded():
-        controller = MaskedMpc(env.model)
+        controller = make(env.model)
         results = [run(env, controller, seed, seconds) for seed in seeds]
     smallest = np.array([result.smallest for result in results])
     contacts = {seed: r.contact_names for seed, r in zip(seeds, results, strict=True) if r.contacts}
@@ -26,8 +27,9 @@ def check(seeds, seconds):
     return statuses
 
 
-def test_rude_intents_in_clutter():
-    statuses = check(range(1000, 1004), seconds=5.0)
+@pytest.mark.parametrize("make", [MaskedMpc, safety_filter])
+def test_rude_intents_in_clutter(make):
+    statuses = check(range(1000, 1004), 5.0, make)
     assert {"ok", "invalid_intent"} <= set(statuses)
 
 
