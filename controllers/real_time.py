@@ -36,6 +36,7 @@ class _Guess(NamedTuple):
     u: FloatArray
     nodes: Nodes
     distances: Distances
+    depth: float  # by which pairs overlap that do not now, or not as much [m]
 
 
 class RealTimeSolver:
@@ -113,14 +114,15 @@ class RealTimeSolver:
         """Return what to linearise around: the guess, or a full stop where the guess runs into something.
 
         Inside an obstacle the nearest way out may be the far side, so a colliding guess would be pulled
-        through; the stop is free of collision, since the last update made sure that it is.
+        through; the stop is free of collision, since the last update made sure that it is. Where an obstacle
+        comes at the robot neither may be, and the one is taken that runs into it less.
         """
         begin = _measured(problem, *_rolled_out(problem, guess, np.zeros_like(guess)))
-        values = begin.distances.values
-        if not values.size or (values >= np.minimum(values[0], 0.0)).all():
+        if begin.depth <= 0.0:
             return begin
         stop = _stop(problem)
-        return _measured(problem, *_rolled_out(problem, stop, np.zeros_like(stop)))
+        stopped = _measured(problem, *_rolled_out(problem, stop, np.zeros_like(stop)))
+        return stopped if stopped.depth <= begin.depth else begin
 
     def _solve(self, problem: Problem, quadratic: Quadratic, rows: Rows) -> "_Answer":
         """Solve the QP; its step is left in `_motion`."""
@@ -202,7 +204,9 @@ def _rolled_out(problem: Problem, guess: FloatArray, change: FloatArray) -> tupl
 def _measured(problem: Problem, q: FloatArray, v: FloatArray, u: FloatArray) -> _Guess:
     nodes = Nodes(problem, q, v)
     distances = problem.collision.distances(nodes.q, problem.margins + problem.reach, nodes.times)
-    return _Guess(q, v, u, nodes, distances)
+    values = distances.values
+    depth = float((np.minimum(values[0], 0.0) - values).max()) if values.size else 0.0
+    return _Guess(q, v, u, nodes, distances, depth)
 
 
 def _penalty(problem: Problem, slack: FloatArray) -> float:
