@@ -12,6 +12,7 @@ from handrail.controllers.problem import Plan
 from handrail.controllers.trajectory import Trajectory
 
 _SAMPLES = 2  # of a plan's stage
+_SAME = 1e-6  # difference of velocities that is rounding [m/s, rad/s]
 
 
 @dataclass(frozen=True)
@@ -20,15 +21,13 @@ class Situation:
 
     Attributes:
         q: measured position, (n,).
-        v: measured velocity, (n,).
-        start: velocity that a command begins with, (n,).
+        v: velocity that a command begins with: the commanded one, if the robot follows it, (n,).
         distances: signed distances of all pairs, (P,) [m].
         elapsed: time since the last update [s].
     """
 
     q: FloatArray
     v: FloatArray
-    start: FloatArray
     distances: FloatArray
     elapsed: float
 
@@ -54,7 +53,8 @@ class Backup:
     1. The new plan, if a full stop after its first stage is safe; that stage and stop are stored.
     2. The new plan, if its own path and a full stop from its end are safe, or from half way, or half of that;
        these are stored.
-    3. What is stored, from where it is now. Only while the robot follows it.
+    3. What is stored, from where it is now; only if the robot is on it: not when it was pushed away, nor when
+       an update comes so late that more than was stored has been driven.
     4. A full stop at once.
 
     An operator who is gone or talks nonsense has no plan, and wants 4 before 3. Where no way is safe,
@@ -64,17 +64,12 @@ class Backup:
         certificate: measures the ways.
         limiter: knows the full stop.
         dt: time between knots [s].
-        tolerance: difference of the measured velocity from the stored one up to which the robot follows,
-            (n,).
     """
 
-    def __init__(
-        self, certificate: StopCertificate, limiter: Limiter, dt: float, tolerance: FloatArray
-    ) -> None:
+    def __init__(self, certificate: StopCertificate, limiter: Limiter, dt: float) -> None:
         self._certificate = certificate
         self._limiter = limiter
         self._dt = dt
-        self._tolerance = tolerance
         self._stored: Trajectory | None = None
 
     def choose(self, situation: Situation, plan: Plan | None, halt: bool = False) -> Way:
@@ -110,7 +105,7 @@ class Backup:
             yield self._stop(situation)
         if self._stored is not None:
             rest = self._stopping(self._stored).after(situation.elapsed)
-            if np.all(np.abs(situation.v - rest.velocity(0.0)) <= self._tolerance):
+            if np.allclose(situation.v, rest.velocity(0.0), rtol=0.0, atol=_SAME):
                 yield Way(rest, self._certificate.until_rest(*rest.path(situation.q), now))
         if not halt:
             yield self._stop(situation)
@@ -128,8 +123,8 @@ class Backup:
 
     def _stop(self, situation: Situation) -> Way:
         now = situation.q, situation.distances
-        shortfall = self._certificate.shortfall(situation.q, situation.start, now)
-        return Way(self._braking(situation.start), shortfall)
+        shortfall = self._certificate.shortfall(situation.q, situation.v, now)
+        return Way(self._braking(situation.v), shortfall)
 
     def _braking(self, velocity: FloatArray) -> Trajectory:
         """Return a full stop from a velocity, (n,)."""

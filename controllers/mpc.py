@@ -99,7 +99,7 @@ class MaskedMpc:
             self.model.description.limits,
             settings.horizon * settings.dt,
         )
-        self._backup = Backup(certificate, self._limiter, settings.dt, self._tolerance)
+        self._backup = Backup(certificate, self._limiter, settings.dt)
         self._parameters = self.residuals.parameters
         self._plan: Plan | None = None
         self._followed: Followed | None = None
@@ -202,7 +202,7 @@ class MaskedMpc:
             velocity = self._followed.velocity(state.time) if known else np.zeros(self.model.size)
             return self._backup.brake(velocity), False
         elapsed = 0.0 if self._followed is None else self._followed.elapsed(state.time)
-        situation = Situation(state.q, state.v, self._start_velocity(state), distances, elapsed)
+        situation = Situation(state.q, self._start_velocity(state), distances, elapsed)
         halt = status in (Status.INVALID_INTENT, Status.STALE_INTENT)
         way = self._backup.choose(situation, plan, halt)
         if plan is not None and way.planned:

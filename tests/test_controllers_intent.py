@@ -180,7 +180,7 @@ def test_the_certificate_measures_the_stop():
         wall = Obstacle("wall", Shape("box", [0.2, 4.0, 0.2]), [HOME[0] + 0.48 + gap + 0.1, 0.0, 0.1])
         collision = CollisionModel(MODEL, (wall,))
         certificate = StopCertificate(
-            limiter, collision, np.full(collision.size, 0.03), MODEL.description.limits
+            limiter, collision, np.full(collision.size, 0.03), MODEL.description.limits, span=1.0
         )
         now = collision.values(HOME[None])[0]
         shortfall = certificate.shortfall(HOME, v, (HOME, now))

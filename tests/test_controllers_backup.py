@@ -1,0 +1,208 @@
+"""The backup's laws: whatever fails, the robot comes to rest without contact and inside its limits."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from backup_helpers import HOME, LIMITS, MODEL, PERIOD, Robot, asking, clutter, table
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from handrail.controllers.certificate import StopCertificate
+from handrail.controllers.collision import CollisionModel
+from handrail.controllers.command import Status
+from handrail.controllers.controller import State
+from handrail.controllers.errors import HandrailError
+from handrail.controllers.intent import Intent
+from handrail.controllers.limiter import Limiter
+from handrail.controllers.mpc import MaskedMpc
+from handrail.controllers.shape import Obstacle, Shape
+
+MPC = MaskedMpc(MODEL)
+CHANNELS = MPC.channels
+LIMITER = Limiter(MODEL.description)
+HONEST = MPC.solver.solve
+FLOOR = 0.03 - 2e-3  # what the settings ask for, less what counts as no loss
+AHEAD = asking(CHANNELS, np.eye(18)[0] * 0.6, "base")
+
+
+def raises(error):
+    def solve(problem, guess):
+        raise error
+
+    return solve
+
+
+def unsolved(problem, guess):
+    return replace(HONEST(problem, guess), solved=False)
+
+
+def not_a_number(problem, guess):
+    plan = HONEST(problem, guess)
+    return replace(plan, u=plan.u * np.nan, v=plan.v * np.nan, q=plan.q * np.nan)
+
+
+FAILURES = [raises(HandrailError("no")), raises(RuntimeError("no")), unsolved, not_a_number]
+
+
+def full_stop(robot):
+    """Return the smallest distance to obstacles along the full stop from where the robot is now [m]."""
+    collision = robot.controller._collision
+    path, _ = LIMITER.stop(robot.q, robot.v, np.linspace(0.0, 1.0, 21))
+    scene = np.array([second == "table" for _, second in collision.pairs])
+    return float(collision.values(path)[:, scene].min())
+
+
+def random_intent(rng):
+    mask = CHANNELS.mask(*[("ee",), ("base",), ("base", "ee"), ("joint",)][rng.integers(4)])
+    values = np.concatenate([[1, 1, 0.4], [0.6] * 3, [1] * 3, 0.5 * LIMITS.velocity]) * rng.uniform(-1, 1, 18)
+    return lambda time: Intent(np.where(mask, values, 0.0), mask, time=time)
+
+
+def assert_within_limits(robot):
+    steps = np.abs(robot.steps)
+    assert np.all(steps <= LIMITS.acceleration * robot.period * (1 + 1e-6) + 1e-9)
+    assert all(np.all(np.abs(c.velocities) <= LIMITS.velocity + 1e-9) for c in robot.commands)
+
+
+@pytest.mark.parametrize("height", [-0.05, 0.0])
+def test_the_robot_drives_on_where_its_own_path_is_safe_and_a_full_stop_is_not(height):
+    """Up to a table, the hand at the height of its edge: the arm rises while the base rolls on."""
+    robot = Robot(MPC, (table(height),))
+    stops = []
+    for _ in range(100):
+        command = robot.update(AHEAD(robot.time))
+        assert command.health.status is Status.OK
+        stops.append(full_stop(robot))
+    assert min(stops) < FLOOR
+    assert robot.smallest > FLOOR
+    assert robot.q[0] - HOME[0] > 1.0
+
+
+@pytest.mark.parametrize("height", [-0.05, 0.0])
+@pytest.mark.parametrize("trouble", ["solver", "stale"])
+def test_what_was_stored_is_followed_where_a_full_stop_is_not_safe(monkeypatch, trouble, height):
+    """The trouble comes at the worst moment of the same way."""
+    robot, stops = Robot(MPC, (table(height),)), []
+    for _ in range(60):
+        robot.update(AHEAD(robot.time))
+        stops.append(full_stop(robot))
+    worst = int(np.argmin(stops)) + 1
+    robot = Robot(MPC, (table(height),))
+    for _ in range(worst):
+        robot.update(AHEAD(robot.time))
+    assert full_stop(robot) < FLOOR
+    if trouble == "solver":
+        monkeypatch.setattr(MPC.solver, "solve", unsolved)
+    for _ in range(50):
+        command = robot.update(AHEAD(robot.time - (trouble == "stale")))
+        assert command.health.status is (Status.STALE_INTENT if trouble == "stale" else Status.SOLVER_FAILED)
+    assert robot.smallest > FLOOR
+    np.testing.assert_allclose(robot.v, 0.0, atol=1e-3)
+    assert_within_limits(robot)
+
+
+@pytest.mark.parametrize("speed", [0.0, 0.3])
+@pytest.mark.parametrize("seed", range(6))
+def test_a_solver_that_fails_for_good_leaves_the_robot_at_rest_without_contact(monkeypatch, seed, speed):
+    rng = np.random.default_rng([seed, int(10 * speed)])
+    robot = Robot(MPC, clutter(rng, speed=speed))
+    intent, updates = random_intent(rng), int(rng.integers(10, 60))
+    for k in range(updates):
+        if k % 12 == 11:
+            intent = random_intent(rng)
+        robot.update(intent(robot.time))
+    monkeypatch.setattr(MPC.solver, "solve", FAILURES[seed % len(FAILURES)])
+    while np.abs(robot.v).max() > 1e-9:
+        assert robot.update(intent(robot.time)).health.status is Status.SOLVER_FAILED
+        assert len(robot.commands) < updates + 45  # one stage and one stop, or a plan and one
+    assert robot.smallest > 0.0
+    assert_within_limits(robot)
+
+
+@pytest.mark.parametrize("period", [0.02, 0.05, 0.07, 0.13])
+def test_no_change_of_mind_exceeds_a_limit(monkeypatch, period):
+    """Plans, what is stored and stops follow each other at random, at periods that divide no stage."""
+    rng = np.random.default_rng(int(1000 * period))
+
+    def moody(problem, guess):
+        return HONEST(problem, guess) if rng.random() < 0.7 else unsolved(problem, guess)
+
+    monkeypatch.setattr(MPC.solver, "solve", moody)
+    robot = Robot(MPC, clutter(rng), period)
+    for k in range(150):
+        if k % 10 == 0:
+            intent = random_intent(rng)
+        trouble, state = rng.random(), None
+        stamp = robot.time - 1.0 if trouble < 0.1 else robot.time
+        if 0.1 < trouble < 0.15:
+            state = replace(robot.state, q=np.full(9, np.nan))
+        if 0.15 < trouble < 0.2 and k > 1:  # a period is known
+            state = replace(robot.state, time=np.nan)
+        robot.update(intent(stamp), state)
+    statuses = {command.health.status for command in robot.commands}
+    assert {Status.OK, Status.SOLVER_FAILED, Status.STALE_INTENT, Status.INVALID_STATE} <= statuses
+    assert robot.smallest > 0.0
+    assert_within_limits(robot)
+
+
+def test_a_robot_that_was_pushed_brakes_from_where_it_is(monkeypatch):
+    robot = Robot(MPC)
+    for _ in range(10):
+        robot.update(AHEAD(robot.time))
+    robot.v = robot.v + np.eye(9)[1] * 0.5
+    monkeypatch.setattr(MPC.solver, "solve", unsolved)
+    command = robot.update(AHEAD(robot.time))
+    start = command.velocity(0.0)
+    assert start[1] == pytest.approx(0.5 - 0.1 * LIMITS.velocity[1], abs=1e-6)  # as near as is trusted
+    expected = np.sign(start) * np.maximum(np.abs(start) - LIMITS.acceleration * PERIOD, 0.0)
+    np.testing.assert_allclose(robot.v[:2], expected[:2], atol=1e-9)
+
+
+@settings(max_examples=30, deadline=None)
+@given(
+    arrays(float, (10, 9), elements=st.floats(-1, 1)),
+    arrays(float, 9, elements=st.floats(-1, 1)),
+)
+def test_a_plan_within_the_limits_is_still_a_plan(accelerations, velocity):
+    """Cutting velocities keeps the dynamics and the accelerations' limits, and changes nothing inside."""
+    MPC.reset()
+    problem = MPC.problem(State(HOME, velocity * LIMITS.velocity), Intent.idle(CHANNELS))
+    honest = HONEST(problem, np.zeros((10, 9)))
+    u = accelerations * LIMITS.acceleration
+    q, v = problem.rollout(u)
+    plan = replace(honest, q=q, v=v, u=u).within(problem)
+    assert plan.is_solution(problem)
+    assert np.all(np.abs(plan.v) <= LIMITS.velocity + 1e-9)
+    if np.all(np.abs(v) <= LIMITS.velocity):
+        np.testing.assert_array_equal(plan.u, u)
+
+
+def test_a_solver_that_ignores_velocity_limits_is_cut_to_them(monkeypatch):
+    def hasty(problem, guess):
+        plan = HONEST(problem, guess)
+        u = np.tile(LIMITS.acceleration * (np.arange(9) == 0), (10, 1))
+        q, v = problem.rollout(u)
+        return replace(plan, q=q, v=v, u=u)
+
+    monkeypatch.setattr(MPC.solver, "solve", hasty)
+    robot = Robot(MPC)
+    for _ in range(25):
+        assert robot.update(AHEAD(robot.time)).health.status is Status.OK
+    np.testing.assert_allclose(robot.v[0], LIMITS.velocity[0], rtol=2e-3)
+    assert_within_limits(robot)
+
+
+def test_where_obstacles_move_rest_is_not_safe_for_ever():
+    """A pillar comes to a robot that stands: safe as long as it is farther than the span."""
+    for away, safe in ((0.35, False), (1.0, True)):
+        x = HOME[0] + 0.48 + 0.2 + away
+        pillar = Obstacle(
+            "pillar", Shape("cylinder", [0.2, 0.25]), [x, 0.0, 0.125], velocity=[-0.5, 0.0, 0.0]
+        )
+        collision = CollisionModel(MODEL, (pillar,))
+        certificate = StopCertificate(LIMITER, collision, np.full(collision.size, 0.03), LIMITS, span=1.0)
+        now = collision.values(HOME[None])[0]
+        shortfall = certificate.shortfall(HOME, np.zeros(9), (HOME, now))
+        assert shortfall == pytest.approx(0.0 if safe else 0.5 - away + 0.03, abs=1e-6)
