@@ -7,7 +7,6 @@ import numpy as np
 
 from handrail.controllers.arrays import BoolArray, FloatArray
 from handrail.controllers.backup import Backup, Situation
-from handrail.controllers.basis import cut
 from handrail.controllers.certificate import StopCertificate
 from handrail.controllers.channels import Channels
 from handrail.controllers.collision import CollisionModel
@@ -19,6 +18,7 @@ from handrail.controllers.guard import check_inputs
 from handrail.controllers.intent import Intent
 from handrail.controllers.limiter import Limiter
 from handrail.controllers.model import RobotModel
+from handrail.controllers.motion import cut
 from handrail.controllers.objective import Objective
 from handrail.controllers.objectives.regularisation import (
     acceleration_regularisation,

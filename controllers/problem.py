@@ -5,9 +5,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray, frozen
-from handrail.controllers.basis import is_motion, largest_share, rollout
 from handrail.controllers.collision import CollisionModel
 from handrail.controllers.description import Limits
+from handrail.controllers.motion import is_motion, largest_share, rollout
 
 
 @dataclass(frozen=True)

@@ -10,9 +10,9 @@ from handrail.controllers import active_set
 from handrail.controllers.active_rows import active_rows
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.banded import factor
-from handrail.controllers.basis import clipped_sum, largest_share
 from handrail.controllers.collision import Distances
 from handrail.controllers.constraints import SLACKS
+from handrail.controllers.motion import clipped_sum, largest_share
 from handrail.controllers.nodes import Nodes
 from handrail.controllers.problem import Plan, Problem
 from handrail.controllers.residuals import StageResiduals
