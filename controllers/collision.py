@@ -105,7 +105,7 @@ class CollisionModel:
         if not self.size:
             return _nothing(len(q), self._model.nv)
         times = np.zeros(len(q)) if times is None else times
-        reaches = np.broadcast_to(np.asarray(reach, dtype=np.float64), (self.size,)).copy()
+        reaches = reach if isinstance(reach, np.ndarray) else np.full(self.size, float(reach))
         witnesses = np.empty((len(q), self.size, 9))
         jacobians = np.empty((len(q), 6, self._model.nv))
         self._measure(self._all, q[0], times[0], witnesses[0])

@@ -1,6 +1,5 @@
 """The real-time solver: Gauss-Newton steps, each a banded QP solved by a warm-started active-set method."""
 
-from dataclasses import replace
 from time import perf_counter
 from typing import NamedTuple
 
@@ -18,7 +17,9 @@ from handrail.controllers.problem import Plan, Problem
 from handrail.controllers.residuals import StageResiduals
 from handrail.controllers.rows import Rows, rows_around
 from handrail.controllers.stage_cost import Quadratic, StageCost
+from handrail.controllers.witnesses import depth
 
+_PHASES = ("distances", "residuals", "solve")
 _MORE_STEPS = 2  # at most, in one update
 _LARGE = 0.2  # change of an acceleration near obstacles that asks for another step, relative to its limit
 _COARSE = 0.01  # share of the promised descent by which a linearised cost may be wrong,
@@ -62,18 +63,29 @@ class RealTimeSolver:
         Right after the intent or the scene has jumped, the guess is far off; a step that is still large, and
         did not lead where its linearisation said, is followed by another.
         """
-        plan, again = self._step(problem, guess)
-        for _ in range(_MORE_STEPS):
-            if not again:
+        spent = np.zeros(len(_PHASES))
+        for _ in range(1 + _MORE_STEPS):
+            step = self._step(problem, guess, spent)
+            if not step.again:
                 break
-            spent = plan.phases
-            plan, again = self._step(problem, plan.u)
-            phases = [(name, a + b) for (name, a), (_, b) in zip(spent, plan.phases, strict=True)]
-            plan = replace(plan, phases=tuple(phases))
-        return plan
+            guess = step.moved.u
+        slack = step.answer.slack
+        return Plan(
+            q=step.moved.q,
+            v=step.moved.v,
+            u=step.moved.u,
+            collision_slack=float(slack[0]),
+            limit_slack=float(slack[1]),
+            distances=step.distances,
+            solved=step.answer.solved,
+            iterations=step.answer.changes,
+            tracking_error=self.cost.tracking_error(problem),
+            rows=step.rows,
+            phases=tuple(zip(_PHASES, spent.tolist(), strict=True)),
+        )
 
-    def _step(self, problem: Problem, guess: FloatArray) -> tuple[Plan, bool]:
-        """Return the plan after one step, and whether another is worth while."""
+    def _step(self, problem: Problem, guess: FloatArray, spent: FloatArray) -> "_Step":
+        """Take one step; add the time that its phases take."""
         start = perf_counter()
         begin = self._linearisation(problem, guess)
         rows = rows_around(problem, begin[:3], begin.nodes, begin.distances, self.cost.matrix)
@@ -83,25 +95,8 @@ class RealTimeSolver:
         answer = self._solve(problem, quadratic, rows)
         moved = self._damped(problem, begin.u, quadratic.value, answer.slack, rows.needed)
         again = answer.solved and self._is_far(problem, quadratic.value, answer, moved)
-        done = perf_counter()
-        plan = Plan(
-            q=moved.q,
-            v=moved.v,
-            u=moved.u,
-            collision_slack=float(answer.slack[0]),
-            limit_slack=float(answer.slack[1]),
-            distances=begin.distances.values[0],
-            solved=answer.solved,
-            iterations=answer.changes,
-            tracking_error=self.cost.tracking_error(problem),
-            rows=len(rows.names),
-            phases=(
-                ("distances", measured - start),
-                ("residuals", built - measured),
-                ("solve", done - built),
-            ),
-        )
-        return plan, again
+        spent += measured - start, built - measured, perf_counter() - built
+        return _Step(answer, moved, begin.distances.values[0], len(rows.names), again)
 
     def _is_far(self, problem: Problem, before: float, answer: "_Answer", moved: "_Moved") -> bool:
         """Whether a step's linearisation was too coarse: of the cost, or of distances after a large step."""
@@ -184,6 +179,16 @@ class _Answer(NamedTuple):
     near: bool
 
 
+class _Step(NamedTuple):
+    """A step, the distances now, (P,), the number of distance rows, and whether to take another."""
+
+    answer: _Answer
+    moved: "_Moved"
+    distances: FloatArray
+    rows: int
+    again: bool
+
+
 class _Moved(NamedTuple):
     """A step taken: the motion after it, the change of the accelerations, the cost."""
 
@@ -204,9 +209,7 @@ def _rolled_out(problem: Problem, guess: FloatArray, change: FloatArray) -> tupl
 def _measured(problem: Problem, q: FloatArray, v: FloatArray, u: FloatArray) -> _Guess:
     nodes = Nodes(problem, q, v)
     distances = problem.collision.distances(nodes.q, problem.margins + problem.reach, nodes.times)
-    values = distances.values
-    depth = float((np.minimum(values[0], 0.0) - values).max()) if values.size else 0.0
-    return _Guess(q, v, u, nodes, distances, depth)
+    return _Guess(q, v, u, nodes, distances, depth(distances.values))
 
 
 def _penalty(problem: Problem, slack: FloatArray) -> float:

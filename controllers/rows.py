@@ -32,22 +32,15 @@ class Rows:
 
     def any_distance(self, keys: IntArray) -> bool:
         """Whether there are distance rows among some keys."""
-        return bool(len(keys)) and int(keys.max()) >= first_distance(*self.constraints.guess.shape)
+        return bool(_largest(keys) >= first_distance(*self.constraints.guess.shape))
 
     def keys(self, names: IntArray) -> IntArray:
         """Return the keys of rows that were named in an earlier update, as far as they still exist."""
-        first = first_distance(*self.constraints.guess.shape)
-        found = np.flatnonzero(np.isin(self.names, names)) if len(self.names) else np.zeros(0, dtype=np.int64)
-        return np.concatenate([names[names < first], first + found])
+        return _keys(names, self.names, first_distance(*self.constraints.guess.shape))
 
     def named(self, keys: IntArray) -> IntArray:
         """Return the lasting names of keys."""
-        first = first_distance(*self.constraints.guess.shape)
-        names = keys.copy()
-        distances = keys >= first
-        if distances.any():
-            names[distances] = self.names[keys[distances] - first]
-        return names
+        return _names(keys, self.names, first_distance(*self.constraints.guess.shape))
 
 
 def rows_around(
@@ -118,3 +111,36 @@ def _rows(matrix, q, v, u, limits, near, gradients, values, margins, gains):
         kept += 1
     needed[1] = max(over[0], over[1] / VELOCITY_SLACK)
     return (matrix, guess, acceleration, offsets, scales, stage, coefficients, left), names, needed
+
+
+@jit
+def _largest(keys):
+    largest = -1
+    for index in range(len(keys)):
+        largest = max(largest, keys[index])
+    return largest
+
+
+@jit
+def _keys(names, existing, first):
+    """Return the keys of names: themselves below the first distance row, else where they are found."""
+    keys, count = np.empty(len(names), dtype=np.int64), 0
+    for name in names:
+        if name < first:
+            keys[count] = name
+            count += 1
+    for row in range(len(existing)):
+        for name in names:
+            if name == existing[row]:
+                keys[count] = first + row
+                count += 1
+                break
+    return keys[:count]
+
+
+@jit
+def _names(keys, existing, first):
+    names = np.empty(len(keys), dtype=np.int64)
+    for index in range(len(keys)):
+        names[index] = keys[index] if keys[index] < first else existing[keys[index] - first]
+    return names

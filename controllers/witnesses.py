@@ -115,3 +115,17 @@ def smallest_distances(distances, work):
         else:
             smallest = min(smallest, distances[p])
     return smallest, at_work
+
+
+@jit
+def depth(values):
+    """Return by how much pairs overlap along a path that do not at its start, or not as much [m].
+
+    Args:
+        values: distances, (K, P) [m].
+    """
+    deepest = 0.0
+    for k in range(values.shape[0]):
+        for p in range(values.shape[1]):
+            deepest = max(deepest, min(values[0, p], 0.0) - values[k, p])
+    return deepest
