@@ -3,16 +3,19 @@
 import numpy as np
 import pytest
 from collect_helpers import environment
-from fuzz_helpers import run
+from fuzz_helpers import failing, run
 
 from handrail.controllers.mpc import MaskedMpc
 from handrail.controllers.threads import single_threaded
 
 
-def check(seeds, seconds):
+def check(seeds, seconds, failures=0.0):
     with environment("Reach") as env, single_threaded():
         controller = MaskedMpc(env.model)
-        results = [run(env, controller, seed, seconds) for seed in seeds]
+        results = []
+        for seed in seeds:
+            with failing(controller, seed, failures):
+                results.append(run(env, controller, seed, seconds))
     smallest = np.array([result.smallest for result in results])
     contacts = {seed: r.contact_names for seed, r in zip(seeds, results, strict=True) if r.contacts}
     statuses = {}
@@ -31,6 +34,16 @@ def test_rude_intents_in_clutter():
     assert {"ok", "invalid_intent"} <= set(statuses)
 
 
+def test_rude_intents_in_clutter_with_a_solver_that_fails():
+    statuses = check(range(1000, 1004), seconds=5.0, failures=0.05)
+    assert statuses["solver_failed"] > 20
+
+
 @pytest.mark.slow
 def test_rude_intents_in_clutter_at_length():
     check(range(200), seconds=20.0)
+
+
+@pytest.mark.slow
+def test_rude_intents_in_clutter_with_a_solver_that_fails_at_length():
+    check(range(50), seconds=20.0, failures=0.05)
