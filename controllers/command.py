@@ -10,19 +10,19 @@ from handrail.controllers.trajectory import Trajectory
 
 
 class Status(StrEnum):
-    """How an update went; everything but `ok` and `clipped` brakes the robot."""
+    """How an update went; with everything but `ok` and `clipped` it comes to rest."""
 
     OK = "ok"
     CLIPPED = "clipped"  # a direct command that the limits cut
     INVALID_INTENT = "invalid_intent"  # wrong size, NaN or infinite
     INVALID_STATE = "invalid_state"
     STALE_INTENT = "stale_intent"
-    SOLVER_FAILED = "solver_failed"
-    BACKUP = "backup"  # neither the plan nor a stop out of it was safe: the stored backup is followed
+    SOLVER_FAILED = "solver_failed"  # the stored backup is followed
+    BACKUP = "backup"  # the plan leaves no safe way out: the stored backup is followed
 
     @property
     def brakes(self) -> bool:
-        """Whether the command of this update brakes the robot."""
+        """Whether the command of this update leads to rest instead of following a new plan."""
         return self not in (Status.OK, Status.CLIPPED)
 
 

@@ -20,10 +20,10 @@ TRAIL = 5  # positions looked at in a period
 class Robot:
     """Follows commands exactly; remembers commands and the smallest true distance to anything."""
 
-    def __init__(self, controller, obstacles=(), period=PERIOD):
+    def __init__(self, controller, obstacles=(), period=PERIOD, q=HOME):
         controller.reset(obstacles)
         self.controller, self.period = controller, period
-        self.q, self.v, self.time = np.array(HOME), np.zeros(MODEL.size), 0.0
+        self.q, self.v, self.time = np.array(q), np.zeros(MODEL.size), 0.0
         self.smallest, self.commands, self.steps = np.inf, [], []
         self._obstacles = obstacles
         self._truth = CollisionModel(MODEL, obstacles)
@@ -49,6 +49,10 @@ class Robot:
         self.v = after
         self.commands.append(command)
         return command
+
+    def put(self, *obstacles):
+        """Put the obstacles somewhere else."""
+        self._obstacles = obstacles
 
     def _look(self):
         still = tuple(replace(o, velocity=np.zeros(3)) for o in self._seen(self.time))

@@ -1,5 +1,7 @@
 """Random cluttered scenes and random, rude intents, for the safety fuzz."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,11 +11,14 @@ from handrail.collect.env import HandrailEnv
 from handrail.collect.scene import Scene, SceneObject, View
 from handrail.collect.tasks.reach import Reach
 from handrail.collect.tasks.task import Episode
+from handrail.controllers.arrays import FloatArray
 from handrail.controllers.collision import CollisionModel
 from handrail.controllers.command import Status
+from handrail.controllers.errors import HandrailError
 from handrail.controllers.frames import Frames
 from handrail.controllers.intent import Intent
 from handrail.controllers.mpc import MaskedMpc
+from handrail.controllers.problem import Plan, Problem
 from handrail.controllers.shape import Shape
 
 GROUPS = [
@@ -115,6 +120,23 @@ class RudeOperator:
         elif trouble < 0.20:
             values = values + rng.normal(0, 0.5, size)
         return Intent(values, mask, time=stamp, frames=frames)
+
+
+@contextmanager
+def failing(controller: MaskedMpc, seed: int, share: float) -> Iterator[None]:
+    """Let the solver fail at random, now and then for a while."""
+    rng, honest, until = np.random.default_rng([seed, 2]), controller.solver.solve, 0
+
+    def solve(problem: Problem, guess: FloatArray) -> Plan:
+        nonlocal until
+        if until > 0 or rng.random() < share:
+            until = until - 1 if until else int(rng.integers(0, 20))
+            raise HandrailError("the solver fails on purpose")
+        return honest(problem, guess)
+
+    controller.solver.solve = solve
+    yield
+    controller.solver.solve = honest
 
 
 def run(env: HandrailEnv, controller: MaskedMpc, seed: int, seconds: float) -> FuzzResult:

@@ -27,6 +27,17 @@ FLOOR = 0.03 - 2e-3  # what the settings ask for, less what counts as no loss
 AHEAD = asking(CHANNELS, np.eye(18)[0] * 0.6, "base")
 
 
+def reckless(joint):
+    """Return a solver that speeds a joint up as fast as it can, whatever is in its way."""
+
+    def solve(problem, guess):
+        u = np.tile(LIMITS.acceleration * (np.arange(9) == joint), (10, 1))
+        q, v = problem.rollout(u)
+        return replace(HONEST(problem, guess), q=q, v=v, u=u)
+
+    return solve
+
+
 def raises(error):
     def solve(problem, guess):
         raise error
@@ -180,18 +191,40 @@ def test_a_plan_within_the_limits_is_still_a_plan(accelerations, velocity):
 
 
 def test_a_solver_that_ignores_velocity_limits_is_cut_to_them(monkeypatch):
-    def hasty(problem, guess):
-        plan = HONEST(problem, guess)
-        u = np.tile(LIMITS.acceleration * (np.arange(9) == 0), (10, 1))
-        q, v = problem.rollout(u)
-        return replace(plan, q=q, v=v, u=u)
-
-    monkeypatch.setattr(MPC.solver, "solve", hasty)
+    monkeypatch.setattr(MPC.solver, "solve", reckless(joint=0))
     robot = Robot(MPC)
     for _ in range(25):
         assert robot.update(AHEAD(robot.time)).health.status is Status.OK
     np.testing.assert_allclose(robot.v[0], LIMITS.velocity[0], rtol=2e-3)
     assert_within_limits(robot)
+
+
+def test_a_solver_that_ignores_the_range_of_a_joint_is_stopped_in_it(monkeypatch):
+    """The last wrist joint turns towards its end; nothing else keeps it from running into it."""
+    monkeypatch.setattr(MPC.solver, "solve", reckless(joint=8))
+    q = np.array(HOME)
+    q[8] = LIMITS.position_upper[8] - 1.5
+    robot = Robot(MPC, q=q)
+    for _ in range(60):
+        robot.update(AHEAD(robot.time))
+    assert robot.commands[-1].health.status is Status.BACKUP
+    assert abs(robot.q[8] - LIMITS.position_upper[8]) < 0.1
+    assert robot.q[8] < LIMITS.position_upper[8] + 0.02
+
+
+def test_where_nothing_is_safe_the_least_bad_is_done(monkeypatch):
+    """A wall is put so close that no stop is short enough: the robot stops as fast as it can all the same."""
+    wall = Obstacle("wall", Shape("box", [0.2, 4.0, 0.2]), [2.0, 0.0, 0.1])
+    robot = Robot(MPC, (wall,))
+    for _ in range(30):
+        robot.update(AHEAD(robot.time))
+    monkeypatch.setattr(MPC.solver, "solve", reckless(joint=0))
+    robot.put(replace(wall, position=[robot.q[0] + 0.48 + 0.1 + 0.1, 0.0, 0.1]))
+    for _ in range(5):
+        before = robot.v[0]
+        assert before > LIMITS.acceleration[0] * PERIOD
+        assert robot.update(AHEAD(robot.time)).health.status is Status.BACKUP
+        assert robot.v[0] == pytest.approx(before - LIMITS.acceleration[0] * PERIOD, abs=1e-9)
 
 
 def test_where_obstacles_move_rest_is_not_safe_for_ever():

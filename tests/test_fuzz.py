@@ -3,17 +3,20 @@
 import numpy as np
 import pytest
 from collect_helpers import environment
-from fuzz_helpers import run
+from fuzz_helpers import failing, run
 
 from handrail.controllers.mpc import MaskedMpc
 from handrail.controllers.safety_filter import safety_filter
 from handrail.controllers.threads import single_threaded
 
 
-def check(seeds, seconds, make=MaskedMpc):
+def check(seeds, seconds, make=MaskedMpc, failures=0.0):
     with environment("Reach") as env, single_threaded():
         controller = make(env.model)
-        results = [run(env, controller, seed, seconds) for seed in seeds]
+        results = []
+        for seed in seeds:
+            with failing(controller, seed, failures):
+                results.append(run(env, controller, seed, seconds))
     smallest = np.array([result.smallest for result in results])
     contacts = {seed: r.contact_names for seed, r in zip(seeds, results, strict=True) if r.contacts}
     statuses = {}
@@ -33,6 +36,16 @@ def test_rude_intents_in_clutter(make):
     assert {"ok", "invalid_intent"} <= set(statuses)
 
 
+def test_rude_intents_in_clutter_with_a_solver_that_fails():
+    statuses = check(range(1000, 1004), seconds=5.0, failures=0.05)
+    assert statuses["solver_failed"] > 20
+
+
 @pytest.mark.slow
 def test_rude_intents_in_clutter_at_length():
     check(range(200), seconds=20.0)
+
+
+@pytest.mark.slow
+def test_rude_intents_in_clutter_with_a_solver_that_fails_at_length():
+    check(range(50), seconds=20.0, failures=0.05)
