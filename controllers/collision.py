@@ -15,6 +15,7 @@ from handrail.controllers.shape import Obstacle, Shape
 from handrail.controllers.witnesses import gradients, lower_bounds, measured
 
 FLOOR = "floor"
+_STRETCH = 13  # configurations after which all pairs are measured again
 _FAR = 0.15  # a pair that stays farther apart than this need not be measured exactly [m]
 
 
@@ -94,8 +95,8 @@ class CollisionModel:
     ) -> Distances:
         """Return the signed distances along a trajectory, and gradients of those below `reach`.
 
-        A pair that cannot come below its reach on the way is measured at the first configuration only; at the
-        others its value is a lower bound: `d(q_k) ≥ d(q_0) - Σ_j L_j |q_k - q_0|_j - |v_obstacle| t_k`.
+        On every stretch of the way a pair that cannot come below its reach is measured at the beginning only;
+        after that its value is a lower bound: `d(q_k) ≥ d(q_0) - Σ_j L_j |q_k - q_0|_j - |v_obstacle| t_k`.
 
         Args:
             q: configurations, (K, n).
@@ -108,16 +109,22 @@ class CollisionModel:
         reaches = reach if isinstance(reach, np.ndarray) else np.full(self.size, float(reach))
         witnesses = np.empty((len(q), self.size, 9))
         jacobians = np.empty((len(q), 6, self._model.nv))
-        self._measure(self._all, q[0], times[0], witnesses[0])
-        jacobians[0] = pin.computeJointJacobians(self._model, self._data)
-        now = np.empty((1, self.size))
-        measured(witnesses, self._every, now)
-        values, close = lower_bounds(now[0], q[0], q, times, self._levers, self._speeds, reaches)
-        chosen = self._along.select(close)
-        for node in range(1, len(q)) if len(chosen) else ():
-            self._measure(self._along, q[node], times[node], witnesses[node])
-            jacobians[node] = pin.computeJointJacobians(self._model, self._data)
-        measured(witnesses, chosen, values)
+        values = np.empty((len(q), self.size))
+        for begin in range(0, len(q), _STRETCH):
+            stretch = slice(begin, begin + _STRETCH)
+            self._measure(self._all, q[begin], times[begin], witnesses[begin])
+            jacobians[begin] = pin.computeJointJacobians(self._model, self._data)
+            measured(witnesses[begin : begin + 1], self._every, values[begin : begin + 1])
+            ahead = times[stretch] - times[begin]
+            bounds, close = lower_bounds(
+                values[begin], q[begin], q[stretch], ahead, self._levers, self._speeds, reaches
+            )
+            chosen = self._along.select(close)
+            for node in range(begin + 1, begin + len(bounds)) if len(chosen) else ():
+                self._measure(self._along, q[node], times[node], witnesses[node])
+                jacobians[node] = pin.computeJointJacobians(self._model, self._data)
+            measured(witnesses[stretch], chosen, bounds)
+            values[stretch] = bounds
         near, rows = gradients(witnesses, jacobians, self._moves, values, reaches)
         return Distances(values, near, rows)
 

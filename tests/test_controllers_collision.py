@@ -53,7 +53,7 @@ def test_what_is_skipped_is_far():
     collision = CollisionModel(MODEL, scene(rng))
     for _ in range(30):
         start = rng.uniform(-1.5, 1.5, MODEL.size)
-        path = start + np.cumsum(rng.uniform(-0.05, 0.05, (8, MODEL.size)), axis=0)
+        path = start + np.cumsum(rng.uniform(-0.05, 0.05, (30, MODEL.size)), axis=0)
         exact = collision.values(path)
         distances = collision.distances(path, reach=0.3)
         assert np.all(distances.values <= exact + 1e-5)
