@@ -18,9 +18,7 @@ class WholeBodyCompletion:
         self._model = model
         self._inverse = model.description.limits.velocity**2 / damping  # of λ W², (n,)
 
-    def __call__(
-        self, q: FloatArray, previous: FloatArray, twist: FloatArray, duration: float
-    ) -> FloatArray:
+    def __call__(self, q: FloatArray, previous: FloatArray, twist: FloatArray, duration: float) -> FloatArray:
         """Return the velocity, (n,), from `v = D Jᵀ (J D Jᵀ + I)⁻¹ twist` with `D = (λ W²)⁻¹`."""
         jacobian = self._model.jacobian(q)
         scaled = self._inverse[:, None] * jacobian.T  # (n, 6)
