@@ -1,30 +1,40 @@
 """From settings to a session: the robot, the environment, the operator and the controller."""
 
 import importlib.metadata
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import gymnasium
 import numpy as np
 
 from handrail.collect.config import SessionConfig, check_fps
 from handrail.collect.env import HandrailEnv
-from handrail.collect.operators.modes import TeleopMode, find_mode
+from handrail.collect.operators.modes import Completion, TeleopMode, find_mode
 from handrail.collect.operators.pick_place_script import PickPlaceScript
 from handrail.collect.operators.reach_script import ReachScript
 from handrail.collect.operators.scripted import ScriptedOperator
 from handrail.collect.operators.steering import Gains
 from handrail.collect.session import Observer, Session
+from handrail.collect.tasks.reach import Reach
+from handrail.controllers.cbf_filter import CbfFilter
 from handrail.controllers.channels import Channels
 from handrail.controllers.controller import Controller
 from handrail.controllers.direct import DirectController
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.model import RobotModel
 from handrail.controllers.mpc import MaskedMpc
+from handrail.controllers.safety_filter import safety_filter
 from handrail.datasets.frames import moment_features
 from handrail.datasets.schema import Feature
 
 ENVIRONMENTS = {"pick_place": "handrail/PickPlace-v0", "reach": "handrail/Reach-v0"}
 SCRIPTS = {"pick_place": PickPlaceScript, "reach": ReachScript}
+CONTROLLERS: Mapping[Completion, Callable[[RobotModel, float], Controller]] = {
+    "mpc": lambda model, period: MaskedMpc(model),
+    "direct": DirectController,
+    "filter": safety_filter,
+    "cbf": CbfFilter,
+}
 _VERSIONED = ("handrail", "lerobot", "mujoco", "pin", "coal", "casadi", "daqp", "numpy", "gymnasium")
 
 
@@ -41,6 +51,8 @@ def build_env(config: SessionConfig, fps: int, render: bool = False) -> Handrail
     """
     config.check()
     check_fps(fps)
+    moving = config.moving_obstacles
+    variant: dict[str, Any] = {"task": Reach(moving_obstacles=moving)} if moving else {}
     env = gymnasium.make(
         ENVIRONMENTS[config.task],
         robot=config.robot,
@@ -49,6 +61,7 @@ def build_env(config: SessionConfig, fps: int, render: bool = False) -> Handrail
         image_size=(config.image_size, config.image_size),
         render_mode="rgb_array" if render else None,
         disable_env_checker=True,
+        **variant,
     )
     unwrapped = env.unwrapped
     if not isinstance(unwrapped, HandrailEnv):
@@ -69,7 +82,7 @@ def build_session(config: SessionConfig, env: HandrailEnv, observers: Sequence[O
 
 def build_controller(mode: TeleopMode, model: RobotModel, fps: int) -> Controller:
     """Return the controller of a mode."""
-    return DirectController(model, period=1.0 / fps) if mode.direct else MaskedMpc(model)
+    return CONTROLLERS[mode.controller](model, 1.0 / fps)
 
 
 def build_mode(config: SessionConfig, model: RobotModel) -> TeleopMode:
@@ -88,7 +101,7 @@ def build_mode(config: SessionConfig, model: RobotModel) -> TeleopMode:
             f"one each for {', '.join(channels.names)}; got {len(config.mask)}"
         )
     names = tuple(np.array(channels.names)[np.array(list(config.mask)) == "1"])
-    return TeleopMode(f"mask:{config.mask}", lambda focus: names, mode.direct, "a mask of one's own")
+    return TeleopMode(f"mask:{config.mask}", lambda focus: names, mode.controller, "a mask of one's own")
 
 
 def session_features(env: HandrailEnv) -> dict[str, Feature]:

@@ -11,10 +11,11 @@ from handrail.collect.operators.human import HumanSettings
 from handrail.controllers.errors import HandrailError, unknown_name
 
 TASKS = ("pick_place", "reach")
-MODE_NAMES = ("base", "base+ee", "direct", "ee", "joints", "switching")
+MODE_NAMES = ("base", "base+ee", "direct", "direct_cbf", "direct_filtered", "ee", "joints", "switching")
 OPERATORS = ("scripted",)
 CAMERAS = ("wrist", "scene")
 FPS_RANGE = (10, 100)
+MOST_MOVING = 4
 
 
 @dataclass(frozen=True)
@@ -24,7 +25,7 @@ class SessionConfig:
     task: str = "pick_place"
     """What to do: pick_place or reach."""
     mode: str = "ee"
-    """Teleop mode: ee, base, base+ee, joints, switching or direct (no MPC)."""
+    """Teleop mode: ee, base, base+ee, joints, switching, direct (no MPC), direct_filtered or direct_cbf."""
     mask: str = ""
     """A mask of your own instead of the mode's: 0 or 1 for each channel (base twist, tool twist, joints)."""
     operator: str = "scripted"
@@ -32,6 +33,8 @@ class SessionConfig:
     noise: float = 1.0
     """How human the scripted hand is: 0 perfect, 1 as measured in people."""
     human: HumanSettings = field(default_factory=HumanSettings)
+    moving_obstacles: int = 0
+    """Obstacles that cross the robot's way at up to 0.5 m/s, 0 to 4; task reach only."""
     robot: str = "ridgeback_ur10"
     """A robot that comes with Handrail, or a description file (.toml)."""
     seed: int = 0
@@ -63,6 +66,12 @@ class SessionConfig:
             raise HandrailError(f"--cameras {self.cameras}: expected each camera once")
         if not 0.0 <= self.noise <= 5.0:
             raise HandrailError(f"--noise {self.noise}: expected a number from 0 (perfect) to 5")
+        if not 0 <= self.moving_obstacles <= MOST_MOVING:
+            raise HandrailError(
+                f"--moving_obstacles {self.moving_obstacles}: expected a whole number from 0 to {MOST_MOVING}"
+            )
+        if self.moving_obstacles and self.task != "reach":
+            raise HandrailError(f"--moving_obstacles: expected --task reach, got --task {self.task}")
         if self.seed < 0:
             raise HandrailError(f"--seed {self.seed}: expected a whole number >= 0")
         if not 16 <= self.image_size <= 1024 or self.image_size % 2:
@@ -172,6 +181,8 @@ class InspectConfig:
     dataset: StoredConfig = field(default_factory=StoredConfig)
     repair: bool = False
     """Repair what a crash left behind, first."""
+    quality: bool = False
+    """Also print how smooth the motion was and how much the commands chattered."""
 
 
 @dataclass(frozen=True)

@@ -57,14 +57,18 @@ class Display:
         rr.set_time("time", duration=0.0)
         rr.log("world", rr.Clear(recursive=True))
         rr.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP)
+        self._movers = env.episode.scene.movers
         for obstacle in env.obstacles():
             self._log_shape(f"world/scene/{obstacle.name}", obstacle)
 
     def see(self, moment: Moment) -> None:
         """Log one moment."""
         rr = self._rr
-        rr.set_time("time", duration=self._frame * self._period)
+        time = self._frame * self._period
+        rr.set_time("time", duration=time)
         self._frame += 1
+        for mover in self._movers:
+            self._log_shape(f"world/scene/{mover.name}", mover.obstacle(time))
         q = moment.state[: self._model.size].astype(float)
         v = moment.state[self._model.size : 2 * self._model.size].astype(float)
         self._log_robot(q)

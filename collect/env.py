@@ -139,8 +139,8 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         return self.simulation.state()
 
     def obstacles(self) -> tuple[Obstacle, ...]:
-        """Return what a controller has to avoid besides the floor."""
-        return self.episode.scene.obstacles()
+        """Return what a controller has to avoid besides the floor, where it is now and how fast it moves."""
+        return self.episode.scene.obstacles(float(self.simulation.data.time))
 
     def task_state(self) -> TaskState:
         """Return the truth of this moment."""

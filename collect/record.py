@@ -83,13 +83,15 @@ def episode_seed(seed: int, episode: int) -> int:
 
 def _session_columns(config: RecordConfig) -> dict[str, str | float]:
     """Return what every episode's metadata says of the session; a replay builds it anew from this."""
-    return {
+    columns: dict[str, str | float] = {
         "environment": config.task,
         "robot": config.robot,
         "operator": config.operator,
         "mode": config.mode,
         "noise": config.noise,
     }
+    moving = config.moving_obstacles
+    return columns | {"moving_obstacles": moving} if moving else columns
 
 
 def _open_writer(config: RecordConfig, env: HandrailEnv) -> EpisodeWriter:

@@ -66,7 +66,9 @@ def replay_episode(root: Path, episode: int, pictures: int = 0) -> tuple[Replay,
     info = read_info(root)
     row = _row(root, episode)
     frames = read_frames(root, episode, ["action", "observation.state"])
-    env = build_env(SessionConfig(task=row["environment"], robot=row["robot"]), info.fps, render=pictures > 0)
+    moving = int(row.get("moving_obstacles") or 0)
+    config = SessionConfig(task=row["environment"], robot=row["robot"], moving_obstacles=moving)
+    env = build_env(config, info.fps, render=pictures > 0)
     try:
         states, last, taken = _run(env, row["seed"], frames["action"], pictures)
     finally:

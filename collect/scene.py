@@ -1,13 +1,14 @@
 """One scene, two uses: MuJoCo bodies for the simulation, obstacles for the controller."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from handrail.collect import geometry
 from handrail.collect.gl import MjSpec
+from handrail.collect.patrol import Patrol
 from handrail.controllers.arrays import FloatArray, frozen
 from handrail.controllers.errors import HandrailError, unknown_name
 from handrail.controllers.shape import Obstacle, Shape
@@ -46,6 +47,7 @@ class SceneObject:
         ghost: drawn, never touched: a marker.
         parts: what is drawn and touched, if not the shape itself.
         friction: sliding friction coefficient.
+        patrol: how it moves by itself, from `position` on; nothing stops it.
     """
 
     name: str
@@ -58,6 +60,7 @@ class SceneObject:
     ghost: bool = False
     parts: tuple[Part, ...] = ()
     friction: float = 0.8
+    patrol: Patrol | None = None
 
     def __post_init__(self) -> None:
         """Copy the arrays and make them read-only."""
@@ -74,9 +77,12 @@ class SceneObject:
         """Height of its upper face above the floor [m], for an upright object."""
         return float(self.position[2] + geometry.bounding_box(self.shape)[2] / 2)
 
-    def obstacle(self) -> Obstacle:
-        """Return it as the controller sees it."""
-        return Obstacle(self.name, self.shape, self.position, self.rotation, work_surface=self.work_surface)
+    def obstacle(self, time: float = 0.0) -> Obstacle:
+        """Return it as the controller sees it at a time of the episode [s]."""
+        still = Obstacle(self.name, self.shape, self.position, self.rotation, work_surface=self.work_surface)
+        if self.patrol is None:
+            return still
+        return replace(still, position=self.patrol.position(time), velocity=self.patrol.velocity(time))
 
 
 @dataclass(frozen=True)
@@ -122,9 +128,17 @@ class Scene:
         """The things that can be moved."""
         return tuple(item for item in self.objects if item.movable)
 
-    def obstacles(self) -> tuple[Obstacle, ...]:
-        """Return what the controller has to avoid: neither the floor, nor markers, nor movable things."""
-        return tuple(item.obstacle() for item in self.objects if not (item.movable or item.ghost))
+    @property
+    def movers(self) -> tuple[SceneObject, ...]:
+        """The things that move by themselves."""
+        return tuple(item for item in self.objects if item.patrol is not None)
+
+    def obstacles(self, time: float = 0.0) -> tuple[Obstacle, ...]:
+        """Return what the controller has to avoid at a time of the episode [s].
+
+        Neither the floor, nor markers, nor movable things.
+        """
+        return tuple(item.obstacle(time) for item in self.objects if not (item.movable or item.ghost))
 
 
 def add_scene(spec: MjSpec, scene: Scene) -> None:
@@ -135,7 +149,8 @@ def add_scene(spec: MjSpec, scene: Scene) -> None:
 
 
 def _add_object(spec: MjSpec, item: SceneObject) -> None:
-    body = spec.worldbody.add_body(name=item.name, **geometry.pose(item.position, item.rotation))
+    placement = geometry.pose(item.position, item.rotation)
+    body = spec.worldbody.add_body(name=item.name, mocap=item.patrol is not None, **placement)
     if item.movable:
         body.add_freejoint(name=item.name)
         body.explicitinertial = True

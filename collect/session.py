@@ -104,12 +104,14 @@ class Session:
         for observer in self._observers:
             observer.begin(self.env, seed)
         tally = _Tally(seed, 1.0 / self.env.fps)
-        done = False
+        moving, done = bool(self.env.episode.scene.movers), False
         while not done:
             wall_clock = tally.elapsed
             with tally.timed("operator"):
                 intent = self._operator.act(self._view())
             with tally.timed("controller"):
+                if moving:
+                    self._controller.observe(self.env.obstacles())
                 command = self._controller.update(self.env.state(), intent)
             action = action_of(command, 1.0 / self.env.fps)
             with tally.timed("environment"):

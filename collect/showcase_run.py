@@ -151,6 +151,10 @@ class Parametrised:
         for objective, values in self._values.items():
             self._mpc.set_parameters(objective, values)
 
+    def observe(self, obstacles: tuple[Obstacle, ...]) -> None:
+        """Tell the controller where the obstacles are."""
+        self._mpc.observe(obstacles)
+
     def update(self, state: State, intent: Intent) -> Command:
         """Return the controller's command."""
         return self._mpc.update(state, intent)

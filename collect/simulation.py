@@ -73,6 +73,8 @@ class Simulation:
         if gripper:
             self._finger_index = np.array([compiled.joint(name).qposadr[0] for name in FINGERS])
             self._gripper_servo = compiled.actuator("gripper").id
+        bodies = {item.name: int(compiled.body(item.name).mocapid[0]) for item in self._scene.movers}
+        self._patrols = [(bodies[item.name], item.patrol) for item in self._scene.movers if item.patrol]
 
     def _place(self, q: FloatArray) -> None:
         self.data.qpos[self._q_index] = q
@@ -94,9 +96,11 @@ class Simulation:
             weight = index / self.substeps
             data.ctrl[self._servo_index] = (1.0 - weight) * start + weight * velocity
             self._move_gripper(gripper)
+            self._move_obstacles()
             mujoco.mj_step(self.mujoco_model, data)
             self._contacts.look(data)
         self.commanded = np.array(velocity, dtype=np.float64)
+        self._move_obstacles()
         mujoco.mj_kinematics(self.mujoco_model, data)
         mujoco.mj_camlight(self.mujoco_model, data)
         return self._contacts.names
@@ -108,6 +112,11 @@ class Simulation:
         now = self.data.ctrl[self._gripper_servo]
         reach = self._speed * self._step / self.substeps
         self.data.ctrl[self._gripper_servo] = now + min(max(wanted - now, -reach), reach)
+
+    def _move_obstacles(self) -> None:
+        """Put what moves by itself where it is now."""
+        for body, patrol in self._patrols:
+            self.data.mocap_pos[body] = patrol.position(self.data.time)
 
     def state(self) -> State:
         """Return the measured positions and velocities."""

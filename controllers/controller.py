@@ -37,6 +37,14 @@ class Controller(Protocol):
         """Forget the past (warm start, last command) and take the scene of a new episode."""
         ...
 
+    def observe(self, obstacles: tuple[Obstacle, ...]) -> None:
+        """Take where the obstacles are now and how fast they move; called before an update if any moves.
+
+        Raises:
+            HandrailError: they are not the obstacles of this episode.
+        """
+        ...
+
     def update(self, state: State, intent: Intent) -> Command:
         """Return the command from `state.time` on."""
         ...

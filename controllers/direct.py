@@ -46,6 +46,10 @@ class DirectController:
         self._previous: FloatArray | None = None
         self._gripper = 0.0
 
+    def observe(self, obstacles: tuple[Obstacle, ...]) -> None:
+        """Take where the obstacles are now."""
+        self._collision.observe(obstacles)
+
     def update(self, state: State, intent: Intent) -> Command:
         """Return the command from now on; brakes when an input is invalid or stale."""
         start = perf_counter()

@@ -1,6 +1,7 @@
-"""Measures of a motion: how smooth it was, and how far it went.
+"""Measures of a motion: how smooth it was, how far it went, and how much a safety filter chattered.
 
-Definitions and golden values: Balasubramanian et al. 2015, "On the analysis of movement smoothness".
+Smoothness, definitions and golden values: Balasubramanian et al. 2015, "On the analysis of movement
+smoothness". Chattering: Pizarro Bejarano et al. 2023, "Multi-step model predictive safety filters".
 """
 
 import numpy as np
@@ -10,6 +11,7 @@ from handrail.controllers.errors import HandrailError
 CUTOFF = 10.0  # [Hz]
 AMPLITUDE_THRESHOLD = 0.05
 ZERO_PADDING = 4  # powers of two
+CORRECTION = 0.01  # of a velocity from which it counts [m/s, rad/s]
 
 
 def sparc(speed: np.ndarray, fs: float) -> float:
@@ -77,6 +79,89 @@ def path_length(positions: np.ndarray) -> float:
         The length of the path [m].
     """
     return float(np.linalg.norm(np.diff(np.asarray(positions, float), axis=0), axis=1).sum())
+
+
+def rate_of_change(command: np.ndarray, fs: float) -> float:
+    """Return the norm of the rate of change of a command: 0 is a command that never changes.
+
+    √(1/(N−1) Σ_t ‖(u_{t+1} − u_t) fs‖²): the norm over the whole episode, made independent of its length.
+
+    Args:
+        command: `(N, d)`, in any unit.
+        fs: Samples a second [Hz].
+
+    Returns:
+        The measure, a velocity's in [m/s², rad/s²], or NaN if there are fewer than two samples or one is not
+        finite.
+
+    Raises:
+        HandrailError: `command` has another shape, or `fs` is not positive.
+    """
+    command = _checked_rows(command, fs)
+    if len(command) < 2 or not np.isfinite(command).all():
+        return float("nan")
+    changes = np.diff(command, axis=0) * fs
+    return float(np.sqrt(np.mean(np.sum(changes**2, axis=1))))
+
+
+def high_frequency_content(command: np.ndarray, fs: float) -> float:
+    """Return the amplitude spectrum weighted by frequency, summed over the columns: 0 is a constant command.
+
+    Σ_f f · (2/N) |FFT(u)(f)| over the frequencies f = k fs / N with 0 < f ≤ fs/2. A vibration of amplitude A
+    and frequency f below fs/2 adds A · f. Noise adds more in a longer episode, about as √N: compare episodes
+    of like length.
+
+    Args:
+        command: `(N, d)`, in any unit.
+        fs: Samples a second [Hz].
+
+    Returns:
+        The measure [unit · Hz], or NaN if there are fewer than two samples or one is not finite.
+
+    Raises:
+        HandrailError: `command` has another shape, or `fs` is not positive.
+    """
+    command = _checked_rows(command, fs)
+    size = len(command)
+    if size < 2 or not np.isfinite(command).all():
+        return float("nan")
+    frequency = np.fft.rfftfreq(size, 1.0 / fs)
+    return float((frequency @ (2.0 / size * np.abs(np.fft.rfft(command, axis=0)))).sum())
+
+
+def corrections(
+    asked: np.ndarray, commanded: np.ndarray, owned: np.ndarray, tolerance: float = CORRECTION
+) -> int:
+    """Return how often the correction of a command switched on or off.
+
+    It is on where `|commanded − asked| > tolerance` on any owned channel, and off before the first sample.
+
+    Args:
+        asked: What the operator asked for, `(N, d)`.
+        commanded: What was sent on the same channels, `(N, d)`.
+        owned: Where the operator owned a channel, `(N, d)`; elsewhere nothing was asked.
+        tolerance: Largest difference that is no correction.
+
+    Raises:
+        HandrailError: The shapes differ.
+    """
+    asked, commanded, owned = np.asarray(asked, float), np.asarray(commanded, float), np.asarray(owned, bool)
+    if asked.ndim != 2 or not asked.shape == commanded.shape == owned.shape:
+        raise HandrailError(
+            "asked, commanded, owned: expected one and the same shape (N, d), "
+            f"got {asked.shape}, {commanded.shape}, {owned.shape}"
+        )
+    on = np.any(owned & (np.abs(commanded - asked) > tolerance), axis=1)
+    return int(np.count_nonzero(np.diff(on, prepend=False)))
+
+
+def _checked_rows(command: np.ndarray, fs: float) -> np.ndarray:
+    command = np.asarray(command, float)
+    if command.ndim != 2:
+        raise HandrailError(f"command: expected the shape (N, d), got {command.shape}")
+    if not fs > 0:
+        raise HandrailError(f"fs: expected a positive rate [Hz], got {fs}")
+    return command
 
 
 def _checked(speed: np.ndarray, fs: float) -> np.ndarray:

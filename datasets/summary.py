@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from handrail.datasets.metrics import sparc
+from handrail.datasets.metrics import corrections, high_frequency_content, rate_of_change, sparc
 from handrail.datasets.reader import DatasetInfo, read_episodes, read_info, read_rows_of
 
 UNKNOWN = "–"
@@ -24,8 +24,18 @@ HEADINGS = (
     "smoothness",
     "contacts",
 )
+QUALITY_HEADINGS = (
+    "episode",
+    "mode",
+    "length [s]",
+    "smoothness",
+    "rate of change",
+    "high-frequency content",
+    "corrections",
+)
 TOOL = ("tool.x", "tool.y", "tool.z")
 STATE, ACTION = "observation.state", "action"
+ASKED, OWNED = "teleop.values", "teleop.mask"
 MODE, DISTANCE, CONTACTS = "teleop.mode", "controller.smallest_distance", "safety.contacts"
 
 
@@ -43,6 +53,10 @@ class EpisodeSummary:
         smallest_distance: Smallest distance to a collision [m].
         smoothness: SPARC of the tool's speed, or else of the norm of the commanded velocity.
         contacts: How many unwanted contacts began.
+        rate_of_change: Of the commanded velocities, see `metrics.rate_of_change`.
+        high_frequency_content: Of the commanded velocities, see `metrics.high_frequency_content`.
+        corrections: How often the command began or ceased to differ from what was asked, on the joints that
+            the operator commanded one by one; None without any: what is not commanded is not corrected.
     """
 
     episode: int
@@ -54,6 +68,9 @@ class EpisodeSummary:
     smallest_distance: float | None
     smoothness: float | None
     contacts: int | None
+    rate_of_change: float | None
+    high_frequency_content: float | None
+    corrections: int | None
 
     def cells(self) -> tuple[str, ...]:
         """Return the line as text, one cell for each of `HEADINGS`."""
@@ -70,6 +87,18 @@ class EpisodeSummary:
             _number(self.contacts, "{:d}"),
         )
 
+    def quality_cells(self) -> tuple[str, ...]:
+        """Return the measures of quality as text, one cell for each of `QUALITY_HEADINGS`."""
+        return (
+            str(self.episode),
+            self.mode or UNKNOWN,
+            f"{self.length:.1f}",
+            _number(self.smoothness, "{:.2f}"),
+            _number(self.rate_of_change, "{:.2f}"),
+            _number(self.high_frequency_content, "{:.2f}"),
+            _number(self.corrections, "{:d}"),
+        )
+
 
 def summarize(root: str | Path) -> list[EpisodeSummary]:
     """Return one summary an episode, in order.
@@ -81,13 +110,15 @@ def summarize(root: str | Path) -> list[EpisodeSummary]:
         HandrailError: There is no dataset, or a file of it cannot be read.
     """
     info = read_info(root)
-    wanted = [name for name in (STATE, ACTION, MODE, DISTANCE, CONTACTS) if _is_column(info, name)]
+    known = (STATE, ACTION, ASKED, OWNED, MODE, DISTANCE, CONTACTS)
+    wanted = [name for name in known if _is_column(info, name)]
     return [_summary(info, row, read_rows_of(info, row, wanted)) for row in read_episodes(root)]
 
 
 def _summary(info: DatasetInfo, row: dict[str, Any], frames: dict[str, np.ndarray]) -> EpisodeSummary:
     distance = _finite(frames.get(DISTANCE))
     contacts = frames.get(CONTACTS)
+    commands = _commands(info, frames)
     return EpisodeSummary(
         episode=row["episode_index"],
         task="; ".join(row.get("tasks") or ()),
@@ -98,6 +129,11 @@ def _summary(info: DatasetInfo, row: dict[str, Any], frames: dict[str, np.ndarra
         smallest_distance=None if distance is None else float(distance.min()),
         smoothness=_smoothness(info, frames),
         contacts=None if contacts is None or contacts.ndim != 1 else _contacts_begun(contacts),
+        rate_of_change=None if commands is None else _known(rate_of_change(commands, info.fps)),
+        high_frequency_content=None
+        if commands is None
+        else _known(high_frequency_content(commands, info.fps)),
+        corrections=_corrections(info, frames),
     )
 
 
@@ -109,9 +145,9 @@ def _mode(row: dict[str, Any], frames: dict[str, np.ndarray]) -> str | None:
 def _smoothness(info: DatasetInfo, frames: dict[str, np.ndarray]) -> float | None:
     speed = _tool_speed(info, frames)
     if speed is None:
-        speed = _commanded_speed(info, frames)
-    value = float("nan") if speed is None else sparc(speed, info.fps)
-    return value if np.isfinite(value) else None
+        commands = _commands(info, frames)
+        speed = None if commands is None else np.linalg.norm(commands, axis=1)
+    return None if speed is None else _known(sparc(speed, info.fps))
 
 
 def _tool_speed(info: DatasetInfo, frames: dict[str, np.ndarray]) -> np.ndarray | None:
@@ -123,13 +159,28 @@ def _tool_speed(info: DatasetInfo, frames: dict[str, np.ndarray]) -> np.ndarray 
     return np.linalg.norm(np.diff(positions, axis=0), axis=1) * info.fps
 
 
-def _commanded_speed(info: DatasetInfo, frames: dict[str, np.ndarray]) -> np.ndarray | None:
-    """Return the norm of the commanded velocity, `(N,)`; another tool's action may be a position."""
+def _commands(info: DatasetInfo, frames: dict[str, np.ndarray]) -> np.ndarray | None:
+    """Return the commanded velocities, `(N, n)`; another tool's action may be a position."""
     names = info.features[ACTION].names if ACTION in frames and info.from_handrail else None
     if not names or frames[ACTION].ndim != 2:
         return None
     moving = [index for index, name in enumerate(names) if "gripper" not in name]
-    return np.linalg.norm(frames[ACTION][:, moving].astype(float), axis=1)
+    return frames[ACTION][:, moving].astype(float)
+
+
+def _corrections(info: DatasetInfo, frames: dict[str, np.ndarray]) -> int | None:
+    """Return how often the correction of a joint's command switched, if the operator commanded any joint."""
+    if not {ACTION, ASKED, OWNED} <= set(frames):
+        return None
+    channels = {name: index for index, name in enumerate(info.features[ASKED].names or ())}
+    joints = [
+        (index, channels[f"joint.{name.removeprefix('v_')}"])
+        for index, name in enumerate(info.features[ACTION].names or ())
+        if f"joint.{name.removeprefix('v_')}" in channels
+    ]
+    sent, asked = np.array(joints, dtype=int).reshape(-1, 2).T
+    owned = frames[OWNED][:, asked]
+    return corrections(frames[ASKED][:, asked], frames[ACTION][:, sent], owned) if owned.any() else None
 
 
 def _contacts_begun(contacts: np.ndarray) -> int:
@@ -148,6 +199,10 @@ def _is_column(info: DatasetInfo, name: str) -> bool:
 
 def _as_bool(value: Any) -> bool | None:
     return bool(value) if isinstance(value, bool | int | float) else None
+
+
+def _known(value: float) -> float | None:
+    return value if np.isfinite(value) else None
 
 
 def _number(value: float | None, pattern: str) -> str:

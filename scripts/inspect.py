@@ -12,13 +12,15 @@ def main() -> None:
 def _inspect(config: InspectConfig) -> int:
     from rich.console import Console
 
-    from handrail.collect.tables import summary_table
+    from handrail.collect.tables import quality_table, summary_table
     from handrail.datasets.repair import repair
 
     console = Console()
     if config.repair:
         console.print(str(repair(config.dataset.folder)), highlight=False)
     console.print(summary_table(config.dataset.folder))
+    if config.quality:
+        console.print(quality_table(config.dataset.folder))
     return 0
 
 

@@ -52,6 +52,14 @@ WRONG = {
     "robot": (["--robot", "spot"], "unknown robot 'spot'"),
     "flag": (["--speed", "9"], "--speed"),
     "repo id": (["--dataset.repo_id", "no spaces/please/ever"], "repo_id"),
+    "too many movers": (
+        ["--task", "reach", "--moving_obstacles", "5"],
+        "expected a whole number from 0 to 4",
+    ),
+    "movers elsewhere": (
+        ["--moving_obstacles", "1"],
+        "--moving_obstacles: expected --task reach, got --task",
+    ),
     "both": (["--resume", "--overwrite"], "expected one of them"),
     "rrd": (["--display_save", "movie.mp4"], "expected a file that ends in .rrd"),
 }
@@ -149,6 +157,21 @@ def test_a_replay_repeats_the_recording_exactly(recorded):
     assert "0.00e+00" in done.stdout
 
 
+def test_moving_obstacles_move_again_in_a_replay(tmp_path):
+    from handrail.collect.replay import replay_episode
+
+    root = tmp_path / "d"
+    done = command(
+        "--task", "reach", "--moving_obstacles", 1, "--dataset.num_episodes", 1, "--dataset.root", root
+    )
+    assert done.returncode == 0, done.stderr
+    assert read_episodes(root)[0]["moving_obstacles"] == 1
+    assert "mover_0.vx" in (read_info(root).features["observation.environment_state"].names or ())
+    assert replay_episode(root, 0)[0].largest == 0.0
+    refused = command("--task", "reach", "--dataset.root", root, "--resume")
+    assert refused.returncode == 2
+
+
 def test_a_replay_shows_when_the_commands_differ(recorded, monkeypatch):
     """The deviation is measured, not assumed."""
     from handrail.collect import replay
@@ -168,6 +191,8 @@ def test_inspect_prints_every_episode(recorded):
     assert done.returncode == 0, done.stderr
     assert "2 episodes, 2 succeeded" in done.stdout
     assert len(re.findall(r"│ \d+ +│ ee", done.stdout)) == 2
+    more = command("--dataset.root", recorded, "--quality", name="inspect")
+    assert len(re.findall(r"│ \d+ +│ ee", more.stdout)) == 4
 
 
 def test_resume_goes_on_with_new_seeds(recorded, tmp_path):

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from datasets_helpers import FPS, REPO, ROBOT, record
 
-from handrail.datasets.metrics import sparc
+from handrail.datasets.metrics import high_frequency_content, rate_of_change, sparc
 from handrail.datasets.reader import read_episodes, read_frames, read_info
 from handrail.datasets.schema import Feature
-from handrail.datasets.summary import HEADINGS, TOOL, summarize
+from handrail.datasets.summary import HEADINGS, QUALITY_HEADINGS, TOOL, summarize
 from handrail.datasets.writer import EpisodeWriter
 
 FEATURES = {
@@ -56,6 +56,33 @@ def test_an_episode_of_ours(root):
     assert second.cells()[3:5] == ("no", "dropped it")
 
 
+def test_chattering_of_what_was_commanded(tmp_path):
+    """Corrections count on joints that are owned, whatever else was asked; the gripper is no velocity."""
+    asked = ("base.vx", "joint.x", "joint.elbow", "gripper")
+    features = {
+        "action": Feature("float32", (3,), ("v_x", "v_elbow", "gripper")),
+        "teleop.values": Feature("float32", (4,), asked),
+        "teleop.mask": Feature("bool", (4,), asked),
+    }
+    sent = np.array([[0.1, 0.2], [0.1, 0.5], [0.1, 0.2], [0.9, 0.2], [0.1, 0.2]])
+    with EpisodeWriter.create(tmp_path / "set", REPO, FPS, features, ROBOT) as writer:
+        for owned in ([False, False, True], [True, False, False]):
+            for index, row in enumerate(sent):
+                values = np.array([0.7, 0.1, 0.2, index % 2])
+                mask = np.array([*owned, True])
+                action = np.append(row, index % 2)
+                frame = {"action": action, "teleop.values": np.where(mask, values, 0.0), "teleop.mask": mask}
+                writer.add_frame(frame, "drive")
+            writer.save_episode()
+    elbow, base = summarize(tmp_path / "set")
+    assert elbow.corrections == 2
+    assert base.corrections is None
+    assert elbow.rate_of_change == pytest.approx(rate_of_change(sent, FPS), rel=1e-5)
+    assert elbow.high_frequency_content == pytest.approx(high_frequency_content(sent, FPS), rel=1e-5)
+    assert len(elbow.quality_cells()) == len(QUALITY_HEADINGS)
+    assert base.quality_cells()[-1] == "–"
+
+
 def test_without_a_tool_the_commanded_velocity_is_judged(tmp_path):
     root = record(tmp_path / "set", 2)
     frames = read_frames(root, 1)
@@ -97,5 +124,7 @@ def test_a_dataset_of_lerobot_s_own(tmp_path):
     assert frames["matrix"].shape == (5, 2, 3)
     assert frames["flags"].sum() == 5
     assert frames["action"].shape == (5,)
-    cells = summarize(tmp_path / "set")[2].cells()
+    summary = summarize(tmp_path / "set")[2]
+    cells = summary.cells()
+    assert summary.quality_cells() == ("2", "–", "0.2", "–", "–", "–", "–")
     assert cells == ("2", "push", "–", "–", "–", "0.2", "–", "–", "–")

@@ -7,11 +7,13 @@ from handrail.collect.build import build_controller, build_env, build_mode, buil
 from handrail.collect.config import SessionConfig
 from handrail.collect.operators.modes import MODES, find_mode
 from handrail.collect.session import Session
+from handrail.controllers.cbf_filter import CbfFilter
 from handrail.controllers.command import Status
 from handrail.controllers.direct import DirectController
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.intent import Intent
 from handrail.controllers.mpc import MaskedMpc
+from handrail.controllers.safety_filter import filter_settings, safety_filter
 from handrail.datasets.frames import moment_row
 from handrail.datasets.schema import check_frame
 
@@ -115,7 +117,7 @@ class Unruly:
         return Intent(values, self._channels.mask("ee"), time=view.state.time - late)
 
 
-@pytest.mark.parametrize("kind", [MaskedMpc, DirectController])
+@pytest.mark.parametrize("kind", [MaskedMpc, DirectController, CbfFilter, safety_filter])
 def test_garbage_brakes_and_is_counted(kind):
     env = build_env(SessionConfig(task="reach"), 20)
     controller = kind(env.model)
@@ -146,6 +148,10 @@ def test_controllers_follow_the_mode():
     env = build_env(SessionConfig(task="reach"), 20)
     assert isinstance(build_controller(find_mode("direct"), env.model, 20), DirectController)
     assert isinstance(build_controller(find_mode("ee"), env.model, 20), MaskedMpc)
+    assert isinstance(build_controller(find_mode("direct_cbf"), env.model, 20), CbfFilter)
+    filtered = build_controller(find_mode("direct_filtered"), env.model, 25)
+    assert isinstance(filtered, MaskedMpc)
+    assert filtered.settings == filter_settings(0.04)
 
 
 def test_a_second_robot_is_a_new_description_and_nothing_else(tmp_path):

@@ -13,6 +13,7 @@ from handrail.controllers.errors import unknown_name
 from handrail.controllers.model import RobotModel
 
 Focus = Literal["hand", "base"]
+Completion = Literal["mpc", "direct", "filter", "cbf"]
 JOINT_SPEED = 0.8  # full stick of one joint [rad/s]
 _DAMPING = 0.03
 _BASE_WEIGHT = 0.3
@@ -42,13 +43,14 @@ class TeleopMode:
     Attributes:
         name: as on the command line.
         groups: channel groups that the operator owns, by focus.
-        direct: whether the command bypasses the MPC, clipped to limits only.
+        controller: what becomes of the command: `mpc` completes it, `filter` and `cbf` keep it safe, `direct`
+            clips it to limits only.
         help: one line.
     """
 
     name: str
     groups: Callable[[Focus], tuple[str, ...]]
-    direct: bool
+    controller: Completion
     help: str
 
 
@@ -63,13 +65,22 @@ def _by_focus(focus: Focus) -> tuple[str, ...]:
 MODES = {
     mode.name: mode
     for mode in (
-        TeleopMode("ee", _always("ee"), False, "steer the hand; the base comes along by itself"),
-        TeleopMode("base", _always("base"), False, "steer the base; the arm keeps clear by itself"),
-        TeleopMode("base+ee", _always("base", "ee"), False, "steer base and hand at once"),
-        TeleopMode("joints", _always("joint"), False, "steer every joint, kept safe by the MPC"),
-        TeleopMode("switching", _by_focus, False, "drive the base, then steer the hand"),
+        TeleopMode("ee", _always("ee"), "mpc", "steer the hand; the base comes along by itself"),
+        TeleopMode("base", _always("base"), "mpc", "steer the base; the arm keeps clear by itself"),
+        TeleopMode("base+ee", _always("base", "ee"), "mpc", "steer base and hand at once"),
+        TeleopMode("joints", _always("joint"), "mpc", "steer every joint, kept safe by the MPC"),
+        TeleopMode("switching", _by_focus, "mpc", "drive the base, then steer the hand"),
         TeleopMode(
-            "direct", _always("joint"), True, "all joint velocities, clipped to limits only: the baseline"
+            "direct", _always("joint"), "direct", "all joint velocities, clipped to limits only: the baseline"
+        ),
+        TeleopMode(
+            "direct_filtered",
+            _always("joint"),
+            "filter",
+            "all joint velocities through the multi-step predictive safety filter",
+        ),
+        TeleopMode(
+            "direct_cbf", _always("joint"), "cbf", "all joint velocities through a one-step CBF safety filter"
         ),
     )
 }

@@ -6,6 +6,7 @@ import numpy as np
 
 from handrail.collect.goal_reaching import ORIENTATION_TOLERANCE, POSITION_TOLERANCE, sample_goal
 from handrail.collect.scene import Part, Scene, SceneObject, View
+from handrail.collect.tasks.moving import mover_features, mover_names, sample_movers
 from handrail.collect.tasks.task import Episode, Outcome, TaskState
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.model import Pose, RobotModel
@@ -28,6 +29,7 @@ class Reach:
         horizon: time limit [s].
         position_tolerance: largest d_p [m].
         orientation_tolerance: largest d_r.
+        moving_obstacles: how many cylinders cross the robot's way; goals are the same with and without.
     """
 
     name: str = "Reach"
@@ -35,22 +37,26 @@ class Reach:
     horizon: float = 30.0
     position_tolerance: float = POSITION_TOLERANCE
     orientation_tolerance: float = ORIENTATION_TOLERANCE
+    moving_obstacles: int = 0
 
     @property
     def state_names(self) -> tuple[str, ...]:
-        """The goal's position and quaternion."""
-        return tuple(f"goal.{axis}" for axis in ("x", "y", "z", "qw", "qx", "qy", "qz"))
+        """The goal's position and quaternion, and what moves."""
+        goal = tuple(f"goal.{axis}" for axis in ("x", "y", "z", "qw", "qx", "qy", "qz"))
+        return (*goal, *mover_names(self.moving_obstacles))
 
     def sample(self, model: RobotModel, rng: np.random.Generator) -> Episode:
-        """Draw a goal."""
+        """Draw a goal, then the moving obstacles."""
         drawn = sample_goal(rng)
         goal = Pose(drawn.position, drawn.rotation)
-        return Episode(Scene((_marker(goal),), _VIEW), model.description.home, goal)
+        movers = sample_movers(self.moving_obstacles, model, model.description.home, rng)
+        return Episode(Scene((_marker(goal), *movers), _VIEW), model.description.home, goal)
 
     def features(self, state: TaskState) -> FloatArray:
-        """Return the goal pose, (7,)."""
+        """Return the goal pose, (7,), and place, velocity and size of what moves, (6,) each."""
         goal = _goal(state)
-        return np.concatenate([goal.position, quaternion_from_matrix(goal.rotation)])
+        movers = mover_features(state.episode.scene, state.time, self.moving_obstacles)
+        return np.concatenate([goal.position, quaternion_from_matrix(goal.rotation), movers])
 
     def outcome(self, state: TaskState) -> Outcome:
         """Judge by the distance and the orientation error."""

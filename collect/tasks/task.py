@@ -56,8 +56,8 @@ class TaskState:
 
     @property
     def obstacles(self) -> tuple[Obstacle, ...]:
-        """What the robot must not touch."""
-        return self.episode.scene.obstacles()
+        """What the robot must not touch, where it is now."""
+        return self.episode.scene.obstacles(self.time)
 
     def pose(self, name: str) -> Pose:
         """Return where an object is.

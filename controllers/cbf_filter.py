@@ -1,0 +1,176 @@
+"""The one-step safety filter with control barrier functions: the classical rival of the predictive one."""
+
+from dataclasses import dataclass, fields, replace
+from time import perf_counter
+
+import daqp
+import numpy as np
+
+from handrail.controllers.arrays import FloatArray
+from handrail.controllers.channels import Channels
+from handrail.controllers.collision import CollisionModel
+from handrail.controllers.command import Command, Health, Status
+from handrail.controllers.controller import State
+from handrail.controllers.errors import HandrailError
+from handrail.controllers.guard import check_inputs
+from handrail.controllers.intent import Intent
+from handrail.controllers.limiter import Limiter
+from handrail.controllers.model import RobotModel
+from handrail.controllers.shape import Obstacle
+
+_INFINITE = 1e30
+
+
+@dataclass(frozen=True)
+class CbfSettings:
+    """Settings of the filter.
+
+    Attributes:
+        alpha: α, how fast a distance may shrink, relative to what is left above its margin [1/s]. Braking
+            from v along `d' = -α (d - margin)` takes `α v`: above a_max / v_max it asks for more than the
+            robot has.
+        margin: signed distance kept between shapes [m].
+        work_margin: the same between tool shapes and work surfaces [m].
+        reach: distance beyond the margin at which a pair gets a row [m].
+        slack_linear: linear penalty of the slack of the rows, per m/s.
+        slack_quadratic: quadratic penalty of it.
+        intent_timeout: age from which an intent is stale [s].
+    """
+
+    alpha: float = 1.0
+    margin: float = 0.10
+    work_margin: float = 0.008
+    reach: float = 2.0
+    slack_linear: float = 1e4
+    slack_quadratic: float = 1e4
+    intent_timeout: float = 0.25
+
+    def __post_init__(self) -> None:
+        """Check the numbers.
+
+        Raises:
+            HandrailError: one is negative or not finite.
+        """
+        for entry in fields(self):
+            value = getattr(self, entry.name)
+            if not np.isfinite(value) or value < 0:
+                raise HandrailError(f"CBF setting {entry.name}: expected a finite number >= 0, got {value}")
+
+
+@dataclass(frozen=True)
+class _Barriers:
+    """`gradients u ≥ lower` of the R near pairs, (R, n) and (R,), and the distances of all, (P,)."""
+
+    gradients: FloatArray
+    lower: FloatArray
+    distances: FloatArray
+
+
+class CbfFilter:
+    """Sends the joint velocities nearest to the commanded ones that the barriers allow; a controller.
+
+    `min ‖u - u_cmd‖²_W + ρ₁ s + ½ ρ₂ s²  s.t.  ∇d·u + ∂d/∂t ≥ -α (d - margin) - s` for every near pair, with
+    u within the limits of velocity and acceleration and able to brake before the position limits, and
+    W = diag(1 / v_max²). It looks one step ahead: at high speed the acceleration limit can leave it without
+    a solution, and then s > 0. Joints that nobody commands are asked to rest.
+
+    Args:
+        model: of the robot.
+        period: time in which a velocity is reached, one control period [s].
+        settings: α, margins.
+    """
+
+    def __init__(self, model: RobotModel, period: float = 0.05, settings: CbfSettings | None = None) -> None:
+        self._model = model
+        self._period = period
+        self._settings = settings or CbfSettings()
+        self.channels = Channels.of(model.description)
+        self._limiter = Limiter(model.description)
+        self._weights = model.description.limits.velocity**-2.0
+        self.reset()
+
+    def reset(self, obstacles: tuple[Obstacle, ...] = ()) -> None:
+        """Forget the last command; take the obstacles of a new episode."""
+        self._collision = CollisionModel(self._model, obstacles)
+        wanted = np.where(self._collision.work, self._settings.work_margin, self._settings.margin)
+        self._margins = np.minimum(wanted, self._collision.largest_margin)
+        self._previous: FloatArray | None = None
+        self._gripper = 0.0
+
+    def observe(self, obstacles: tuple[Obstacle, ...]) -> None:
+        """Take where the obstacles are now and how fast they move."""
+        self._collision.observe(obstacles)
+
+    def update(self, state: State, intent: Intent) -> Command:
+        """Return the command from now on; brakes on a bad input or a failed solve."""
+        start = perf_counter()
+        status = check_inputs(state, intent, self.channels, self._settings.intent_timeout)
+        previous = self._start_velocity(state)
+        if status is Status.INVALID_STATE:
+            velocity, _ = self._limiter.limit(previous, np.zeros(self._model.size), self._period)
+            health = Health(status)
+        else:
+            velocity, health = self._filtered(state.q, previous, intent, status)
+        self._previous = velocity
+        health = replace(health, solve_time=perf_counter() - start)
+        return Command(np.stack([previous, velocity]), self._period, self._gripper, health)
+
+    def _filtered(
+        self, q: FloatArray, previous: FloatArray, intent: Intent, status: Status
+    ) -> tuple[FloatArray, Health]:
+        """Return the velocity to command, (n,), and the health but for its time."""
+        barriers = self._barriers(q)
+        asked, wanted, slack = np.zeros(self._model.size), np.zeros(self._model.size), 0.0
+        if status is Status.OK:
+            self._gripper = float(np.clip(intent.gripper, 0.0, 1.0))
+            joints = self.channels.joint_slice
+            fastest = self._model.description.limits.velocity
+            asked = np.clip(np.where(intent.mask[joints], intent.values[joints], 0.0), -fastest, fastest)
+            wanted, slack, solved = self._solve(asked, barriers, *self._bounds(previous, q))
+            status = Status.OK if solved else Status.SOLVER_FAILED
+        velocity, _ = self._limiter.limit(previous, wanted, self._period, q)
+        work = self._collision.work
+        return velocity, Health(
+            status=status,
+            slack=slack,
+            smallest_distance=float(np.min(barriers.distances[~work], initial=np.inf)),
+            work_distance=float(np.min(barriers.distances[work], initial=np.inf)),
+            tracking_error=float(np.linalg.norm(velocity - asked)),
+        )
+
+    def _barriers(self, q: FloatArray) -> _Barriers:
+        """Return the barrier rows at q; how the obstacles' own motion changes d is seen over a period."""
+        times = np.array([0.0, self._period])
+        distances = self._collision.distances(np.stack([q, q]), self._margins + self._settings.reach, times)
+        keep = distances.near[:, 0] == 1
+        pair = distances.near[keep, 1]
+        now, then = distances.values[:, pair]
+        drift = (then - now) / self._period
+        lower = -self._settings.alpha * (now - self._margins[pair]) - drift
+        return _Barriers(distances.gradients[keep], lower, distances.values[0])
+
+    def _bounds(self, previous: FloatArray, q: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return what velocities the limits allow, (n,) each."""
+        fastest = self._model.description.limits.velocity
+        slowest, _ = self._limiter.limit(previous, -fastest, self._period, q)
+        return slowest, self._limiter.limit(previous, fastest, self._period, q)[0]
+
+    def _solve(
+        self, asked: FloatArray, barriers: _Barriers, lower: FloatArray, upper: FloatArray
+    ) -> tuple[FloatArray, float, bool]:
+        """Return the nearest velocity that is allowed, (n,), the slack [m/s], and whether that succeeded."""
+        hessian = np.diag(np.append(self._weights, self._settings.slack_quadratic))
+        gradient = np.append(-self._weights * asked, self._settings.slack_linear)
+        matrix = np.hstack([barriers.gradients, np.ones((len(barriers.lower), 1))])
+        above = np.concatenate([upper, np.full(len(matrix) + 1, _INFINITE)])
+        below = np.concatenate([lower, [0.0], barriers.lower])
+        solution, _, flag, _ = daqp.solve(hessian, gradient, matrix, above, below)
+        if flag <= 0 or not np.isfinite(solution).all():
+            return np.zeros(len(asked)), 0.0, False
+        return solution[:-1], max(float(solution[-1]), 0.0), True
+
+    def _start_velocity(self, state: State) -> FloatArray:
+        if self._previous is not None:
+            return self._previous
+        valid = state.is_finite and state.v.shape == (self._model.size,)
+        return state.v if valid else np.zeros(self._model.size)
