@@ -15,7 +15,7 @@ MOST_WORKERS = 64
 
 @dataclass(frozen=True)
 class BenchmarkConfig:
-    """Run the paper's goal-reaching benchmark: every controller on the same goals, steered by the same planner."""
+    """Run the paper's goal-reaching benchmark: every controller on the same goals, with the same planner."""
 
     controllers: str = "all"
     """Which controllers, comma-separated, or all: mpc, rl, mink, dls, dls_arm, decoupled, blended, direct,
@@ -41,8 +41,8 @@ class BenchmarkConfig:
     """Write everything measured, every episode too, to this file."""
     report: str = ""
     """Write an HTML report with figures and a video to this folder."""
-    results: str = ""
-    """Write a page in Markdown with its figures to this folder."""
+    page: str = ""
+    """Put the tables into this Markdown page, between marks of this kind of run; figures go beside it."""
     video: bool = True
     """Whether the report has a video (needs OpenGL)."""
 
@@ -55,6 +55,15 @@ class BenchmarkConfig:
     def profile_names(self) -> tuple[str, ...]:
         """The profiles asked for."""
         return _names(self.profile, PROFILES)
+
+    @property
+    def label(self) -> str:
+        """A name of this kind of run: what is special about it, and the seed."""
+        profiles = self.profile_names
+        kinds = [profiles[0] if len(profiles) == 1 else "profiles"]
+        kinds += [name for name in ("clutter", "closed_loop") if getattr(self, name)]
+        kinds += [word for word, there in (("whole", self.early_stop), ("ideal", self.physics)) if not there]
+        return "_".join([*kinds, f"seed_{self.seed}"])
 
     def check(self) -> None:
         """Check what can be checked without loading anything heavy.
@@ -71,10 +80,10 @@ class BenchmarkConfig:
                 raise HandrailError(f"--{name} {value}: expected a whole number {limits}")
         if self.json and not Path(self.json).expanduser().absolute().parent.is_dir():
             raise HandrailError(f"--json {self.json}: expected a file in an existing folder")
-        for name in ("report", "results"):
-            value = getattr(self, name)
-            if value and Path(value).expanduser().exists() and not Path(value).expanduser().is_dir():
-                raise HandrailError(f"--{name} {value}: expected a folder, found a file")
+        if self.page and not (self.page.endswith(".md") and Path(self.page).expanduser().parent.is_dir()):
+            raise HandrailError(f"--page {self.page}: expected a .md file in an existing folder")
+        if self.report and Path(self.report).expanduser().is_file():
+            raise HandrailError(f"--report {self.report}: expected a folder, found a file")
 
 
 def _names(given: str, everything: tuple[str, ...]) -> tuple[str, ...]:

@@ -31,9 +31,9 @@ def goal_reaching_settings() -> MpcSettings:
     """Return the masked MPC's settings in the benchmark; what differs from its defaults, and why.
 
     Stages of 0.4 s look 4 s ahead for the price of 1 s: the palm keeps clear of the forearm by turning early
-    instead of late and fast, which halves the effort of the few goals where it matters. A base that costs a third
-    of an arm joint halves neither effort nor base path but suits both. No posture to return to and no
-    terminal cost: the protocol has none, and both only add motion.
+    instead of late and fast, which nearly halves the effort of the goals where it matters. The base costs a
+    third of an arm joint: less would lengthen its path, more the arm's effort. No posture to return to and
+    no terminal cost: the protocol has none, and both only add motion.
     """
     return MpcSettings(dt=0.4, base_velocity=0.03, acceleration=0.03, posture=0.0, terminal_velocity=0.0)
 
@@ -154,7 +154,13 @@ CONTENDERS: Mapping[str, Contender] = {
         Contender("blended", "blended control, α = 0.5", _blended),
         Contender("direct", "direct joint control", _direct, JointIntent),
         Contender("cbf_filter", "CBF safety filter on joint commands", _cbf, JointIntent),
-        Contender("safety_filter", "multi-step safety filter on joint commands", _filter, JointIntent, _FILTER_PERIOD),
+        Contender(
+            "safety_filter",
+            "multi-step safety filter on joint commands",
+            _filter,
+            JointIntent,
+            _FILTER_PERIOD,
+        ),
     )
 }
 """All that this floor can build; the RL baseline comes from the floor above."""

@@ -1,4 +1,4 @@
-"""The benchmark's measures of an episode, from the simulated joint velocities; definitions of the protocol."""
+"""The benchmark's measures of an episode, from the simulated joint velocities, as the protocol has them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -101,12 +101,14 @@ def _noisy(twists: FloatArray, rng: np.random.Generator) -> FloatArray:
     tremor[0] = rng.standard_normal(6)
     for step in range(1, len(twists)):
         tremor[step] = keep * tremor[step - 1] + np.sqrt(1.0 - keep**2) * rng.standard_normal(6)
-    sizes = np.repeat([np.linalg.norm(twists[:, :3], axis=1), np.linalg.norm(twists[:, 3:], axis=1)], 3, axis=0)
+    sizes = np.repeat(
+        [np.linalg.norm(twists[:, :3], axis=1), np.linalg.norm(twists[:, 3:], axis=1)], 3, axis=0
+    )
     return twists + _NOISE * sizes.T * tremor
 
 
 def _quantised(twists: FloatArray) -> FloatArray:
-    """Press keys of one speed each so often that the displacement comes out: each decision makes up for the last.
+    """Press keys of one speed so often that the displacement comes out; a decision makes up for the last.
 
     Of what is still owed, (6,), a key takes its share for one press whenever that is more than half of it.
     """

@@ -50,7 +50,7 @@ class Reach:
         drawn = sample_goal(rng)
         goal = Pose(drawn.position, drawn.rotation)
         movers = sample_movers(self.moving_obstacles, model, model.description.home, rng)
-        return Episode(Scene((_marker(goal), *movers), _VIEW), model.description.home, goal)
+        return Episode(Scene((goal_marker(goal), *movers), _VIEW), model.description.home, goal)
 
     def features(self, state: TaskState) -> FloatArray:
         """Return the goal pose, (7,), and place, velocity and size of what moves, (6,) each."""
@@ -75,7 +75,7 @@ def _goal(state: TaskState) -> Pose:
     return state.goal if state.goal is not None else state.tool
 
 
-def _marker(goal: Pose) -> SceneObject:
+def goal_marker(goal: Pose) -> SceneObject:
     """Return three coloured axes on a ball, drawn without contact."""
     axes = tuple(
         Part(
