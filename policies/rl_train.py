@@ -13,6 +13,7 @@ from handrail.policies.rl_checkpoint import Curve, begin_run, resume_run, write_
 from handrail.policies.rl_config import TrainRlConfig
 from handrail.policies.rl_env import GoalReachingEnv, Reward
 from handrail.policies.rl_evaluation import evaluate, evaluation_goals
+from handrail.policies.rl_figure import save_curve
 from handrail.policies.rl_policy import Actor
 from handrail.policies.rl_record import training_record
 
@@ -23,7 +24,7 @@ def train(config: TrainRlConfig) -> dict[str, Any]:
     """Train, or go on training, and return the record that was written beside the actor.
 
     The folder holds `config.json`, `checkpoints/<steps>/` (networks, replay buffer, curve; only the last),
-    `actors/<steps>.npz` (all), `tensorboard/`, and at the end `actor.npz` with `actor.json`.
+    `actors/<steps>.npz` (all), `tensorboard/`, and at the end `actor.npz`, `actor.json` and `curve.png`.
 
     Raises:
         HandrailError: a setting is wrong, there is a run already, or there is none to resume.
@@ -38,6 +39,7 @@ def train(config: TrainRlConfig) -> dict[str, Any]:
     actor_of(model).save(config.folder / "actor.npz")
     record = training_record(config, curve)
     (config.folder / "actor.json").write_text(json.dumps(record, indent=1) + "\n")
+    save_curve(curve, config.folder / "curve.png")
     return record
 
 

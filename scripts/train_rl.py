@@ -22,7 +22,7 @@ def _train(config: TrainRlConfig) -> int:
     record = train(config)
     last = record["curve"][-1]
     print(f"success {last['success']:.0%} of {config.goals} goals after {last['steps']} steps")
-    print(f"written: {config.folder}/actor.npz, actor.json")
+    print(f"written: {config.folder}/actor.npz, actor.json, curve.png")
     return 0
 
 

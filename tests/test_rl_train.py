@@ -45,6 +45,7 @@ def test_the_folder_holds_what_is_needed_and_no_more(run):
     assert sorted(path.name for path in (config.folder / "actors").iterdir()) == [
         "00000040.npz", "00000060.npz", "00000080.npz", "00000100.npz",
     ]  # fmt: skip
+    assert (config.folder / "curve.png").stat().st_size > 5000
     assert list((config.folder / "tensorboard").rglob("events.*"))
 
 
