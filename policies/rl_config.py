@@ -5,7 +5,7 @@ from pathlib import Path
 
 from handrail.controllers.errors import HandrailError
 
-_FREE_ON_RESUME = ("output_dir", "steps", "save_every", "threads", "resume", "overwrite")
+_FREE_ON_RESUME = ("output_dir", "steps", "save_every", "final_goals", "threads", "resume", "overwrite")
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,9 @@ class TrainRlConfig:
     save_every: int = 20_000
     """Steps between checkpoints, each with an evaluation."""
     goals: int = 50
-    """Goals of an evaluation, always the same."""
+    """Goals of these evaluations, always the same."""
+    final_goals: int = 300
+    """Goals of the last evaluation; nobody looked at them before."""
     threads: int = 1
     """Of PyTorch."""
     resume: bool = False
@@ -65,7 +67,7 @@ class TrainRlConfig:
             HandrailError: one is wrong.
         """
         whole = ("steps", "batch_size", "buffer_size", "train_freq", "gradient_steps", "save_every")
-        for name in (*whole, "goals", "threads"):
+        for name in (*whole, "goals", "final_goals", "threads"):
             if getattr(self, name) < 1:
                 raise HandrailError(f"--{name} {getattr(self, name)}: expected 1 or more")
         for name in ("seed", "random_steps", "action_change", "action_size"):

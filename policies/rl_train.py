@@ -12,7 +12,7 @@ from stable_baselines3.common.callbacks import BaseCallback
 from handrail.policies.rl_checkpoint import Curve, begin_run, resume_run, write_checkpoint
 from handrail.policies.rl_config import TrainRlConfig
 from handrail.policies.rl_env import GoalReachingEnv, Reward
-from handrail.policies.rl_evaluation import evaluate, evaluation_goals
+from handrail.policies.rl_evaluation import FINAL_SEED, evaluate, evaluation_goals, means, spreads
 from handrail.policies.rl_figure import save_curve
 from handrail.policies.rl_policy import Actor
 from handrail.policies.rl_record import training_record
@@ -36,8 +36,10 @@ def train(config: TrainRlConfig) -> dict[str, Any]:
     if remaining > 0:
         callback = Watch(config, curve)
         model.learn(remaining, callback, log_interval=20, reset_num_timesteps=not config.resume)
-    actor_of(model).save(config.folder / "actor.npz")
-    record = training_record(config, curve)
+    actor = actor_of(model)
+    actor.save(config.folder / "actor.npz")
+    final = spreads(evaluate(actor, evaluation_goals(config.final_goals, FINAL_SEED)))
+    record = training_record(config, curve, final)
     (config.folder / "actor.json").write_text(json.dumps(record, indent=1) + "\n")
     save_curve(curve, config.folder / "curve.png")
     return record
@@ -83,7 +85,7 @@ class Watch(BaseCallback):
 
     def _evaluate_and_save(self) -> None:
         actor = actor_of(self.model)
-        score = evaluate(actor, self._goals)
+        score = means(evaluate(actor, self._goals))
         seconds = time.monotonic() - self._began
         updates = float(self.model._n_updates)
         self._curve.append({"steps": self.num_timesteps, "updates": updates, "seconds": seconds, **score})

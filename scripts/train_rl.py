@@ -20,8 +20,11 @@ def _train(config: TrainRlConfig) -> int:
     from handrail.policies.rl_train import train
 
     record = train(config)
-    last = record["curve"][-1]
-    print(f"success {last['success']:.0%} of {config.goals} goals after {last['steps']} steps")
+    score = {name: values["mean"] for name, values in record["final"].items()}
+    print(
+        f"after {record['curve'][-1]['steps']} steps: {score['success']:.1%} of {config.final_goals} new goals, "
+        f"effort {score['arm_effort']:.1f}, jerkiness {score['jerkiness']:.3f}"
+    )
     print(f"written: {config.folder}/actor.npz, actor.json, curve.png")
     return 0
 
