@@ -40,6 +40,8 @@ class TrainRlConfig:
     """Weight of the squared change of the action in the reward."""
     action_size: float = 0.05
     """Weight of the squared action in the reward."""
+    failure_cost: float = 0.0
+    """Subtracted from the reward when an episode is given up; without it, giving up early can pay."""
     reward_scale: float = 1.0
     """Factor of the whole reward."""
     save_every: int = 20_000
@@ -70,7 +72,7 @@ class TrainRlConfig:
         for name in (*whole, "goals", "final_goals", "threads"):
             if getattr(self, name) < 1:
                 raise HandrailError(f"--{name} {getattr(self, name)}: expected 1 or more")
-        for name in ("seed", "random_steps", "action_change", "action_size"):
+        for name in ("seed", "random_steps", "action_change", "action_size", "failure_cost"):
             if not getattr(self, name) >= 0:
                 raise HandrailError(f"--{name} {getattr(self, name)}: expected 0 or more")
         for name in ("gamma", "tau", "learning_rate"):

@@ -4,7 +4,11 @@ import json
 import time
 from typing import Any
 
+import gymnasium
+import numpy as np
 import torch
+from gymnasium import spaces
+from gymnasium.wrappers import TransformObservation
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from stable_baselines3 import SAC
 from stable_baselines3.common.callbacks import BaseCallback
@@ -14,6 +18,7 @@ from handrail.policies.rl_config import TrainRlConfig
 from handrail.policies.rl_env import GoalReachingEnv, Reward
 from handrail.policies.rl_evaluation import FINAL_SEED, evaluate, evaluation_goals, means, spreads
 from handrail.policies.rl_figure import save_curve
+from handrail.policies.rl_observation import conditioning
 from handrail.policies.rl_policy import Actor
 from handrail.policies.rl_record import training_record
 
@@ -47,7 +52,8 @@ def train(config: TrainRlConfig) -> dict[str, Any]:
 
 def actor_of(model: SAC) -> Actor:
     """Return the actor of a model as plain arrays."""
-    return Actor.from_state({name: value.cpu().numpy() for name, value in model.actor.state_dict().items()})
+    state = {name: value.cpu().numpy() for name, value in model.actor.state_dict().items()}
+    return Actor.from_state(state, conditioning())
 
 
 class Watch(BaseCallback):
@@ -129,5 +135,14 @@ def _resumed(config: TrainRlConfig) -> tuple[SAC, Curve]:
     return model, curve
 
 
-def _environment(config: TrainRlConfig) -> GoalReachingEnv:
-    return GoalReachingEnv(reward=Reward(config.reward_scale, config.action_change, config.action_size))
+def _environment(config: TrainRlConfig) -> gymnasium.Env:
+    reward = Reward(
+        scale=config.reward_scale,
+        change=config.action_change,
+        size=config.action_size,
+        failure=config.failure_cost,
+    )
+    matrix = conditioning()
+    space = spaces.Box(-np.inf, np.inf, (len(matrix),), np.float32)
+    env = GoalReachingEnv(reward=reward)
+    return TransformObservation(env, lambda values: (matrix @ values).astype(np.float32), space)

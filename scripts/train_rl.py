@@ -22,7 +22,7 @@ def _train(config: TrainRlConfig) -> int:
     record = train(config)
     score = {name: values["mean"] for name, values in record["final"].items()}
     print(
-        f"after {record['curve'][-1]['steps']} steps: {score['success']:.1%} of {config.final_goals} new goals, "
+        f"{score['success']:.1%} of new goals after {record['curve'][-1]['steps']} steps, "
         f"effort {score['arm_effort']:.1f}, jerkiness {score['jerkiness']:.3f}"
     )
     print(f"written: {config.folder}/actor.npz, actor.json, curve.png")
