@@ -36,6 +36,8 @@ class TrainRlConfig:
     """Updates each time."""
     layers: tuple[int, ...] = (512, 512, 256)
     """Hidden layers of actor and critics."""
+    temperature: float = 1.0
+    """Of the entropy in the beginning; then tuned automatically."""
     action_change: float = 0.05
     """Weight of the squared change of the action in the reward."""
     action_size: float = 0.05
@@ -78,8 +80,9 @@ class TrainRlConfig:
         for name in ("gamma", "tau", "learning_rate"):
             if not 0.0 < getattr(self, name) <= 1.0:
                 raise HandrailError(f"--{name} {getattr(self, name)}: expected a number in (0, 1]")
-        if not self.reward_scale > 0.0:
-            raise HandrailError(f"--reward_scale {self.reward_scale}: expected a positive number")
+        for name in ("temperature", "reward_scale"):
+            if not getattr(self, name) > 0.0:
+                raise HandrailError(f"--{name} {getattr(self, name)}: expected a positive number")
         if not self.layers or min(self.layers) < 1:
             raise HandrailError(f"--layers {self.layers}: expected sizes of 1 or more")
         if self.resume and self.overwrite:

@@ -118,6 +118,7 @@ def _new(config: TrainRlConfig) -> tuple[SAC, Curve]:
         gamma=config.gamma,
         train_freq=config.train_freq,
         gradient_steps=config.gradient_steps,
+        ent_coef=f"auto_{config.temperature}",
         target_entropy=_TARGET_ENTROPY,
         policy_kwargs={"net_arch": list(config.layers)},
         tensorboard_log=str(config.folder / "tensorboard"),
