@@ -5,7 +5,7 @@ from pathlib import Path
 
 from handrail.controllers.errors import HandrailError
 
-_FREE_ON_RESUME = ("output_dir", "steps", "save_every", "threads", "resume", "overwrite")
+_FREE_ON_RESUME = ("output_dir", "steps", "save_every", "final_goals", "threads", "resume", "overwrite")
 
 
 @dataclass(frozen=True)
@@ -36,16 +36,22 @@ class TrainRlConfig:
     """Updates each time."""
     layers: tuple[int, ...] = (512, 512, 256)
     """Hidden layers of actor and critics."""
+    temperature: float = 1.0
+    """Of the entropy in the beginning; then tuned automatically."""
     action_change: float = 0.05
     """Weight of the squared change of the action in the reward."""
     action_size: float = 0.05
     """Weight of the squared action in the reward."""
+    failure_cost: float = 0.0
+    """Subtracted from the reward when an episode is given up; without it, giving up early can pay."""
     reward_scale: float = 1.0
     """Factor of the whole reward."""
     save_every: int = 20_000
     """Steps between checkpoints, each with an evaluation."""
     goals: int = 50
-    """Goals of an evaluation, always the same."""
+    """Goals of these evaluations, always the same."""
+    final_goals: int = 300
+    """Goals of the last evaluation; nobody looked at them before."""
     threads: int = 1
     """Of PyTorch."""
     resume: bool = False
@@ -65,17 +71,18 @@ class TrainRlConfig:
             HandrailError: one is wrong.
         """
         whole = ("steps", "batch_size", "buffer_size", "train_freq", "gradient_steps", "save_every")
-        for name in (*whole, "goals", "threads"):
+        for name in (*whole, "goals", "final_goals", "threads"):
             if getattr(self, name) < 1:
                 raise HandrailError(f"--{name} {getattr(self, name)}: expected 1 or more")
-        for name in ("seed", "random_steps", "action_change", "action_size"):
+        for name in ("seed", "random_steps", "action_change", "action_size", "failure_cost"):
             if not getattr(self, name) >= 0:
                 raise HandrailError(f"--{name} {getattr(self, name)}: expected 0 or more")
         for name in ("gamma", "tau", "learning_rate"):
             if not 0.0 < getattr(self, name) <= 1.0:
                 raise HandrailError(f"--{name} {getattr(self, name)}: expected a number in (0, 1]")
-        if not self.reward_scale > 0.0:
-            raise HandrailError(f"--reward_scale {self.reward_scale}: expected a positive number")
+        for name in ("temperature", "reward_scale"):
+            if not getattr(self, name) > 0.0:
+                raise HandrailError(f"--{name} {getattr(self, name)}: expected a positive number")
         if not self.layers or min(self.layers) < 1:
             raise HandrailError(f"--layers {self.layers}: expected sizes of 1 or more")
         if self.resume and self.overwrite:

@@ -42,12 +42,14 @@ class Reward:
         scale: s.
         change: w_Δ.
         size: w_a.
+        failure: s times this is subtracted when an episode is given up.
         failures: steps off the planner's pose, by more than a success allows, that end an episode.
     """
 
     scale: float = 1.0
     change: float = 0.05
     size: float = 0.05
+    failure: float = 0.0
     failures: int = 20
 
     def value(self, d: float, r: float, action: FloatArray, previous: FloatArray) -> float:
@@ -115,6 +117,7 @@ class GoalReachingEnv(gymnasium.Env[FloatArray, FloatArray]):
         self._previous = action
         self._failures += not reached(d, r)
         failed = self._early_failure and self._failures >= self._reward.failures
+        reward -= self._reward.scale * self._reward.failure * failed
         d_p, d_r = pose_error(*self._pose, self.planner.goal)
         success = reached(d_p, d_r) and not failed
         info = {"is_success": success, "failed": failed, "position_error": d_p, "orientation_error": d_r}

@@ -54,6 +54,20 @@ def observe(situation: Situation) -> FloatArray:
     return np.concatenate(parts)
 
 
+def conditioning() -> FloatArray:
+    """Return P of `z = P o`: the observation as the networks are trained on it, (54, 54).
+
+    The twist and the way from the current to the desired pose are small beside the other numbers and matter
+    most: they are enlarged, and desired and goal pose become differences from the current one. P can be
+    undone, so nothing is added or lost; a trained actor takes it into its first layer.
+    """
+    scale = np.concatenate([np.full(3, 10.0), np.full(3, 3.0), np.ones(OBSERVATION_SIZE - 6)])
+    scale[18:30] = np.repeat([10.0, 5.0], [3, 9])
+    difference = np.eye(OBSERVATION_SIZE)
+    difference[18:30, 6:18] = difference[30:42, 6:18] = -np.eye(12)
+    return scale[:, None] * difference
+
+
 def base_velocity(action: FloatArray, angle: float) -> FloatArray:
     """Return the base coordinates' velocity of an action, in the world frame, (3,) [m/s, rad/s].
 

@@ -54,17 +54,20 @@ class Actor:
         return np.tanh(self.weights[-1] @ values + self.biases[-1])
 
     @classmethod
-    def from_state(cls, state: Mapping[str, FloatArray]) -> "Actor":
-        """Return the actor of a Stable-Baselines3 policy's actor state, names as there."""
+    def from_state(cls, state: Mapping[str, FloatArray], conditioning: FloatArray) -> "Actor":
+        """Return the actor of a trained network.
+
+        Args:
+            state: of the actor of a Stable-Baselines3 policy, names as there.
+            conditioning: P, where the network was trained on P o; (54, 54).
+        """
         names = sorted(
             (name for name in state if name.startswith("latent_pi.") and name.endswith(".weight")),
             key=lambda name: int(name.split(".")[1]),
         )
         layers = [name.removesuffix(".weight") for name in names] + ["mu"]
-        return cls(
-            tuple(state[f"{layer}.weight"] for layer in layers),
-            tuple(state[f"{layer}.bias"] for layer in layers),
-        )
+        first, *others = (state[f"{layer}.weight"] for layer in layers)
+        return cls((first @ conditioning, *others), tuple(state[f"{layer}.bias"] for layer in layers))
 
     def save(self, path: Path) -> None:
         """Write the arrays to an .npz file."""

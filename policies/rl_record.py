@@ -13,12 +13,15 @@ _VERSIONED = ("handrail", "stable-baselines3", "torch", "gymnasium", "numpy", "p
 _PLACES = ("output_dir", "resume", "overwrite")  # of a run, not of what came out
 
 
-def training_record(config: TrainRlConfig, curve: list[dict[str, float]]) -> dict[str, Any]:
+def training_record(
+    config: TrainRlConfig, curve: list[dict[str, float]], final: dict[str, dict[str, float]]
+) -> dict[str, Any]:
     """Return what a reader needs to repeat a training.
 
     Args:
         config: of the training; the seed is in there.
         curve: evaluations, the last one that of the actor.
+        final: its evaluation on goals that it was not chosen by.
     """
     settings = {name: value for name, value in asdict(config).items() if name not in _PLACES}
     return {
@@ -31,6 +34,7 @@ def training_record(config: TrainRlConfig, curve: list[dict[str, float]]) -> dic
             "python": platform.python_version(),
             **{name: importlib.metadata.version(name) for name in _VERSIONED},
         },
+        "final": final,
         "curve": curve,
     }
 

@@ -4,7 +4,11 @@ import json
 import time
 from typing import Any
 
+import gymnasium
+import numpy as np
 import torch
+from gymnasium import spaces
+from gymnasium.wrappers import TransformObservation
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from stable_baselines3 import SAC
 from stable_baselines3.common.callbacks import BaseCallback
@@ -12,7 +16,9 @@ from stable_baselines3.common.callbacks import BaseCallback
 from handrail.policies.rl_checkpoint import Curve, begin_run, resume_run, write_checkpoint
 from handrail.policies.rl_config import TrainRlConfig
 from handrail.policies.rl_env import GoalReachingEnv, Reward
-from handrail.policies.rl_evaluation import evaluate, evaluation_goals
+from handrail.policies.rl_evaluation import FINAL_SEED, evaluate, evaluation_goals, means, spreads
+from handrail.policies.rl_figure import save_curve
+from handrail.policies.rl_observation import conditioning
 from handrail.policies.rl_policy import Actor
 from handrail.policies.rl_record import training_record
 
@@ -23,7 +29,7 @@ def train(config: TrainRlConfig) -> dict[str, Any]:
     """Train, or go on training, and return the record that was written beside the actor.
 
     The folder holds `config.json`, `checkpoints/<steps>/` (networks, replay buffer, curve; only the last),
-    `actors/<steps>.npz` (all), `tensorboard/`, and at the end `actor.npz` with `actor.json`.
+    `actors/<steps>.npz` (all), `tensorboard/`, and at the end `actor.npz`, `actor.json` and `curve.png`.
 
     Raises:
         HandrailError: a setting is wrong, there is a run already, or there is none to resume.
@@ -35,15 +41,19 @@ def train(config: TrainRlConfig) -> dict[str, Any]:
     if remaining > 0:
         callback = Watch(config, curve)
         model.learn(remaining, callback, log_interval=20, reset_num_timesteps=not config.resume)
-    actor_of(model).save(config.folder / "actor.npz")
-    record = training_record(config, curve)
+    actor = actor_of(model)
+    actor.save(config.folder / "actor.npz")
+    final = spreads(evaluate(actor, evaluation_goals(config.final_goals, FINAL_SEED)))
+    record = training_record(config, curve, final)
     (config.folder / "actor.json").write_text(json.dumps(record, indent=1) + "\n")
+    save_curve(curve, config.folder / "curve.png")
     return record
 
 
 def actor_of(model: SAC) -> Actor:
     """Return the actor of a model as plain arrays."""
-    return Actor.from_state({name: value.cpu().numpy() for name, value in model.actor.state_dict().items()})
+    state = {name: value.cpu().numpy() for name, value in model.actor.state_dict().items()}
+    return Actor.from_state(state, conditioning())
 
 
 class Watch(BaseCallback):
@@ -81,7 +91,7 @@ class Watch(BaseCallback):
 
     def _evaluate_and_save(self) -> None:
         actor = actor_of(self.model)
-        score = evaluate(actor, self._goals)
+        score = means(evaluate(actor, self._goals))
         seconds = time.monotonic() - self._began
         updates = float(self.model._n_updates)
         self._curve.append({"steps": self.num_timesteps, "updates": updates, "seconds": seconds, **score})
@@ -108,6 +118,7 @@ def _new(config: TrainRlConfig) -> tuple[SAC, Curve]:
         gamma=config.gamma,
         train_freq=config.train_freq,
         gradient_steps=config.gradient_steps,
+        ent_coef=f"auto_{config.temperature}",
         target_entropy=_TARGET_ENTROPY,
         policy_kwargs={"net_arch": list(config.layers)},
         tensorboard_log=str(config.folder / "tensorboard"),
@@ -125,5 +136,14 @@ def _resumed(config: TrainRlConfig) -> tuple[SAC, Curve]:
     return model, curve
 
 
-def _environment(config: TrainRlConfig) -> GoalReachingEnv:
-    return GoalReachingEnv(reward=Reward(config.reward_scale, config.action_change, config.action_size))
+def _environment(config: TrainRlConfig) -> gymnasium.Env:
+    reward = Reward(
+        scale=config.reward_scale,
+        change=config.action_change,
+        size=config.action_size,
+        failure=config.failure_cost,
+    )
+    matrix = conditioning()
+    space = spaces.Box(-np.inf, np.inf, (len(matrix),), np.float32)
+    env = GoalReachingEnv(reward=reward)
+    return TransformObservation(env, lambda values: (matrix @ values).astype(np.float32), space)

@@ -20,9 +20,12 @@ def _train(config: TrainRlConfig) -> int:
     from handrail.policies.rl_train import train
 
     record = train(config)
-    last = record["curve"][-1]
-    print(f"success {last['success']:.0%} of {config.goals} goals after {last['steps']} steps")
-    print(f"written: {config.folder}/actor.npz, actor.json")
+    score = {name: values["mean"] for name, values in record["final"].items()}
+    print(
+        f"{score['success']:.1%} of new goals after {record['curve'][-1]['steps']} steps, "
+        f"effort {score['arm_effort']:.1f}, jerkiness {score['jerkiness']:.3f}"
+    )
+    print(f"written: {config.folder}/actor.npz, actor.json, curve.png")
     return 0
 
 

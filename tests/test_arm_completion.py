@@ -51,6 +51,15 @@ def test_limits_hold_for_anything(previous, base, twist):
     assert np.all(np.abs(v - previous) <= LIMITS.acceleration * PERIOD + 1e-9)
 
 
+@given(BASES)
+def test_the_arm_makes_up_for_the_base_that_the_limits_leave(base):
+    """Law: the arm answers to what the base will do, not to what was asked of it."""
+    arm, step = ArmCompletion(MODEL), LIMITS.acceleration * PERIOD
+    v = arm.velocity(HOME, np.zeros(9), base, np.zeros(6), PERIOD)
+    assert np.allclose(v[:3], np.clip(base, -step[:3], step[:3]))
+    assert np.allclose(v[3:], np.clip(arm.arm_velocity(HOME, v[:3], np.zeros(6)), -step[3:], step[3:]))
+
+
 @given(arrays(float, 3, elements=st.floats(-0.1, 0.1)), st.floats(-3.0, 3.0))
 def test_a_welded_base_makes_planar_motions_alone(planar, angle):
     """Law: for vx, vy, ωz of the tool the arm rests, wherever the base points."""

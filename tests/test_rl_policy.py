@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from handrail.controllers.errors import HandrailError
+from handrail.policies.rl_observation import conditioning
 from handrail.policies.rl_policy import Actor
 
 SIZES = (54, 16, 8, 3)
@@ -58,10 +59,11 @@ def test_plain_arrays_act_like_the_trained_network():
     from handrail.policies.rl_env import GoalReachingEnv
 
     env = GoalReachingEnv()
+    P = conditioning()
     model = sac("MlpPolicy", env, policy_kwargs={"net_arch": [32, 16]}, buffer_size=10, seed=0, device="cpu")
-    actor = Actor.from_state({name: value.numpy() for name, value in model.actor.state_dict().items()})
+    actor = Actor.from_state({name: value.numpy() for name, value in model.actor.state_dict().items()}, P)
     observation, _ = env.reset(seed=0)
     for _ in range(30):
-        expected, _ = model.predict(observation, deterministic=True)
+        expected, _ = model.predict((P @ observation).astype(np.float32), deterministic=True)
         assert np.allclose(actor(observation), expected, atol=1e-5)
         observation, *_ = env.step(env.action_space.sample())

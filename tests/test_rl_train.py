@@ -1,6 +1,7 @@
 """Training: a run can be stopped and resumed, its settings stay, and what it writes can be used."""
 
 import json
+import pickle
 from dataclasses import replace
 
 import numpy as np
@@ -8,7 +9,7 @@ import pytest
 
 from handrail.controllers.errors import HandrailError
 from handrail.policies.rl_config import TrainRlConfig
-from handrail.policies.rl_evaluation import evaluate, evaluation_goals
+from handrail.policies.rl_evaluation import FINAL_SEED, evaluate, evaluation_goals, means
 from handrail.policies.rl_policy import Actor
 
 pytest.importorskip("stable_baselines3")
@@ -16,7 +17,14 @@ pytest.importorskip("tensorboard")
 from handrail.policies.rl_train import train
 
 TINY = TrainRlConfig(
-    steps=60, random_steps=20, layers=(8, 8), batch_size=8, buffer_size=200, save_every=40, goals=1
+    steps=60,
+    random_steps=20,
+    layers=(8, 8),
+    batch_size=8,
+    buffer_size=200,
+    save_every=40,
+    goals=1,
+    final_goals=2,
 )
 
 
@@ -39,12 +47,22 @@ def test_a_resumed_run_goes_on_where_it_stopped(run):
     assert not np.array_equal(Actor.load(config.folder / "actor.npz").weights[0], first.weights[0])
 
 
+def test_a_resumed_run_remembers_and_meets_new_goals(run):
+    config, *_ = run
+    with open(config.folder / "checkpoints" / "00000100" / "replay_buffer.pkl", "rb") as file:
+        buffer = pickle.load(file)
+    assert buffer.pos == 100
+    first, resumed = buffer.observations[0, 0], buffer.observations[60, 0]
+    assert not np.allclose(first[30:42], resumed[30:42])  # the goal
+
+
 def test_the_folder_holds_what_is_needed_and_no_more(run):
     config, *_ = run
     assert [path.name for path in (config.folder / "checkpoints").iterdir()] == ["00000100"]
     assert sorted(path.name for path in (config.folder / "actors").iterdir()) == [
         "00000040.npz", "00000060.npz", "00000080.npz", "00000100.npz",
     ]  # fmt: skip
+    assert (config.folder / "curve.png").stat().st_size > 5000
     assert list((config.folder / "tensorboard").rglob("events.*"))
 
 
@@ -55,8 +73,11 @@ def test_the_record_says_how_the_actor_was_made(run):
     assert {"stable-baselines3", "torch", "python", "handrail"} <= set(record["versions"])
     assert record["hardware"]["threads"] == 1
     last = Actor.load(config.folder / "actor.npz")
-    score = evaluate(last, evaluation_goals(config.goals))
+    score = means(evaluate(last, evaluation_goals(config.goals)))
     assert {name: record["curve"][-1][name] for name in score} == score
+    final = evaluate(last, evaluation_goals(2, FINAL_SEED))
+    assert record["final"]["length"]["max"] == max(score.length for score in final)
+    assert record["final"]["length"]["mean"] == means(final)["length"]
 
 
 def test_the_same_seed_gives_the_same_actor(tmp_path):
