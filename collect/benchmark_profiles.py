@@ -14,11 +14,11 @@ NOTHING_YET = -1
 
 _BURST = 10  # `steps`: so many steps at double speed, then as many at rest
 _NOISE = 0.3  # `noise`: standard deviation over the speed
-_TREMOR = 0.1  # `noise`: time constant [s]
+_TREMOR = (0.1, 0.5)  # `noise`: time constants of the band it lies in [s]
 _DELAYS = (4, 7)  # `delay`: a message takes so many steps, 0.12 to 0.21 s
 _LINK, _LOST = (20, 100), (4, 24)  # `dropouts`: steps with and without a link: 0.6 to 3 s, 0.12 to 0.72 s
 _WATCHDOG = 8  # `dropouts`: steps after which a robot without messages rests (0.25 s)
-_PRESS = 5  # `quantised`: steps between two decisions which keys to press
+_PRESS = 10  # `quantised`: steps between two decisions which keys to press (0.3 s)
 _KEYS = np.array([0.15] * 3 + [0.5] * 3)  # `quantised`: what a key commands [m/s, rad/s]
 
 
@@ -95,16 +95,22 @@ def _with_gaps(rng: np.random.Generator) -> IntArray:
 
 
 def _noisy(twists: FloatArray, rng: np.random.Generator) -> FloatArray:
-    """Add a tremor, an Ornstein-Uhlenbeck process, in proportion to the speed and to the turning rate."""
-    keep = np.exp(-STEP / _TREMOR)
-    tremor = np.empty_like(twists)
-    tremor[0] = rng.standard_normal(6)
-    for step in range(1, len(twists)):
-        tremor[step] = keep * tremor[step - 1] + np.sqrt(1.0 - keep**2) * rng.standard_normal(6)
-    sizes = np.repeat(
-        [np.linalg.norm(twists[:, :3], axis=1), np.linalg.norm(twists[:, 3:], axis=1)], 3, axis=0
-    )
-    return twists + _NOISE * sizes.T * tremor
+    """Add a tremor in proportion to the speed and to the turning rate.
+
+    It is white noise through a fast low-pass minus the same through a slow one, scaled to variance 1: it comes
+    and goes, and leaves the hand where it was.
+    """
+    keep = np.exp(-STEP / np.array(_TREMOR))[:, None]
+    passed, tremor = np.zeros((2, 6)), np.empty_like(twists)
+    for step in range(len(twists)):
+        passed = keep * passed + (1.0 - keep) * rng.standard_normal(6)
+        tremor[step] = passed[0] - passed[1]
+    fast, slow = keep[:, 0]
+    own = (1.0 - fast) / (1.0 + fast) + (1.0 - slow) / (1.0 + slow)
+    variance = own - 2.0 * (1.0 - fast) * (1.0 - slow) / (1.0 - fast * slow)
+    speed, rate = (np.linalg.norm(part, axis=1, keepdims=True) for part in (twists[:, :3], twists[:, 3:]))
+    sizes = np.repeat(np.hstack([speed, rate]), 3, axis=1)
+    return twists + _NOISE / np.sqrt(variance) * sizes * tremor
 
 
 def _quantised(twists: FloatArray) -> FloatArray:

@@ -12,7 +12,7 @@ from handrail.controllers.model import RobotModel
 
 VIEW = View(position=(-2.9, -3.4, 3.0), target=(-0.3, 0.0, 0.4), fovy=48.0)
 _LOW, _TALL = (0.3, 0.3), (0.25, 1.5)  # radius and height of the showcase's cylinders [m]
-_COUNTS = ((3, _LOW), (1, _TALL))
+_COUNTS = ((2, _LOW), (1, _TALL))
 _AREA = (-1.2, -1.2), (1.2, 1.2)  # of their centres [m]
 _CLEAR_START = 0.2  # of the robot at home [m]
 _CLEAR_HAND = 0.6  # of a tall one from the hand's straight way, seen from above [m]
@@ -26,7 +26,7 @@ def empty_floor() -> Scene:
 
 
 def cluttered_floor(model: RobotModel, goal: Goal, rng: np.random.Generator) -> Scene:
-    """Draw three low and one tall cylinder, clear of the robot's start, of the hand's way and of each other.
+    """Draw two low cylinders and a tall one, clear of the robot's start, of the hand's way and of each other.
 
     Low ones stand in the way of the base, tall ones in the way of the arm; the straight way of the hand from
     home to the goal is free, so that a goal can be reached.
