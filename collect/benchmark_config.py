@@ -32,7 +32,7 @@ class BenchmarkConfig:
     clutter: bool = False
     """Cylinders on the floor, between start and goal too."""
     early_stop: bool = True
-    """End an episode at its success, as the protocol says; else one second after the planner's last step."""
+    """End an episode at its success, as the protocol says; else 4 s after the planner's last step."""
     closed_loop: bool = False
     """The planner sees the hand and corrects its errors, instead of running open loop."""
     workers: int = 1

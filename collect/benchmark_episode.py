@@ -19,7 +19,7 @@ from handrail.controllers.model import Pose, RobotModel
 from handrail.controllers.rotation import rotation_vector
 
 _GAIN = 1.0  # of a planner that sees the hand [1/s]
-_SETTLING = 34  # steps after the planner's last one, without early stop (1 s)
+_SETTLING = 134  # steps after the planner's last one, without early stop (4 s)
 
 
 @dataclass(frozen=True)

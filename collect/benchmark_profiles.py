@@ -97,8 +97,8 @@ def _with_gaps(rng: np.random.Generator) -> IntArray:
 def _noisy(twists: FloatArray, rng: np.random.Generator) -> FloatArray:
     """Add a tremor in proportion to the speed and to the turning rate.
 
-    It is white noise through a fast low-pass minus the same through a slow one, scaled to variance 1: it comes
-    and goes, and leaves the hand where it was.
+    It is white noise through a fast low-pass minus the same through a slow one, scaled to variance 1: it
+    comes and goes, and leaves the hand where it was.
     """
     keep = np.exp(-STEP / np.array(_TREMOR))[:, None]
     passed, tremor = np.zeros((2, 6)), np.empty_like(twists)

@@ -6,6 +6,7 @@ import re
 import subprocess
 import sys
 from dataclasses import replace
+from io import StringIO
 
 import numpy as np
 import pytest
@@ -74,7 +75,7 @@ def test_the_report_carries_everything_with_it(written):
 def test_the_page_keeps_what_others_wrote(written):
     folder, results = written
     page = folder / "page.md"
-    config = BenchmarkConfig(controllers="mpc,dls", profile="nominal,fast3")
+    config = replace(QUICK, profile="nominal,fast3")
     first = page.read_text()
     assert "| paper: proposed | 97.0 |" in first
     assert all((folder / link).is_file() for link in re.findall(r"\]\((.+?)\)", first))
@@ -83,14 +84,14 @@ def test_the_page_keeps_what_others_wrote(written):
     again = page.read_text()
     assert again.startswith("# Mine\n\nBefore.\n")
     assert again.endswith("\nAfter.\n")
-    assert again.count("<!-- profiles_seed_1 -->") == 1
+    assert again.count("<!-- profiles_ideal_seed_1 -->") == 1
     assert "![" not in again
     write_page(results, {}, page, replace(config, seed=2))
     assert page.read_text().startswith(again.rstrip())
 
 
 def test_tables_show_every_controller(written):
-    console = Console(width=200, record=True, quiet=False, file=open("/dev/null", "w"))  # noqa: SIM115
+    console = Console(width=200, record=True, file=StringIO())
     console.print(benchmark_tables(written[1]))
     text = console.export_text()
     for words in ("mpc", "dls", "paper: RL", "success %", "mpc minus"):
@@ -147,7 +148,7 @@ def test_a_planner_that_sees_the_hand_gets_it_there():
 
 
 def test_physics_and_ideal_robot_tell_the_same_story():
-    real, ideal = (rows(BenchmarkConfig(goals=2, physics=physics), "dls") for physics in (True, False))
+    real, ideal = (rows(BenchmarkConfig(goals=2, physics=physics), "mpc") for physics in (True, False))
     for one, other in zip(real, ideal, strict=True):
         assert abs(one["length"] - other["length"]) <= 3
         assert one["arm_effort"] == pytest.approx(other["arm_effort"], rel=0.05)
@@ -161,7 +162,7 @@ def test_an_update_is_asked_for_at_its_period():
 
 
 def test_clutter_is_seen_by_the_mpc_and_not_by_plain_least_squares():
-    config = BenchmarkConfig(goals=8, clutter=True, physics=False)
+    config = BenchmarkConfig(goals=4, clutter=True, physics=False)
     found = rows(config, "mpc", "dls")
     contacts = {name: sum(r["contacts"] for r in found if r["controller"] == name) for name in ("mpc", "dls")}
     assert contacts["mpc"] == 0
@@ -192,7 +193,7 @@ WRONG = {
     "workers": (["--workers", "1000"], "--workers 1000: expected a whole number from 1 to 64"),
     "json": (
         ["--json", "/nowhere/at/all.json"],
-        "--json /nowhere/at/all.json: expected a file in an existing",
+        "/nowhere/at/all.json: expected a file in an existing",
     ),
     "page": (["--page", "results.txt"], "--page results.txt: expected a .md file"),
     "report": (["--report", __file__], "expected a folder, found a file"),

@@ -102,7 +102,7 @@ def test_a_blend_gives_the_hand_what_both_give_it(twist, alpha):
 
 
 def test_a_share_is_a_share():
-    with pytest.raises(HandrailError, match="alpha: expected 0 to 1, got 1.5"):
+    with pytest.raises(HandrailError, match=r"alpha: expected 0 to 1, got 1\.5"):
         BlendedCompletion(WholeBodyCompletion(MODEL), WholeBodyCompletion(MODEL), 1.5)
 
 
