@@ -1,7 +1,7 @@
 """One episode of the benchmark: planner, command profile, controller, robot."""
 
 from dataclasses import dataclass
-from time import perf_counter
+from time import perf_counter, process_time
 
 import numpy as np
 
@@ -56,7 +56,7 @@ def run_episode(
         controller: what its `build` returned; is reset.
         conditions: goal, scene, commands.
     """
-    start = perf_counter()
+    start = perf_counter(), process_time()
     plant = build_plant(model, conditions.scene, conditions.physics)
     controller.reset(conditions.scene.obstacles())
     contender.aim(controller, conditions.goal)
@@ -71,7 +71,8 @@ def run_episode(
         tally.add(plant.advance(velocity, 0.0))
         if conditions.early_stop and tally.reached:
             break
-    return tally.trace(drive, operator.end, perf_counter() - start)
+    spent = perf_counter() - start[0], process_time() - start[1]
+    return tally.trace(drive, operator.end, spent)
 
 
 class _Operator:
@@ -150,7 +151,7 @@ class _Tally:
         self._errors.append(pose_error(tool.position, tool.rotation, self._goal))
         self._contacts.append(contacts)
 
-    def trace(self, drive: _Drive, end: int, wall_time: float) -> Trace:
+    def trace(self, drive: _Drive, end: int, spent: tuple[float, float]) -> Trace:
         """Return what was noted."""
         return Trace(
             q=np.array(self._q),
@@ -161,5 +162,6 @@ class _Tally:
             statuses=[command.health.status for command in drive.commands],
             solve_times=[command.health.solve_time for command in drive.commands],
             end=end,
-            wall_time=wall_time,
+            wall_time=spent[0],
+            cpu_time=spent[1],
         )

@@ -15,6 +15,8 @@ HEADINGS = {
     "base_path": "base path m",
     "jerkiness": "jerkiness",
     "wall_time_s": "wall time s",
+    "cpu_time_s": "CPU time s",
+    "update_ms_median": "update ms",
     "planned_position_error": "position error at the planner's end m",
     "planned_orientation_error": "orientation error at the planner's end",
     "smallest_distance": "smallest distance m",
@@ -23,7 +25,8 @@ HEADINGS = {
 }
 COMPARED = ("success", "final_position_error", "arm_effort", "base_path", "jerkiness", "wall_time_s")
 """What paired tables show."""
-_DIGITS = {"length": 1, "arm_effort": 1, "base_path": 2, "wall_time_s": 2, "contacts": 1, "brakes": 1}
+_ONE, _TWO = ("length", "arm_effort", "contacts", "brakes"), ("base_path", "wall_time_s", "cpu_time_s")
+_DIGITS = dict.fromkeys(_ONE, 1) | dict.fromkeys(_TWO, 2)
 
 Table = tuple[list[str], list[list[str]]]
 """Headings and rows."""

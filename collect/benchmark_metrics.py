@@ -24,6 +24,7 @@ METRICS = (
 )
 """Those of the paper's Table I, in its order."""
 
+COST_METRICS = ("cpu_time_s", "update_ms_median")
 SAFETY_METRICS = ("contacts", "smallest_distance", "brakes")
 SETTLED_METRICS = ("planned_position_error", "planned_orientation_error")
 """Errors right after the planner's last step; only of episodes that got there."""
@@ -43,6 +44,7 @@ class Trace:
         solve_times: of the controller's updates [s].
         end: first step from which on nothing but rest arrives from the planner.
         wall_time: of the episode, controller, physics and collision checking together [s].
+        cpu_time: of the process in that time [s]; other programs do not lengthen it.
     """
 
     q: FloatArray
@@ -54,6 +56,7 @@ class Trace:
     solve_times: Sequence[float]
     end: int
     wall_time: float
+    cpu_time: float
 
 
 def measure(trace: Trace, collision: CollisionModel, base: int) -> dict[str, Any]:
@@ -75,6 +78,7 @@ def measure(trace: Trace, collision: CollisionModel, base: int) -> dict[str, Any
         "base_path": path_length(trace.q[:, :2]) if base else 0.0,
         "jerkiness": jerkiness(trace.v),
         "wall_time_s": trace.wall_time,
+        "cpu_time_s": trace.cpu_time,
         "contacts": sum(map(bool, trace.contacts)),
         "contact_names": names,
         "smallest_distance": float(collision.values(trace.q).min(initial=np.inf)),

@@ -13,7 +13,7 @@ from handrail.collect.benchmark_format import (
     profile_table,
     safety_table,
 )
-from handrail.collect.benchmark_metrics import METRICS, SETTLED_METRICS
+from handrail.collect.benchmark_metrics import COST_METRICS, METRICS, SETTLED_METRICS
 from handrail.collect.benchmark_results import save_json
 
 
@@ -54,7 +54,7 @@ def _parts(results: Mapping[str, Any], pictures: Mapping[str, bytes], stem: str)
     profiles = list(results["profiles"])
     for profile in profiles:
         parts += [f"**Profile {profile}**"] if len(profiles) > 1 else []
-        parts.append(_markdown(main_table(results, METRICS, profile)))
+        parts.append(_markdown(main_table(results, (*METRICS, COST_METRICS[0]), profile)))
         if not results["config"]["early_stop"]:
             parts.append(_markdown(main_table(results, SETTLED_METRICS, profile)))
         parts.append(_markdown(safety_table(results, profile)))

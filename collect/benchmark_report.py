@@ -14,7 +14,7 @@ from handrail.collect.benchmark_format import (
     profile_table,
     safety_table,
 )
-from handrail.collect.benchmark_metrics import METRICS, SETTLED_METRICS
+from handrail.collect.benchmark_metrics import COST_METRICS, METRICS, SETTLED_METRICS
 
 _STYLE = """
 body { font: 15px/1.45 system-ui, sans-serif; color: #222; }
@@ -41,7 +41,7 @@ def write_report(
     parts = ["<h1>Goal reaching</h1>", *(f'<p class="finding">{line}</p>' for line in _findings(results))]
     for profile in results["profiles"]:
         parts += [f"<h2>Profile {escape(profile)}</h2>", "<p>Mean ± SD (min, max) over the episodes.</p>"]
-        parts.append(_table(main_table(results, (*METRICS, *SETTLED_METRICS), profile)))
+        parts.append(_table(main_table(results, (*METRICS, COST_METRICS[0], *SETTLED_METRICS), profile)))
         parts += ["<h3>Safety</h3>", _table(safety_table(results, profile))]
         if results["paired"][profile]:
             parts += [f"<h3>Paired differences</h3><p>{_PAIRED}</p>"]

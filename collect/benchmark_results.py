@@ -12,7 +12,7 @@ import numpy as np
 
 from handrail.collect.benchmark_config import BenchmarkConfig
 from handrail.collect.benchmark_contenders import Contender, goal_reaching_settings
-from handrail.collect.benchmark_metrics import METRICS, SAFETY_METRICS, SETTLED_METRICS
+from handrail.collect.benchmark_metrics import COST_METRICS, METRICS, SAFETY_METRICS, SETTLED_METRICS
 from handrail.datasets.paired import paired_difference, paired_success, wilson
 
 Row = Mapping[str, Any]
@@ -69,7 +69,7 @@ def _column(rows: Sequence[Row], metric: str) -> np.ndarray:
 
 def _summary(rows: Sequence[Row]) -> dict[str, Any]:
     summary: dict[str, Any] = {"episodes": len(rows)}
-    for metric in (*METRICS, *SAFETY_METRICS, *SETTLED_METRICS):
+    for metric in (*METRICS, *COST_METRICS, *SAFETY_METRICS, *SETTLED_METRICS):
         values = _column(rows, metric)
         values = values[np.isfinite(values)]
         if len(values):

@@ -10,6 +10,7 @@ from handrail.collect.benchmark_format import (
     COMPARED,
     HEADINGS,
     Table,
+    Values,
     extremes,
     main_table,
     mean_and_spread,
@@ -19,6 +20,7 @@ from handrail.collect.benchmark_format import (
 )
 from handrail.collect.benchmark_metrics import METRICS, SETTLED_METRICS
 
+_ERRORS, _EFFORTS = METRICS[:4], (*METRICS[4:], "cpu_time_s")
 _SHORT = {
     HEADINGS["final_position_error"]: "d_p m",
     HEADINGS["final_orientation_error"]: "d_r",
@@ -35,12 +37,12 @@ def benchmark_tables(results: Mapping[str, Any]) -> Group:
     """Return everything worth a look, for printing."""
     tables = []
     for profile in results["profiles"]:
-        tables.append(_rich(main_table(results, METRICS, profile, mean_and_spread), f"{profile}: mean ± SD"))
-        tables.append(_rich(main_table(results, METRICS, profile, extremes), f"{profile}: min … max"))
-        if not results["config"]["early_stop"]:
-            tables.append(
-                _rich(main_table(results, SETTLED_METRICS, profile), f"{profile}: mean ± SD (min … max)")
-            )
+        groups = (
+            [_ERRORS, _EFFORTS] if results["config"]["early_stop"] else [_ERRORS, _EFFORTS, SETTLED_METRICS]
+        )
+        for group in groups:
+            title = f"{profile}: mean ± SD, min … max"
+            tables.append(_rich(main_table(results, group, profile, _stacked), title))
         tables.append(_rich(safety_table(results, profile), f"{profile}: safety"))
         if results["paired"][profile]:
             title = f"{profile}: paired differences [95 % bootstrap interval]"
@@ -50,10 +52,17 @@ def benchmark_tables(results: Mapping[str, Any]) -> Group:
     return Group(*tables)
 
 
+def _stacked(metric: str, values: Values) -> str:
+    """Return mean and spread above the extremes: narrow enough for a terminal."""
+    ends = extremes(metric, values)
+    mean = mean_and_spread(metric, values)
+    return mean if ends == "–" else f"{mean}\n{ends}"
+
+
 def _rich(table: Table, title: str) -> RichTable:
     headings, rows = table
     headings = [_SHORT.get(heading, heading) for heading in headings]
-    rich = RichTable(title=title)
+    rich = RichTable(title=title, show_lines=any("\n" in cell for row in rows for cell in row))
     for index, heading in enumerate(headings):
         rich.add_column(heading, no_wrap=index == 0)
     for row in rows:

@@ -81,8 +81,8 @@ class Bounded:
     """Hold the command until the hand would have gone some way, then let it rest.
 
     `û(t) = u` while `t ≤ min(d / ‖v‖, φ / ‖ω‖)`, then zero on the tool's channels; the first time ahead
-    always holds. The bound is a length, not a time: a fast command over a long horizon would else be predicted
-    to lead where the robot cannot go, and the plan would slow down at once for what is not going to happen.
+    always holds. The bound is a length, not a time: a fast command over a long horizon would else be
+    predicted to lead where the robot cannot go, and the plan would slow down for what will not happen.
 
     Args:
         channels: of the robot.

@@ -25,7 +25,7 @@ from handrail.controllers.model import load_model
 
 MODEL = load_model()
 QUIET = Console(quiet=True)
-TIMED = ("wall_time_s", "update_ms_median")
+TIMED = ("wall_time_s", "cpu_time_s", "update_ms_median")
 QUICK = BenchmarkConfig(controllers="mpc,dls", goals=2, physics=False, video=False)
 
 

@@ -31,6 +31,7 @@ def trace(steps=4, end=4, errors=(0.05, 0.01), contacts=()):
         solve_times=[1e-3, 2e-3, 3e-3],
         end=end,
         wall_time=0.5,
+        cpu_time=0.4,
     )
 
 
