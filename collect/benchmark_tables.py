@@ -18,9 +18,8 @@ from handrail.collect.benchmark_format import (
     profile_table,
     safety_table,
 )
-from handrail.collect.benchmark_metrics import METRICS, SETTLED_METRICS
+from handrail.collect.benchmark_metrics import COST_METRICS, METRICS, SETTLED_METRICS
 
-_ERRORS, _EFFORTS = METRICS[:4], (*METRICS[4:], "cpu_time_s")
 _SHORT = {
     HEADINGS["final_position_error"]: "d_p m",
     HEADINGS["final_orientation_error"]: "d_r",
@@ -37,10 +36,8 @@ def benchmark_tables(results: Mapping[str, Any]) -> Group:
     """Return everything worth a look, for printing."""
     tables = []
     for profile in results["profiles"]:
-        groups = (
-            [_ERRORS, _EFFORTS] if results["config"]["early_stop"] else [_ERRORS, _EFFORTS, SETTLED_METRICS]
-        )
-        for group in groups:
+        settled = () if results["config"]["early_stop"] else (SETTLED_METRICS,)
+        for group in (METRICS[:4], METRICS[4:], COST_METRICS, *settled):
             title = f"{profile}: mean ± SD, min … max"
             tables.append(_rich(main_table(results, group, profile, _stacked), title))
         tables.append(_rich(safety_table(results, profile), f"{profile}: safety"))

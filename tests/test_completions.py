@@ -125,7 +125,7 @@ def test_a_decoupled_base_keeps_the_hand_in_its_place():
     held_rule = Held(MODEL)
     for _ in range(2000):
         q[:3] += 0.01 * held_rule.base_velocity(q)
-    np.testing.assert_allclose(np.linalg.norm(q[:2] - HOME[:2]), DecoupledSettings().free, atol=0.02)
+    assert abs(np.linalg.norm(q[:2] - HOME[:2]) - DecoupledSettings().free) < 0.02
 
 
 def test_a_decoupled_base_rests_when_nothing_is_asked():
@@ -145,7 +145,7 @@ def test_a_rival_follows_the_hand(name):
         command = rival.update(State(q, v, step * STEP), hand_intent(twist, step * STEP))
         after = command.velocity(STEP)
         q, v = q + 0.5 * STEP * (v + after), after
-    np.testing.assert_allclose(MODEL.jacobian(q) @ v, twist, atol=0.05 * np.linalg.norm(twist))
+    np.testing.assert_allclose(MODEL.jacobian(q) @ v, twist, atol=0.05 * float(np.linalg.norm(twist)))
 
 
 @pytest.mark.parametrize("name", RIVALS)
