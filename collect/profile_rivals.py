@@ -1,19 +1,13 @@
 """What the controller is measured against: converged solvers on its problem, and mink."""
 
-from dataclasses import replace
 from time import perf_counter
-from typing import Any
 
 import numpy as np
 
+from handrail.collect.mink_scene import avoidance, import_mink, qp_solvers, shape_model, shape_pairs
 from handrail.collect.profile_lane import PERIOD, Lane, Update
 from handrail.controllers.converged import ConvergedSolver
-from handrail.controllers.errors import HandrailError
-from handrail.controllers.model import RobotModel
 from handrail.controllers.settings import MpcSettings
-from handrail.controllers.shape import Obstacle
-
-_SOLVERS = ("daqp", "proxqp", "quadprog")  # PIQP is slower than these and prints
 
 
 class Converged:
@@ -74,13 +68,8 @@ class Mink:
     name = "mink"
 
     def __init__(self, lane: Lane, reach: float) -> None:
-        try:
-            import mink
-            import qpsolvers
-        except ImportError as error:
-            raise HandrailError("handrail-profile: expected mink, found none; pip install mink") from error
-        self._mink = mink
-        self._solvers = tuple(name for name in _SOLVERS if name in qpsolvers.available_solvers)
+        self._mink = import_mink()
+        self._solvers = qp_solvers()
         self._reach = reach
         self._by_solver: dict[str, list[float]] = {solver: [] for solver in self._solvers}
         self.failed = 0
@@ -99,7 +88,7 @@ class Mink:
 
     def begin(self, lane: Lane) -> None:
         """Build MuJoCo's model of a new scene, and mink's tasks and limits."""
-        mink, model = self._mink, _mujoco_model(lane.model, lane.obstacles)
+        mink, model = self._mink, shape_model(lane.model, lane.obstacles)
         self._configuration = mink.Configuration(model)
         self._task = mink.FrameTask("tool", "site", position_cost=1.0, orientation_cost=1.0)
         posture = mink.PostureTask(model, cost=1e-3)
@@ -107,12 +96,7 @@ class Mink:
         limits = lane.model.description.limits
         speeds = dict(zip(lane.model.joints, limits.velocity.tolist(), strict=True))
         margin = MpcSettings().margin
-        avoid = _every_pair(mink)(
-            model,
-            [([first], [second]) for first, second in _pairs(lane)],
-            minimum_distance_from_collisions=margin,
-            collision_detection_distance=self._reach,
-        )
+        avoid = avoidance(model, shape_pairs(lane.model, lane.obstacles), margin, self._reach)
         self.pairs = avoid.max_num_contacts
         self._tasks = [self._task, posture]
         self._limits = [mink.ConfigurationLimit(model), mink.VelocityLimit(model, speeds), avoid]
@@ -142,40 +126,3 @@ class Mink:
         except (self._mink.MinkError, ValueError, RuntimeError):
             self.failed += 1
         return perf_counter() - start
-
-
-def _every_pair(mink: Any) -> Any:
-    """Return mink's limit without its filter, which drops neighbours: base against obstacle, for one."""
-
-    class EveryPair(mink.CollisionAvoidanceLimit):
-        def _construct_geom_id_pairs(self, geom_pairs: Any) -> list[tuple[int, int]]:
-            return [(self.model.geom(a).id, self.model.geom(b).id) for (a,), (b,) in geom_pairs]
-
-    return EveryPair
-
-
-def _pairs(lane: Lane) -> tuple[tuple[str, str], ...]:
-    description = lane.model.description
-    return (
-        *description.self_pairs,
-        *((name, "floor") for name in description.floor_shapes),
-        *((name, obstacle.name) for name in description.scene_shapes for obstacle in lane.obstacles),
-    )
-
-
-def _mujoco_model(model: RobotModel, obstacles: tuple[Obstacle, ...]) -> Any:
-    """Return the controller's own shapes in MuJoCo, each a geom of its name."""
-    from handrail.collect import geometry
-    from handrail.collect.gl import mujoco
-    from handrail.collect.robot import build_robot
-
-    bare = RobotModel(replace(model.description, gripper=None))
-    spec = build_robot(bare, meshes=False).spec
-    spec.worldbody.add_geom(name="floor", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[8.0, 8.0, 0.1])
-    for obstacle in obstacles:
-        spec.worldbody.add_geom(
-            name=obstacle.name,
-            **geometry.geom_shape(obstacle.shape),
-            **geometry.pose(obstacle.position, obstacle.rotation),
-        )
-    return spec.compile()

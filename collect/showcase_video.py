@@ -1,16 +1,15 @@
 """The video of a case: the scene camera's pictures with a caption."""
 
-from fractions import Fraction
 from pathlib import Path
 from types import TracebackType
 
-import av
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
 from handrail.collect.env import HandrailEnv
 from handrail.collect.showcase_cases import Case
+from handrail.collect.video_file import VideoFile
 from handrail.datasets.frames import Moment
 
 SIZE = (540, 960)  # height, width [px]
@@ -22,14 +21,7 @@ class Filmer:
 
     def __init__(self, case: Case, path: Path, fps: int) -> None:
         self._case = case
-        self._container = av.open(str(path), "w", format="mp4")
-        self._stream = self._container.add_stream(
-            "libx264", rate=fps, options={"crf": "20", "preset": "medium", "x264-params": "log=-1"}
-        )
-        self._stream.height, self._stream.width = SIZE[0] + _BAR, SIZE[1]
-        self._stream.pix_fmt, self._stream.time_base = "yuv420p", Fraction(1, fps)
-        self._count = 0
-        self._fps = fps
+        self._file = VideoFile(path, (SIZE[0] + _BAR, SIZE[1]), fps)
         self._large, self._small = (ImageFont.load_default(size) for size in (20, 16))
 
     def __enter__(self) -> "Filmer":
@@ -39,9 +31,8 @@ class Filmer:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Write what the encoder still holds and close the file."""
-        self._container.mux(self._stream.encode(None))
-        self._container.close()
+        """Close the file."""
+        self._file.__exit__(kind, error, trace)
 
     def begin(self, env: HandrailEnv, seed: int) -> None:
         """Take note of the environment."""
@@ -50,12 +41,8 @@ class Filmer:
     def see(self, moment: Moment) -> None:
         """Add the picture of this moment."""
         picture = self._env.render()
-        if picture is None:
-            return
-        frame = av.VideoFrame.from_ndarray(self._captioned(picture, moment), format="rgb24")
-        frame.pts, frame.time_base = self._count, Fraction(1, self._fps)
-        self._container.mux(self._stream.encode(frame))
-        self._count += 1
+        if picture is not None:
+            self._file.add(self._captioned(picture, moment))
 
     def _captioned(self, picture: NDArray[np.uint8], moment: Moment) -> NDArray[np.uint8]:
         """Return the picture on top of a bar that says what is steered and how near things are."""

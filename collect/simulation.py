@@ -83,6 +83,13 @@ class Simulation:
             self.data.ctrl[self._gripper_servo] = self._stroke
         mujoco.mj_forward(self.mujoco_model, self.data)
 
+    def show(self, q: FloatArray) -> None:
+        """Put the robot at q, (n,), at rest, for a picture; no time passes."""
+        self.data.qpos[self._q_index] = q
+        self.data.qvel[:] = 0.0
+        mujoco.mj_kinematics(self.mujoco_model, self.data)
+        mujoco.mj_camlight(self.mujoco_model, self.data)
+
     def advance(self, velocity: FloatArray, gripper: float) -> tuple[str, ...]:
         """Reach a velocity linearly over one control step; return the forbidden contacts on the way.
 

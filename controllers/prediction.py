@@ -6,6 +6,7 @@ from collections.abc import Callable
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray
+from handrail.controllers.channels import Channels
 from handrail.controllers.intent import Intent
 
 Prediction = Callable[[Intent, FloatArray], FloatArray]
@@ -74,6 +75,34 @@ class Extrapolated:
         centred = times - times.mean()
         spread = float(centred @ centred)
         return centred @ values / spread if spread > 0 else np.zeros(values.shape[1])
+
+
+class Bounded:
+    """Hold the command until the hand would have gone some way, then let it rest.
+
+    `û(t) = u` while `t ≤ min(d / ‖v‖, φ / ‖ω‖)`, then zero on the tool's channels; the first time ahead
+    always holds. The bound is a length, not a time: a fast command over a long horizon would else be
+    predicted to lead where the robot cannot go, and the plan would slow down for what will not happen.
+
+    Args:
+        channels: of the robot.
+        distance: d [m].
+        angle: φ [rad].
+    """
+
+    def __init__(self, channels: Channels, distance: float = 0.4, angle: float = 1.5) -> None:
+        self._tool = channels.tool_slice
+        self._distance, self._angle = distance, angle
+
+    def __call__(self, intent: Intent, times: FloatArray) -> FloatArray:
+        """Return the predicted values, (N, m)."""
+        values = np.array(constant(intent, times))
+        twist = np.where(intent.mask, intent.values, 0.0)[self._tool]
+        pace = max(
+            float(np.linalg.norm(twist[:3])) / self._distance, float(np.linalg.norm(twist[3:])) / self._angle
+        )
+        values[(times * pace > 1.0) & (times > times[0]), self._tool] = 0.0
+        return values
 
 
 class Preview:

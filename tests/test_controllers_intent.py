@@ -13,7 +13,7 @@ from handrail.controllers.intent import Intent
 from handrail.controllers.limiter import Limiter
 from handrail.controllers.model import load_model
 from handrail.controllers.mpc import MaskedMpc
-from handrail.controllers.prediction import Decaying, Extrapolated, Preview, constant
+from handrail.controllers.prediction import Bounded, Decaying, Extrapolated, Preview, constant
 from handrail.controllers.settings import MpcSettings
 from handrail.controllers.shape import Obstacle, Shape
 
@@ -46,6 +46,29 @@ def test_decaying_dies_away():
     asked = intent(np.ones(18), "ee")
     predicted = Decaying(0.5)(asked, TIMES)
     np.testing.assert_allclose(predicted[:, 3], np.exp(-TIMES / 0.5))
+
+
+@pytest.mark.parametrize("speed", [0.05, 0.5, 1.0, 50.0])
+def test_bounded_holds_for_a_way_not_for_a_time(speed):
+    """The hand goes as far as the bound at any speed, to within a stage; other channels hold."""
+    times = 0.01 * np.arange(1, 2001)
+    values = np.full(18, 0.2)
+    values[3:9] = [speed, 0.0, 0.0, 0.0, 0.0, 0.0]
+    predicted = Bounded(CHANNELS, distance=0.4, angle=1.0)(intent(values, "ee", "base"), times)
+    way = 0.01 * predicted[:, 3].sum()
+    assert abs(way - 0.4) <= 0.01 * speed + 1e-9
+    assert predicted[0, 3] == speed
+    np.testing.assert_array_equal(predicted[:, :3], 0.2)
+
+
+def test_bounded_ends_with_the_first_of_way_and_turn():
+    values = np.zeros(18)
+    values[CHANNELS.tool_slice] = [0.1, 0.0, 0.0, 0.0, 0.0, 1.0]
+    predicted = Bounded(CHANNELS, distance=1.0, angle=0.55)(intent(values, "ee"), TIMES)
+    np.testing.assert_array_equal(predicted[:5], np.tile(values, (5, 1)))
+    np.testing.assert_array_equal(predicted[5:], 0.0)
+    resting = intent(np.zeros(18), "ee")
+    np.testing.assert_array_equal(Bounded(CHANNELS)(resting, TIMES), constant(resting, TIMES))
 
 
 def test_extrapolated_follows_a_ramp_and_levels_off():

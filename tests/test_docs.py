@@ -18,6 +18,7 @@ from handrail.collect.operators.modes import MODES
 from handrail.collect.profile_config import ProfileConfig
 from handrail.collect.showcase_config import ShowcaseConfig
 from handrail.controllers.command import Status
+from handrail.policies.rl_config import TrainRlConfig
 from handrail.scripts import cli
 
 ROOT = Path(__file__).parent.parent
@@ -29,6 +30,7 @@ CONFIGS = {
     "handrail-demo": DemoConfig,
     "handrail-showcase": ShowcaseConfig,
     "handrail-profile": ProfileConfig,
+    "handrail-train-rl": TrainRlConfig,
 }
 _LEROBOT = """
 import json, sys

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
+from handrail.collect.goal_reaching import ORIENTATION_TOLERANCE, POSITION_TOLERANCE, sample_goal
 from handrail.collect.scene import Part, Scene, SceneObject, View
 from handrail.collect.tasks.moving import mover_features, mover_names, sample_movers
 from handrail.collect.tasks.task import Episode, Outcome, TaskState
@@ -35,8 +35,8 @@ class Reach:
     name: str = "Reach"
     description: str = "Move the gripper to the goal frame."
     horizon: float = 30.0
-    position_tolerance: float = 0.1
-    orientation_tolerance: float = 0.05
+    position_tolerance: float = POSITION_TOLERANCE
+    orientation_tolerance: float = ORIENTATION_TOLERANCE
     moving_obstacles: int = 0
 
     @property
@@ -47,10 +47,10 @@ class Reach:
 
     def sample(self, model: RobotModel, rng: np.random.Generator) -> Episode:
         """Draw a goal, then the moving obstacles."""
-        position = rng.uniform([-1.0, -1.0, 0.7], [1.0, 1.0, 1.0])
-        goal = Pose(position, _rotation(rng))
+        drawn = sample_goal(rng)
+        goal = Pose(drawn.position, drawn.rotation)
         movers = sample_movers(self.moving_obstacles, model, model.description.home, rng)
-        return Episode(Scene((_marker(goal), *movers), _VIEW), model.description.home, goal)
+        return Episode(Scene((goal_marker(goal), *movers), _VIEW), model.description.home, goal)
 
     def features(self, state: TaskState) -> FloatArray:
         """Return the goal pose, (7,), and place, velocity and size of what moves, (6,) each."""
@@ -75,14 +75,7 @@ def _goal(state: TaskState) -> Pose:
     return state.goal if state.goal is not None else state.tool
 
 
-def _rotation(rng: np.random.Generator) -> FloatArray:
-    """Return a rotation about a normalised uniform-cube axis by an angle uniform in [0, π]."""
-    axis = rng.uniform(-1.0, 1.0, 3)
-    axis /= np.linalg.norm(axis)
-    return Rotation.from_rotvec(axis * rng.uniform(0.0, np.pi)).as_matrix()
-
-
-def _marker(goal: Pose) -> SceneObject:
+def goal_marker(goal: Pose) -> SceneObject:
     """Return three coloured axes on a ball, drawn without contact."""
     axes = tuple(
         Part(

@@ -1,0 +1,102 @@
+"""What `handrail-benchmark` runs, as typed settings; light to import."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from handrail.controllers.errors import HandrailError, unknown_name
+
+CONTROLLERS = (
+    *("mpc", "rl", "mink", "dls", "dls_arm", "decoupled", "blended"),
+    *("direct", "cbf_filter", "safety_filter"),
+)
+PROFILES = ("nominal", "fast15", "fast2", "fast3", "steps", "noise", "delay", "dropouts", "quantised")
+MOST_WORKERS = 64
+
+
+@dataclass(frozen=True)
+class BenchmarkConfig:
+    """Run the paper's goal-reaching benchmark: every controller on the same goals, with the same planner."""
+
+    controllers: str = "all"
+    """Which controllers, comma-separated, or all: mpc, rl, mink, dls, dls_arm, decoupled, blended, direct,
+    cbf_filter, safety_filter."""
+    goals: int = 100
+    """Goals, the same for every controller."""
+    seed: int = 1
+    """Of the goals, obstacles and command noise."""
+    profile: str = "nominal"
+    """How the planner's twist arrives, comma-separated, or all: nominal, fast15, fast2, fast3, steps, noise,
+    delay, dropouts, quantised."""
+    physics: bool = True
+    """MuJoCo physics; without it an ideal robot that does what it is told."""
+    clutter: bool = False
+    """Cylinders on the floor, between start and goal too."""
+    early_stop: bool = True
+    """End an episode at its success, as the protocol says; else 4 s after the planner's last step."""
+    closed_loop: bool = False
+    """The planner sees the hand and corrects its errors, instead of running open loop."""
+    workers: int = 1
+    """Processes that share the goals."""
+    json: str = ""
+    """Write everything measured, every episode too, to this file."""
+    report: str = ""
+    """Write an HTML report with figures and a video to this folder."""
+    page: str = ""
+    """Put the tables into this Markdown page, between marks of this kind of run; figures go beside it."""
+    video: bool = True
+    """Whether the report has a video (needs OpenGL)."""
+
+    @property
+    def controller_names(self) -> tuple[str, ...]:
+        """The controllers asked for."""
+        return _names(self.controllers, CONTROLLERS)
+
+    @property
+    def profile_names(self) -> tuple[str, ...]:
+        """The profiles asked for."""
+        return _names(self.profile, PROFILES)
+
+    @property
+    def label(self) -> str:
+        """A name of this kind of run: what is special about it, and the seed."""
+        profiles = self.profile_names
+        kinds = [profiles[0] if len(profiles) == 1 else "profiles"]
+        kinds += [name for name in ("clutter", "closed_loop") if getattr(self, name)]
+        kinds += [word for word, there in (("whole", self.early_stop), ("ideal", self.physics)) if not there]
+        return "_".join([*kinds, f"seed_{self.seed}"])
+
+    def check(self) -> None:
+        """Check what can be checked without loading anything heavy.
+
+        Raises:
+            HandrailError: one setting is wrong; the message says what may be chosen.
+        """
+        _check_names("controller", "--controllers", self.controller_names, CONTROLLERS)
+        _check_names("profile", "--profile", self.profile_names, PROFILES)
+        for name, least, most in (("goals", 1, 100_000), ("seed", 0, None), ("workers", 1, MOST_WORKERS)):
+            value = getattr(self, name)
+            if value < least or (most is not None and value > most):
+                limits = f"from {least} to {most}" if most is not None else f">= {least}"
+                raise HandrailError(f"--{name} {value}: expected a whole number {limits}")
+        if self.json and not Path(self.json).expanduser().absolute().parent.is_dir():
+            raise HandrailError(f"--json {self.json}: expected a file in an existing folder")
+        if self.page and not (self.page.endswith(".md") and Path(self.page).expanduser().parent.is_dir()):
+            raise HandrailError(f"--page {self.page}: expected a .md file in an existing folder")
+        if self.report and Path(self.report).expanduser().is_file():
+            raise HandrailError(f"--report {self.report}: expected a folder, found a file")
+
+
+def _names(given: str, everything: tuple[str, ...]) -> tuple[str, ...]:
+    if given.strip() == "all":
+        return everything
+    return tuple(name.strip() for name in given.split(",") if name.strip())
+
+
+def _check_names(thing: str, flag: str, names: tuple[str, ...], choices: tuple[str, ...]) -> None:
+    if not names:
+        raise HandrailError(f"{flag}: expected all, or some of {', '.join(choices)}; got none")
+    for name in names:
+        if name not in choices:
+            raise unknown_name(thing, name, ("all", *choices))
+    if len(set(names)) != len(names):
+        raise HandrailError(f"{flag} {','.join(names)}: expected each {thing} once")

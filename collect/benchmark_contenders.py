@@ -1,0 +1,176 @@
+"""Who takes part in the benchmark: each controller, what its operator sends, and how often it is asked."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from handrail.collect.goal_reaching import STEP, Goal
+from handrail.collect.mink_controller import MinkController
+from handrail.controllers.arm_completion import WeldedBaseCompletion
+from handrail.controllers.arrays import FloatArray
+from handrail.controllers.blended_completion import BlendedCompletion
+from handrail.controllers.cbf_filter import CbfFilter
+from handrail.controllers.channels import Channels
+from handrail.controllers.controller import Controller, State
+from handrail.controllers.decoupled_completion import DecoupledCompletion
+from handrail.controllers.direct import DirectController
+from handrail.controllers.intent import Intent
+from handrail.controllers.model import RobotModel
+from handrail.controllers.mpc import MaskedMpc
+from handrail.controllers.prediction import Bounded
+from handrail.controllers.safety_filter import safety_filter
+from handrail.controllers.settings import MpcSettings
+from handrail.controllers.twist_completion import twist_controller
+from handrail.controllers.whole_body_completion import WholeBodyCompletion
+
+MPC_PERIOD = 0.1  # of the protocol [s]
+_FILTER_PERIOD = 0.06  # [s]
+
+
+def goal_reaching_settings() -> MpcSettings:
+    """Return the masked MPC's settings in the benchmark; what differs from its defaults, and why.
+
+    Twelve stages of 0.4 s look 4.8 s ahead: the palm keeps clear of the forearm by turning early instead of
+    late and fast, which nearly halves the effort where that pair matters. The price is a hand that takes
+    about 0.4 s to take up a new command. The larger weight of accelerations spreads a turn over the stages;
+    the base's weight shares the motion between base and arm. No posture to return to and no terminal cost:
+    the protocol has none, and both only add motion. Chosen on goals of seeds from 100 on.
+    """
+    return MpcSettings(
+        dt=0.4,
+        horizon=12,
+        base_velocity=0.02,
+        acceleration=0.2,
+        posture=0.0,
+        terminal_velocity=0.0,
+    )
+
+
+class HandIntent:
+    """The operator steers the hand: the twist goes on the tool's channels.
+
+    Args:
+        model: of the robot.
+    """
+
+    def __init__(self, model: RobotModel) -> None:
+        self._channels = Channels.of(model.description)
+        self._mask = self._channels.mask("ee")
+
+    def __call__(self, twist: FloatArray, state: State, time: float) -> Intent:
+        """Return the intent of a twist, world-aligned at the tool, that was sent at a time [s]."""
+        values = np.zeros(self._channels.size)
+        values[self._channels.tool_slice] = twist
+        return Intent(values, self._mask, mode="hand", time=time)
+
+
+class JointIntent:
+    """The operator steers every joint, and works out how by himself: plain damped least squares.
+
+    What reaches the controller is a complete command, as direct control and safety filters expect it; nobody
+    could do that with his hands so well.
+
+    Args:
+        model: of the robot.
+    """
+
+    def __init__(self, model: RobotModel) -> None:
+        self._channels = Channels.of(model.description)
+        self._mask = self._channels.mask("joint")
+        self._resolve = WholeBodyCompletion(model)
+
+    def __call__(self, twist: FloatArray, state: State, time: float) -> Intent:
+        """Return the intent of a twist, world-aligned at the tool, that was sent at a time [s]."""
+        values = np.zeros(self._channels.size)
+        values[self._channels.joint_slice] = self._resolve(state.q, state.v, twist, STEP)
+        return Intent(values, self._mask, mode="joints", time=time)
+
+
+IntentMap = Callable[[FloatArray, State, float], Intent]
+
+
+def _no_aim(controller: Controller, goal: Goal) -> None:
+    """Tell a controller nothing of the goal: it sees the operator's commands only."""
+
+
+@dataclass(frozen=True)
+class Contender:
+    """One entry of the benchmark; its functions are a module's own, so that worker processes find them.
+
+    Attributes:
+        name: as on the command line.
+        title: one line.
+        build: the controller for a robot.
+        operator: what the planner's twist becomes.
+        period: between two updates [s].
+        aim: tells the controller the goal, if it needs to know it.
+    """
+
+    name: str
+    title: str
+    build: Callable[[RobotModel], Controller]
+    operator: Callable[[RobotModel], IntentMap] = HandIntent
+    period: float = STEP
+    aim: Callable[[Controller, Goal], None] = _no_aim
+
+
+def _mpc(model: RobotModel) -> Controller:
+    predict = Bounded(Channels.of(model.description))
+    return MaskedMpc(model, goal_reaching_settings(), predict=predict)
+
+
+def _mink(model: RobotModel) -> Controller:
+    return MinkController(model, STEP)
+
+
+def _whole_body(model: RobotModel) -> Controller:
+    return twist_controller(model, WholeBodyCompletion(model), STEP)
+
+
+def _nominal_base(model: RobotModel) -> Controller:
+    return twist_controller(model, WeldedBaseCompletion(model), STEP)
+
+
+def _decoupled(model: RobotModel) -> Controller:
+    return twist_controller(model, DecoupledCompletion(model), STEP)
+
+
+def _blended(model: RobotModel) -> Controller:
+    blend = BlendedCompletion(WholeBodyCompletion(model), WeldedBaseCompletion(model))
+    return twist_controller(model, blend, STEP)
+
+
+def _direct(model: RobotModel) -> Controller:
+    return DirectController(model, STEP)
+
+
+def _cbf(model: RobotModel) -> Controller:
+    return CbfFilter(model, STEP)
+
+
+def _filter(model: RobotModel) -> Controller:
+    return safety_filter(model, _FILTER_PERIOD)
+
+
+CONTENDERS: Mapping[str, Contender] = {
+    contender.name: contender
+    for contender in (
+        Contender("mpc", "masked MPC", _mpc, period=MPC_PERIOD),
+        Contender("mink", "differential IK with collision avoidance (mink)", _mink),
+        Contender("dls", "damped least squares, whole body", _whole_body),
+        Contender("dls_arm", "damped least squares on the arm, nominal base", _nominal_base),
+        Contender("decoupled", "decoupled base and arm", _decoupled),
+        Contender("blended", "blended control, α = 0.5", _blended),
+        Contender("direct", "direct joint control", _direct, JointIntent),
+        Contender("cbf_filter", "CBF safety filter on joint commands", _cbf, JointIntent),
+        Contender(
+            "safety_filter",
+            "multi-step safety filter on joint commands",
+            _filter,
+            JointIntent,
+            _FILTER_PERIOD,
+        ),
+    )
+}
+"""All that this floor can build; the RL baseline comes from the floor above."""

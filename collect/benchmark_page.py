@@ -1,0 +1,80 @@
+"""The benchmark's part of a Markdown page: tables and figures between two marks; what a repository keeps."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from handrail.collect.benchmark_config import BenchmarkConfig
+from handrail.collect.benchmark_format import (
+    COMPARED,
+    Table,
+    main_table,
+    paired_table,
+    profile_table,
+    safety_table,
+)
+from handrail.collect.benchmark_metrics import COST_METRICS, METRICS, SETTLED_METRICS
+from handrail.collect.benchmark_results import save_json
+
+
+def write_page(
+    results: Mapping[str, Any], pictures: Mapping[str, bytes], page: Path, config: BenchmarkConfig
+) -> None:
+    """Put tables and figures into a page, between the marks of this kind of run; other text stays.
+
+    Figures and the summaries as JSON go beside the page, named `<page>_<label>…`.
+
+    Args:
+        results: as summarised.
+        pictures: PNG by name.
+        page: the Markdown file, made if it is not there.
+        config: what was run.
+    """
+    stem = f"{page.stem}_{config.label}"
+    for name, data in pictures.items():
+        (page.parent / f"{stem}_{name}.png").write_bytes(data)
+    save_json({k: v for k, v in results.items() if k != "episodes"}, page.parent / f"{stem}.json")
+    body = "\n\n".join(_parts(results, pictures, stem))
+    text = page.read_text(encoding="utf-8") if page.exists() else "# Goal reaching\n"
+    page.write_text(_replaced(text, config.label, body), encoding="utf-8")
+
+
+def _replaced(text: str, label: str, body: str) -> str:
+    """Return the text with the body between the label's marks; at its end where there are none."""
+    begin, end = f"<!-- {label} -->", f"<!-- end {label} -->"
+    block = f"{begin}\n\n{body}\n\n{end}"
+    before, found, rest = text.partition(begin)
+    if not found:
+        return f"{text.rstrip()}\n\n{block}\n"
+    return before + block + rest.partition(end)[2]
+
+
+def _parts(results: Mapping[str, Any], pictures: Mapping[str, bytes], stem: str) -> list[str]:
+    parts = [f"`{_command(results)}` wrote this. Mean ± SD (min, max) over the episodes."]
+    profiles = list(results["profiles"])
+    for profile in profiles:
+        parts += [f"**Profile {profile}**"] if len(profiles) > 1 else []
+        parts.append(_markdown(main_table(results, (*METRICS, COST_METRICS[0]), profile)))
+        if not results["config"]["early_stop"]:
+            parts.append(_markdown(main_table(results, SETTLED_METRICS, profile)))
+        parts.append(_markdown(safety_table(results, profile)))
+        if results["paired"][profile]:
+            parts.append(_markdown(paired_table(results, COMPARED, profile)))
+    if len(profiles) > 1:
+        parts.append(_markdown(profile_table(results)))
+    parts += [f"![{name}]({stem}_{name}.png)" for name in pictures]
+    return parts + [f"Left out: {name} ({reason})." for name, reason in results["skipped"].items()]
+
+
+def _markdown(table: Table) -> str:
+    headings, rows = table
+    lines = [headings, ["---"] * len(headings), *rows]
+    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
+
+
+def _command(results: Mapping[str, Any]) -> str:
+    config = results["config"]
+    flags = [f"--{name} {config[name]}" for name in ("controllers", "goals", "seed", "profile", "workers")]
+    flags += [f"--{name}" for name in ("clutter", "closed_loop") if config[name]]
+    flags += [f"--no_{name}" for name in ("physics", "early_stop") if not config[name]]
+    return " ".join(["handrail-benchmark", *flags])

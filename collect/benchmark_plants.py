@@ -1,0 +1,72 @@
+"""The robot that the benchmark drives: an ideal one, or MuJoCo's."""
+
+from typing import Protocol
+
+import numpy as np
+
+from handrail.collect.goal_reaching import STEP
+from handrail.collect.scene import Scene
+from handrail.collect.simulation import Simulation
+from handrail.controllers.arrays import FloatArray
+from handrail.controllers.collision import CollisionModel
+from handrail.controllers.controller import State
+from handrail.controllers.model import Pose, RobotModel
+
+
+class Plant(Protocol):
+    """Something that follows velocities in steps of 0.03 s."""
+
+    def state(self) -> State:
+        """Return the measured positions, velocities and time."""
+        ...
+
+    @property
+    def tool(self) -> Pose:
+        """The pose of the tool point."""
+        ...
+
+    def advance(self, velocity: FloatArray, gripper: float) -> tuple[str, ...]:
+        """Reach a velocity linearly over one step; return the forbidden contacts on the way."""
+        ...
+
+
+class IdealRobot:
+    """Does exactly what it is told; shapes that overlap count as contacts.
+
+    Args:
+        model: of the robot.
+        scene: obstacles.
+        q: where it starts, (n,).
+    """
+
+    def __init__(self, model: RobotModel, scene: Scene, q: FloatArray) -> None:
+        self._model = model
+        self._collision = CollisionModel(model, scene.obstacles())
+        self._q, self._v = np.array(q), np.zeros(len(q))
+        self._distances = self._collision.values(self._q[None])[0]
+        self._steps = 0
+
+    def state(self) -> State:
+        """Return position, velocity and time."""
+        return State(self._q, self._v, self._steps * STEP)
+
+    @property
+    def tool(self) -> Pose:
+        """The pose of the tool point."""
+        return self._model.pose(self._q)
+
+    def advance(self, velocity: FloatArray, gripper: float) -> tuple[str, ...]:
+        """Move by `½ h (v + v⁺)`; return the pairs of shapes that overlap then."""
+        before = self._q
+        self._q = before + 0.5 * STEP * (self._v + velocity)
+        self._v = np.array(velocity, dtype=np.float64)
+        self._steps += 1
+        self._distances = self._collision.values(self._q[None], now=(before, self._distances))[0]
+        overlaps = np.flatnonzero(self._distances < 0.0)
+        return tuple(" – ".join(self._collision.pairs[index]) for index in overlaps)
+
+
+def build_plant(model: RobotModel, scene: Scene, physics: bool) -> Plant:
+    """Return a robot at home in a scene."""
+    home = model.description.home
+    return Simulation(model, scene, home, STEP) if physics else IdealRobot(model, scene, home)

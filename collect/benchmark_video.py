@@ -1,0 +1,76 @@
+"""An example video of the benchmark: controllers on the same goal, side by side, in step."""
+
+from collections.abc import Sequence
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, ImageDraw, ImageFont
+
+from handrail.collect.benchmark_contenders import Contender
+from handrail.collect.benchmark_episode import Conditions
+from handrail.collect.benchmark_metrics import Trace
+from handrail.collect.goal_reaching import STEP
+from handrail.collect.rendering import PRETTY, Painter
+from handrail.collect.scene import Scene
+from handrail.collect.simulation import Simulation
+from handrail.collect.tasks.reach import goal_marker
+from handrail.collect.video_file import VideoFile
+from handrail.controllers.model import Pose, RobotModel
+
+_SIZE = (360, 480)  # of one picture [px]
+_BAR = 44  # height of the caption [px]
+_EVERY = 3  # steps between pictures
+_REST = 10  # pictures after the end
+
+
+def film(
+    model: RobotModel,
+    conditions: Conditions,
+    runs: Sequence[tuple[Contender, Trace]],
+    path: Path,
+) -> None:
+    """Write the video of some runs under the same conditions.
+
+    Args:
+        model: of the robot.
+        conditions: goal and obstacles.
+        runs: who, and what happened.
+        path: of the file, .mp4.
+
+    Raises:
+        HandrailError: there is no OpenGL on this machine.
+    """
+    goal = Pose(conditions.goal.position, conditions.goal.rotation)
+    scene = Scene((*conditions.scene.objects, goal_marker(goal)), conditions.scene.view)
+    simulation = Simulation(model, scene, model.description.home, STEP, meshes=True)
+    painter = Painter(simulation.mujoco_model, _SIZE, PRETTY)
+    longest = max(len(trace.q) for _, trace in runs)
+    size = (_SIZE[0] + _BAR, _SIZE[1] * len(runs))
+    try:
+        with VideoFile(path, size, 1 / (_EVERY * Fraction(STEP).limit_denominator(1000))) as video:
+            for step in range(0, longest + _REST * _EVERY, _EVERY):
+                panels = [_panel(simulation, painter, who, trace, step) for who, trace in runs]
+                video.add(np.hstack(panels))
+    finally:
+        painter.close()
+
+
+def _panel(
+    simulation: Simulation, painter: Painter, who: Contender, trace: Trace, step: int
+) -> NDArray[np.uint8]:
+    """Return the picture of a run at a step, over a bar that says who it is and how far from the goal."""
+    index = min(step, len(trace.q) - 1)
+    simulation.show(trace.q[index])
+    picture = painter.paint(simulation.mujoco_model, simulation.data, "scene")
+    d_p, d_r = trace.errors[max(index - 1, 0)]
+    image = Image.new("RGB", (_SIZE[1], _SIZE[0] + _BAR), (24, 26, 30))
+    image.paste(Image.fromarray(picture))
+    draw = ImageDraw.Draw(image)
+    draw.text((10, _SIZE[0] + 5), who.title, font=ImageFont.load_default(14), fill=(245, 245, 245))
+    words = f"{index * STEP:4.1f} s   {d_p:.2f} m   d_r {d_r:.3f}"
+    touched = sum(map(bool, trace.contacts[:index]))
+    words += f"   in contact {touched * STEP:.1f} s" if touched else ""
+    draw.text((10, _SIZE[0] + 24), words, font=ImageFont.load_default(12), fill=(190, 195, 205))
+    return np.array(image)

@@ -1,0 +1,69 @@
+"""The folder of a training run: settings, the last checkpoint, every evaluated actor."""
+
+import json
+import shutil
+from dataclasses import asdict
+from pathlib import Path
+
+from stable_baselines3 import SAC
+
+from handrail.controllers.errors import HandrailError
+from handrail.policies.rl_config import TrainRlConfig
+from handrail.policies.rl_policy import Actor
+
+Curve = list[dict[str, float]]
+
+
+def begin_run(config: TrainRlConfig) -> None:
+    """Make the folder of a new run and write its settings.
+
+    Raises:
+        HandrailError: something is there that must not be removed.
+    """
+    folder, settings = config.folder, config.folder / "config.json"
+    if folder.exists() and any(folder.iterdir()):
+        if not config.overwrite:
+            raise HandrailError(f"{folder}: there is something already; expected --resume or --overwrite")
+        if not settings.is_file():
+            raise HandrailError(f"--overwrite: expected a training run in {folder}, found something else")
+        shutil.rmtree(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    settings.write_text(json.dumps(asdict(config), indent=1) + "\n")
+
+
+def resume_run(config: TrainRlConfig) -> tuple[SAC, Curve]:
+    """Return the model of the last checkpoint, replay buffer included, and the curve until then.
+
+    Raises:
+        HandrailError: there is no checkpoint, or the settings differ from those that the run began with.
+    """
+    last = _last(config.folder)
+    if last is None:
+        raise HandrailError(f"--resume: expected a run with a checkpoint in {config.folder}, found none")
+    settings = json.loads((config.folder / "config.json").read_text())
+    config.check_continues(TrainRlConfig(**{**settings, "layers": tuple(settings["layers"])}))
+    model = SAC.load(last / "model.zip", device="cpu")
+    model.load_replay_buffer(last / "replay_buffer.pkl")
+    return model, json.loads((last / "curve.json").read_text())
+
+
+def write_checkpoint(folder: Path, model: SAC, actor: Actor, curve: Curve) -> None:
+    """Write a checkpoint under another name, rename it, and remove the one before."""
+    name = f"{model.num_timesteps:08d}"
+    (folder / "actors").mkdir(exist_ok=True)
+    actor.save(folder / "actors" / f"{name}.npz")
+    last, final = _last(folder), folder / "checkpoints" / name
+    partial = final.with_suffix(".partial")
+    shutil.rmtree(partial, ignore_errors=True)
+    partial.mkdir(parents=True)
+    model.save(partial / "model.zip")
+    model.save_replay_buffer(partial / "replay_buffer.pkl")
+    (partial / "curve.json").write_text(json.dumps(curve, indent=1) + "\n")
+    partial.rename(final)
+    if last is not None:
+        shutil.rmtree(last)
+
+
+def _last(folder: Path) -> Path | None:
+    found = sorted(path for path in (folder / "checkpoints").glob("*") if path.suffix != ".partial")
+    return found[-1] if found else None

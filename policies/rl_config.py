@@ -1,0 +1,100 @@
+"""Settings of the reinforcement-learning baseline's training; light to import."""
+
+from dataclasses import dataclass, fields
+from pathlib import Path
+
+from handrail.controllers.errors import HandrailError
+
+_FREE_ON_RESUME = ("output_dir", "steps", "save_every", "final_goals", "threads", "resume", "overwrite")
+
+
+@dataclass(frozen=True)
+class TrainRlConfig:
+    """Train the reinforcement-learning baseline: a soft actor-critic drives the base, the arm follows."""
+
+    output_dir: str = "outputs/rl"
+    """Folder for checkpoints, TensorBoard curves and the actor."""
+    steps: int = 500_000
+    """Environment steps, those before a resume included."""
+    seed: int = 0
+    """Of the goals, the networks and the exploration."""
+    learning_rate: float = 1e-4
+    """Of actor, critics and entropy temperature."""
+    gamma: float = 0.99
+    """Discount of the reward a step."""
+    tau: float = 0.001
+    """Share of the critics that enters their targets at every update."""
+    batch_size: int = 256
+    """Transitions an update."""
+    buffer_size: int = 100_000
+    """Transitions kept."""
+    random_steps: int = 10_000
+    """Steps with random actions before the first update."""
+    train_freq: int = 1
+    """Environment steps between updates."""
+    gradient_steps: int = 1
+    """Updates each time."""
+    layers: tuple[int, ...] = (512, 512, 256)
+    """Hidden layers of actor and critics."""
+    temperature: float = 1.0
+    """Of the entropy in the beginning; then tuned automatically."""
+    action_change: float = 0.05
+    """Weight of the squared change of the action in the reward."""
+    action_size: float = 0.05
+    """Weight of the squared action in the reward."""
+    failure_cost: float = 0.0
+    """Subtracted from the reward when an episode is given up; without it, giving up early can pay."""
+    reward_scale: float = 1.0
+    """Factor of the whole reward."""
+    save_every: int = 20_000
+    """Steps between checkpoints, each with an evaluation."""
+    goals: int = 50
+    """Goals of these evaluations, always the same."""
+    final_goals: int = 300
+    """Goals of the last evaluation; nobody looked at them before."""
+    threads: int = 1
+    """Of PyTorch."""
+    resume: bool = False
+    """Go on from the last checkpoint in the folder."""
+    overwrite: bool = False
+    """Remove the run that is there."""
+
+    @property
+    def folder(self) -> Path:
+        """The folder of the run."""
+        return Path(self.output_dir).expanduser()
+
+    def check(self) -> None:
+        """Check the settings.
+
+        Raises:
+            HandrailError: one is wrong.
+        """
+        whole = ("steps", "batch_size", "buffer_size", "train_freq", "gradient_steps", "save_every")
+        for name in (*whole, "goals", "final_goals", "threads"):
+            if getattr(self, name) < 1:
+                raise HandrailError(f"--{name} {getattr(self, name)}: expected 1 or more")
+        for name in ("seed", "random_steps", "action_change", "action_size", "failure_cost"):
+            if not getattr(self, name) >= 0:
+                raise HandrailError(f"--{name} {getattr(self, name)}: expected 0 or more")
+        for name in ("gamma", "tau", "learning_rate"):
+            if not 0.0 < getattr(self, name) <= 1.0:
+                raise HandrailError(f"--{name} {getattr(self, name)}: expected a number in (0, 1]")
+        for name in ("temperature", "reward_scale"):
+            if not getattr(self, name) > 0.0:
+                raise HandrailError(f"--{name} {getattr(self, name)}: expected a positive number")
+        if not self.layers or min(self.layers) < 1:
+            raise HandrailError(f"--layers {self.layers}: expected sizes of 1 or more")
+        if self.resume and self.overwrite:
+            raise HandrailError("--resume and --overwrite: expected one of them, got both")
+
+    def check_continues(self, earlier: "TrainRlConfig") -> None:
+        """Check that a run can go on with these settings.
+
+        Raises:
+            HandrailError: one differs that must not.
+        """
+        for entry in fields(self):
+            now, then = getattr(self, entry.name), getattr(earlier, entry.name)
+            if entry.name not in _FREE_ON_RESUME and now != then:
+                raise HandrailError(f"--resume with --{entry.name} {now}: expected {then} as the run began")

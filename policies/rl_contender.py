@@ -1,0 +1,21 @@
+"""The reinforcement-learning baseline's entry in the goal-reaching benchmark."""
+
+from typing import cast
+
+from handrail.collect.benchmark_contenders import Contender
+from handrail.collect.goal_reaching import Goal
+from handrail.controllers.controller import Controller
+from handrail.controllers.model import RobotModel
+from handrail.policies.rl_controller import RlController
+
+
+def _build(model: RobotModel) -> Controller:
+    return RlController(model)
+
+
+def _aim(controller: Controller, goal: Goal) -> None:
+    """Tell it the goal: the baseline's observation has it."""
+    cast(RlController, controller).aim(goal)
+
+
+RL = Contender("rl", "reinforcement-learning baseline (SAC)", _build, aim=_aim)

@@ -1,0 +1,84 @@
+"""What the reinforcement-learning policy sees and does: 54 numbers in the base frame, and a base twist."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from handrail.controllers.arrays import FloatArray
+
+OBSERVATION_SIZE = 54
+ACTION_SIZE = 3
+BASE_SPEED = np.array([0.4, 0.4, 0.75])  # of a full action: vx, vy [m/s], ωz [rad/s]
+
+RigidPose = tuple[FloatArray, FloatArray]  # position (3,) [m], rotation (3, 3)
+
+
+@dataclass(frozen=True)
+class Situation:
+    """What an observation is made of; poses and twist in the world frame.
+
+    Attributes:
+        q: generalised coordinates, planar base first, (n,).
+        start: base coordinates at the beginning of the episode, (3,).
+        twist: commanded tool twist, world-aligned, (6,) [m/s, rad/s].
+        current: pose of the tool.
+        desired: where the commands so far would have brought it.
+        goal: where they lead.
+        previous: action before, (3,).
+    """
+
+    q: FloatArray
+    start: FloatArray
+    twist: FloatArray
+    current: RigidPose
+    desired: RigidPose
+    goal: RigidPose
+    previous: FloatArray
+
+
+def observe(situation: Situation) -> FloatArray:
+    """Return the observation: twist 6, poses 3 × (3 + 9), base since the start 3, arm 6, previous action 3.
+
+    Everything but the base coordinates is in the frame of the base, and these are relative to the base's
+    first pose, so that an observation does not change when robot and goal are moved or turned together.
+    """
+    angle = situation.q[2]
+    to_base = planar_rotation(-angle)
+    origin = np.array([situation.q[0], situation.q[1], 0.0])
+    twist = situation.twist.reshape(2, 3) @ to_base.T
+    parts = [twist.ravel()]
+    for position, rotation in (situation.current, situation.desired, situation.goal):
+        parts += [to_base @ (position - origin), (to_base @ rotation).ravel()]
+    travelled = planar_rotation(-situation.start[2])[:2, :2] @ (situation.q[:2] - situation.start[:2])
+    parts += [travelled, [angle - situation.start[2]], situation.q[3:], situation.previous]
+    return np.concatenate(parts)
+
+
+def conditioning() -> FloatArray:
+    """Return P of `z = P o`: the observation as the networks are trained on it, (54, 54).
+
+    The twist and the way from the current to the desired pose are small beside the other numbers and matter
+    most: they are enlarged, and desired and goal pose become differences from the current one. P can be
+    undone, so nothing is added or lost; a trained actor takes it into its first layer.
+    """
+    scale = np.concatenate([np.full(3, 10.0), np.full(3, 3.0), np.ones(OBSERVATION_SIZE - 6)])
+    scale[18:30] = np.repeat([10.0, 5.0], [3, 9])
+    difference = np.eye(OBSERVATION_SIZE)
+    difference[18:30, 6:18] = difference[30:42, 6:18] = -np.eye(12)
+    return scale[:, None] * difference
+
+
+def base_velocity(action: FloatArray, angle: float) -> FloatArray:
+    """Return the base coordinates' velocity of an action, in the world frame, (3,) [m/s, rad/s].
+
+    Args:
+        action: in [−1, 1], (3,), in the base frame.
+        angle: of the base [rad].
+    """
+    return planar_rotation(angle) @ (BASE_SPEED * np.clip(action, -1.0, 1.0))
+
+
+def planar_rotation(angle: float) -> FloatArray:
+    """Return the rotation about z by an angle [rad], (3, 3)."""
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])

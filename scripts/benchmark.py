@@ -1,0 +1,31 @@
+"""`handrail-benchmark`: the paper's goal-reaching benchmark, every controller on the same goals."""
+
+from handrail.collect.benchmark_config import BenchmarkConfig
+from handrail.scripts import cli
+
+
+def main() -> None:
+    """Run the command."""
+    cli.run(lambda: _benchmark(cli.parse(BenchmarkConfig, "handrail-benchmark")))
+
+
+def _benchmark(config: BenchmarkConfig) -> int:
+    config.check()
+    from rich.console import Console
+
+    from handrail.collect.benchmark import benchmark
+    from handrail.collect.benchmark_contenders import CONTENDERS
+    from handrail.collect.benchmark_tables import benchmark_tables
+    from handrail.policies.rl_contender import RL
+
+    console = Console()
+    results = benchmark(config, {**CONTENDERS, RL.name: RL}, console)
+    console.print(benchmark_tables(results))
+    for written in (config.json, config.report and f"{config.report}/benchmark.html", config.page):
+        if written:
+            console.print(f"Written: {written}", highlight=False, soft_wrap=True)
+    return 0
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,33 @@
+"""`handrail-train-rl`: train the reinforcement-learning baseline."""
+
+from importlib.util import find_spec
+
+from handrail.controllers.errors import HandrailError
+from handrail.policies.rl_config import TrainRlConfig
+from handrail.scripts import cli
+
+
+def main() -> None:
+    """Run the command."""
+    cli.run(lambda: _train(cli.parse(TrainRlConfig, "handrail-train-rl")))
+
+
+def _train(config: TrainRlConfig) -> int:
+    config.check()
+    for needed in ("stable_baselines3", "tensorboard"):
+        if find_spec(needed) is None:
+            raise HandrailError(f"handrail-train-rl: expected {needed}, found none; pip install '.[rl]'")
+    from handrail.policies.rl_train import train
+
+    record = train(config)
+    score = {name: values["mean"] for name, values in record["final"].items()}
+    print(
+        f"{score['success']:.1%} of new goals after {record['curve'][-1]['steps']} steps, "
+        f"effort {score['arm_effort']:.1f}, jerkiness {score['jerkiness']:.3f}"
+    )
+    print(f"written: {config.folder}/actor.npz, actor.json, curve.png")
+    return 0
+
+
+if __name__ == "__main__":
+    main()

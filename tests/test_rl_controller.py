@@ -1,0 +1,93 @@
+"""The baseline as a controller: what it does is what its environment does, and bad input brakes it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from test_rl_policy import random_actor
+
+from handrail.collect.goal_reaching import STEP, Goal
+from handrail.controllers.channels import Channels
+from handrail.controllers.command import Status
+from handrail.controllers.controller import State
+from handrail.controllers.intent import Intent
+from handrail.controllers.model import load_model
+from handrail.policies.rl_controller import RlController
+from handrail.policies.rl_env import GoalReachingEnv
+
+MODEL = load_model()
+CHANNELS = Channels.of(MODEL.description)
+
+
+def intent(twist, time: float = 0.0) -> Intent:
+    values = np.zeros(CHANNELS.size)
+    values[CHANNELS.tool_slice] = twist
+    return Intent(values, CHANNELS.mask("ee"), time=time)
+
+
+@pytest.fixture
+def controller():
+    return RlController(MODEL, random_actor())
+
+
+def test_the_controller_moves_like_the_environment(controller):
+    """Law: fed with the planner's twists, it commands the velocities that the actor was trained with."""
+    env, actor = GoalReachingEnv(early_failure=False), random_actor()
+    for seed in (0, 1):
+        observation, _ = env.reset(seed=seed)
+        controller.reset()
+        controller.aim(env.planner.goal)
+        q, v = env.q, env.velocity
+        for t in range(80):
+            command = controller.update(State(q, v, t * STEP), intent(env.planner.twist(t), t * STEP))
+            observation, *_ = env.step(actor(observation))
+            v = command.velocities[-1]
+            q = q + STEP * v
+            assert command.health.status is Status.OK
+            assert np.allclose(v, env.velocity, atol=1e-5)
+        assert np.abs(v[:3]).max() > 0.01
+
+
+@pytest.mark.parametrize(
+    ("spoil", "status"),
+    [
+        (lambda good: replace(good, values=np.full(CHANNELS.size, np.nan)), Status.INVALID_INTENT),
+        (lambda good: replace(good, values=np.zeros(4)), Status.INVALID_INTENT),
+        (lambda good: replace(good, mask=CHANNELS.mask("joint")), Status.INVALID_INTENT),
+        (lambda good: replace(good, time=-1.0), Status.STALE_INTENT),
+    ],
+)
+def test_bad_input_brakes_within_the_limits(controller, spoil, status):
+    q, v = MODEL.description.home, np.zeros(9)
+    for _ in range(30):
+        v = controller.update(State(q, v), intent([0.2, 0.0, 0.0, 0.0, 0.0, 0.0])).velocities[-1]
+    speed = np.linalg.norm(v)
+    command = controller.update(State(q, v), spoil(intent(np.zeros(6))))
+    assert command.health.status is status
+    assert np.linalg.norm(command.velocities[-1]) < speed
+    assert np.all(np.abs(command.velocities[-1] - v) <= MODEL.description.limits.acceleration * STEP + 1e-9)
+    for _ in range(100):
+        command = controller.update(State(q, v), spoil(intent(np.zeros(6))))
+    assert not command.velocities[-1].any()
+
+
+def test_a_broken_state_brakes(controller):
+    command = controller.update(State(np.full(9, np.nan), np.zeros(9)), intent(np.ones(6)))
+    assert command.health.status is Status.INVALID_STATE
+    assert not command.velocities.any()
+
+
+def test_a_new_episode_knows_nothing_of_the_one_before(controller):
+    def drive():
+        q, v = MODEL.description.home, np.zeros(9)
+        for _ in range(20):
+            v = controller.update(State(q, v), intent([0.05, 0.1, 0.0, 0.0, 0.0, 0.2])).velocities[-1]
+            q = q + STEP * v
+        return q
+
+    first = drive()
+    controller.aim(Goal(np.array([0.5, 0.5, 0.8]), np.eye(3)))
+    second = drive()
+    controller.reset()
+    assert not np.allclose(first, second)
+    assert np.array_equal(first, drive())

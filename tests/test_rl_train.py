@@ -1,0 +1,122 @@
+"""Training: a run can be stopped and resumed, its settings stay, and what it writes can be used."""
+
+import json
+import pickle
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from handrail.controllers.errors import HandrailError
+from handrail.policies.rl_config import TrainRlConfig
+from handrail.policies.rl_evaluation import FINAL_SEED, evaluate, evaluation_goals, means
+from handrail.policies.rl_policy import Actor
+
+pytest.importorskip("stable_baselines3")
+pytest.importorskip("tensorboard")
+from handrail.policies.rl_train import train
+
+TINY = TrainRlConfig(
+    steps=60,
+    random_steps=20,
+    layers=(8, 8),
+    batch_size=8,
+    buffer_size=200,
+    save_every=40,
+    goals=1,
+    final_goals=2,
+)
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    """A run of 60 steps, stopped and resumed to 100."""
+    config = replace(TINY, output_dir=str(tmp_path_factory.mktemp("runs") / "rl"))
+    train(config)
+    first = Actor.load(config.folder / "actor.npz")
+    record = train(replace(config, steps=100, resume=True))
+    return config, first, record
+
+
+def test_a_resumed_run_goes_on_where_it_stopped(run):
+    config, first, record = run
+    assert [row["steps"] for row in record["curve"]] == [40, 60, 80, 100]
+    assert record["curve"][-1]["updates"] == 100 - config.random_steps
+    seconds = [row["seconds"] for row in record["curve"]]
+    assert seconds == sorted(seconds)
+    assert not np.array_equal(Actor.load(config.folder / "actor.npz").weights[0], first.weights[0])
+
+
+def test_a_resumed_run_remembers_and_meets_new_goals(run):
+    config, *_ = run
+    with open(config.folder / "checkpoints" / "00000100" / "replay_buffer.pkl", "rb") as file:
+        buffer = pickle.load(file)
+    assert buffer.pos == 100
+    first, resumed = buffer.observations[0, 0], buffer.observations[60, 0]
+    assert not np.allclose(first[30:42], resumed[30:42])  # the goal
+
+
+def test_the_folder_holds_what_is_needed_and_no_more(run):
+    config, *_ = run
+    assert [path.name for path in (config.folder / "checkpoints").iterdir()] == ["00000100"]
+    assert sorted(path.name for path in (config.folder / "actors").iterdir()) == [
+        "00000040.npz", "00000060.npz", "00000080.npz", "00000100.npz",
+    ]  # fmt: skip
+    assert (config.folder / "curve.png").stat().st_size > 5000
+    assert list((config.folder / "tensorboard").rglob("events.*"))
+
+
+def test_the_record_says_how_the_actor_was_made(run):
+    config, _, record = run
+    assert json.loads((config.folder / "actor.json").read_text()) == json.loads(json.dumps(record))
+    assert record["settings"]["seed"] == config.seed
+    assert {"stable-baselines3", "torch", "python", "handrail"} <= set(record["versions"])
+    assert record["hardware"]["threads"] == 1
+    last = Actor.load(config.folder / "actor.npz")
+    score = means(evaluate(last, evaluation_goals(config.goals)))
+    assert {name: record["curve"][-1][name] for name in score} == score
+    final = evaluate(last, evaluation_goals(2, FINAL_SEED))
+    assert record["final"]["length"]["max"] == max(score.length for score in final)
+    assert record["final"]["length"]["mean"] == means(final)["length"]
+
+
+def test_the_same_seed_gives_the_same_actor(tmp_path):
+    actors = []
+    for name in ("one", "other"):
+        config = replace(TINY, output_dir=str(tmp_path / name), steps=40)
+        train(config)
+        actors.append(Actor.load(config.folder / "actor.npz"))
+    assert all(np.array_equal(*pair) for pair in zip(actors[0].weights, actors[1].weights, strict=True))
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({}, "there is something already"),
+        ({"resume": True, "gamma": 0.9}, "--resume with --gamma 0.9: expected 0.99"),
+        ({"resume": True, "layers": (8,)}, "--layers"),
+        ({"resume": True, "overwrite": True}, "expected one of them"),
+    ],
+)
+def test_a_run_is_not_spoiled_by_accident(run, change, message):
+    with pytest.raises(HandrailError, match=message):
+        train(replace(run[0], **change))
+    assert Actor.load(run[0].folder / "actor.npz")
+
+
+def test_only_a_training_run_is_overwritten(tmp_path):
+    (tmp_path / "thesis.txt").write_text("years of work")
+    with pytest.raises(HandrailError, match="expected a training run"):
+        train(replace(TINY, output_dir=str(tmp_path), overwrite=True))
+    with pytest.raises(HandrailError, match="expected a run with a checkpoint"):
+        train(replace(TINY, output_dir=str(tmp_path), resume=True))
+    assert (tmp_path / "thesis.txt").read_text() == "years of work"
+
+
+@pytest.mark.parametrize(
+    "change",
+    [{"steps": 0}, {"gamma": 1.5}, {"tau": 0.0}, {"layers": ()}, {"seed": -1}, {"reward_scale": 0.0}],
+)
+def test_settings_that_make_no_sense_are_refused(change):
+    with pytest.raises(HandrailError, match="expected"):
+        replace(TINY, **change).check()
