@@ -5,7 +5,16 @@ from pathlib import Path
 
 from handrail.controllers.errors import HandrailError
 
-_FREE_ON_RESUME = ("output_dir", "steps", "save_every", "final_goals", "threads", "resume", "overwrite")
+_FREE_ON_RESUME = (
+    "output_dir",
+    "steps",
+    "learning_rate",
+    "save_every",
+    "final_goals",
+    "threads",
+    "resume",
+    "overwrite",
+)
 
 
 @dataclass(frozen=True)
@@ -19,7 +28,7 @@ class TrainRlConfig:
     seed: int = 0
     """Of the goals, the networks and the exploration."""
     learning_rate: float = 1e-4
-    """Of actor, critics and entropy temperature."""
+    """Of actor, critics and entropy temperature; may be another one after a resume."""
     gamma: float = 0.99
     """Discount of the reward a step."""
     tau: float = 0.001

@@ -94,7 +94,8 @@ class Watch(BaseCallback):
         score = means(evaluate(actor, self._goals))
         seconds = time.monotonic() - self._began
         updates = float(self.model._n_updates)
-        self._curve.append({"steps": self.num_timesteps, "updates": updates, "seconds": seconds, **score})
+        row = {"steps": self.num_timesteps, "updates": updates, "seconds": seconds}
+        self._curve.append({**row, "learning_rate": self._config.learning_rate, **score})
         for name, value in score.items():
             self.logger.record(f"evaluation/{name}", value)
         self.logger.dump(self.num_timesteps)
@@ -133,6 +134,8 @@ def _resumed(config: TrainRlConfig) -> tuple[SAC, Curve]:
     model.set_env(_environment(config))
     model.set_random_seed(config.seed + model.num_timesteps)  # else the same goals would come again
     model.tensorboard_log = str(config.folder / "tensorboard")
+    model.learning_rate = config.learning_rate
+    model._setup_lr_schedule()
     return model, curve
 
 
