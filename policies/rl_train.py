@@ -13,7 +13,13 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from stable_baselines3 import SAC
 from stable_baselines3.common.callbacks import BaseCallback
 
-from handrail.policies.rl_checkpoint import Curve, begin_run, resume_run, write_checkpoint
+from handrail.policies.rl_checkpoint import (
+    Curve,
+    begin_run,
+    evaluated_actors,
+    resume_run,
+    write_checkpoint,
+)
 from handrail.policies.rl_config import TrainRlConfig
 from handrail.policies.rl_env import GoalReachingEnv, Reward
 from handrail.policies.rl_evaluation import FINAL_SEED, evaluate, evaluation_goals, means, spreads
@@ -41,7 +47,7 @@ def train(config: TrainRlConfig) -> dict[str, Any]:
     if remaining > 0:
         callback = Watch(config, curve)
         model.learn(remaining, callback, log_interval=20, reset_num_timesteps=not config.resume)
-    actor = actor_of(model)
+    actor = Actor.mean(evaluated_actors(config.folder, config.average))
     actor.save(config.folder / "actor.npz")
     final = spreads(evaluate(actor, evaluation_goals(config.final_goals, FINAL_SEED)))
     record = training_record(config, curve, final)

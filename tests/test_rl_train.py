@@ -82,7 +82,7 @@ def test_the_record_says_how_the_actor_was_made(run):
     assert {"stable-baselines3", "torch", "python", "handrail"} <= set(record["versions"])
     assert record["hardware"]["threads"] == 1
     last = Actor.load(config.folder / "actor.npz")
-    score = means(evaluate(last, evaluation_goals(config.goals)))
+    score = means(evaluate(last, evaluation_goals(config.goals)))  # the mean of one actor is that actor
     assert {name: record["curve"][-1][name] for name in score} == score
     final = evaluate(last, evaluation_goals(2, FINAL_SEED))
     assert record["final"]["length"]["max"] == max(score.length for score in final)
@@ -111,6 +111,14 @@ def test_a_run_is_not_spoiled_by_accident(run, change, message):
     with pytest.raises(HandrailError, match=message):
         train(replace(run[0], **change))
     assert Actor.load(run[0].folder / "actor.npz")
+
+
+def test_the_actor_may_be_the_mean_of_the_last_ones(run):
+    config, *_ = run
+    train(replace(config, steps=100, resume=True, average=2))
+    last = [Actor.load(config.folder / "actors" / f"{steps:08d}.npz") for steps in (80, 100)]
+    found = Actor.load(config.folder / "actor.npz")
+    assert np.allclose(found.weights[0], (last[0].weights[0] + last[1].weights[0]) / 2)
 
 
 def test_only_a_training_run_is_overwritten(tmp_path):
