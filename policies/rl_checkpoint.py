@@ -64,6 +64,11 @@ def write_checkpoint(folder: Path, model: SAC, actor: Actor, curve: Curve) -> No
         shutil.rmtree(last)
 
 
+def evaluated_actors(folder: Path, most: int) -> list[Actor]:
+    """Return the last evaluated actors of a run, at most so many."""
+    return [Actor.load(path) for path in sorted((folder / "actors").glob("*.npz"))[-most:]]
+
+
 def _last(folder: Path) -> Path | None:
     found = sorted(path for path in (folder / "checkpoints").glob("*") if path.suffix != ".partial")
     return found[-1] if found else None

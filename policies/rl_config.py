@@ -5,7 +5,10 @@ from pathlib import Path
 
 from handrail.controllers.errors import HandrailError
 
-_FREE_ON_RESUME = ("output_dir", "steps", "save_every", "final_goals", "threads", "resume", "overwrite")
+_FREE_ON_RESUME = (
+    *("output_dir", "steps", "learning_rate", "save_every", "final_goals", "average"),
+    *("threads", "resume", "overwrite"),
+)
 
 
 @dataclass(frozen=True)
@@ -19,7 +22,7 @@ class TrainRlConfig:
     seed: int = 0
     """Of the goals, the networks and the exploration."""
     learning_rate: float = 1e-4
-    """Of actor, critics and entropy temperature."""
+    """Of actor, critics and entropy temperature; may be another one after a resume."""
     gamma: float = 0.99
     """Discount of the reward a step."""
     tau: float = 0.001
@@ -52,6 +55,8 @@ class TrainRlConfig:
     """Goals of these evaluations, always the same."""
     final_goals: int = 300
     """Goals of the last evaluation; nobody looked at them before."""
+    average: int = 1
+    """The actor at the end is the mean of so many last evaluated ones: steadier than any of them."""
     threads: int = 1
     """Of PyTorch."""
     resume: bool = False
@@ -71,7 +76,7 @@ class TrainRlConfig:
             HandrailError: one is wrong.
         """
         whole = ("steps", "batch_size", "buffer_size", "train_freq", "gradient_steps", "save_every")
-        for name in (*whole, "goals", "final_goals", "threads"):
+        for name in (*whole, "goals", "final_goals", "average", "threads"):
             if getattr(self, name) < 1:
                 raise HandrailError(f"--{name} {getattr(self, name)}: expected 1 or more")
         for name in ("seed", "random_steps", "action_change", "action_size", "failure_cost"):

@@ -1,7 +1,7 @@
 """The trained actor without PyTorch: a small network in plain arrays."""
 
 import itertools
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -68,6 +68,16 @@ class Actor:
         layers = [name.removesuffix(".weight") for name in names] + ["mu"]
         first, *others = (state[f"{layer}.weight"] for layer in layers)
         return cls((first @ conditioning, *others), tuple(state[f"{layer}.bias"] for layer in layers))
+
+    @classmethod
+    def mean(cls, actors: Sequence["Actor"]) -> "Actor":
+        """Return the actor whose weights are the means of others' weights; they must have the same layers."""
+        weights = zip(*(actor.weights for actor in actors), strict=True)
+        biases = zip(*(actor.biases for actor in actors), strict=True)
+        return cls(
+            tuple(np.mean(layer, axis=0) for layer in weights),
+            tuple(np.mean(layer, axis=0) for layer in biases),
+        )
 
     def save(self, path: Path) -> None:
         """Write the arrays to an .npz file."""

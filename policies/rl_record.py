@@ -20,8 +20,8 @@ def training_record(
 
     Args:
         config: of the training; the seed is in there.
-        curve: evaluations, the last one that of the actor.
-        final: its evaluation on goals that it was not chosen by.
+        curve: evaluations during the training.
+        final: evaluation of the actor on goals that nobody looked at before.
     """
     settings = {name: value for name, value in asdict(config).items() if name not in _PLACES}
     return {

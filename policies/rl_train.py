@@ -13,7 +13,13 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from stable_baselines3 import SAC
 from stable_baselines3.common.callbacks import BaseCallback
 
-from handrail.policies.rl_checkpoint import Curve, begin_run, resume_run, write_checkpoint
+from handrail.policies.rl_checkpoint import (
+    Curve,
+    begin_run,
+    evaluated_actors,
+    resume_run,
+    write_checkpoint,
+)
 from handrail.policies.rl_config import TrainRlConfig
 from handrail.policies.rl_env import GoalReachingEnv, Reward
 from handrail.policies.rl_evaluation import FINAL_SEED, evaluate, evaluation_goals, means, spreads
@@ -41,7 +47,7 @@ def train(config: TrainRlConfig) -> dict[str, Any]:
     if remaining > 0:
         callback = Watch(config, curve)
         model.learn(remaining, callback, log_interval=20, reset_num_timesteps=not config.resume)
-    actor = actor_of(model)
+    actor = Actor.mean(evaluated_actors(config.folder, config.average))
     actor.save(config.folder / "actor.npz")
     final = spreads(evaluate(actor, evaluation_goals(config.final_goals, FINAL_SEED)))
     record = training_record(config, curve, final)
@@ -94,7 +100,8 @@ class Watch(BaseCallback):
         score = means(evaluate(actor, self._goals))
         seconds = time.monotonic() - self._began
         updates = float(self.model._n_updates)
-        self._curve.append({"steps": self.num_timesteps, "updates": updates, "seconds": seconds, **score})
+        row = {"steps": self.num_timesteps, "updates": updates, "seconds": seconds}
+        self._curve.append({**row, "learning_rate": self._config.learning_rate, **score})
         for name, value in score.items():
             self.logger.record(f"evaluation/{name}", value)
         self.logger.dump(self.num_timesteps)
@@ -133,6 +140,8 @@ def _resumed(config: TrainRlConfig) -> tuple[SAC, Curve]:
     model.set_env(_environment(config))
     model.set_random_seed(config.seed + model.num_timesteps)  # else the same goals would come again
     model.tensorboard_log = str(config.folder / "tensorboard")
+    model.learning_rate = config.learning_rate
+    model._setup_lr_schedule()
     return model, curve
 
 

@@ -26,6 +26,15 @@ def test_a_file_gives_the_same_actor_back(tmp_path):
     assert np.array_equal(read(observation), actor(observation))
 
 
+def test_the_mean_of_actors_lies_between_them():
+    """Law: in a single layer the mean's action before tanh is the mean of theirs."""
+    rng = np.random.default_rng(3)
+    pair = [Actor((rng.normal(size=(3, 54)),), (rng.normal(size=3),)) for _ in range(2)]
+    observation = rng.normal(scale=0.1, size=54)
+    expected = np.mean([np.arctanh(actor(observation)) for actor in pair], axis=0)
+    assert np.allclose(np.arctanh(Actor.mean(pair)(observation)), expected, atol=1e-3)
+
+
 def test_actions_stay_in_range():
     rng = np.random.default_rng(2)
     actions = np.array([random_actor()(rng.normal(scale=100.0, size=54)) for _ in range(50)])

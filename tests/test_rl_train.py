@@ -14,6 +14,8 @@ from handrail.policies.rl_policy import Actor
 
 pytest.importorskip("stable_baselines3")
 pytest.importorskip("tensorboard")
+from stable_baselines3 import SAC
+
 from handrail.policies.rl_train import train
 
 TINY = TrainRlConfig(
@@ -34,7 +36,7 @@ def run(tmp_path_factory):
     config = replace(TINY, output_dir=str(tmp_path_factory.mktemp("runs") / "rl"))
     train(config)
     first = Actor.load(config.folder / "actor.npz")
-    record = train(replace(config, steps=100, resume=True))
+    record = train(replace(config, steps=100, resume=True, learning_rate=2e-4))
     return config, first, record
 
 
@@ -42,9 +44,16 @@ def test_a_resumed_run_goes_on_where_it_stopped(run):
     config, first, record = run
     assert [row["steps"] for row in record["curve"]] == [40, 60, 80, 100]
     assert record["curve"][-1]["updates"] == 100 - config.random_steps
+    assert [row["learning_rate"] for row in record["curve"]] == [1e-4, 1e-4, 2e-4, 2e-4]
     seconds = [row["seconds"] for row in record["curve"]]
     assert seconds == sorted(seconds)
     assert not np.array_equal(Actor.load(config.folder / "actor.npz").weights[0], first.weights[0])
+
+
+def test_a_resumed_run_learns_at_the_new_rate(run):
+    model = SAC.load(run[0].folder / "checkpoints" / "00000100" / "model.zip", device="cpu")
+    for part in (model.actor, model.critic):
+        assert part.optimizer.param_groups[0]["lr"] == 2e-4
 
 
 def test_a_resumed_run_remembers_and_meets_new_goals(run):
@@ -73,7 +82,7 @@ def test_the_record_says_how_the_actor_was_made(run):
     assert {"stable-baselines3", "torch", "python", "handrail"} <= set(record["versions"])
     assert record["hardware"]["threads"] == 1
     last = Actor.load(config.folder / "actor.npz")
-    score = means(evaluate(last, evaluation_goals(config.goals)))
+    score = means(evaluate(last, evaluation_goals(config.goals)))  # the mean of one actor is that actor
     assert {name: record["curve"][-1][name] for name in score} == score
     final = evaluate(last, evaluation_goals(2, FINAL_SEED))
     assert record["final"]["length"]["max"] == max(score.length for score in final)
@@ -102,6 +111,14 @@ def test_a_run_is_not_spoiled_by_accident(run, change, message):
     with pytest.raises(HandrailError, match=message):
         train(replace(run[0], **change))
     assert Actor.load(run[0].folder / "actor.npz")
+
+
+def test_the_actor_may_be_the_mean_of_the_last_ones(run):
+    config, *_ = run
+    train(replace(config, steps=100, resume=True, average=2))
+    last = [Actor.load(config.folder / "actors" / f"{steps:08d}.npz") for steps in (80, 100)]
+    found = Actor.load(config.folder / "actor.npz")
+    assert np.allclose(found.weights[0], (last[0].weights[0] + last[1].weights[0]) / 2)
 
 
 def test_only_a_training_run_is_overwritten(tmp_path):
