@@ -194,8 +194,8 @@ class MaskedMpc:
     ) -> tuple[Trajectory, bool]:
         """Return how the robot moves from now on, and whether that is the plan."""
         if distances is None:
-            known = self._followed is not None
-            velocity = self._followed.velocity(state.time) if known else np.zeros(self.model.size)
+            resting = np.zeros(self.model.size)
+            velocity = resting if self._followed is None else self._followed.velocity(state.time)
             return self._backup.brake(velocity), False
         elapsed = 0.0 if self._followed is None else self._followed.elapsed(state.time)
         situation = Situation(state.q, self._start_velocity(state), distances, elapsed)
