@@ -79,7 +79,7 @@ def main_table(
     """
     summaries = dict(results["profiles"][profile])
     if profile == "nominal" and not results["config"]["clutter"]:
-        summaries |= PUBLISHED
+        summaries |= {name: known for name, known in PUBLISHED.items() if set(metrics) & set(known)}
     rows = [[name, *_cells(summary, metrics, cell)] for name, summary in summaries.items()]
     return ["controller", *(HEADINGS[metric] for metric in metrics)], rows
 

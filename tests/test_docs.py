@@ -12,6 +12,8 @@ from pathlib import Path
 
 import pytest
 
+from handrail.collect.benchmark_config import CONTROLLERS, PROFILES, BenchmarkConfig
+from handrail.collect.benchmark_contenders import CONTENDERS
 from handrail.collect.build import build_env, session_features
 from handrail.collect.config import DemoConfig, InspectConfig, RecordConfig, ReplayConfig, SessionConfig
 from handrail.collect.operators.modes import MODES
@@ -19,6 +21,7 @@ from handrail.collect.profile_config import ProfileConfig
 from handrail.collect.showcase_config import ShowcaseConfig
 from handrail.controllers.command import Status
 from handrail.policies.rl_config import TrainRlConfig
+from handrail.policies.rl_contender import RL
 from handrail.scripts import cli
 
 ROOT = Path(__file__).parent.parent
@@ -31,6 +34,7 @@ CONFIGS = {
     "handrail-showcase": ShowcaseConfig,
     "handrail-profile": ProfileConfig,
     "handrail-train-rl": TrainRlConfig,
+    "handrail-benchmark": BenchmarkConfig,
 }
 _LEROBOT = """
 import json, sys
@@ -113,6 +117,14 @@ def test_modes_and_tasks_are_all_there():
     assert set(MODE_NAMES) == set(MODES)
     assert table("Tasks") == set(TASKS)
     assert all(f"`{camera}`" in text("README.md") for camera in CAMERAS)
+
+
+def test_controllers_and_profiles_of_the_benchmark_are_all_there():
+    assert table("Goal reaching against rivals") == set(CONTROLLERS) | set(PROFILES)
+    assert set(CONTROLLERS) == {*CONTENDERS, RL.name}
+    source = (ROOT / "collect" / "benchmark_config.py").read_text()
+    helped = re.findall(r'^    """(.*?)"""', source, re.MULTILINE | re.DOTALL)
+    assert all(re.search(rf"\b{name}\b", " ".join(helped)) for name in (*CONTROLLERS, *PROFILES))
 
 
 def flags(config: type, prefix: str = "") -> set[str]:
