@@ -1,7 +1,7 @@
 """One recorded episode, read by what its columns mean rather than by what they are called."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -39,7 +39,7 @@ class Demonstration:
     frames: Mapping[str, np.ndarray]
     names: Names
     meta: Mapping[str, Any]
-    columns: ColumnNames = ColumnNames()
+    columns: ColumnNames = field(default_factory=ColumnNames)
 
     @property
     def count(self) -> int:

@@ -1,4 +1,4 @@
-"""What the names of a column's entries say: which are a point in space, which are one thing in two columns."""
+"""What the names of a column's entries say: which are a point in space, which mean the same."""
 
 from collections.abc import Sequence
 

@@ -104,7 +104,7 @@ class Pool:
 
 
 def signature(episode: Demonstration) -> tuple[object, ...]:
-    """Return what must be equal for two episodes to be on one scale: sizes and entries of what is measured."""
+    """Return what two episodes on one scale have in common: sizes and entries of what is measured."""
     choices = (*episode.columns.choices("action"), *episode.columns.choices("asked"))
     names = sorted(name for name in episode.frames if name.startswith("observation") or name in choices)
     return tuple((name, episode.frames[name].shape[1:], episode.names.get(name)) for name in names)

@@ -59,7 +59,7 @@ def saturation(action: FloatArray, low: FloatArray, high: FloatArray) -> float:
 
 
 def variation_ratio(commanded: FloatArray, reached: FloatArray) -> float:
-    """Return the total variation of the commands over that of what followed: 1 is a robot that does all of it.
+    """Return the total variation of the commands over that of what followed: 1 is a robot that does it all.
 
     Σ_t ‖a_{t+1} − a_t‖₁ / Σ_t ‖s_{t+1} − s_t‖₁; more than 1 are commands that the robot smoothed away.
 

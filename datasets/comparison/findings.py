@@ -1,0 +1,171 @@
+"""What the comparison says, in plain words that never claim more than the intervals.
+
+"No difference detected" is not "equal": it always comes with what would have been seen.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from handrail.datasets.comparison.collection import Collected
+from handrail.datasets.comparison.compare import Comparison
+from handrail.datasets.comparison.differences import Difference
+from handrail.datasets.comparison.outcomes import ArmOutcome, OutcomeDifference, Outcomes
+from handrail.datasets.comparison.wording import (
+    duration,
+    p_value,
+    percent,
+    points_span,
+    signed,
+    span,
+    unit,
+)
+
+SEEDS = 3  # training seeds that are the least
+_SHOWN = 6  # metrics in words; the table has all
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One sentence or two.
+
+    Attributes:
+        kind: `outcome`, `collection`, `quality` or `caution`.
+        text: What to read.
+        detected: Whether it is a difference that was detected.
+    """
+
+    kind: str
+    text: str
+    detected: bool = False
+
+
+def findings(comparison: Comparison) -> list[Finding]:
+    """Return all findings, what matters most first."""
+    found = [*_outcomes(comparison.outcomes)] if comparison.outcomes else []
+    found += [*_collection(comparison), *_quality(comparison)]
+    return found + [Finding("caution", text) for text in _cautions(comparison)]
+
+
+def _outcomes(outcomes: Outcomes) -> Iterator[Finding]:
+    arms = {arm.label: arm for arm in outcomes.arms}
+    for difference in outcomes.differences:
+        one, other = arms[difference.label], arms[difference.baseline]
+        yield Finding("outcome", _outcome(difference, one, other), difference.detected)
+
+
+def _outcome(difference: OutcomeDifference, one: ArmOutcome, other: ArmOutcome) -> str:
+    shares = f"{percent(one.share)} against {percent(other.share)}"
+    interval = points_span(difference.nested or difference.rollouts.interval)
+    if not difference.detected:
+        return (
+            f"No difference in policy success was detected between {one.label} and {other.label}: {shares},"
+            f" difference {interval} points (95 %). This does not show that they are equal: a difference"
+            f" below about {100 * difference.detectable:.0f} points would often go unseen here."
+        )
+    word = "more" if one.share > other.share else "less"
+    whose = "Policies trained on" if difference.nested else "This policy trained on"
+    return (
+        f"{whose} {one.label} succeed{'' if difference.nested else 's'} {word} often than"
+        f" {'those' if difference.nested else 'this one'} trained on {other.label}: {shares}, difference"
+        f" {interval} points (95 %; {p_value(difference.p_adjusted)} after Holm)."
+    )
+
+
+def _collection(comparison: Comparison) -> Iterator[Finding]:
+    by_label = {each.label: each for each in comparison.everything.collected}
+    for label, difference in comparison.success.items():
+        one, other = by_label[label], by_label[comparison.baseline]
+        if difference is None:
+            text = f"Whether episodes succeeded was not recorded for all of {label} and {other.label}."
+            yield Finding("collection", text)
+            continue
+        low, high = difference.interval
+        detected = difference.p < 0.05 and not low <= 0.0 <= high
+        told = f"{_told(one)}; {_told(other)}. Difference {points_span(difference.interval)} points (95 %)"
+        if detected:
+            word = "more" if difference.estimate > 0 else "fewer"
+            text = (
+                f"With {label}, {word} episodes succeeded while collecting: {told}, {p_value(difference.p)}."
+            )
+        else:
+            text = (
+                f"Success while collecting: {told}, no difference detected; one below about"
+                f" {100 * difference.detectable:.0f} points would often go unseen."
+            )
+        yield Finding("collection", text, detected)
+
+
+def _told(one: Collected) -> str:
+    return f"{one.label} {one.successes} of {one.attempts} in {duration(one.operator_time)}"
+
+
+def _quality(comparison: Comparison) -> Iterator[Finding]:
+    for label in comparison.success:
+        mine = [d for d in comparison.everything.differences if d.label == label and not d.reason]
+        detected = sorted((d for d in mine if d.detected), key=lambda d: -abs(d.effect[0]))
+        for difference in detected[:_SHOWN]:
+            yield Finding("quality", _metric(difference), detected=True)
+        rest = [d.metric.title for d in mine if not d.detected]
+        if len(detected) > _SHOWN:
+            more = f"{len(detected) - _SHOWN} more differences between {label} and {comparison.baseline}"
+            yield Finding("quality", f"{more} are in the table.", detected=True)
+        if rest:
+            text = f"{label} and {comparison.baseline}: no difference detected in {', '.join(rest)}."
+            yield Finding("quality", f"{text} That is not evidence of equality.")
+
+
+def _metric(difference: Difference) -> str:
+    metric = difference.metric
+    word = "higher" if difference.estimate > 0 else "lower"
+    judged = {metric.good: ", the better direction", "": ""}.get(
+        word if metric.good else "", ", the worse direction"
+    )
+    text = (
+        f"{difference.label}: {metric.title} is {word} than for {difference.baseline}{judged}"
+        f" ({signed(difference.estimate)}{unit(metric)}, 95 % {span(difference.interval)},"
+        f" {p_value(difference.p_adjusted)} after Holm)"
+    )
+    if metric.name == "length" or difference.at_equal_length:
+        return f"{text}."
+    return f"{text}; not detected between episodes of equal length, so it may only be their length."
+
+
+def _cautions(comparison: Comparison) -> Iterator[str]:
+    groups = comparison.everything.groups
+    if comparison.outcomes is None:
+        yield (
+            "No evaluations were given: nothing here says which data make the better policy. Quality metrics"
+            " describe data and have often misjudged it."
+        )
+    else:
+        yield from _training(comparison.outcomes)
+    if len({group.info.fps for group in groups}) > 1:
+        rates = ", ".join(f"{group.label} {group.info.fps} Hz" for group in groups)
+        yield f"Frame rates differ ({rates}): measures of smoothness and idle time are only roughly comparable."
+    tasks = {group.label: {str(e.meta.get("tasks")) for e in group.episodes} for group in groups}
+    if len({frozenset(each) for each in tasks.values()}) > 1:
+        yield "The tasks differ, so a difference may be the task's."
+    if len(set(comparison.everything.measurements.pools.values())) > 1:
+        yield "The datasets have different columns: metrics that need a common scale are not compared."
+    few = [group.label for group in groups if len(group.episodes) < 20]
+    if few:
+        yield f"Few episodes ({', '.join(few)}): intervals of means are rough below about 20."
+
+
+def _training(outcomes: Outcomes) -> Iterator[str]:
+    few = [arm.label for arm in outcomes.arms if len(arm.seeds) < SEEDS]
+    if few:
+        yield (
+            f"Fewer than {SEEDS} training seeds ({', '.join(few)}): the seed alone moves success by 10 to 15"
+            " points, so the policies may differ where their data do not."
+        )
+    elif any(len(arm.seeds) < 5 for arm in outcomes.arms):
+        yield "Three or four training seeds: the intervals over training are still too narrow; five are better."
+    if all(arm.draws == 1 for arm in outcomes.arms):
+        yield "One draw of each dataset: how much another recording would differ is not in the intervals."
+    if any(not difference.rollouts.paired for difference in outcomes.differences):
+        yield "Training or evaluation seeds differ between arms, so rollouts were not compared as pairs."
+    for name, title in (("episodes", "numbers of episodes"), ("operator_time", "operator times")):
+        values = {arm.trained_on[name] for arm in outcomes.arms if name in arm.trained_on}
+        if values and max(values) > 1.05 * min(values):
+            yield f"The policies were trained on different {title}, which alone can make them differ."
