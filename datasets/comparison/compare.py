@@ -17,6 +17,7 @@ from handrail.datasets.comparison.config import CompareConfig
 from handrail.datasets.comparison.differences import Difference, differences
 from handrail.datasets.comparison.evaluations import Arm, read_evaluations
 from handrail.datasets.comparison.groups import Group, baseline_of, load_groups
+from handrail.datasets.comparison.means import Means, means
 from handrail.datasets.comparison.outcomes import Outcomes, judge
 from handrail.datasets.comparison.proportions import ShareDifference
 from handrail.datasets.quality.measure import Measurements, measure
@@ -31,6 +32,7 @@ class View:
         groups: The episodes chosen.
         collected: What they consist of; failures are counted even where quality is measured without.
         measurements: Of their quality.
+        means: Of these.
         differences: Of every metric, each group against the baseline.
     """
 
@@ -38,6 +40,7 @@ class View:
     groups: Sequence[Group]
     collected: Sequence[Collected]
     measurements: Measurements
+    means: Means
     differences: Sequence[Difference]
 
 
@@ -102,7 +105,8 @@ def _view(
             raise HandrailError(f"--success_only: {group.label!r} has no successful episode among {title}")
     measurements = measure({group.label: group.episodes for group in measured}, rng, config.margin)
     found = differences(measured, measurements, baseline, rng)
-    return View(title, measured, [collected(group) for group in groups], measurements, found)
+    counted = [collected(group) for group in groups]
+    return View(title, measured, counted, measurements, means(measurements, rng), found)
 
 
 def _arms(config: CompareConfig, groups: Sequence[Group]) -> dict[str, Arm]:

@@ -10,6 +10,7 @@ from handrail.datasets.comparison.collection import Collected
 from handrail.datasets.comparison.compare import Comparison
 from handrail.datasets.comparison.differences import Difference
 from handrail.datasets.comparison.outcomes import ArmOutcome, OutcomeDifference, Outcomes
+from handrail.datasets.comparison.proportions import holm
 from handrail.datasets.comparison.wording import (
     duration,
     p_value,
@@ -73,6 +74,8 @@ def _outcome(difference: OutcomeDifference, one: ArmOutcome, other: ArmOutcome) 
 
 def _collection(comparison: Comparison) -> Iterator[Finding]:
     by_label = {each.label: each for each in comparison.everything.collected}
+    known = [label for label, difference in comparison.success.items() if difference]
+    adjusted = dict(zip(known, holm([d.p for d in comparison.success.values() if d]), strict=True))
     for label, difference in comparison.success.items():
         one, other = by_label[label], by_label[comparison.baseline]
         if difference is None:
@@ -80,13 +83,12 @@ def _collection(comparison: Comparison) -> Iterator[Finding]:
             yield Finding("collection", text)
             continue
         low, high = difference.interval
-        detected = difference.p < 0.05 and not low <= 0.0 <= high
+        detected = adjusted[label] < 0.05 and not low <= 0.0 <= high
         told = f"{_told(one)}; {_told(other)}. Difference {points_span(difference.interval)} points (95 %)"
         if detected:
             word = "more" if difference.estimate > 0 else "fewer"
-            text = (
-                f"With {label}, {word} episodes succeeded while collecting: {told}, {p_value(difference.p)}."
-            )
+            text = f"With {label}, {word} episodes succeeded while collecting: {told},"
+            text += f" {p_value(adjusted[label])}."
         else:
             text = (
                 f"Success while collecting: {told}, no difference detected; one below about"
@@ -117,9 +119,7 @@ def _quality(comparison: Comparison) -> Iterator[Finding]:
 def _metric(difference: Difference) -> str:
     metric = difference.metric
     word = "higher" if difference.estimate > 0 else "lower"
-    judged = {metric.good: ", the better direction", "": ""}.get(
-        word if metric.good else "", ", the worse direction"
-    )
+    judged = f", the {'better' if word == metric.good else 'worse'} direction" if metric.good else ""
     text = (
         f"{difference.label}: {metric.title} is {word} than for {difference.baseline}{judged}"
         f" ({signed(difference.estimate)}{unit(metric)}, 95 % {span(difference.interval)},"
@@ -141,7 +141,7 @@ def _cautions(comparison: Comparison) -> Iterator[str]:
         yield from _training(comparison.outcomes)
     if len({group.info.fps for group in groups}) > 1:
         rates = ", ".join(f"{group.label} {group.info.fps} Hz" for group in groups)
-        yield f"Frame rates differ ({rates}): measures of smoothness and idle time are only roughly comparable."
+        yield f"Frame rates differ ({rates}): smoothness and idle time are only roughly comparable."
     tasks = {group.label: {str(e.meta.get("tasks")) for e in group.episodes} for group in groups}
     if len({frozenset(each) for each in tasks.values()}) > 1:
         yield "The tasks differ, so a difference may be the task's."
@@ -160,7 +160,7 @@ def _training(outcomes: Outcomes) -> Iterator[str]:
             " points, so the policies may differ where their data do not."
         )
     elif any(len(arm.seeds) < 5 for arm in outcomes.arms):
-        yield "Three or four training seeds: the intervals over training are still too narrow; five are better."
+        yield "Three or four training seeds: intervals over training are still too narrow; five are better."
     if all(arm.draws == 1 for arm in outcomes.arms):
         yield "One draw of each dataset: how much another recording would differ is not in the intervals."
     if any(not difference.rollouts.paired for difference in outcomes.differences):
