@@ -19,7 +19,9 @@ from handrail.datasets.comparison.evaluations import Arm, read_evaluations
 from handrail.datasets.comparison.groups import Group, baseline_of, load_groups
 from handrail.datasets.comparison.means import Means, means
 from handrail.datasets.comparison.outcomes import Outcomes, judge
+from handrail.datasets.comparison.productivity import RateRatio, rate_interval, rate_ratio
 from handrail.datasets.comparison.proportions import ShareDifference
+from handrail.datasets.comparison.resampling import Interval
 from handrail.datasets.quality.measure import Measurements, measure
 
 
@@ -53,6 +55,8 @@ class Comparison:
         baseline: The label that the others are compared with.
         views: All episodes, as many of each, as much operator time of each.
         success: In collection: each group's difference to the baseline, None where it was not recorded.
+        rates: Each group's interval of successes an hour, None where it cannot be told.
+        ratios: Successes an hour of each group over those of the baseline.
         outcomes: Of trained policies, if evaluations were given.
     """
 
@@ -60,6 +64,8 @@ class Comparison:
     baseline: str
     views: Sequence[View]
     success: Mapping[str, ShareDifference | None]
+    rates: Mapping[str, Interval | None]
+    ratios: Mapping[str, RateRatio | None]
     outcomes: Outcomes | None
 
     @property
@@ -91,9 +97,12 @@ def compare(config: CompareConfig) -> Comparison:
     }
     views = [_view(title, each, baseline, config, rng) for title, each in chosen.items()]
     (base,) = [group for group in groups if group.label == baseline]
-    success = {group.label: success_difference(group, base) for group in groups if group is not base}
+    others = [group for group in groups if group is not base]
+    success = {group.label: success_difference(group, base) for group in others}
+    rates = {group.label: rate_interval(group, rng) for group in groups}
+    ratios = {group.label: rate_ratio(group, base, rng) for group in others}
     outcomes = judge(arms, baseline if baseline in arms else next(iter(arms)), rng) if arms else None
-    return Comparison(config, baseline, views, success, outcomes)
+    return Comparison(config, baseline, views, success, rates, ratios, outcomes)
 
 
 def _view(

@@ -3,16 +3,18 @@
 "No difference detected" is not "equal": it always comes with what would have been seen.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from handrail.datasets.comparison.collection import Collected
 from handrail.datasets.comparison.compare import Comparison
 from handrail.datasets.comparison.differences import Difference
 from handrail.datasets.comparison.outcomes import ArmOutcome, OutcomeDifference, Outcomes
-from handrail.datasets.comparison.proportions import holm
+from handrail.datasets.comparison.productivity import RateRatio
+from handrail.datasets.comparison.proportions import ShareDifference, holm
 from handrail.datasets.comparison.wording import (
     duration,
+    number,
     p_value,
     percent,
     points_span,
@@ -33,11 +35,13 @@ class Finding:
         kind: `outcome`, `collection`, `quality` or `caution`.
         text: What to read.
         detected: Whether it is a difference that was detected.
+        short: The same in fewer words, for a headline.
     """
 
     kind: str
     text: str
     detected: bool = False
+    short: str = ""
 
 
 def findings(comparison: Comparison) -> list[Finding]:
@@ -47,11 +51,34 @@ def findings(comparison: Comparison) -> list[Finding]:
     return found + [Finding("caution", text) for text in _cautions(comparison)]
 
 
+def headline(found: Sequence[Finding]) -> str:
+    """Return the answer in a sentence or two: policies if they were evaluated, else what collecting gives."""
+    for kind in ("outcome", "collection"):
+        parts = [finding.short for finding in found if finding.kind == kind and finding.short]
+        if parts:
+            return "; ".join(parts[:3]) + "."
+    return found[0].text
+
+
 def _outcomes(outcomes: Outcomes) -> Iterator[Finding]:
     arms = {arm.label: arm for arm in outcomes.arms}
     for difference in outcomes.differences:
         one, other = arms[difference.label], arms[difference.baseline]
-        yield Finding("outcome", _outcome(difference, one, other), difference.detected)
+        text, short = _outcome(difference, one, other), _short(difference, one, other)
+        yield Finding("outcome", text, difference.detected, short)
+
+
+def _short(difference: OutcomeDifference, one: ArmOutcome, other: ArmOutcome) -> str:
+    better, worse = (one, other) if one.share >= other.share else (other, one)
+    low, high = difference.nested or difference.rollouts.interval
+    interval = (low, high) if better is one else (-high, -low)
+    shares = f"{better.label} {percent(better.share)}, {worse.label} {percent(worse.share)}"
+    shares += f", difference {points_span(interval)} points"
+    if not difference.detected:
+        return f"Policies: no difference in success detected ({shares})"
+    whose = "Policies trained on" if difference.nested else "The policy trained on"
+    word = "more often" if difference.nested else "more often, in one training run,"
+    return f"{whose} {better.label} succeeded {word} ({shares})"
 
 
 def _outcome(difference: OutcomeDifference, one: ArmOutcome, other: ArmOutcome) -> str:
@@ -74,27 +101,57 @@ def _outcome(difference: OutcomeDifference, one: ArmOutcome, other: ArmOutcome) 
 
 def _collection(comparison: Comparison) -> Iterator[Finding]:
     by_label = {each.label: each for each in comparison.everything.collected}
-    known = [label for label, difference in comparison.success.items() if difference]
-    adjusted = dict(zip(known, holm([d.p for d in comparison.success.values() if d]), strict=True))
+    adjusted = _adjusted(comparison.success)
+    ratios = _adjusted(comparison.ratios)
     for label, difference in comparison.success.items():
         one, other = by_label[label], by_label[comparison.baseline]
         if difference is None:
             text = f"Whether episodes succeeded was not recorded for all of {label} and {other.label}."
             yield Finding("collection", text)
             continue
-        low, high = difference.interval
-        detected = adjusted[label] < 0.05 and not low <= 0.0 <= high
-        told = f"{_told(one)}; {_told(other)}. Difference {points_span(difference.interval)} points (95 %)"
-        if detected:
-            word = "more" if difference.estimate > 0 else "fewer"
-            text = f"With {label}, {word} episodes succeeded while collecting: {told},"
-            text += f" {p_value(adjusted[label])}."
-        else:
-            text = (
-                f"Success while collecting: {told}, no difference detected; one below about"
-                f" {100 * difference.detectable:.0f} points would often go unseen."
-            )
-        yield Finding("collection", text, detected)
+        yield _success(difference, adjusted[label], one, other)
+        ratio = comparison.ratios[label]
+        if ratio:
+            yield _rate(ratio, ratios[label], one, other)
+
+
+def _adjusted(found: Mapping[str, ShareDifference | RateRatio | None]) -> dict[str, float]:
+    known = {label: each.p for label, each in found.items() if each}
+    return dict(zip(known, holm(list(known.values())), strict=True))
+
+
+def _success(difference: ShareDifference, p: float, one: Collected, other: Collected) -> Finding:
+    low, high = difference.interval
+    told = f"{_told(one)}; {_told(other)}. Difference {points_span(difference.interval)} points (95 %)"
+    shares = f"{one.label} {_share(one)}, {other.label} {_share(other)}"
+    if p < 0.05 and not low <= 0.0 <= high:
+        word = "more" if difference.estimate > 0 else "fewer"
+        text = f"With {one.label}, {word} episodes succeeded while collecting: {told}, {p_value(p)}."
+        return Finding("collection", text, True, f"With {one.label}, {word} episodes succeeded ({shares})")
+    text = (
+        f"Success while collecting: {told}, no difference detected; one below about"
+        f" {100 * difference.detectable:.0f} points would often go unseen."
+    )
+    return Finding("collection", text, False, f"Collecting: no difference in success detected ({shares})")
+
+
+def _rate(ratio: RateRatio, p: float, one: Collected, other: Collected) -> Finding:
+    low, high = ratio.interval
+    detected = p < 0.05 and not low <= 1.0 <= high
+    text = (
+        f"Successes per operator hour: {one.label} {number(one.successes_an_hour)},"
+        f" {other.label} {number(other.successes_an_hour)};"
+        f" {number(ratio.estimate)} times as many (95 % {span(ratio.interval)}, {p_value(p)})"
+    )
+    if not detected:
+        return Finding("collection", f"{text}; no difference detected.")
+    factor, who = (ratio.estimate, one) if ratio.estimate > 1 else (1 / ratio.estimate, other)
+    short = f"an operator hour gives {number(factor)} times as many successes with {who.label}"
+    return Finding("collection", f"{text}.", True, short)
+
+
+def _share(each: Collected) -> str:
+    return percent(None if each.successes is None else each.successes / each.attempts)
 
 
 def _told(one: Collected) -> str:

@@ -15,11 +15,13 @@ class Cell:
         text: What it says.
         look: A class of the style: `detected`, `quiet` or "".
         note: Shown when pointed at.
+        below: A second line, smaller.
     """
 
     text: str
     look: str = ""
     note: str = ""
+    below: str = ""
 
 
 def page(title: str, body: str) -> str:
@@ -47,7 +49,8 @@ def _cell(cell: Cell | str) -> str:
     cell = Cell(cell) if isinstance(cell, str) else cell
     look = f' class="{cell.look}"' if cell.look else ""
     note = f' title="{escape(cell.note)}"' if cell.note else ""
-    return f"<td{look}{note}>{escape(cell.text)}</td>"
+    below = f"<small>{escape(cell.below)}</small>" if cell.below else ""
+    return f"<td{look}{note}>{escape(cell.text)}{below}</td>"
 
 
 def items(texts: Iterable[tuple[str, str]]) -> str:

@@ -31,7 +31,7 @@ class ArmOutcome:
         nested: 95 % interval over dataset draw, training seed and evaluation seed; None for one run.
         seeds: Success of each trained policy, one after the other.
         draws: Number of draws of the dataset.
-        means: Mean of every other outcome a rollout, by name.
+        means: Mean of every other outcome a rollout, by name, and its nested 95 % interval.
         trained_on: What the first policy was trained on.
     """
 
@@ -42,7 +42,7 @@ class ArmOutcome:
     nested: Interval | None
     seeds: tuple[float, ...]
     draws: int
-    means: Mapping[str, float]
+    means: Mapping[str, tuple[float, Interval]]
     trained_on: Mapping[str, float]
 
     @property
@@ -99,7 +99,7 @@ def judge(arms: Mapping[str, Arm], baseline: str, rng: np.random.Generator) -> O
     """
     runs = {label: arm.runs() for label, arm in arms.items()}
     resampled = dict(zip(runs, resample_runs(list(runs.values()), rng), strict=True))
-    found = tuple(_arm(arm, resampled[label]) for label, arm in arms.items())
+    found = tuple(_arm(arm, resampled[label], rng) for label, arm in arms.items())
     others = [label for label in arms if label != baseline]
     raw = [_difference(label, baseline, runs, resampled) for label in others]
     adjusted = holm([difference.p for difference in raw])
@@ -107,7 +107,7 @@ def judge(arms: Mapping[str, Arm], baseline: str, rng: np.random.Generator) -> O
     return Outcomes(found, tuple(replace(difference, p_adjusted=p) for difference, p in both))
 
 
-def _arm(arm: Arm, resampled: FloatArray) -> ArmOutcome:
+def _arm(arm: Arm, resampled: FloatArray, rng: np.random.Generator) -> ArmOutcome:
     runs = arm.runs()
     values = np.concatenate([run.values for run in runs])
     names = [name for name in arm.outcomes if name != SUCCESS]
@@ -119,11 +119,14 @@ def _arm(arm: Arm, resampled: FloatArray) -> ArmOutcome:
         nested=percentiles(resampled) if len(runs) > 1 else None,
         seeds=tuple(float(run.values.mean()) for run in runs),
         draws=len({run.draw for run in runs}),
-        means={
-            name: float(np.mean(np.concatenate([run.values for run in arm.runs(name)]))) for name in names
-        },
+        means={name: _mean(arm.runs(name), rng) for name in names},
         trained_on=arm.policies[0].trained_on,
     )
+
+
+def _mean(runs: Sequence[Run], rng: np.random.Generator) -> tuple[float, Interval]:
+    (resampled,) = resample_runs([runs], rng)
+    return float(np.mean(np.concatenate([run.values for run in runs]))), percentiles(resampled)
 
 
 def _difference(

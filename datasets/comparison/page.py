@@ -1,10 +1,12 @@
 """The report as one page that needs nothing else: the answer first, then how it came about."""
 
+from html import escape
+
 from handrail.datasets.comparison import report_tables as tables
 from handrail.datasets.comparison.collection import Collected
 from handrail.datasets.comparison.compare import Comparison
 from handrail.datasets.comparison.figures import answer_figure, colours, effects_figure, metrics_figure
-from handrail.datasets.comparison.findings import Finding
+from handrail.datasets.comparison.findings import Finding, headline
 from handrail.datasets.comparison.markup import (
     card,
     cards,
@@ -18,29 +20,30 @@ from handrail.datasets.comparison.markup import (
 )
 from handrail.datasets.comparison.outcomes import ArmOutcome
 from handrail.datasets.comparison.pictures import first_pictures
+from handrail.datasets.comparison.resampling import Interval
 from handrail.datasets.comparison.trajectories import trajectories_figure
-from handrail.datasets.comparison.wording import duration, number, percent, percent_span
+from handrail.datasets.comparison.wording import duration, number, percent, percent_span, span
 from handrail.datasets.quality.catalogue import METRICS
 
 _HOW = (
-    "Every interval is 95 %. Shares: Wilson; their differences: Newcombe's method 10, exact McNemar test where"
-    " the same seeds were tried under both, Boschloo's where not. Several trained policies: bootstrap over"
-    " dataset draw, training seed and evaluation seed, nested. Means of metrics: bootstrap over episodes and"
-    " permutation tests, paired by seed where episodes began alike. A difference counts as detected if its"
-    " intervals leave zero out and p stays below 0.05 after Holm's correction over all comparisons of its kind."
-    " “Detectable” is the difference that would be detected in 80 % of such experiments. ↔ marks metrics that"
-    " follow the length of the episodes (Spearman's |ρ| ≥ 0.5); “same length” is the difference with that taken"
-    " off by analysis of covariance."
+    "Every interval is 95 %. Shares: Wilson; their differences: Newcombe's method 10, exact McNemar test"
+    " where the same seeds were tried under both, Boschloo's where not. Several trained policies: bootstrap"
+    " over dataset draw, training seed and evaluation seed, nested. Means of metrics: bootstrap over episodes"
+    " and permutation tests, paired by seed where episodes began alike. A difference counts as detected if"
+    " its intervals leave zero out and p stays below 0.05 after Holm's correction over all comparisons of its"
+    " kind. “Detectable” is the difference that would be detected in 80 % of such experiments. ↔ marks"
+    " metrics that follow the length of the episodes (Spearman's |ρ| ≥ 0.5); “same length” is the difference"
+    " with that taken off by analysis of covariance."
 )
 _QUALITY = (
-    "Bold: detected. These numbers describe data; they do not rank it. Point at a name for what it means, and"
-    " at a dash for why there is nothing."
+    "Each with its 95 % interval; bold: detected. These numbers describe data; they do not rank it. Point at"
+    " a name for what it means, and at a dash for why there is nothing."
 )
 
 
 def report_page(comparison: Comparison, found: list[Finding]) -> str:
     """Return the page."""
-    title = "Comparison: " + " · ".join(comparison.labels)
+    title = _title(comparison)
     parts = [_first_screen(comparison, found), section("Findings", _findings(found))]
     if comparison.outcomes:
         shown = tables.arms_table(comparison.outcomes), tables.outcome_differences_table(comparison.outcomes)
@@ -69,15 +72,23 @@ def _first_screen(comparison: Comparison, found: list[Finding]) -> str:
     }
     what = f"{', '.join(sources)} – {'; '.join(sorted(tasks)[:2])}{' …' if len(tasks) > 2 else ''}"
     arms = {arm.label: arm for arm in comparison.outcomes.arms} if comparison.outcomes else {}
-    shown = [_card(each, arms.get(each.label), known[each.label]) for each in comparison.everything.collected]
-    headline = paragraph(found[0].text, "headline")
-    heading = f"<header><h1>Which data, and how good?</h1>{paragraph(what)}</header>"
+    shown = [
+        _card(each, arms.get(each.label), comparison.rates[each.label], known[each.label])
+        for each in comparison.everything.collected
+    ]
+    answer = paragraph(headline(found), "headline")
+    heading = f"<header><h1>{escape(_title(comparison))}</h1>{paragraph(what)}</header>"
     figure = f"<section>{picture(answer_figure(comparison), 'success')}</section>"
-    return heading + headline + cards(shown) + figure
+    return heading + answer + cards(shown) + figure
 
 
-def _card(each: Collected, arm: ArmOutcome | None, colour: str) -> str:
-    rate = number(each.successes_an_hour)
+def _title(comparison: Comparison) -> str:
+    *first, last = comparison.labels
+    return f"{', '.join(first)} and {last}, compared"
+
+
+def _card(each: Collected, arm: ArmOutcome | None, rates: Interval | None, colour: str) -> str:
+    rate = number(each.successes_an_hour) + (f" ({span(rates)})" if rates else "")
     lines = [
         f"{each.episodes} episodes in {duration(each.operator_time)} of operator time",
         f"{rate} successes per operator hour" if each.successes is not None else "success was not recorded",

@@ -63,6 +63,12 @@ def as_json(comparison: Comparison, found: list[Finding]) -> dict[str, Any]:
             "collection_differences": {
                 label: asdict(each) if each else None for label, each in comparison.success.items()
             },
+            "successes_an_hour": {
+                "intervals": comparison.rates,
+                "ratios": {
+                    label: asdict(each) if each else None for label, each in comparison.ratios.items()
+                },
+            },
             "views": {view.title: _view(view) for view in comparison.views},
             "outcomes": asdict(comparison.outcomes) if comparison.outcomes else None,
         }

@@ -7,7 +7,7 @@ from handrail.datasets.comparison.compare import Comparison, View
 from handrail.datasets.comparison.differences import FOLLOWS, Difference
 from handrail.datasets.comparison.markup import Cell, table
 from handrail.datasets.comparison.means import Mean
-from handrail.datasets.comparison.outcomes import Outcomes
+from handrail.datasets.comparison.outcomes import ArmOutcome, Outcomes
 from handrail.datasets.comparison.wording import (
     DASH,
     duration,
@@ -76,7 +76,15 @@ def matched_table(views: Sequence[View]) -> str:
 def arms_table(outcomes: Outcomes) -> str:
     """Return how each arm's policies fared."""
     names = list(dict.fromkeys(name for arm in outcomes.arms for name in arm.means))
-    headings = ("trained on", "success", "rollouts 95 %", "nested 95 %", "each training seed", "data", *names)
+    headings = (
+        "trained on",
+        "success",
+        "rollouts 95 %",
+        "nested 95 %",
+        "each training seed",
+        "data",
+        *map(_heading, names),
+    )
     rows = [
         [
             arm.label,
@@ -85,11 +93,23 @@ def arms_table(outcomes: Outcomes) -> str:
             percent_span(arm.nested),
             ", ".join(percent(share) for share in arm.seeds),
             ", ".join(f"{name} {number(value)}" for name, value in arm.trained_on.items()) or DASH,
-            *(number(arm.means.get(name)) for name in names),
+            *(_outcome(arm, name) for name in names),
         ]
         for arm in outcomes.arms
     ]
     return table(headings, rows)
+
+
+def _heading(name: str) -> str:
+    return f"{name} / 100 rollouts" if name == "contacts" else name
+
+
+def _outcome(arm: ArmOutcome, name: str) -> Cell | str:
+    if name not in arm.means:
+        return Cell(DASH, "quiet", "not every rollout has it")
+    mean, (low, high) = arm.means[name]
+    factor = 100.0 if name == "contacts" else 1.0
+    return Cell(number(factor * mean), below=span((factor * low, factor * high)))
 
 
 def outcome_differences_table(outcomes: Outcomes) -> str:
@@ -112,8 +132,8 @@ def outcome_differences_table(outcomes: Outcomes) -> str:
 
 def metrics_table(comparison: Comparison, label: str) -> str:
     """Return every metric of a group and the baseline, and how they differ in each view."""
-    headings = ("metric", "unit", "better", comparison.baseline, label)
-    headings += ("difference, 95 %", "same number", "same time", "same length", "p after Holm")
+    headings = ("metric", "better", comparison.baseline, label)
+    headings += ("difference", "same number", "same time", "same length", "p after Holm")
     rows = [row for metric in METRICS if (row := _metric(comparison, metric, label))]
     return table(headings, rows)
 
@@ -128,15 +148,19 @@ def _metric(comparison: Comparison, metric: Metric, label: str) -> list[Cell | s
     follows = abs(every.follows_length) >= FOLLOWS and metric.name != "length"
     name = metric.title + (" ↔" if follows else "")
     return [
-        Cell(name, "", metric.meaning),
-        Cell(metric.unit, "quiet"),
+        Cell(name, "", metric.meaning, metric.unit),
         Cell(metric.good or "neither", "quiet"),
         _mean(other),
         _mean(one),
         *([_estimate(each) for each in (every, number_, time)]),
-        reason if every.reason or metric.name == "length" else Cell(span(every.at_length_interval)),
+        reason if every.reason or metric.name == "length" else _at_length(every),
         reason if every.reason else p_value(every.p_adjusted),
     ]
+
+
+def _at_length(each: Difference) -> Cell:
+    look = "detected" if each.at_equal_length else ""
+    return Cell(signed(each.at_length), look, below=span(each.at_length_interval))
 
 
 def _of(view: View, metric: Metric, label: str) -> Difference:
@@ -147,13 +171,14 @@ def _of(view: View, metric: Metric, label: str) -> Difference:
 def _mean(mean: Mean) -> Cell:
     if mean.mean is None:
         return Cell("does not apply", "quiet", mean.reason)
-    return Cell(f"{number(mean.mean)} [{span(mean.interval)}]" if mean.interval else number(mean.mean))
+    return Cell(number(mean.mean), below=span(mean.interval) if mean.interval else "")
 
 
 def _estimate(each: Difference) -> Cell:
     if each.reason:
         return Cell(DASH, "quiet", each.reason)
-    return Cell(f"{signed(each.estimate)} [{span(each.interval)}]", "detected" if each.detected else "")
+    look = "detected" if each.detected else ""
+    return Cell(signed(each.estimate), look, below=span(each.interval))
 
 
 def not_applicable_table(comparison: Comparison) -> str:

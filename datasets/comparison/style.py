@@ -25,6 +25,7 @@ th, td { text-align: left; padding: 5px 10px 5px 0; border-bottom: 1px solid var
   vertical-align: top; }
 th { color: var(--quiet); font-weight: 600; }
 td.detected { font-weight: 700; }
+td small { display: block; color: var(--quiet); font-weight: 400; white-space: nowrap; }
 td.quiet, .quiet { color: var(--quiet); }
 .wide { overflow-x: auto; }
 ul { margin: 6px 0; padding-left: 20px; }

@@ -1,5 +1,6 @@
 """Figures of the motion itself: where it went in every episode, and how fast in one of each group."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -26,7 +27,16 @@ def trajectories_figure(comparison: Comparison) -> str:
     for (above, over_time), group in zip(grid, groups, strict=True):
         _paths(above, group, known[group.label])
         _speed(over_time, group, known[group.label])
+    _same_limits([row[0] for row in grid])
+    _same_limits([row[1] for row in grid])
     return svg(figure)
+
+
+def _same_limits(axes: Sequence[Any]) -> None:
+    for part in ("xlim", "ylim"):
+        limits = [getattr(each, f"get_{part}")() for each in axes]
+        for each in axes:
+            each.set(**{part: (min(low for low, _ in limits), max(high for _, high in limits))})
 
 
 def example(group: Group) -> Demonstration:
@@ -54,7 +64,7 @@ def _paths(axes: Any, group: Group, colour: str) -> None:
     failed = ", grey: failed" if any(e.success is False for e in group.episodes) else ""
     axes.set(title=f"{group.label}: paths, dot: end{failed}", xlabel=names[0], ylabel=names[1])
     if first.motion_is_tool:
-        axes.set_aspect("equal", adjustable="datalim")
+        axes.set_aspect("equal", adjustable="box")
     tidy(axes)
 
 

@@ -5,6 +5,8 @@ import numpy as np
 from handrail.controllers.arrays import FloatArray
 from handrail.datasets.quality.missing import DoesNotApply
 
+_ROUNDING = 1e-6
+
 
 def smallest_distance(distance: FloatArray) -> float:
     """Return min_t d(t), signed: negative is penetration [m].
@@ -47,10 +49,13 @@ def impulse(impulses: FloatArray) -> float:
 def slack_used(slack: FloatArray) -> float:
     """Return max_t of the slack: how far a soft limit was given up at most, in the limit's unit.
 
+    Below 1e-6 it is the solver's rounding, and zero.
+
     Args:
         slack: Largest violation in the plan of each period, `(N,)`.
     """
-    return float(_finite(slack).max())
+    most = float(_finite(slack).max())
+    return most if most > _ROUNDING else 0.0
 
 
 def _finite(values: FloatArray) -> FloatArray:
