@@ -9,7 +9,7 @@ from scipy.stats import fisher_exact
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.comparison.differences import at_equal_length
 from handrail.datasets.comparison.evaluations import FORMAT, read_evaluations
-from handrail.datasets.comparison.outcomes import judge
+from handrail.datasets.comparison.outcomes import judge, welch_p
 from handrail.datasets.comparison.proportions import (
     holm,
     newcombe_paired,
@@ -132,6 +132,16 @@ def test_what_is_paired_stays_paired():
     arm = runs([0.5])
     one, other = resample_runs([arm, arm], rng())
     assert np.array_equal(one, other)
+
+
+def test_welch_knows_how_few_training_seeds_there_are():
+    """Golden: shares 0.8, 0.6 against 0.4, 0.2: t = 0.4 / √0.02, two degrees of freedom, p = 0.1056."""
+    shares = [
+        [Run(0, s, (0,), np.array([x])) for s, x in enumerate(each)] for each in ([0.8, 0.6], [0.4, 0.2])
+    ]
+    assert welch_p(*shares) == pytest.approx(0.1056, abs=1e-4)
+    same = [Run(0, seed, (0,), np.ones(1)) for seed in range(3)]
+    assert welch_p(same, same) == 1.0
 
 
 def arms(directory, **shares):

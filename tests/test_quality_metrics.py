@@ -59,9 +59,9 @@ def test_nothing_moves():
 
 
 def test_idle_time_with_and_without_the_final_hold():
-    """Golden at 22 Hz: go 2 s at 1 m/s, wait 2 s, and again; windows of 11 frames, bound 0.2 · 0.5 m.
+    """Golden at 22 Hz: go 2 s at 1 m/s, wait 2 s, twice; windows of 11 frames, bound 0.2 · 0.5 m.
 
-    A window is idle if it shares at most two steps of 1/22 m with motion: 34 windows within the first wait and
+    A window is idle if it shares at most two steps of 1/22 m with motion: 34 windows in the first wait and
     two at either end of it; 34 within the last one and two before, which is the final hold.
     """
     speed = np.repeat([1.0, 0.0, 1.0, 0.0], 44) / 22.0

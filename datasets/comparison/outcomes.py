@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy import stats
 
 from handrail.controllers.arrays import FloatArray
 from handrail.datasets.comparison.evaluations import SUCCESS, Arm
@@ -61,7 +62,8 @@ class OutcomeDifference:
         rollouts: Over all rollouts, as if these policies were all there is.
         nested: 95 % interval over dataset draw, training seed and evaluation seed; None where an arm has
             only one run, since then nothing is known of how much the training seed matters.
-        p: Two-sided, the larger of the exact test's and the nested bootstrap's.
+        p: Two-sided, the largest of the exact test's, the nested bootstrap's, and Welch's t test of the
+            trained policies' success; resampling a handful of training seeds alone would see too much.
         p_adjusted: By Holm, over all differences.
         detectable: The difference that would be seen as one in 80 % of such experiments.
     """
@@ -137,9 +139,17 @@ def _difference(
         return OutcomeDifference(label, baseline, shares, None, shares.p, shares.p, shares.detectable)
     nested = resampled[label] - resampled[baseline]
     tail = (1 + min(np.count_nonzero(nested <= 0), np.count_nonzero(nested >= 0))) / (len(nested) + 1)
-    p = max(shares.p, min(1.0, 2.0 * float(tail)))
+    p = max(shares.p, min(1.0, 2.0 * float(tail)), welch_p(runs[label], runs[baseline]))
     detectable = max(shares.detectable, min(1.0, _REACH * float(nested.std())))
     return OutcomeDifference(label, baseline, shares, percentiles(nested), p, p, detectable)
+
+
+def welch_p(first: Sequence[Run], second: Sequence[Run]) -> float:
+    """Return the p of Welch's t test of the success of trained policies, one number a training seed."""
+    one, other = (np.array([run.values.mean() for run in runs]) for runs in (first, second))
+    if not one.std() and not other.std():
+        return 1.0 if one[0] == other[0] else 0.0
+    return float(np.asarray(stats.ttest_ind(one, other, equal_var=False))[1])
 
 
 def compare_rollouts(first: Sequence[Run], second: Sequence[Run]) -> ShareDifference:

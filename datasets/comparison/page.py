@@ -28,12 +28,12 @@ from handrail.datasets.quality.catalogue import METRICS
 _HOW = (
     "Every interval is 95 %. Shares: Wilson; their differences: Newcombe's method 10, exact McNemar test"
     " where the same seeds were tried under both, Boschloo's where not. Several trained policies: bootstrap"
-    " over dataset draw, training seed and evaluation seed, nested. Means of metrics: bootstrap over episodes"
-    " and permutation tests, paired by seed where episodes began alike. A difference counts as detected if"
-    " its intervals leave zero out and p stays below 0.05 after Holm's correction over all comparisons of its"
-    " kind. “Detectable” is the difference that would be detected in 80 % of such experiments. ↔ marks"
-    " metrics that follow the length of the episodes (Spearman's |ρ| ≥ 0.5); “same length” is the difference"
-    " with that taken off by analysis of covariance."
+    " over dataset draw, training seed and evaluation seed, nested, and Welch's t test over the policies."
+    " Means of metrics: bootstrap over episodes and permutation tests, paired by seed where episodes began"
+    " alike. A difference counts as detected if its intervals leave zero out and p stays below 0.05 after"
+    " Holm's correction over all comparisons of its kind. “Detectable” is the difference that would be"
+    " detected in 80 % of such experiments. ↔ marks metrics that follow the length of the episodes"
+    " (Spearman's |ρ| ≥ 0.5); “same length” is the difference with that taken off by analysis of covariance."
 )
 _QUALITY = (
     "Each with its 95 % interval; bold: detected. These numbers describe data; they do not rank it. Point at"

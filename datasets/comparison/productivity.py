@@ -1,5 +1,6 @@
 """Successful episodes an hour of the operator's time: what a day of recording yields."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,7 +20,7 @@ class RateRatio:
     Attributes:
         estimate: The ratio.
         interval: 95 %, bootstrap over episodes.
-        p: Two-sided, of the bootstrap.
+        p: Permutation test, two-sided.
     """
 
     estimate: float
@@ -60,10 +61,28 @@ def rate_ratio(group: Group, baseline: Group, rng: np.random.Generator) -> RateR
     if pairs:
         draws[1] = draws[0]
     one, other = (_rate(s[draw], t[draw]) for (s, t), draw in zip(numbers, draws, strict=True))
-    tail = 1 + min(np.count_nonzero(one <= other), np.count_nonzero(one >= other))
     ratio = np.divide(one, other, out=np.full(RESAMPLES, np.inf), where=other > 0)
     estimate = float(_rate(*numbers[0]) / _rate(*numbers[1]))
-    return RateRatio(estimate, percentiles(ratio), min(1.0, 2.0 * tail / (RESAMPLES + 1)))
+    return RateRatio(estimate, percentiles(ratio), _permutation_p(numbers, bool(pairs), rng))
+
+
+def _permutation_p(
+    numbers: Sequence[tuple[FloatArray, FloatArray]], paired: bool, rng: np.random.Generator
+) -> float:
+    """Return p of the difference of the rates: episodes change groups at random, or pairs are swapped."""
+    count = len(numbers[0][0])
+    successes, seconds = (np.concatenate(each) for each in zip(*numbers, strict=True))
+    first = np.zeros((RESAMPLES, len(successes)), bool)
+    first[:, :count] = True
+    if paired:
+        swapped = rng.random((RESAMPLES, count)) < 0.5
+        first = np.hstack([~swapped, swapped])
+    else:
+        first = rng.permuted(first, axis=1)
+    rates = [(which @ successes) / (which @ seconds) for which in (first, ~first)]
+    observed = _rate(*numbers[0]) - _rate(*numbers[1])
+    extreme = np.abs(HOUR * (rates[0] - rates[1])) >= abs(observed) * (1.0 - 1e-12)
+    return float((1 + np.count_nonzero(extreme)) / (RESAMPLES + 1))
 
 
 def _numbers(group: Group) -> tuple[FloatArray, FloatArray]:

@@ -121,7 +121,8 @@ def outcome_differences_table(outcomes: Outcomes) -> str:
             Cell(f"{points(each.rollouts.estimate)} points", "detected" if each.detected else ""),
             points_span(each.rollouts.interval),
             points_span(each.nested) if each.nested else DASH,
-            ("McNemar" if each.rollouts.paired else "Boschloo") + (" and bootstrap" if each.nested else ""),
+            ("McNemar" if each.rollouts.paired else "Boschloo")
+            + (", bootstrap, Welch" if each.nested else ""),
             p_value(each.p_adjusted),
             f"{100 * each.detectable:.0f} points",
         ]
@@ -132,8 +133,8 @@ def outcome_differences_table(outcomes: Outcomes) -> str:
 
 def metrics_table(comparison: Comparison, label: str) -> str:
     """Return every metric of a group and the baseline, and how they differ in each view."""
-    headings = ("metric", "better", comparison.baseline, label)
-    headings += ("difference", "same number", "same time", "same length", "p after Holm")
+    headings = ("metric", comparison.baseline, label)
+    headings += ("difference", "same number", "same time", "same length", "p, Holm")
     rows = [row for metric in METRICS if (row := _metric(comparison, metric, label))]
     return table(headings, rows)
 
@@ -148,14 +149,19 @@ def _metric(comparison: Comparison, metric: Metric, label: str) -> list[Cell | s
     follows = abs(every.follows_length) >= FOLLOWS and metric.name != "length"
     name = metric.title + (" ↔" if follows else "")
     return [
-        Cell(name, "", metric.meaning, metric.unit),
-        Cell(metric.good or "neither", "quiet"),
+        Cell(name, "", metric.meaning, _below(metric)),
         _mean(other),
         _mean(one),
         *([_estimate(each) for each in (every, number_, time)]),
         reason if every.reason or metric.name == "length" else _at_length(every),
-        reason if every.reason else p_value(every.p_adjusted),
+        reason if every.reason else p_value(every.p_adjusted).removeprefix("p = ").removeprefix("p "),
     ]
+
+
+def _below(metric: Metric) -> str:
+    return " · ".join(
+        part for part in (metric.unit, f"{metric.good} is better" if metric.good else "") if part
+    )
 
 
 def _at_length(each: Difference) -> Cell:

@@ -144,7 +144,8 @@ METRICS = (
         "action variance",
         "σ²",
         "",
-        "spread of the actions that other episodes took in like states; not monotone in quality",
+        "spread of actions that other episodes took in like states; falls with more episodes, and is not"
+        " monotone in quality",
         measure_group=_action_variance,
         pooled=True,
     ),
@@ -153,7 +154,8 @@ METRICS = (
         "state coverage",
         "nat",
         "",
-        "entropy of the configurations: more is more varied; too little and too much are both bad",
+        "entropy of the configurations: more is more varied, too little and too much are both bad; for groups"
+        " of the same size",
         measure_group=_state_coverage,
         pooled=True,
     ),
