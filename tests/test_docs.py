@@ -18,6 +18,8 @@ from handrail.collect.operators.modes import MODES
 from handrail.collect.profile_config import ProfileConfig
 from handrail.collect.showcase_config import ShowcaseConfig
 from handrail.controllers.command import Status
+from handrail.datasets.comparison.config import CompareConfig
+from handrail.datasets.quality.catalogue import METRICS
 from handrail.scripts import cli
 
 ROOT = Path(__file__).parent.parent
@@ -29,6 +31,7 @@ CONFIGS = {
     "handrail-demo": DemoConfig,
     "handrail-showcase": ShowcaseConfig,
     "handrail-profile": ProfileConfig,
+    "handrail-compare": CompareConfig,
 }
 _LEROBOT = """
 import json, sys
@@ -111,6 +114,10 @@ def test_modes_and_tasks_are_all_there():
     assert set(MODE_NAMES) == set(MODES)
     assert table("Tasks") == set(TASKS)
     assert all(f"`{camera}`" in text("README.md") for camera in CAMERAS)
+
+
+def test_metrics_are_all_there():
+    assert table("Quality metrics") == {metric.name for metric in METRICS}
 
 
 def flags(config: type, prefix: str = "") -> set[str]:
