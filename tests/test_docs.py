@@ -20,6 +20,8 @@ from handrail.collect.operators.modes import MODES
 from handrail.collect.profile_config import ProfileConfig
 from handrail.collect.showcase_config import ShowcaseConfig
 from handrail.controllers.command import Status
+from handrail.datasets.comparison.config import CompareConfig
+from handrail.datasets.quality.catalogue import METRICS
 from handrail.policies.rl_config import TrainRlConfig
 from handrail.policies.rl_contender import RL
 from handrail.scripts import cli
@@ -35,6 +37,7 @@ CONFIGS = {
     "handrail-profile": ProfileConfig,
     "handrail-train-rl": TrainRlConfig,
     "handrail-benchmark": BenchmarkConfig,
+    "handrail-compare": CompareConfig,
 }
 _LEROBOT = """
 import json, sys
@@ -125,6 +128,10 @@ def test_controllers_and_profiles_of_the_benchmark_are_all_there():
     source = (ROOT / "collect" / "benchmark_config.py").read_text()
     helped = re.findall(r'^    """(.*?)"""', source, re.MULTILINE | re.DOTALL)
     assert all(re.search(rf"\b{name}\b", " ".join(helped)) for name in (*CONTROLLERS, *PROFILES))
+
+
+def test_metrics_are_all_there():
+    assert table("Quality metrics") == {metric.name for metric in METRICS}
 
 
 def flags(config: type, prefix: str = "") -> set[str]:

@@ -1,0 +1,131 @@
+"""The whole comparison: read, measure, judge."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from handrail.controllers.errors import HandrailError
+from handrail.datasets.comparison.collection import (
+    Collected,
+    collected,
+    matched_number,
+    matched_time,
+    success_difference,
+)
+from handrail.datasets.comparison.config import CompareConfig
+from handrail.datasets.comparison.differences import Difference, differences
+from handrail.datasets.comparison.evaluations import Arm, read_evaluations
+from handrail.datasets.comparison.groups import Group, baseline_of, load_groups
+from handrail.datasets.comparison.means import Means, means
+from handrail.datasets.comparison.outcomes import Outcomes, judge
+from handrail.datasets.comparison.productivity import RateRatio, rate_interval, rate_ratio
+from handrail.datasets.comparison.proportions import ShareDifference
+from handrail.datasets.comparison.resampling import Interval
+from handrail.datasets.quality.measure import Measurements, measure
+
+
+@dataclass(frozen=True)
+class View:
+    """One way to choose the episodes that are compared.
+
+    Attributes:
+        title: What is held equal.
+        groups: The episodes chosen.
+        collected: What they consist of; failures are counted even where quality is measured without.
+        measurements: Of their quality.
+        means: Of these.
+        differences: Of every metric, each group against the baseline.
+    """
+
+    title: str
+    groups: Sequence[Group]
+    collected: Sequence[Collected]
+    measurements: Measurements
+    means: Means
+    differences: Sequence[Difference]
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """What was found.
+
+    Attributes:
+        config: What was asked.
+        baseline: The label that the others are compared with.
+        views: All episodes, as many of each, as much operator time of each.
+        success: In collection: each group's difference to the baseline, None where it was not recorded.
+        rates: Each group's interval of successes an hour, None where it cannot be told.
+        ratios: Successes an hour of each group over those of the baseline.
+        outcomes: Of trained policies, if evaluations were given.
+    """
+
+    config: CompareConfig
+    baseline: str
+    views: Sequence[View]
+    success: Mapping[str, ShareDifference | None]
+    rates: Mapping[str, Interval | None]
+    ratios: Mapping[str, RateRatio | None]
+    outcomes: Outcomes | None
+
+    @property
+    def everything(self) -> View:
+        """The view of all episodes."""
+        return self.views[0]
+
+    @property
+    def labels(self) -> list[str]:
+        """Labels of the groups."""
+        return [group.label for group in self.everything.groups]
+
+
+def compare(config: CompareConfig) -> Comparison:
+    """Compare as configured.
+
+    Raises:
+        HandrailError: A setting is wrong, or a dataset or an evaluation cannot be read.
+    """
+    config.check()
+    groups = load_groups(config.datasets, config.by, config.labels, config.columns)
+    baseline = baseline_of(groups, config.baseline)
+    arms = _arms(config, groups)
+    rng = np.random.default_rng(config.seed)
+    chosen = {
+        "all episodes": groups,
+        "the same number of episodes": matched_number(groups),
+        "the same operator time": matched_time(groups),
+    }
+    views = [_view(title, each, baseline, config, rng) for title, each in chosen.items()]
+    (base,) = [group for group in groups if group.label == baseline]
+    others = [group for group in groups if group is not base]
+    success = {group.label: success_difference(group, base) for group in others}
+    rates = {group.label: rate_interval(group, rng) for group in groups}
+    ratios = {group.label: rate_ratio(group, base, rng) for group in others}
+    outcomes = judge(arms, baseline if baseline in arms else next(iter(arms)), rng) if arms else None
+    return Comparison(config, baseline, views, success, rates, ratios, outcomes)
+
+
+def _view(
+    title: str, groups: Sequence[Group], baseline: str, config: CompareConfig, rng: np.random.Generator
+) -> View:
+    measured = [group.successful() for group in groups] if config.success_only else list(groups)
+    for group in measured:
+        if not group.episodes:
+            raise HandrailError(f"--success_only: {group.label!r} has no successful episode among {title}")
+    measurements = measure({group.label: group.episodes for group in measured}, rng, config.margin)
+    found = differences(measured, measurements, baseline, rng)
+    counted = [collected(group) for group in groups]
+    return View(title, measured, counted, measurements, means(measurements, rng), found)
+
+
+def _arms(config: CompareConfig, groups: Sequence[Group]) -> dict[str, Arm]:
+    """Return the evaluations' arms; each must say which group its policies were trained on."""
+    arms = read_evaluations(config.evaluations)
+    labels = [group.label for group in groups]
+    for label in arms:
+        if not any(label == known or label.startswith((f"{known} ", f"{known}/")) for known in labels):
+            raise HandrailError(
+                f"evaluations: unknown arm {label!r}, expected one of {', '.join(labels)},"
+                " or one of these with more after a space"
+            )
+    return arms

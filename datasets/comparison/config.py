@@ -1,0 +1,57 @@
+"""Settings of a comparison; light to import."""
+
+import math
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import tyro
+
+from handrail.controllers.errors import HandrailError
+from handrail.datasets.quality.columns import ColumnNames
+
+
+@dataclass(frozen=True)
+class CompareConfig:
+    """Compare LeRobot datasets, or the teleop modes in one, and write a report."""
+
+    datasets: tyro.conf.Positional[tuple[str, ...]]
+    """Folders of LeRobot v3.0 datasets, whoever recorded them."""
+    output: str = "outputs/compare"
+    """Folder for report.html, report.json, episodes.csv and differences.csv."""
+    by: str = ""
+    """Split each dataset by this column of its episodes' metadata: mode, operator, success, …"""
+    labels: tuple[str, ...] = ()
+    """A name for each dataset; the folders' names when empty."""
+    baseline: str = ""
+    """What the others are compared with; the first when empty."""
+    evaluations: tuple[str, ...] = ()
+    """JSON files of what policies trained on the datasets did."""
+    success_only: bool = False
+    """Measure quality on episodes that did not fail."""
+    margin: float = 0.1
+    """Distance to keep, for the time within it [m]."""
+    pictures: bool = True
+    """Show first pictures of the cameras."""
+    seed: int = 0
+    """Of the resampling: the same seed gives the same report."""
+    columns: ColumnNames = field(default_factory=ColumnNames)
+
+    @property
+    def folder(self) -> Path:
+        """The folder of the report."""
+        return Path(self.output).expanduser()
+
+    def check(self) -> None:
+        """Check what can be checked without reading anything.
+
+        Raises:
+            HandrailError: One setting is wrong.
+        """
+        if not self.datasets:
+            raise HandrailError("compare: expected one folder of a dataset or more, got none")
+        if not (math.isfinite(self.margin) and self.margin > 0.0):
+            raise HandrailError(f"--margin {self.margin}: expected a positive distance [m]")
+        if self.seed < 0:
+            raise HandrailError(f"--seed {self.seed}: expected a whole number >= 0")
+        if self.folder.exists() and not self.folder.is_dir():
+            raise HandrailError(f"--output {self.output}: expected a folder, found a file")

@@ -1,0 +1,187 @@
+"""How a metric differs between two groups, with and without the length of the episodes taken into account."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy import stats
+
+from handrail.controllers.arrays import FloatArray
+from handrail.datasets.comparison.collection import shared_seeds
+from handrail.datasets.comparison.groups import Group
+from handrail.datasets.comparison.proportions import holm
+from handrail.datasets.comparison.resampling import (
+    FEWEST,
+    RESAMPLES,
+    Interval,
+    p_of_difference,
+    percentiles,
+)
+from handrail.datasets.quality.catalogue import METRICS, Metric
+from handrail.datasets.quality.measure import Measurements
+
+FOLLOWS = 0.5  # |Spearman's ρ| with length from which a metric counts as following it
+
+
+@dataclass(frozen=True)
+class Difference:
+    """Mean of a metric in a group minus that in the baseline, over episodes.
+
+    Attributes:
+        metric: Which.
+        label: The group.
+        baseline: The other one.
+        reason: Why there is no difference to speak of; "" if there is one.
+        paired: Whether episodes with the same start were compared.
+        counts: Episodes of both that count.
+        estimate: In the metric's unit.
+        interval: 95 %, bootstrap.
+        spread: Standard deviation within groups, pooled.
+        p: Permutation test, two-sided.
+        p_adjusted: By Holm, over all metrics and groups.
+        at_length: The estimate with the metric's linear dependence on length, within groups, taken off.
+        at_length_interval: 95 %, bootstrap.
+        follows_length: Spearman's ρ with episode length within groups.
+    """
+
+    metric: Metric
+    label: str
+    baseline: str
+    reason: str = ""
+    paired: bool = False
+    counts: tuple[int, int] = (0, 0)
+    estimate: float = float("nan")
+    interval: Interval = (float("nan"), float("nan"))
+    spread: float = float("nan")
+    p: float = 1.0
+    p_adjusted: float = 1.0
+    at_length: float = float("nan")
+    at_length_interval: Interval = (float("nan"), float("nan"))
+    follows_length: float = float("nan")
+
+    @property
+    def detected(self) -> bool:
+        """Whether the interval leaves zero out and the adjusted p is below 0.05."""
+        return not self.reason and self.p_adjusted < 0.05 and not self.interval[0] <= 0.0 <= self.interval[1]
+
+    @property
+    def effect(self) -> tuple[float, float, float]:
+        """Estimate and interval in standard deviations; zero where nothing varies."""
+        unit = self.spread or float("inf")
+        return self.estimate / unit, self.interval[0] / unit, self.interval[1] / unit
+
+    @property
+    def at_equal_length(self) -> bool:
+        """Whether what was detected, in its direction, is also there at equal length."""
+        low, high = self.at_length_interval
+        return self.detected and (low > 0.0 if self.estimate > 0.0 else high < 0.0)
+
+
+def differences(
+    groups: Sequence[Group], measurements: Measurements, baseline: str, rng: np.random.Generator
+) -> list[Difference]:
+    """Return every metric's difference between every group and the baseline.
+
+    Args:
+        groups: What was measured.
+        measurements: Of these groups.
+        baseline: The label that the others are compared with.
+        rng: Of the resampling.
+    """
+    (base,) = [group for group in groups if group.label == baseline]
+    others = [group for group in groups if group.label != baseline]
+    found = [_difference(metric, group, base, measurements, rng) for group in others for metric in METRICS]
+    known = [difference for difference in found if not difference.reason]
+    adjusted = iter(holm([difference.p for difference in known]))
+    return [d if d.reason else replace(d, p_adjusted=next(adjusted)) for d in found]
+
+
+def _difference(
+    metric: Metric, group: Group, base: Group, measurements: Measurements, rng: np.random.Generator
+) -> Difference:
+    measured = [measurements.values[metric.name][each.label] for each in (group, base)]
+    names = {"metric": metric, "label": group.label, "baseline": base.label}
+    for each, values in zip((group, base), measured, strict=True):
+        if not values.applies:
+            return Difference(**names, reason=f"{each.label}: {values.reason}")
+    if not measurements.comparable(metric, group.label, base.label):
+        return Difference(**names, reason="the datasets have different columns, so there is no common scale")
+    pairs = _finite_pairs(shared_seeds(group, base), measured[0].values, measured[1].values)
+    chosen = _chosen(pairs, measured[0].values, measured[1].values)
+    if min(map(len, chosen)) < FEWEST:
+        return Difference(**names, reason=f"fewer than {FEWEST} episodes of a group have a value")
+    values = [each.values[places] for each, places in zip(measured, chosen, strict=True)]
+    lengths = [
+        np.array([episode.seconds for episode in each.episodes])[places]
+        for each, places in zip((group, base), chosen, strict=True)
+    ]
+    return replace(Difference(**names), **_compared(values, lengths, bool(pairs), rng))
+
+
+def _finite_pairs(
+    pairs: Sequence[tuple[int, int]], one: FloatArray, other: FloatArray
+) -> list[tuple[int, int]]:
+    return [(i, j) for i, j in pairs if np.isfinite(one[i]) and np.isfinite(other[j])]
+
+
+def _chosen(pairs: Sequence[tuple[int, int]], one: FloatArray, other: FloatArray) -> list[np.ndarray]:
+    if pairs:
+        return [np.array([pair[side] for pair in pairs]) for side in (0, 1)]
+    return [np.flatnonzero(np.isfinite(values)) for values in (one, other)]
+
+
+def _compared(
+    values: Sequence[FloatArray], lengths: Sequence[FloatArray], paired: bool, rng: np.random.Generator
+) -> dict[str, object]:
+    draws = [rng.integers(len(each), size=(RESAMPLES, len(each))) for each in values]
+    if paired:
+        draws[1] = draws[0]
+    resampled = [each[draw] for each, draw in zip(values, draws, strict=True)]
+    durations = [each[draw] for each, draw in zip(lengths, draws, strict=True)]
+    estimate = float(values[0].mean() - values[1].mean())
+    low, high = percentiles(resampled[0].mean(axis=1) - resampled[1].mean(axis=1))
+    spread = float(np.sqrt(np.mean([each.var(ddof=1) for each in values])))
+    whole = [each[None] for each in values], [each[None] for each in lengths]
+    return {
+        "paired": paired,
+        "counts": (len(values[0]), len(values[1])),
+        "estimate": estimate,
+        "interval": (low, high),
+        "spread": spread,
+        "p": p_of_difference(values[0], values[1], paired, rng),
+        "at_length": float(at_equal_length(*whole)[0]),
+        "at_length_interval": percentiles(at_equal_length(resampled, durations)),
+        "follows_length": _follows(values, lengths),
+    }
+
+
+def at_equal_length(values: Sequence[FloatArray], lengths: Sequence[FloatArray]) -> FloatArray:
+    """Return differences of means at equal length: ȳ₁ − ȳ₂ − β (L̄₁ − L̄₂), β the slope within groups.
+
+    β = Σ_g Σ (L − L̄_g)(y − ȳ_g) / Σ_g Σ (L − L̄_g)²: the analysis of covariance.
+
+    Args:
+        values: Of two groups, `(B, N)` and `(B, M)`.
+        lengths: Of the same episodes.
+
+    Returns:
+        `(B,)`.
+    """
+    means = [(y.mean(axis=1), length.mean(axis=1)) for y, length in zip(values, lengths, strict=True)]
+    product = np.zeros(len(values[0]))
+    square = np.zeros(len(values[0]))
+    for y, length, (mean, middle) in zip(values, lengths, means, strict=True):
+        away = length - middle[:, None]
+        product += (away * (y - mean[:, None])).sum(axis=1)
+        square += (away**2).sum(axis=1)
+    slope = np.divide(product, square, out=np.zeros_like(product), where=square > 1e-12)
+    (one, one_length), (other, other_length) = means
+    return one - other - slope * (one_length - other_length)
+
+
+def _follows(values: Sequence[FloatArray], lengths: Sequence[FloatArray]) -> float:
+    """Return the correlation of ranks within groups, all groups together; 0 where nothing varies."""
+    ranks = [[stats.rankdata(each) / len(each) - 0.5 for each in side] for side in (values, lengths)]
+    one, other = (np.concatenate([each - each.mean() for each in side]) for side in ranks)
+    norm = float(np.sqrt((one @ one) * (other @ other)))
+    return float(one @ other) / norm if norm else 0.0

@@ -1,0 +1,55 @@
+"""What all figures share: colours that everybody can tell apart, quiet axes, and SVG inside the page."""
+
+import base64
+import io
+from typing import Any
+
+from handrail.controllers.errors import HandrailError
+
+COLOURS = (
+    "#0072b2",
+    "#d55e00",
+    "#009e73",
+    "#cc79a7",
+    "#e69f00",
+    "#56b4e9",
+    "#5b4b8a",
+    "#7f7f7f",
+)  # Okabe–Ito
+INK, GREY, FAINT = "#1d2733", "#8a94a0", "#e3e7ec"
+
+
+def new_figure(width: float, height: float) -> Any:
+    """Return an empty figure [inch].
+
+    Raises:
+        HandrailError: matplotlib is not installed.
+    """
+    try:
+        from matplotlib.figure import Figure
+    except ImportError as error:
+        raise HandrailError("the report: expected matplotlib, found none; pip install matplotlib") from error
+    return Figure(figsize=(width, height), layout="constrained")
+
+
+def svg(figure: Any) -> str:
+    """Return a figure as an address that holds all of it; the same figure gives the same text."""
+    import matplotlib
+
+    stream = io.BytesIO()
+    with matplotlib.rc_context({"svg.hashsalt": "handrail"}):
+        figure.savefig(stream, format="svg", metadata={"Date": None})
+    return "data:image/svg+xml;base64," + base64.b64encode(stream.getvalue()).decode()
+
+
+def tidy(axes: Any, grid: str = "both") -> None:
+    """Make axes quiet; `grid` is x, y, both or ""."""
+    if grid:
+        axes.grid(axis=grid, color=FAINT, lw=0.7)
+    axes.set_axisbelow(True)
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.spines[["left", "bottom"]].set_color(GREY)
+    axes.tick_params(colors=INK, labelsize=8, length=0)
+    axes.title.set(size=9.5, color=INK, weight="bold")
+    for label in (axes.xaxis.label, axes.yaxis.label):
+        label.set(size=8.5, color=INK)

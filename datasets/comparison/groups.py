@@ -1,0 +1,125 @@
+"""What is compared: whole datasets, or the episodes of datasets by a column of their metadata."""
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from handrail.controllers.errors import HandrailError, unknown_name
+from handrail.datasets.quality.columns import ColumnNames
+from handrail.datasets.quality.demonstration import Demonstration
+from handrail.datasets.quality.load import read_demonstrations
+from handrail.datasets.reader import DatasetInfo, read_info
+
+FEWEST, MOST = 2, 8
+
+
+@dataclass(frozen=True)
+class Group:
+    """Episodes that belong together.
+
+    Attributes:
+        label: Its name in the report.
+        info: What the dataset is.
+        episodes: In the order in which they were recorded.
+    """
+
+    label: str
+    info: DatasetInfo
+    episodes: tuple[Demonstration, ...]
+
+    def first(self, count: int) -> "Group":
+        """Return the first episodes only."""
+        return Group(self.label, self.info, self.episodes[:count])
+
+    def within(self, seconds: float) -> "Group":
+        """Return the first episodes that fit into an operator's time [s], one at least."""
+        total, count = 0.0, 0
+        for episode in self.episodes:
+            total += episode.seconds
+            if total > seconds * (1.0 + 1e-9):
+                break
+            count += 1
+        return self.first(max(1, count))
+
+    def successful(self) -> "Group":
+        """Return the episodes that are not known to have failed."""
+        return Group(self.label, self.info, tuple(e for e in self.episodes if e.success is not False))
+
+
+def load_groups(
+    roots: Sequence[str | Path], by: str = "", labels: Sequence[str] = (), columns: ColumnNames | None = None
+) -> list[Group]:
+    """Return what is to be compared.
+
+    Args:
+        roots: Folders of LeRobot v3.0 datasets.
+        by: Split each dataset by this column of its episodes' metadata, such as `mode`, `operator` or
+            `success`; "" compares whole datasets.
+        labels: A name for each dataset; their folders' names when empty.
+        columns: Which column plays which part.
+
+    Raises:
+        HandrailError: A dataset cannot be read, there is no such column, or there are fewer than two groups.
+    """
+    names = _names(roots, labels)
+    groups: list[Group] = []
+    for root, name in zip(roots, names, strict=True):
+        info, episodes = read_info(root), read_demonstrations(root, columns)
+        if not by:
+            groups.append(Group(name, info, tuple(episodes)))
+            continue
+        prefix = f"{name} · " if len(roots) > 1 else ""
+        for value, members in _split(episodes, by, str(root)).items():
+            groups.append(Group(prefix + value, info, tuple(members)))
+    if not FEWEST <= len(groups) <= MOST:
+        found = ", ".join(group.label for group in groups) or "none"
+        advice = "" if by else "; name another dataset, or say --by mode"
+        raise HandrailError(f"compare: expected {FEWEST} to {MOST} groups of episodes, got {found}{advice}")
+    return groups
+
+
+def baseline_of(groups: Sequence[Group], name: str) -> str:
+    """Return the label of the group that the others are compared with: the first when `name` is "".
+
+    Raises:
+        HandrailError: There is no such group.
+    """
+    labels = [group.label for group in groups]
+    if name and name not in labels:
+        raise unknown_name("baseline", name, labels)
+    return name or labels[0]
+
+
+def _names(roots: Sequence[str | Path], labels: Sequence[str]) -> list[str]:
+    if labels and len(labels) != len(roots):
+        raise HandrailError(f"--labels: expected {len(roots)} names, got {len(labels)}")
+    paths = [Path(root).expanduser().absolute() for root in roots]
+    names = list(labels) or [path.name for path in paths]
+    if not labels and len(set(names)) < len(names):
+        names = [f"{path.parent.name}/{path.name}" for path in paths]
+    twice = [name for name, count in Counter(names).items() if count > 1]
+    if twice:
+        raise HandrailError(f"compare: two datasets are called {twice[0]!r}; give each a name with --labels")
+    return names
+
+
+def _split(episodes: Sequence[Demonstration], by: str, root: str) -> dict[str, list[Demonstration]]:
+    groups: dict[str, list[Demonstration]] = {}
+    for episode in episodes:
+        groups.setdefault(_value(episode, by, root), []).append(episode)
+    return groups
+
+
+def _value(episode: Demonstration, by: str, root: str) -> str:
+    """Return the value of a metadata column; a mode that the metadata lacks is read from the frames."""
+    meta: dict[str, Any] = {key: value for key, value in episode.meta.items() if "/" not in key}
+    if by not in meta and by == "mode" and episode.has("mode"):
+        return " → ".join(dict.fromkeys(str(mode) for mode in episode.column("mode") if mode)) or "none"
+    if by not in meta:
+        raise HandrailError(
+            f"dataset {root!r}: unknown column {by!r} of episodes, expected one of {', '.join(meta)}"
+        )
+    value = meta[by]
+    return "; ".join(map(str, value)) if isinstance(value, list) else str(value)

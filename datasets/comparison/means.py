@@ -1,0 +1,41 @@
+"""The mean of every metric in every group, with its interval or why there is none."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from handrail.datasets.comparison.resampling import Interval, mean_interval
+from handrail.datasets.quality.measure import Measurements
+
+
+@dataclass(frozen=True)
+class Mean:
+    """A metric of a group.
+
+    Attributes:
+        count: Episodes that have a value.
+        mean: Over these; None without any.
+        interval: 95 %, bootstrap; None for fewer than five.
+        reason: Why it does not apply, to all or to some; "" where it applies to all.
+    """
+
+    count: int
+    mean: float | None
+    interval: Interval | None
+    reason: str
+
+
+Means = Mapping[str, Mapping[str, Mean]]
+
+
+def means(measurements: Measurements, rng: np.random.Generator) -> Means:
+    """Return the means by metric and group."""
+    found: dict[str, dict[str, Mean]] = {}
+    for name, groups in measurements.values.items():
+        found[name] = {}
+        for label, measured in groups.items():
+            values = measured.values[np.isfinite(measured.values)]
+            mean = float(values.mean()) if values.size else None
+            found[name][label] = Mean(len(values), mean, mean_interval(values, rng), measured.reason)
+    return found

@@ -1,0 +1,55 @@
+"""First pictures of the cameras, small, for the page."""
+
+import base64
+import io
+from pathlib import Path
+from typing import Any
+
+from handrail.datasets.comparison.groups import Group
+from handrail.datasets.layout import VIDEO_PATH
+from handrail.datasets.quality.demonstration import Demonstration
+from handrail.datasets.schema import video_keys
+
+_EPISODES = 3  # shown of each group
+_WIDTH = 240  # [pixels]
+
+
+def first_pictures(group: Group) -> list[tuple[str, str]]:
+    """Return captions and pictures, as addresses that hold all of them; unreadable videos are left out."""
+    shown = []
+    for episode in group.episodes[:_EPISODES]:
+        for key in video_keys(group.info.features):
+            picture = _first_frame(group.info.root, key, episode)
+            if picture:
+                shown.append(
+                    (f"episode {episode.number}, {key.removeprefix('observation.images.')}", picture)
+                )
+    return shown
+
+
+def _first_frame(root: Path, key: str, episode: Demonstration) -> str:
+    import av
+    from av.error import FFmpegError
+
+    place = {name: episode.meta.get(f"videos/{key}/{name}") for name in ("chunk_index", "file_index")}
+    if None in place.values():
+        return ""
+    begin = float(episode.meta.get(f"videos/{key}/from_timestamp") or 0.0)
+    try:
+        with av.open(str(root / VIDEO_PATH.format(video_key=key, **place))) as container:
+            stream = container.streams.video[0]
+            container.seek(int(begin * 1_000_000))
+            for frame in container.decode(stream):
+                if frame.time is None or frame.time >= begin - 0.5 / episode.fps:
+                    return _address(frame)
+    except (OSError, FFmpegError):
+        return ""
+    return ""
+
+
+def _address(frame: Any) -> str:
+    picture = frame.to_image()
+    picture.thumbnail((_WIDTH, _WIDTH))
+    stream = io.BytesIO()
+    picture.save(stream, format="JPEG", quality=80)
+    return "data:image/jpeg;base64," + base64.b64encode(stream.getvalue()).decode()

@@ -1,0 +1,111 @@
+"""Intervals by resampling: of means, of differences, and of what is nested."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from handrail.controllers.arrays import FloatArray
+
+RESAMPLES = 4000
+FEWEST = 5  # values below which resampling says nothing
+
+Interval = tuple[float, float]
+
+
+def percentiles(resampled: FloatArray) -> Interval:
+    """Return the 95 % interval of resampled estimates, `(B,)`."""
+    low, high = np.percentile(resampled, [2.5, 97.5]).tolist()
+    return low, high
+
+
+def mean_interval(values: FloatArray, rng: np.random.Generator) -> Interval | None:
+    """Return the 95 % bootstrap interval of a mean (percentiles), or None for fewer than five values.
+
+    Args:
+        values: `(N,)`, finite.
+        rng: Of the resampling.
+    """
+    if len(values) < FEWEST:
+        return None
+    return percentiles(values[rng.integers(len(values), size=(RESAMPLES, len(values)))].mean(axis=1))
+
+
+def p_of_difference(first: FloatArray, second: FloatArray, paired: bool, rng: np.random.Generator) -> float:
+    """Return the two-sided p of a difference of means by permutation; of paired ones by turning signs.
+
+    p = (1 + #{|d*| ≥ |d|}) / (B + 1), Phipson & Smyth 2010.
+
+    Args:
+        first: `(N,)`.
+        second: `(M,)`; the same trials where paired.
+        paired: Whether they are.
+        rng: Of the permutations.
+    """
+    if paired:
+        difference = first - second
+        signs = rng.choice([-1.0, 1.0], size=(RESAMPLES, len(difference)))
+        permuted, observed = (signs * difference).mean(axis=1), difference.mean()
+    else:
+        pool = np.concatenate([first, second])
+        share = np.full(len(pool), -1.0 / len(second))
+        share[: len(first)] = 1.0 / len(first)
+        permuted = rng.permuted(np.tile(share, (RESAMPLES, 1)), axis=1) @ pool
+        observed = first.mean() - second.mean()
+    tolerance = 1e-12 * max(1.0, abs(float(observed)))
+    return float((1 + np.count_nonzero(np.abs(permuted) >= abs(observed) - tolerance)) / (RESAMPLES + 1))
+
+
+@dataclass(frozen=True)
+class Run:
+    """The rollouts of one trained policy.
+
+    Attributes:
+        draw: Which draw of the dataset it was trained on.
+        training_seed: Of its training.
+        seeds: Of the rollouts, `(R,)`, rising.
+        values: Success (0 or 1) or another outcome of each, `(R,)`.
+    """
+
+    draw: int
+    training_seed: int
+    seeds: tuple[int, ...]
+    values: FloatArray
+
+
+def resample_runs(arms: Sequence[Sequence[Run]], rng: np.random.Generator) -> list[FloatArray]:
+    """Return bootstrapped means of arms whose rollouts are nested: dataset draw → training seed → rollout.
+
+    Each level is drawn with replacement within the one above. Where every run of every arm has the same
+    evaluation seeds, one draw of these serves all, so that what is paired stays so.
+
+    Args:
+        arms: The runs of each.
+        rng: Of the resampling.
+
+    Returns:
+        For each arm the means, `(B,)`; the same row is the same resampling of the evaluation seeds.
+    """
+    seeds = {run.seeds for runs in arms for run in runs}
+    shared = _shares(len(next(iter(seeds))), rng) if len(seeds) == 1 else None
+    means = []
+    for runs in arms:
+        each = [run.values @ (_shares(len(run.seeds), rng) if shared is None else shared) for run in runs]
+        means.append((np.stack(each) * _weights(runs, rng)).sum(axis=0))
+    return means
+
+
+def _shares(count: int, rng: np.random.Generator) -> FloatArray:
+    """Return how often each of `count` things is drawn, over all draws, `(count, B)`."""
+    return rng.multinomial(count, np.full(count, 1.0 / count), size=RESAMPLES).T / count
+
+
+def _weights(runs: Sequence[Run], rng: np.random.Generator) -> FloatArray:
+    """Return the weight of each run: draws of the dataset resampled, and runs within, `(runs, B)`."""
+    draws = sorted({run.draw for run in runs})
+    of_draws = _shares(len(draws), rng)
+    weights = np.empty((len(runs), RESAMPLES))
+    for share, draw in zip(of_draws, draws, strict=True):
+        places = [place for place, run in enumerate(runs) if run.draw == draw]
+        weights[places] = share * _shares(len(places), rng)
+    return weights

@@ -1,0 +1,39 @@
+"""How the page looks."""
+
+CSS = """
+:root { --ink: #1d2733; --quiet: #5d6874; --line: #e3e7ec; --paper: #ffffff; --wash: #f6f8fa; }
+* { box-sizing: border-box; }
+body { margin: 0; background: var(--wash); color: var(--ink);
+  font: 15px/1.5 system-ui, -apple-system, "Segoe UI", Roboto, "Helvetica Neue", sans-serif; }
+main { max-width: 1080px; margin: 0 auto; padding: 22px 20px 60px; }
+header p { margin: 0; color: var(--quiet); }
+h1 { font-size: 22px; margin: 0; }
+h2 { font-size: 18px; margin: 34px 0 10px; }
+section { background: var(--paper); border: 1px solid var(--line); border-radius: 10px; padding: 16px 18px;
+  margin: 12px 0; }
+section > h2:first-child { margin-top: 0; }
+.headline { font-size: 19px; line-height: 1.4; font-weight: 600; margin: 14px 0 12px; }
+.cards { display: flex; flex-wrap: wrap; gap: 12px; margin: 12px 0; }
+.card { flex: 1 1 220px; background: var(--paper); border: 1px solid var(--line); border-radius: 10px;
+  border-top: 5px solid var(--colour); padding: 10px 14px; }
+.card h3 { margin: 0 0 4px; font-size: 15px; }
+.card .big { font-size: 27px; font-weight: 700; line-height: 1.15; }
+.card small { color: var(--quiet); display: block; }
+img.figure { width: 100%; height: auto; display: block; }
+table { border-collapse: collapse; width: 100%; font-size: 13.5px; font-variant-numeric: tabular-nums; }
+th, td { text-align: left; padding: 5px 10px 5px 0; border-bottom: 1px solid var(--line);
+  vertical-align: top; }
+th { color: var(--quiet); font-weight: 600; }
+td.detected { font-weight: 700; }
+td small { display: block; color: var(--quiet); font-weight: 400; white-space: nowrap; }
+td.quiet, .quiet { color: var(--quiet); }
+.wide { overflow-x: auto; }
+ul { margin: 6px 0; padding-left: 20px; }
+li { margin: 4px 0; }
+li.detected::marker { color: #0072b2; content: "●  "; }
+li.caution::marker { content: "!  "; font-weight: 700; color: #d55e00; }
+.pictures { display: flex; flex-wrap: wrap; gap: 10px; }
+figure { margin: 0; } figcaption { font-size: 12px; color: var(--quiet); }
+details summary { cursor: pointer; color: var(--quiet); }
+@media print { body { background: #fff; } section, .card { break-inside: avoid; } }
+"""

@@ -1,0 +1,66 @@
+"""Numbers as people read them."""
+
+import math
+
+from handrail.datasets.quality.catalogue import Metric
+
+DASH = "–"
+
+
+def number(value: float | None) -> str:
+    """Return a number with three digits that count, or a dash."""
+    if value is None or not math.isfinite(value):
+        return DASH
+    if value == 0:
+        return "0"
+    size = math.floor(math.log10(abs(value)))
+    if size >= 5 or size < -4:
+        return f"{value:.1e}".replace("-", "−")
+    return f"{value:.{max(0, 2 - size)}f}".replace("-", "−")
+
+
+def signed(value: float) -> str:
+    """Return a number with its sign."""
+    return f"+{number(value)}" if value > 0 else number(value)
+
+
+def span(interval: tuple[float, float] | None) -> str:
+    """Return an interval, or a dash."""
+    return DASH if interval is None else f"{number(interval[0])} to {number(interval[1])}"
+
+
+def percent(share: float | None) -> str:
+    """Return a share in percent."""
+    return DASH if share is None else f"{100 * share:.0f} %"
+
+
+def percent_span(interval: tuple[float, float] | None) -> str:
+    """Return an interval of a share in percent."""
+    return DASH if interval is None else f"{100 * interval[0]:.0f} to {100 * interval[1]:.0f} %"
+
+
+def points(difference: float) -> str:
+    """Return a difference of shares in percentage points."""
+    return f"{100 * difference:+.0f}".replace("-", "−")
+
+
+def points_span(interval: tuple[float, float]) -> str:
+    """Return an interval of a difference of shares in percentage points."""
+    return f"{points(interval[0])} to {points(interval[1])}"
+
+
+def p_value(p: float) -> str:
+    """Return a p-value with its sign of comparison."""
+    return "p < 0.001" if p < 0.001 else f"p = {p:.2g}"
+
+
+def duration(seconds: float) -> str:
+    """Return a time in the unit that suits it."""
+    if seconds < 120:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60:.1f} min" if seconds < 7200 else f"{seconds / 3600:.1f} h"
+
+
+def unit(metric: Metric) -> str:
+    """Return a metric's unit after a space, or nothing."""
+    return f" {metric.unit}" if metric.unit else ""

@@ -1,0 +1,189 @@
+"""One recorded episode, read by what its columns mean rather than by what they are called."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from handrail.controllers.arrays import BoolArray, FloatArray
+from handrail.datasets.quality.columns import ColumnNames
+from handrail.datasets.quality.missing import DoesNotApply
+from handrail.datasets.quality.naming import (
+    gripper_entry,
+    is_velocity,
+    point_entries,
+    position_entries,
+    same_thing,
+)
+
+Names = Mapping[str, tuple[str, ...] | None]
+
+
+@dataclass(frozen=True)
+class Demonstration:
+    """One episode. What it does not hold raises `DoesNotApply` with the reason when it is asked for.
+
+    Attributes:
+        number: of the episode in its dataset.
+        fps: Frames a second [Hz].
+        frames: Columns, `(N,)` or `(N, d)`; no pictures.
+        names: Names of the columns' entries.
+        meta: The episode's line of metadata.
+        columns: Which column plays which part.
+    """
+
+    number: int
+    fps: float
+    frames: Mapping[str, np.ndarray]
+    names: Names
+    meta: Mapping[str, Any]
+    columns: ColumnNames = field(default_factory=ColumnNames)
+
+    @property
+    def count(self) -> int:
+        """Number of frames."""
+        return int(self.meta["length"])
+
+    @property
+    def seconds(self) -> float:
+        """Duration, which is also the operator's time [s]."""
+        return self.count / self.fps
+
+    @property
+    def success(self) -> bool | None:
+        """How it ended, if that was recorded."""
+        value = self.meta.get("success")
+        return bool(value) if isinstance(value, bool | int | float) else None
+
+    @cached_property
+    def motion(self) -> FloatArray:
+        """What moves: the tool's position, `(N, 3)` [m], or else the configuration, in the state's units."""
+        state, names = self.matrix("state"), self.entries("state")
+        return state[:, point_entries(names)] if point_entries(names) else self.configuration
+
+    @property
+    def motion_is_tool(self) -> bool:
+        """Whether `motion` is the tool's position [m]."""
+        return bool(point_entries(self.entries("state")))
+
+    @cached_property
+    def configuration(self) -> FloatArray:
+        """Where the robot is: the positions in the state, `(N, c)`, or all of it where no name says."""
+        state, names = self.matrix("state"), self.entries("state")
+        return state[:, position_entries(names)] if position_entries(names) else state
+
+    @cached_property
+    def observation(self) -> FloatArray:
+        """What a policy reads, pictures aside: all numbers under `observation.`, `(N, s)`."""
+        return np.hstack([_rows(self.frames[name]) for name in self.observed])
+
+    @property
+    def observed(self) -> tuple[str, ...]:
+        """The columns that `observation` is made of."""
+        known = (name for name in self.frames if name.startswith("observation"))
+        found = tuple(name for name in known if self.frames[name].dtype.kind in "fiub")
+        if not found:
+            raise DoesNotApply("no column 'observation.…' with numbers")
+        return found
+
+    @cached_property
+    def pairs(self) -> tuple[tuple[int, int], ...]:
+        """Entries of action and state that mean the same in the same unit."""
+        found = same_thing(self.entries("action"), self.entries("state"))
+        if not found:
+            raise DoesNotApply("no entry of the action has its counterpart in the state, by name")
+        return tuple(found)
+
+    @cached_property
+    def commanded(self) -> FloatArray:
+        """The entries of the action that the state measures too, `(N, p)`."""
+        return self.matrix("action")[:, [place for place, _ in self.pairs]]
+
+    @cached_property
+    def reached(self) -> FloatArray:
+        """What the state measured of `commanded`, `(N, p)`."""
+        return self.matrix("state")[:, [place for _, place in self.pairs]]
+
+    @cached_property
+    def relative_action(self) -> FloatArray:
+        """The action, positions taken relative to where the robot is, `(N, a)`."""
+        action, names = self.matrix("action").copy(), self.entries("action")
+        for place, measured in same_thing(names, self.entries("state")):
+            if not is_velocity(names[place]):
+                action[:, place] -= self.matrix("state")[:, measured]
+        return action
+
+    @cached_property
+    def gripper(self) -> FloatArray:
+        """What opens and closes the gripper, commanded or else measured, `(N,)`."""
+        for part in ("action", "state"):
+            place = gripper_entry(self.entries(part))
+            if place is not None:
+                return self.matrix(part)[:, place]
+        raise DoesNotApply("no entry of action or state is called gripper")
+
+    @cached_property
+    def phase(self) -> np.ndarray:
+        """The recorded phase, `(N,)`."""
+        return self.column("phase").reshape(self.count, -1)[:, 0]
+
+    @cached_property
+    def inputs(self) -> FloatArray:
+        """What the operator put in, zero on axes not owned and without the gripper, `(N, u)`."""
+        values = self.matrix("asked")
+        if self.has("owned") and self.owned.shape == values.shape:
+            values = np.where(self.owned, values, 0.0)
+        return values[:, [place for place, name in enumerate(self.axes) if "gripper" not in name]]
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """Names of the input's entries, the gripper's included."""
+        return self.entries("asked") or tuple(map(str, range(self.matrix("asked").shape[1])))
+
+    @cached_property
+    def owned(self) -> BoolArray:
+        """Which of its inputs the operator owned, `(N, u)`."""
+        return self.matrix("owned").astype(bool)
+
+    def has(self, part: str) -> bool:
+        """Return whether a part is there."""
+        return any(name in self.frames for name in self.columns.choices(part))
+
+    def column(self, part: str) -> np.ndarray:
+        """Return the column that plays a part, as it is.
+
+        Raises:
+            DoesNotApply: There is none.
+        """
+        choices = self.columns.choices(part)
+        for name in choices:
+            if name in self.frames:
+                return self.frames[name]
+        raise DoesNotApply(f"no column {' or '.join(map(repr, choices))}")
+
+    def matrix(self, part: str) -> FloatArray:
+        """Return the numbers of a part as `(N, d)`.
+
+        Raises:
+            DoesNotApply: There is none, it holds text, or a number that is not finite.
+        """
+        values = self.column(part)
+        if values.dtype.kind not in "fiub":
+            raise DoesNotApply(f"the column of {part} holds no numbers")
+        rows = _rows(values)
+        if not np.isfinite(rows).all():
+            raise DoesNotApply(f"the column of {part} holds numbers that are not finite")
+        return rows
+
+    def entries(self, part: str) -> tuple[str, ...]:
+        """Return the names of a part's entries; none where the dataset names none."""
+        for name in self.columns.choices(part):
+            if name in self.frames:
+                return self.names.get(name) or ()
+        return ()
+
+
+def _rows(values: np.ndarray) -> FloatArray:
+    return values.reshape(len(values), -1).astype(np.float64)

@@ -1,0 +1,47 @@
+"""Reading a dataset's episodes as demonstrations."""
+
+from pathlib import Path
+
+from handrail.controllers.errors import HandrailError
+from handrail.datasets.quality.columns import ColumnNames
+from handrail.datasets.quality.demonstration import Demonstration
+from handrail.datasets.reader import DatasetInfo, read_episodes, read_info, read_rows_of
+
+
+def read_demonstrations(root: str | Path, columns: ColumnNames | None = None) -> list[Demonstration]:
+    """Return all episodes of a LeRobot v3.0 dataset, whoever recorded it, in order.
+
+    Args:
+        root: The dataset's folder.
+        columns: Which column plays which part.
+
+    Raises:
+        HandrailError: There is no dataset, it has no episodes, or a file of it cannot be read.
+    """
+    columns = columns or ColumnNames()
+    info = read_info(root)
+    if not info.episodes:
+        raise HandrailError(f"dataset {str(info.root)!r}: expected one episode or more, got none")
+    wanted = _wanted(info, columns)
+    names = {name: info.features[name].names for name in wanted}
+    return [
+        Demonstration(
+            number=row["episode_index"],
+            fps=info.fps,
+            frames=read_rows_of(info, row, wanted),
+            names=names,
+            meta=row,
+            columns=columns,
+        )
+        for row in read_episodes(root)
+    ]
+
+
+def _wanted(info: DatasetInfo, columns: ColumnNames) -> list[str]:
+    """Return the columns that play a part, and all numbers that a policy reads."""
+    parts = {name for part in columns.__dataclass_fields__ for name in columns.choices(part)}
+    return [
+        name
+        for name, feature in info.features.items()
+        if feature.dtype not in ("video", "image") and (name in parts or name.startswith("observation"))
+    ]

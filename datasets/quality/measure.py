@@ -1,0 +1,100 @@
+"""All metrics of all groups that are compared, each value or why there is none."""
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from handrail.controllers.arrays import FloatArray
+from handrail.datasets.quality.catalogue import METRICS, Metric
+from handrail.datasets.quality.demonstration import Demonstration
+from handrail.datasets.quality.missing import DoesNotApply
+from handrail.datasets.quality.pool import Pool, signature
+
+
+@dataclass(frozen=True)
+class Measured:
+    """A metric of all episodes of a group.
+
+    Attributes:
+        values: `(E,)`; NaN where it does not apply.
+        reason: Why it applies to none, or not to all: the commonest reason; "" where it applies to all.
+    """
+
+    values: FloatArray
+    reason: str = ""
+
+    @property
+    def applies(self) -> bool:
+        """Whether there is any value."""
+        return bool(np.isfinite(self.values).any())
+
+
+Groups = Mapping[str, Sequence[Demonstration]]
+
+
+@dataclass(frozen=True)
+class Measurements:
+    """What `measure` found.
+
+    Attributes:
+        values: By metric and group.
+        pools: Which pool a group is in; pooled metrics only compare within one.
+    """
+
+    values: Mapping[str, Mapping[str, Measured]]
+    pools: Mapping[str, int]
+
+    def comparable(self, metric: Metric, one: str, other: str) -> bool:
+        """Return whether a metric's values of two groups are on one scale."""
+        return not metric.pooled or self.pools[one] == self.pools[other]
+
+
+def measure(
+    groups: Groups, rng: np.random.Generator, margin: float = 0.1, metrics: Sequence[Metric] = METRICS
+) -> Measurements:
+    """Return every metric of every episode.
+
+    Args:
+        groups: Episodes by label.
+        rng: Of what is estimated from random batches.
+        margin: Distance to keep [m].
+        metrics: Which.
+    """
+    numbers = _pools(groups)
+    pools = {
+        number: Pool([e for label in groups if numbers[label] == number for e in groups[label]], margin)
+        for number in set(numbers.values())
+    }
+    values = {
+        metric.name: {
+            label: _measured(metric, episodes, pools[numbers[label]], rng)
+            for label, episodes in groups.items()
+        }
+        for metric in metrics
+    }
+    return Measurements(values, numbers)
+
+
+def _pools(groups: Groups) -> dict[str, int]:
+    """Return a number for each group, the same for groups whose columns are the same."""
+    seen: dict[tuple[object, ...], int] = {}
+    return {label: seen.setdefault(signature(episodes[0]), len(seen)) for label, episodes in groups.items()}
+
+
+def _measured(
+    metric: Metric, episodes: Sequence[Demonstration], pool: Pool, rng: np.random.Generator
+) -> Measured:
+    if metric.measure_group is not None:
+        try:
+            return Measured(metric.measure_group(episodes, pool, rng))
+        except DoesNotApply as error:
+            return Measured(np.full(len(episodes), np.nan), str(error))
+    values, reasons = np.full(len(episodes), np.nan), Counter[str]()
+    for place, episode in enumerate(episodes):
+        try:
+            values[place] = metric.measure(episode, pool) if metric.measure else np.nan
+        except DoesNotApply as error:
+            reasons[str(error)] += 1
+    return Measured(values, reasons.most_common(1)[0][0] if reasons else "")
