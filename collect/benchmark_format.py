@@ -77,8 +77,8 @@ def main_table(
         profile: of the commands.
         cell: how a measure reads.
     """
-    summaries = dict(results["profiles"][profile])
-    if profile == "nominal" and not results["config"]["clutter"]:
+    summaries, config = dict(results["profiles"][profile]), results["config"]
+    if profile == "nominal" and config["early_stop"] and not (config["clutter"] or config["closed_loop"]):
         summaries |= {name: known for name, known in PUBLISHED.items() if set(metrics) & set(known)}
     rows = [[name, *_cells(summary, metrics, cell)] for name, summary in summaries.items()]
     return ["controller", *(HEADINGS[metric] for metric in metrics)], rows

@@ -52,7 +52,9 @@ def tool_twist(intent: Intent, channels: Channels, tool: Pose) -> FloatArray:
         channels: of the robot.
         tool: its pose.
     """
-    values = np.where(intent.mask, intent.values, 0.0)[channels.tool_slice]
-    turn = tool.rotation if intent.frames.tool == "tool" else np.eye(3)
-    linear, angular = turn @ values[:3], turn @ values[3:]
-    return np.concatenate([linear - np.cross(angular, tool.rotation @ intent.frames.point), angular])
+    twist = np.where(intent.mask, intent.values, 0.0)[channels.tool_slice]
+    if intent.frames.tool == "tool":
+        twist = np.concatenate([tool.rotation @ twist[:3], tool.rotation @ twist[3:]])
+    if intent.frames.point.any():
+        twist[:3] -= np.cross(twist[3:], tool.rotation @ intent.frames.point)
+    return twist
