@@ -233,7 +233,7 @@ def test_episodes_that_began_alike_are_paired(ours):
 def test_successes_an_hour(ours):
     quick, slow = load_groups(ours)
     ratio = rate_ratio(quick, slow, np.random.default_rng(0))
-    rates = [collected(group).successes_an_hour for group in (quick, slow)]
+    rates = [collected(group).successes_an_hour or 0.0 for group in (quick, slow)]
     assert ratio.estimate == pytest.approx(rates[0] / rates[1])
     assert 1.0 < ratio.interval[0] < ratio.estimate < ratio.interval[1]
     assert ratio.p < 0.01
