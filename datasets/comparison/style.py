@@ -5,7 +5,7 @@ CSS = """
 * { box-sizing: border-box; }
 body { margin: 0; background: var(--wash); color: var(--ink);
   font: 15px/1.5 system-ui, -apple-system, "Segoe UI", Roboto, "Helvetica Neue", sans-serif; }
-main { max-width: 1080px; margin: 0 auto; padding: 22px 20px 60px; }
+main { max-width: 1180px; margin: 0 auto; padding: 22px 20px 60px; }
 header p { margin: 0; color: var(--quiet); }
 h1 { font-size: 22px; margin: 0; }
 h2 { font-size: 18px; margin: 34px 0 10px; }
@@ -25,7 +25,8 @@ th, td { text-align: left; padding: 5px 10px 5px 0; border-bottom: 1px solid var
   vertical-align: top; }
 th { color: var(--quiet); font-weight: 600; }
 td.detected { font-weight: 700; }
-td small { display: block; color: var(--quiet); font-weight: 400; white-space: nowrap; }
+td small { display: block; color: var(--quiet); font-weight: 400; font-size: 11px; }
+td:not(:first-child) small { white-space: nowrap; }
 td.quiet, .quiet { color: var(--quiet); }
 .wide { overflow-x: auto; }
 ul { margin: 6px 0; padding-left: 20px; }
