@@ -9,11 +9,13 @@ import numpy as np
 
 from handrail.collect.config import SessionConfig, check_fps
 from handrail.collect.env import HandrailEnv
-from handrail.collect.operators.modes import Completion, TeleopMode, find_mode
+from handrail.collect.operators.drawer_script import DrawerScript
+from handrail.collect.operators.modes import Completion, TeleopMode, find_mode, without
 from handrail.collect.operators.pick_place_script import PickPlaceScript
 from handrail.collect.operators.reach_script import ReachScript
 from handrail.collect.operators.scripted import ScriptedOperator
 from handrail.collect.operators.steering import Gains
+from handrail.collect.operators.tray_script import TrayScript
 from handrail.collect.session import Observer, Session
 from handrail.collect.tasks.reach import Reach
 from handrail.controllers.cbf_filter import CbfFilter
@@ -23,18 +25,30 @@ from handrail.controllers.direct import DirectController
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.model import RobotModel
 from handrail.controllers.mpc import MaskedMpc
+from handrail.controllers.objective import Objective
+from handrail.controllers.objectives.tray import tray_levelling
 from handrail.controllers.safety_filter import safety_filter
 from handrail.datasets.frames import moment_features
 from handrail.datasets.schema import Feature
 
-ENVIRONMENTS = {"pick_place": "handrail/PickPlace-v0", "reach": "handrail/Reach-v0"}
-SCRIPTS = {"pick_place": PickPlaceScript, "reach": ReachScript}
+ENVIRONMENTS = {
+    "drawer": "handrail/Drawer-v0",
+    "pick_place": "handrail/PickPlace-v0",
+    "reach": "handrail/Reach-v0",
+    "tray": "handrail/Tray-v0",
+}
+SCRIPTS = {"drawer": DrawerScript, "pick_place": PickPlaceScript, "reach": ReachScript, "tray": TrayScript}
 CONTROLLERS: Mapping[Completion, Callable[[RobotModel, float], Controller]] = {
     "mpc": lambda model, period: MaskedMpc(model),
     "direct": DirectController,
     "filter": safety_filter,
     "cbf": CbfFilter,
 }
+OBJECTIVES: Mapping[str, Callable[[Channels], tuple[Objective, ...]]] = {
+    "tray": lambda channels: (tray_levelling(channels, up=np.array([0.0, 0.0, -1.0]), level=LEVEL),)
+}
+LEFT = {"tray": ("ee.wx", "ee.wy")}  # a tray's tilt is the MPC's, not the operator's
+LEVEL = 20.0  # weight of a tray's tilt
 _VERSIONED = ("handrail", "lerobot", "mujoco", "pin", "coal", "casadi", "daqp", "numpy", "gymnasium")
 
 
@@ -72,17 +86,25 @@ def build_env(config: SessionConfig, fps: int, render: bool = False) -> Handrail
 def build_session(config: SessionConfig, env: HandrailEnv, observers: Sequence[Observer] = ()) -> Session:
     """Return the session of an environment."""
     mode = build_mode(config, env.model)
+    mode = leave_to_objectives(mode, config.task)
     gains = Gains()
     script = SCRIPTS[config.task](env.model, gains, drives=config.mode == "switching")
     human = config.human.scaled(config.noise)
     operator = ScriptedOperator(env.model, script, mode, human, gains)
-    controller = build_controller(mode, env.model, env.fps)
+    controller = build_controller(mode, env.model, env.fps, config.task)
     return Session(env, controller, operator, observers, config.realtime)
 
 
-def build_controller(mode: TeleopMode, model: RobotModel, fps: int) -> Controller:
-    """Return the controller of a mode."""
+def build_controller(mode: TeleopMode, model: RobotModel, fps: int, task: str = "") -> Controller:
+    """Return the controller of a mode; the masked MPC's knows the objectives that a task brings."""
+    if mode.controller == "mpc" and task in OBJECTIVES:
+        return MaskedMpc(model, objectives=OBJECTIVES[task](Channels.of(model.description)))
     return CONTROLLERS[mode.controller](model, 1.0 / fps)
+
+
+def leave_to_objectives(mode: TeleopMode, task: str) -> TeleopMode:
+    """Return the mode without the channels that a task's objectives look after under the masked MPC."""
+    return without(mode, LEFT.get(task, ())) if mode.controller == "mpc" else mode
 
 
 def build_mode(config: SessionConfig, model: RobotModel) -> TeleopMode:

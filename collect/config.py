@@ -10,7 +10,7 @@ import tyro
 from handrail.collect.operators.human import HumanSettings
 from handrail.controllers.errors import HandrailError, unknown_name
 
-TASKS = ("pick_place", "reach")
+TASKS = ("drawer", "pick_place", "reach", "tray")
 MODE_NAMES = ("base", "base+ee", "direct", "direct_cbf", "direct_filtered", "ee", "joints", "switching")
 OPERATORS = ("scripted",)
 CAMERAS = ("wrist", "scene")
@@ -23,7 +23,7 @@ class SessionConfig:
     """Who steers what, how, and what is watched."""
 
     task: str = "pick_place"
-    """What to do: pick_place or reach."""
+    """What to do: drawer, pick_place, reach or tray."""
     mode: str = "ee"
     """Teleop mode: ee, base, base+ee, joints, switching, direct (no MPC), direct_filtered or direct_cbf."""
     mask: str = ""

@@ -10,7 +10,7 @@ from handrail.controllers.description import RobotDescription
 from handrail.controllers.errors import unknown_name
 
 _BASE = ("base.vx", "base.vy", "base.wz")
-_TOOL = ("ee.vx", "ee.vy", "ee.vz", "ee.wx", "ee.wy", "ee.wz")
+TOOL = ("ee.vx", "ee.vy", "ee.vz", "ee.wx", "ee.wy", "ee.wz")
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class Channels:
     def of(cls, description: RobotDescription) -> "Channels":
         """Return the channels of a robot."""
         joints = tuple(f"joint.{name}" for name in description.joints)
-        return cls(_BASE if description.base_joints else (), _TOOL, joints)
+        return cls(_BASE if description.base_joints else (), TOOL, joints)
 
     @cached_property
     def names(self) -> tuple[str, ...]:

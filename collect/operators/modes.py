@@ -1,14 +1,14 @@
 """Teleop modes: which channels an operator owns, and how a wish becomes values on them."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 
 from handrail.collect.operators.steering import Gains
 from handrail.controllers.arrays import BoolArray, FloatArray
-from handrail.controllers.channels import Channels
+from handrail.controllers.channels import TOOL, Channels
 from handrail.controllers.errors import unknown_name
 from handrail.controllers.model import RobotModel
 
@@ -84,6 +84,18 @@ MODES = {
         ),
     )
 }
+
+
+def without(mode: TeleopMode, left: tuple[str, ...]) -> TeleopMode:
+    """Return a mode whose operator leaves some tool channels alone, where the mode has them by group."""
+    if not left:
+        return mode
+    kept = tuple(name for name in TOOL if name not in left)
+
+    def groups(focus: Focus) -> tuple[str, ...]:
+        return tuple(name for group in mode.groups(focus) for name in (kept if group == "ee" else (group,)))
+
+    return replace(mode, groups=groups)
 
 
 def find_mode(name: str) -> TeleopMode:
