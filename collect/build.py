@@ -14,7 +14,6 @@ from handrail.collect.operators.modes import Completion, TeleopMode, find_mode, 
 from handrail.collect.operators.pick_place_script import PickPlaceScript
 from handrail.collect.operators.reach_script import ReachScript
 from handrail.collect.operators.scripted import ScriptedOperator
-from handrail.collect.operators.steering import Gains
 from handrail.collect.operators.tray_script import TrayScript
 from handrail.collect.session import Observer, Session
 from handrail.collect.tasks.reach import Reach
@@ -28,6 +27,7 @@ from handrail.controllers.mpc import MaskedMpc
 from handrail.controllers.objective import Objective
 from handrail.controllers.objectives.tray import tray_levelling
 from handrail.controllers.safety_filter import safety_filter
+from handrail.controllers.split_controller import split_controller
 from handrail.datasets.frames import moment_features
 from handrail.datasets.schema import Feature
 
@@ -43,6 +43,7 @@ CONTROLLERS: Mapping[Completion, Callable[[RobotModel, float], Controller]] = {
     "direct": DirectController,
     "filter": safety_filter,
     "cbf": CbfFilter,
+    "split": split_controller,
 }
 OBJECTIVES: Mapping[str, Callable[[Channels], tuple[Objective, ...]]] = {
     "tray": lambda channels: (tray_levelling(channels, up=np.array([0.0, 0.0, -1.0]), level=LEVEL),)
@@ -87,10 +88,9 @@ def build_session(config: SessionConfig, env: HandrailEnv, observers: Sequence[O
     """Return the session of an environment."""
     mode = build_mode(config, env.model)
     mode = leave_to_objectives(mode, config.task)
-    gains = Gains()
-    script = SCRIPTS[config.task](env.model, gains, drives=config.mode == "switching")
-    human = config.human.scaled(config.noise)
-    operator = ScriptedOperator(env.model, script, mode, human, gains)
+    script = SCRIPTS[config.task](env.model, mode.gains, drives=mode.drives)
+    human = config.human.scaled(config.noise).person(np.random.default_rng(config.person))
+    operator = ScriptedOperator(env.model, script, mode, human)
     controller = build_controller(mode, env.model, env.fps, config.task)
     return Session(env, controller, operator, observers, config.realtime)
 
@@ -123,7 +123,9 @@ def build_mode(config: SessionConfig, model: RobotModel) -> TeleopMode:
             f"one each for {', '.join(channels.names)}; got {len(config.mask)}"
         )
     names = tuple(np.array(channels.names)[np.array(list(config.mask)) == "1"])
-    return TeleopMode(f"mask:{config.mask}", lambda focus: names, mode.controller, "a mask of one's own")
+    return TeleopMode(
+        f"mask:{config.mask}", lambda focus: names, mode.controller, "a mask of one's own", gains=mode.gains
+    )
 
 
 def session_features(env: HandrailEnv) -> dict[str, Feature]:

@@ -11,7 +11,19 @@ from handrail.collect.operators.human import HumanSettings
 from handrail.controllers.errors import HandrailError, unknown_name
 
 TASKS = ("drawer", "pick_place", "reach", "tray")
-MODE_NAMES = ("base", "base+ee", "direct", "direct_cbf", "direct_filtered", "ee", "joints", "switching")
+MODE_NAMES = (
+    "base",
+    "base+ee",
+    "decoupled",
+    "direct",
+    "direct_cbf",
+    "direct_filtered",
+    "direct_single",
+    "ee",
+    "joints",
+    "leader",
+    "switching",
+)
 OPERATORS = ("scripted",)
 CAMERAS = ("wrist", "scene")
 FPS_RANGE = (10, 100)
@@ -25,7 +37,8 @@ class SessionConfig:
     task: str = "pick_place"
     """What to do: drawer, pick_place, reach or tray."""
     mode: str = "ee"
-    """Teleop mode: ee, base, base+ee, joints, switching, direct (no MPC), direct_filtered or direct_cbf."""
+    """Teleop mode; through the MPC: ee, base, base+ee, joints, switching; safety filters: direct_filtered,
+    direct_cbf; neither: direct, direct_single, leader, decoupled."""
     mask: str = ""
     """A mask of your own instead of the mode's: 0 or 1 for each channel (base twist, tool twist, joints)."""
     operator: str = "scripted"
@@ -33,6 +46,8 @@ class SessionConfig:
     noise: float = 1.0
     """How human the scripted hand is: 0 perfect, 1 as measured in people."""
     human: HumanSettings = field(default_factory=HumanSettings)
+    person: int = 0
+    """Which person the scripted operator is; persons differ in delay, noise and all the rest."""
     moving_obstacles: int = 0
     """Obstacles that cross the robot's way at up to 0.5 m/s, 0 to 4; task reach only."""
     robot: str = "ridgeback_ur10"
@@ -72,6 +87,8 @@ class SessionConfig:
             )
         if self.moving_obstacles and self.task != "reach":
             raise HandrailError(f"--moving_obstacles: expected --task reach, got --task {self.task}")
+        if self.person < 0:
+            raise HandrailError(f"--person {self.person}: expected a whole number >= 0")
         if self.seed < 0:
             raise HandrailError(f"--seed {self.seed}: expected a whole number >= 0")
         if not 16 <= self.image_size <= 1024 or self.image_size % 2:

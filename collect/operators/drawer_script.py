@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from handrail.collect.operators.modes import Wish
 from handrail.collect.operators.operator import View
 from handrail.collect.operators.phases import Phase, PhaseRunner
 from handrail.collect.operators.standing import standing_point
 from handrail.collect.operators.steering import Gains
+from handrail.collect.operators.wish import Wish
 from handrail.collect.tasks.cabinet import inward
 from handrail.collect.tasks.drawer import handle, opened
 from handrail.controllers.arrays import FloatArray

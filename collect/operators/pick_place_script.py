@@ -4,11 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from handrail.collect.operators.modes import Wish
 from handrail.collect.operators.operator import View
 from handrail.collect.operators.phases import Phase, PhaseRunner
 from handrail.collect.operators.route import Route, front_edge
 from handrail.collect.operators.steering import Gains, pose_errors
+from handrail.collect.operators.wish import Wish
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.model import Pose, RobotModel
 
