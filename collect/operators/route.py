@@ -9,6 +9,7 @@ from handrail.collect.tasks.task import TaskState
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.model import Pose, RobotModel
 
+_FROM_ABOVE = 0.7  # of the reach at home: comfortable where the hand points down
 _CLEARANCE = 0.25  # of the chassis behind the floor obstacles, and before a table [m]
 
 
@@ -36,7 +37,7 @@ class Route:
             place: what is worked at, (3,) [m].
             edge: the x of the table's near edge [m].
         """
-        base = standing_point(self._model, place)
+        base = standing_point(self._model, place, comfort=_FROM_ABOVE)
         length = self._model.description.base_size[0]
         base[0] = min(base[0], edge - length / 2 - _CLEARANCE)
         return base

@@ -84,21 +84,28 @@ class SingleAxisMap:
             return axis
         off = np.abs(errors) / tolerances
         candidates = [int(index) for index in np.argsort(-off) if off[index] > 1.0]
+        best, widest = None, -np.inf
         for share in _SHARES:
             for index in candidates:
-                if self._is_free(index, share * errors[index], q):
-                    self._axis, self._left = index, (1.0 - share) * errors[index]
-                    return index
-        return None
+                clear = self._clearance(index, share * errors[index], q)
+                if clear > widest:
+                    best, widest = (index, share), clear
+                if clear >= _CLEAR:
+                    return self._take(index, share, errors)
+        return self._take(*best, errors) if best else None
 
-    def _is_free(self, index: int, way: float, q: FloatArray) -> bool:
-        """Return whether an arm joint hits nothing on its way, or only what it is near already."""
+    def _take(self, index: int, share: float, errors: FloatArray) -> int:
+        """Take an axis and go a share of its way."""
+        self._axis, self._left = index, (1.0 - share) * errors[index]
+        return index
+
+    def _clearance(self, index: int, way: float, q: FloatArray) -> float:
+        """Return how much an arm joint's motion keeps clear of everything, no more than is asked for [m]."""
         if index < self._arm.start:
-            return True  # the script says where to drive
-        path = np.tile(q, (len(_SWEEP) + 1, 1))
-        path[1:, index - self.channels.joint_slice.start] += _SWEEP * way
-        nearest = np.min(self._collision.values(path), axis=1)
-        return bool(np.min(nearest[1:]) > min(_CLEAR, nearest[0] - 0.002))
+            return _CLEAR  # the script says where to drive
+        path = np.tile(q, (len(_SWEEP), 1))
+        path[:, index - self.channels.joint_slice.start] += _SWEEP * way
+        return min(float(np.min(self._collision.values(path))), _CLEAR)
 
     def _think(self, target: Target, state: State) -> None:
         """Work out which joints would do it, for a new target, or when they did not."""

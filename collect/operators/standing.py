@@ -13,7 +13,9 @@ _YAWS = (0.0, 0.5, -0.5, 1.0, -1.0, 1.5, -1.5)  # in which a person would try to
 _CLEAR = 0.08  # of the arm to itself that is enough [m]
 
 
-def standing_point(model: RobotModel, place: ArrayLike, yaw: float = 0.0) -> FloatArray:
+def standing_point(
+    model: RobotModel, place: ArrayLike, yaw: float = 0.0, comfort: float = _COMFORT
+) -> FloatArray:
     """Return the base pose (x, y, θ) that has a place as far ahead as the tool is at home, a little nearer.
 
     The tool's offset from the base at home, turned by the yaw and shortened, is taken from the place; the
@@ -25,7 +27,7 @@ def standing_point(model: RobotModel, place: ArrayLike, yaw: float = 0.0) -> Flo
     x, y, theta = description.home[:3]
     tool = model.pose(description.home).position[:2] - [x, y]
     offset = _rotation(yaw - theta) @ tool
-    spot = np.asarray(place, dtype=float)[:2] - _COMFORT * offset
+    spot = np.asarray(place, dtype=float)[:2] - comfort * offset
     lower, upper = description.limits.position_lower[:2], description.limits.position_upper[:2]
     return np.array([*np.clip(spot, lower, upper), yaw])
 
