@@ -2,7 +2,6 @@
 
 import importlib.metadata
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
 
 import gymnasium
 import numpy as np
@@ -16,7 +15,11 @@ from handrail.collect.operators.reach_script import ReachScript
 from handrail.collect.operators.scripted import ScriptedOperator
 from handrail.collect.operators.tray_script import TrayScript
 from handrail.collect.session import Observer, Session
+from handrail.collect.tasks.drawer import Drawer
+from handrail.collect.tasks.pick_place import PickPlace
 from handrail.collect.tasks.reach import Reach
+from handrail.collect.tasks.task import Task
+from handrail.collect.tasks.tray import Tray
 from handrail.controllers.cbf_filter import CbfFilter
 from handrail.controllers.channels import Channels
 from handrail.controllers.controller import Controller
@@ -36,6 +39,12 @@ ENVIRONMENTS = {
     "pick_place": "handrail/PickPlace-v0",
     "reach": "handrail/Reach-v0",
     "tray": "handrail/Tray-v0",
+}
+TASK_CLASSES: Mapping[str, Callable[..., Task]] = {
+    "drawer": Drawer,
+    "pick_place": PickPlace,
+    "reach": Reach,
+    "tray": Tray,
 }
 SCRIPTS = {"drawer": DrawerScript, "pick_place": PickPlaceScript, "reach": ReachScript, "tray": TrayScript}
 CONTROLLERS: Mapping[Completion, Callable[[RobotModel, float], Controller]] = {
@@ -66,22 +75,27 @@ def build_env(config: SessionConfig, fps: int, render: bool = False) -> Handrail
     """
     config.check()
     check_fps(fps)
-    moving = config.moving_obstacles
-    variant: dict[str, Any] = {"task": Reach(moving_obstacles=moving)} if moving else {}
     env = gymnasium.make(
         ENVIRONMENTS[config.task],
+        task=build_task(config),
         robot=config.robot,
         fps=fps,
         cameras=config.camera_names,
         image_size=(config.image_size, config.image_size),
         render_mode="rgb_array" if render else None,
         disable_env_checker=True,
-        **variant,
     )
     unwrapped = env.unwrapped
     if not isinstance(unwrapped, HandrailEnv):
         raise HandrailError(f"environment of task {config.task}: expected a HandrailEnv, got {unwrapped}")
     return unwrapped
+
+
+def build_task(config: SessionConfig) -> Task:
+    """Return the task, with the time limit and the moving obstacles of the settings."""
+    limit = {"horizon": config.time_limit} if config.time_limit else {}
+    moving = {"moving_obstacles": config.moving_obstacles} if config.moving_obstacles else {}
+    return TASK_CLASSES[config.task](**limit, **moving)
 
 
 def build_session(config: SessionConfig, env: HandrailEnv, observers: Sequence[Observer] = ()) -> Session:

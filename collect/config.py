@@ -28,6 +28,7 @@ OPERATORS = ("scripted",)
 CAMERAS = ("wrist", "scene")
 FPS_RANGE = (10, 100)
 MOST_MOVING = 4
+MOST_TIME = 3600.0  # [s]
 
 
 @dataclass(frozen=True)
@@ -48,6 +49,8 @@ class SessionConfig:
     human: HumanSettings = field(default_factory=HumanSettings)
     person: int = 0
     """Which person the scripted operator is; persons differ in delay, noise and all the rest."""
+    time_limit: float = 0.0
+    """Time after which an episode is given up [s]; the task's own when 0."""
     moving_obstacles: int = 0
     """Obstacles that cross the robot's way at up to 0.5 m/s, 0 to 4; task reach only."""
     robot: str = "ridgeback_ur10"
@@ -87,6 +90,8 @@ class SessionConfig:
             )
         if self.moving_obstacles and self.task != "reach":
             raise HandrailError(f"--moving_obstacles: expected --task reach, got --task {self.task}")
+        if not 0.0 <= self.time_limit <= MOST_TIME:
+            raise HandrailError(f"--time_limit {self.time_limit}: expected 0 (the task's own) to {MOST_TIME} s")
         if self.person < 0:
             raise HandrailError(f"--person {self.person}: expected a whole number >= 0")
         if self.seed < 0:

@@ -23,9 +23,8 @@ class HumanSettings:
         switch_time: hands off the stick while changing to other inputs [s]; makes switching 17.4 % of the
             time when steering joint by joint.
         movement: of the hand from one deflection to the next, minimum jerk [s].
-        misjudgement: standard deviation of the distance to go as it is seen, over that distance.
-        inner_error: standard deviation of a joint angle as the operator imagines it [rad], and of a joint
-            motion that he plans, over that motion.
+        misjudgement: standard deviation of a distance to go as it is seen, over that distance.
+        inner_error: standard deviation of a joint angle as an operator of all joints imagines it [rad].
         tremor: standard deviation of a hand that holds a leader arm, at the joints [rad].
         persons: how much people differ, standard deviation of the logarithm of each number above.
         moods: the same for the same person from episode to episode.

@@ -5,7 +5,7 @@ from typing import Protocol
 import numpy as np
 
 from handrail.collect.operators.human import HumanSettings
-from handrail.collect.operators.modes import JOINT_SPEED, TeleopMode
+from handrail.collect.operators.modes import TeleopMode
 from handrail.collect.operators.operator import View
 from handrail.collect.operators.steering import Gains
 from handrail.collect.operators.wish import Focus, Wish
@@ -118,6 +118,6 @@ class StickMap:
 def full_stick(model: RobotModel, gains: Gains) -> FloatArray:
     """Return the full stick of every channel, (m,) [m/s, rad/s]."""
     base = gains.full[6:][: len(model.description.base_joints)]
-    joints = np.full(model.size, JOINT_SPEED)
+    joints = np.full(model.size, gains.joint_rate)
     joints[: len(base)] = base
     return np.concatenate([base, gains.full[:6], joints])

@@ -14,7 +14,7 @@ from handrail.controllers.channels import Channels
 from handrail.controllers.controller import State
 from handrail.controllers.model import RobotModel
 
-_FOLLOW = 4.0  # of the joints towards the leader's [1/s]
+_FOLLOW = 6.0  # of the joints towards the leader's [1/s]
 
 
 class LeaderArmMap:
@@ -39,9 +39,7 @@ class LeaderArmMap:
     @property
     def full(self) -> FloatArray:
         """Full stick of the base, fastest motion of the leader's joints, (m,)."""
-        full = full_stick(self._model, self._gains)
-        full[self._arm] = self._model.description.limits.velocity[self._base :]
-        return full
+        return full_stick(self._model, self._gains)
 
     def reset(self, view: View, settings: HumanSettings, rng: np.random.Generator) -> None:
         """Take hold of the leader, which stands as the arm does."""

@@ -11,7 +11,6 @@ from handrail.controllers.errors import unknown_name
 
 Completion = Literal["mpc", "direct", "filter", "cbf", "split"]
 Device = Literal["sticks", "single_axis", "leader_arm"]
-JOINT_SPEED = 0.8  # full stick of one joint [rad/s]
 _POSITION_ORDER = 0.25 / 0.35  # refractory time of a position device over a velocity stick's
 
 
@@ -76,6 +75,7 @@ MODES = {
             "one axis of base or arm at a time, with a mode switch between",
             device="single_axis",
             drives=True,
+            gains=Gains(gain=1.8, hand_speed=0.7, joint_rate=1.2, patience=4.0),
         ),
         TeleopMode(
             "leader",
@@ -84,6 +84,7 @@ MODES = {
             "a leader arm for the joints in one hand, a base stick in the other",
             device="leader_arm",
             drives=True,
+            gains=Gains(gain=1.2, joint_rate=1.2),
             refractory=_POSITION_ORDER,
         ),
         TeleopMode(

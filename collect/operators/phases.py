@@ -82,8 +82,8 @@ class PhaseRunner:
     def _advance(self, view: View) -> None:
         if self._index >= len(self._phases):
             return
-        time = view.state.time
-        if self._reached_at is None and (self._reached(view) or time - self._entered > self.phase.patience):
+        time, patience = view.state.time, self._gains.patience * self.phase.patience
+        if self._reached_at is None and (self._reached(view) or time - self._entered > patience):
             self._reached_at = time
         if self._reached_at is not None and time - self._reached_at >= self.phase.dwell:
             back = self._redo(view, self.phase.name)

@@ -72,14 +72,19 @@ class PickPlaceScript:
         phases += self._place(place, down, rim)
         lane = self._route.lane
         if self._drives:
-            drive = self._route.drive(view.state.q[:3], self._stand(pick), phases[0].hand, 0.0)
-            phases = drive + phases
+            *across, up = self._route.drive(view.state.q[:3], self._stand(pick), phases[0].hand, 0.0)
+            phases = [*across, self._ready(across[-1].base if across else view.state.q, pick, down), up, *phases]
         elif self._route.blocked(view.state.q[:2], self._stand(pick)[:2]):
             height = cube.position[2] + 0.30
             around = Pose(np.array([lane + _AHEAD, cube.position[1], height]), down)
             base = np.array([lane, cube.position[1], 0.0])
             phases.insert(0, Phase("approach", around, base, distance=0.15, angle=0.5))
         return phases
+
+    def _ready(self, base: FloatArray, pick: _Place, down: FloatArray) -> Phase:
+        """Return the phase that folds the arm before it is driven up to the table, from where the base is."""
+        hand = np.array([base[0] + _AHEAD, base[1], pick.thing[2] + 0.30])
+        return Phase("ready", Pose(hand, down), base, distance=0.15, angle=0.5)
 
     def _pick(self, pick: _Place, down: FloatArray) -> list[Phase]:
         cube, base = pick.thing, self._stand(pick)
@@ -107,8 +112,8 @@ class PickPlaceScript:
             return Phase(name, hand, base, gripper=1.0, distance=0.12, angle=0.4)
 
         if self._drives:
-            retreat = phase("retreat", pick.edge - _RETREAT, pick, self._stand(pick))
-            front = phase("front", place.edge - _RETREAT, place, self._stand(place))
+            retreat = phase("retreat", self._stand(pick)[0] + _AHEAD, pick, self._stand(pick))
+            front = phase("front", self._stand(place)[0] + _AHEAD, place, self._stand(place))
             return [retreat, *self._route.drive(self._stand(pick), self._stand(place), front.hand, 1.0)]
         return [
             phase("retreat", hand_lane, pick, np.array([lane, pick.thing[1], 0.0])),

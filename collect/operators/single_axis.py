@@ -15,7 +15,6 @@ from handrail.controllers.controller import State
 from handrail.controllers.model import RobotModel
 
 _NEAR = 0.35  # share of the tolerance that one axis may use up
-_DONE = 0.5  # share of that at which the axis is left
 _PREPARATION = 1.35  # of the mind before it thinks again: M of the keystroke-level model [s]
 _SHARES = (1.0, 0.5, 0.25)  # of an axis' way that the operator considers
 _SWEEP = np.linspace(0.25, 1.0, 4)  # where on the way he looks whether something is hit
@@ -49,7 +48,7 @@ class SingleAxisMap:
     def reset(self, view: View, settings: HumanSettings, rng: np.random.Generator) -> None:
         """Begin with no axis chosen and nothing thought."""
         self._rng = rng
-        self._error = settings.inner_error
+        self._error = settings.misjudgement
         self._collision = CollisionModel(self._model, view.task.obstacles)
         self._axis: int | None = None
         self._left = 0.0  # of the way that the axis shall not go this time
@@ -80,7 +79,7 @@ class SingleAxisMap:
     def _choose(self, errors: FloatArray, tolerances: FloatArray, q: FloatArray) -> int | None:
         """Return the axis to push: the same until it is where it shall be, then another; None rests."""
         axis = self._axis
-        if axis is not None and abs(errors[axis] - self._left) > _DONE * tolerances[axis]:
+        if axis is not None and abs(errors[axis] - self._left) > tolerances[axis]:
             return axis
         off = np.abs(errors) / tolerances
         candidates = [int(index) for index in np.argsort(-off) if off[index] > 1.0]
