@@ -15,6 +15,7 @@ from handrail.controllers.controller import State
 from handrail.controllers.model import RobotModel
 
 _NEAR = 0.35  # share of the tolerance that one axis may use up
+_MOST_CARE = 0.1
 _PREPARATION = 1.35  # of the mind before it thinks again: M of the keystroke-level model [s]
 _SHARES = (1.0, 0.5, 0.25)  # of an axis' way that the operator considers
 _SWEEP = np.linspace(0.25, 1.0, 4)  # where on the way he looks whether something is hit
@@ -49,12 +50,14 @@ class SingleAxisMap:
         """Begin with no axis chosen and nothing thought."""
         self._rng = rng
         self._error = settings.misjudgement
+        self._least = 1.2 * settings.threshold
         self._collision = CollisionModel(self._model, view.task.obstacles)
         self._axis: int | None = None
         self._left = 0.0  # of the way that the axis shall not go this time
         self._goal = np.zeros(self._model.size)
         self._thought: tuple[float, ...] = ()
         self._thinks_at = -np.inf
+        self._care = 1.0  # share of the usual tolerance: less after each attempt that was not good enough
 
     def wanted(self, wish: Wish, state: State) -> tuple[BoolArray, FloatArray]:
         """Return the mask of the axis chosen, and how far the stick shall be pushed."""
@@ -65,7 +68,7 @@ class SingleAxisMap:
             axis = self._choose(errors, tolerances, state.q)
             if axis is not None:
                 speed = self._fastest(wish.target, state.q)[axis]
-                values[axis] = np.clip(self._gains.gain * (errors[axis] - self._left), -speed, speed)
+                values[axis] = self._push(errors[axis] - self._left, speed, self._least * self.full[axis])
         return np.arange(self.channels.size) == (self._axis or 0), values
 
     def sent(self, moved: FloatArray, state: State) -> FloatArray:
@@ -75,6 +78,10 @@ class SingleAxisMap:
     def raw(self, moved: FloatArray) -> FloatArray:
         """Return the deflection."""
         return moved / self.full
+
+    def _push(self, way: float, fastest: float, slowest: float) -> float:
+        """Return the speed at which an axis is driven along the rest of its way; a stick is felt from `slowest` on."""
+        return float(np.sign(way) * np.clip(self._gains.gain * abs(way), min(slowest, fastest), fastest))
 
     def _choose(self, errors: FloatArray, tolerances: FloatArray, q: FloatArray) -> int | None:
         """Return the axis to push: the same until it is where it shall be, then another; None rests."""
@@ -114,7 +121,8 @@ class SingleAxisMap:
             return
         exact, _ = arm_configuration(self._model, state.q, target.hand)
         self._goal = state.q + (exact - state.q) * (1.0 + self._error * self._rng.standard_normal(len(exact)))
-        self._thought, self._axis, self._left = key, self._axis, 0.0
+        self._care = 1.0 if key != self._thought else max(0.5 * self._care, _MOST_CARE)
+        self._thought, self._left = key, 0.0
         self._thinks_at = state.time + _PREPARATION
 
     def _goal_error(self, target: Target, q: FloatArray) -> FloatArray:
@@ -124,7 +132,7 @@ class SingleAxisMap:
     def _near(self, target: Target, q: FloatArray) -> FloatArray:
         """Return how near is near enough for each arm joint, (n − b,) [rad]."""
         linear, angular = self._levers(q)
-        return _NEAR * np.minimum(target.distance / linear, target.angle / angular)
+        return self._care * _NEAR * np.minimum(target.distance / linear, target.angle / angular)
 
     def _errors(self, wish: Wish, target: Target, q: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return how far each axis is from where it belongs, (m,), and how near is near enough, (m,)."""
