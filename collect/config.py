@@ -91,7 +91,9 @@ class SessionConfig:
         if self.moving_obstacles and self.task != "reach":
             raise HandrailError(f"--moving_obstacles: expected --task reach, got --task {self.task}")
         if not 0.0 <= self.time_limit <= MOST_TIME:
-            raise HandrailError(f"--time_limit {self.time_limit}: expected 0 (the task's own) to {MOST_TIME} s")
+            raise HandrailError(
+                f"--time_limit {self.time_limit}: expected 0 (the task's own) to {MOST_TIME} s"
+            )
         if self.person < 0:
             raise HandrailError(f"--person {self.person}: expected a whole number >= 0")
         if self.seed < 0:

@@ -74,5 +74,7 @@ class DrawerScript:
 
 def handle_rotation(tool: FloatArray, into: FloatArray) -> FloatArray:
     """Return the rotation nearest to the tool's that points it into the cabinet, fingers above and below."""
-    candidates = [np.column_stack([up, np.cross(into, up), into]) for up in ([0.0, 0.0, 1.0], [0.0, 0.0, -1.0])]
+    candidates = [
+        np.column_stack([up, np.cross(into, up), into]) for up in ([0.0, 0.0, 1.0], [0.0, 0.0, -1.0])
+    ]
     return max(candidates, key=lambda rotation: float(np.trace(rotation.T @ tool)))

@@ -73,7 +73,12 @@ class PickPlaceScript:
         lane = self._route.lane
         if self._drives:
             *across, up = self._route.drive(view.state.q[:3], self._stand(pick), phases[0].hand, 0.0)
-            phases = [*across, self._ready(across[-1].base if across else view.state.q, pick, down), up, *phases]
+            phases = [
+                *across,
+                self._ready(across[-1].base if across else view.state.q, pick, down),
+                up,
+                *phases,
+            ]
         elif self._route.blocked(view.state.q[:2], self._stand(pick)[:2]):
             height = cube.position[2] + 0.30
             around = Pose(np.array([lane + _AHEAD, cube.position[1], height]), down)

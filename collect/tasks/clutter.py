@@ -15,7 +15,9 @@ _QUANTITIES = ("x", "y", "radius", "height")
 
 def obstacle_names() -> tuple[str, ...]:
     """Return the names of what `obstacle_features` returns, (12,)."""
-    return tuple(f"{_PREFIX}_{index}.{quantity}" for index in range(MOST_OBSTACLES) for quantity in _QUANTITIES)
+    return tuple(
+        f"{_PREFIX}_{index}.{quantity}" for index in range(MOST_OBSTACLES) for quantity in _QUANTITIES
+    )
 
 
 def obstacle_features(scene: Scene) -> FloatArray:

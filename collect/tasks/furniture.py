@@ -115,7 +115,9 @@ def tray(
     parts.append(Part(box([bar, width, bar]), np.array([0.0, 0.0, height]), rgba=_STEEL))
     shape = box([length, width, 2 * (height + bar)])
     position = handle - rotation @ np.array([0.0, 0.0, height])
-    return SceneObject(name, shape, position, rotation, rgba=_TRAY, mass=mass, parts=tuple(parts), friction=0.35)
+    return SceneObject(
+        name, shape, position, rotation, rgba=_TRAY, mass=mass, parts=tuple(parts), friction=0.35
+    )
 
 
 def can(name: str, position: FloatArray, radius: float, height: float, mass: float) -> SceneObject:
