@@ -17,7 +17,7 @@ def split_controller(
 ) -> ReactiveController:
     """Return the controller that sends the base where its stick says, and the hand by the arm's joints alone.
 
-    `v_base` as commanded; `q̇_arm = (JᵀJ + λW²)⁻¹ Jᵀ (twist − J_b v_base)` while the hand is commanded, else 0.
+    v_base as commanded; `q̇_arm = (JᵀJ + λW²)⁻¹ Jᵀ (twist − J_b v_base)` while the hand is, else 0.
     It looks neither ahead nor at obstacles; single joints make it brake.
 
     Args:

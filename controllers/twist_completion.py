@@ -43,7 +43,7 @@ def twist_controller(
 
 
 def base_velocity(intent: Intent, channels: Channels, q: FloatArray) -> FloatArray:
-    """Return the commanded base twist as the base's joint velocities in the world, (3,); (0,) without a base."""
+    """Return the commanded base twist as the base's joint velocities in the world, (3,), or (0,)."""
     if not channels.base:
         return np.zeros(0)
     vx, vy, wz = np.where(intent.mask, intent.values, 0.0)[channels.base_slice]

@@ -1,4 +1,4 @@
-"""How human an operator is: perception, delay, intermittency, noise, drift, switching; one person or another."""
+"""How human an operator is: perception, delay, intermittency, noise, drift, switching; who it is."""
 
 from dataclasses import dataclass, fields
 

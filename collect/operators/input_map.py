@@ -1,4 +1,4 @@
-"""Input maps: how a wish becomes values on the channels of a mode. The only thing that differs between modes."""
+"""Input maps: how a wish becomes values on the channels of a mode; nothing else differs between modes."""
 
 from typing import Protocol
 
@@ -19,7 +19,13 @@ _BASE_WEIGHT = 0.3
 
 
 class InputMap(Protocol):
-    """What lies between a wish and an intent."""
+    """What lies between a wish and an intent.
+
+    Attributes:
+        channels: of the robot.
+    """
+
+    channels: Channels
 
     @property
     def full(self) -> FloatArray:
@@ -47,7 +53,8 @@ class StickMap:
     """Velocity sticks on all channels of a mode at once.
 
     Where the mode has joint channels, the operator solves for them himself, as an expert would, with the
-    arm's angles as he imagines them, `q + δ`: `min ‖J(q + δ) v - hand‖² + w_b ‖v_base - base‖² + λ ‖v / v_max‖²`.
+    arm's angles as he imagines them, q + δ:
+    `min ‖J(q + δ) v - hand‖² + w_b ‖v_base - base‖² + λ ‖v / v_max‖²`.
 
     Args:
         model: of the robot.

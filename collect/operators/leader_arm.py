@@ -1,4 +1,4 @@
-"""A leader arm: the operator moves a small copy of the arm, and the robot's joints go where its joints are."""
+"""A leader arm: the operator moves a small copy of the arm; the robot's joints go where its joints are."""
 
 import numpy as np
 
@@ -20,8 +20,8 @@ _FOLLOW = 6.0  # of the joints towards the leader's [1/s]
 class LeaderArmMap:
     """Absolute joint targets from one hand, a stick for the base in the other; nothing to switch.
 
-    The hand takes the leader along, whose joints q_L follow by its mechanics: `q̇_L = J⁺ hand`. The robot is sent
-    `q̇ = q̇_L + k (q_L + tremor − q)`. The leader starts where the arm is, so that nothing jumps.
+    The hand takes the leader along, whose joints q_L follow by its mechanics: `q̇_L = J⁺ hand`. The robot is
+    sent `q̇ = q̇_L + k (q_L + tremor − q)`. The leader starts where the arm is, so that nothing jumps.
 
     Args:
         model: of the robot.

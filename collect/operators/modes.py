@@ -57,7 +57,11 @@ MODES = {
         TeleopMode("joints", _always("joint"), "mpc", "steer every joint, kept safe by the MPC"),
         TeleopMode("switching", _by_focus, "mpc", "drive the base, then steer the hand", drives=True),
         TeleopMode(
-            "direct", _always("joint"), "direct", "all joint velocities, clipped to limits only: the baseline"
+            "direct",
+            _always("joint"),
+            "direct",
+            "all joint velocities, clipped to limits only: the baseline",
+            gains=Gains(gain=1.6),
         ),
         TeleopMode(
             "direct_filtered",

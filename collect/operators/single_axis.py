@@ -1,4 +1,4 @@
-"""One axis at a time: the operator picks a joint, drives it where he thinks it belongs, and picks the next."""
+"""One axis at a time: the operator picks a joint, drives it where he thinks it belongs, picks the next."""
 
 import numpy as np
 
@@ -80,7 +80,7 @@ class SingleAxisMap:
         return moved / self.full
 
     def _push(self, way: float, fastest: float, slowest: float) -> float:
-        """Return the speed at which an axis is driven along the rest of its way; a stick is felt from `slowest` on."""
+        """Return the speed at which an axis is driven on its way; nobody pushes a stick below `slowest`."""
         return float(np.sign(way) * np.clip(self._gains.gain * abs(way), min(slowest, fastest), fastest))
 
     def _choose(self, errors: FloatArray, tolerances: FloatArray, q: FloatArray) -> int | None:
@@ -126,7 +126,7 @@ class SingleAxisMap:
         self._thinks_at = state.time + _PREPARATION
 
     def _goal_error(self, target: Target, q: FloatArray) -> FloatArray:
-        """Return how far each arm joint is from where it was thought to belong, over what is near, (n − b,)."""
+        """Return how far each arm joint is from where it was thought to belong, over `_near`, (n − b,)."""
         return np.abs(self._goal - q)[self._base :] / self._near(target, q)
 
     def _near(self, target: Target, q: FloatArray) -> FloatArray:

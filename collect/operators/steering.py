@@ -13,9 +13,9 @@ from handrail.controllers.rotation import rotation_vector
 class Gains:
     """How briskly an operator steers.
 
-    Pushing the stick in proportion to the distance to go, `v = gain · e`, obeys Fitts' law: from D to W it takes
-    `ln(D / W) / gain`, a throughput of `gain / ln 2`. In people 1.6–2.6 bit/s with a velocity stick, 3.7–4.9 with a
-    mouse: gains of 1.1–1.8 and 2.6–3.4.
+    Pushing the stick in proportion to the distance to go, `v = gain · e`, obeys Fitts' law: from D to W it
+    takes `ln(D / W) / gain`, a throughput of `gain / ln 2`. In people it is 1.6–2.6 bit/s with a velocity
+    stick, 3.7–4.9 with a mouse: gains of 1.1–1.8 and 2.6–3.4.
 
     Attributes:
         gain: of the distance to go [1/s].

@@ -28,8 +28,10 @@ def cabinet(name: str, x: float, y: float, yaw: float, height: float) -> SceneOb
         Part(box([_DEPTH, _WIDTH, below]), np.array([0.0, 0.0, (below - height) / 2])),
         Part(box([_WALL, inner, _TALL]), np.array([(_DEPTH - _WALL) / 2, 0.0, height / 2 - DROP])),
     ]
-    for sign in (-1.0, 1.0):
-        parts.append(Part(box([_DEPTH, _WALL, _TALL]), np.array([0.0, sign * side, height / 2 - DROP])))
+    parts += [
+        Part(box([_DEPTH, _WALL, _TALL]), np.array([0.0, sign * side, height / 2 - DROP]))
+        for sign in (-1.0, 1.0)
+    ]
     return SceneObject(
         name,
         box([_DEPTH, _WIDTH, height]),

@@ -18,7 +18,7 @@ _SIZE = (0.26, 0.32, 0.20)  # of the tray: length, width, handle above the plate
 _TRAY_MASS, _CAN_MASS = 0.35, 0.20  # [kg]
 _RADIUS, _HEIGHT = 0.033, 0.10  # of the can [m]
 _POSE = ("x", "y", "z", "qw", "qx", "qy", "qz")
-_VIEW = View(position=(2.6, 0.0, 3.2), target=(-0.35, 0.0, 0.3), fovy=58.0)
+_VIEW = View(position=(2.2, 0.0, 2.9), target=(-0.2, 0.0, 0.3), fovy=62.0)
 HANDLE = np.array([0.0, 0.0, _SIZE[2]])  # centre of the handle's bar in the tray's frame [m]
 
 
@@ -108,7 +108,8 @@ def _sample_start(model: RobotModel, side: float, rng: np.random.Generator) -> F
     q, error = arm_configuration(model, q, Pose(place, down))
     if error > 1e-3:
         raise HandrailError(
-            f"task Tray: expected robot {model.description.name} to reach {place.round(2).tolist()} from above"
+            f"task Tray: expected a robot that reaches {place.round(2).tolist()} from above, "
+            f"got {model.description.name}"
         )
     return q
 
