@@ -12,9 +12,12 @@ from handrail.collect.operators.input_map import StickMap
 from handrail.collect.operators.modes import MODES, find_mode
 from handrail.collect.operators.perception import Perception
 from handrail.collect.operators.pick_place_script import grasp_rotation
-from handrail.collect.operators.standing import standing_point
+from handrail.collect.operators.standing import standing_point, standing_pose
 from handrail.collect.operators.steering import Gains, base_twist, hand_twist
 from handrail.collect.operators.wish import Wish
+from handrail.collect.tasks.reach import Reach
+from handrail.controllers.arm_pose import arm_configuration
+from handrail.controllers.collision import CollisionModel
 from handrail.controllers.controller import State
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.model import Pose, load_model
@@ -205,6 +208,29 @@ def test_the_base_stands_where_the_place_is_in_reach():
     place = np.array([0.5, 0.4, 0.7])
     spot = standing_point(MODEL, place)
     assert 0.8 < np.linalg.norm(place[:2] - spot[:2]) < 1.5
+
+
+def test_the_arm_is_solved_for_and_the_base_stays():
+    rng, arm = np.random.default_rng(0), slice(3, MODEL.size)
+    for _ in range(10):
+        there = HOME + np.concatenate([np.zeros(3), rng.uniform(-0.4, 0.4, MODEL.size - 3)])
+        q, error = arm_configuration(MODEL, HOME, MODEL.pose(there))
+        np.testing.assert_array_equal(q[:3], HOME[:3])
+        assert error < 1e-4
+        np.testing.assert_allclose(MODEL.pose(q).position, MODEL.pose(there).position, atol=1e-4)
+        assert np.all(np.abs(q[arm]) <= MODEL.description.limits.position_upper[arm])
+    far = Pose(np.array([5.0, 0.0, 1.0]), np.eye(3))
+    assert arm_configuration(MODEL, HOME, far)[1] > 1.0
+
+
+def test_the_base_stands_where_the_arm_keeps_clear_of_itself():
+    collision, clear = CollisionModel(MODEL), 0
+    for seed in range(12):
+        goal = Reach().sample(MODEL, np.random.default_rng(seed)).goal
+        stand = standing_pose(MODEL, HOME, goal)
+        q, error = arm_configuration(MODEL, np.concatenate([stand, HOME[3:]]), goal)
+        clear += error < 0.01 and np.min(collision.values(q[None, :])) >= 0.08
+    assert clear >= 10
 
 
 def test_grasps_point_down_and_are_square_to_the_cube():

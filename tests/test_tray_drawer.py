@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 from collect_helpers import action, environment, moved
 
-from handrail.collect.build import build_env, build_session
+from handrail.collect.build import build_env, build_session, build_task
 from handrail.collect.config import SessionConfig
 from handrail.collect.env import HandrailEnv
 from handrail.collect.tasks.cabinet import HANDLE, TRAVEL, inward
 from handrail.collect.tasks.drawer import Drawer, handle, opened
 from handrail.collect.tasks.task import Episode
 from handrail.collect.tasks.tray import Tray
+from handrail.controllers.errors import HandrailError
 from handrail.controllers.model import load_model
 
 MODEL = load_model()
@@ -189,6 +190,14 @@ def test_a_thing_weighs_what_the_task_says():
             for name in names:
                 body = env.simulation.mujoco_model.body(name)
                 assert body.mass[0] == pytest.approx(env.episode.scene.find(name).mass)
+
+
+@pytest.mark.parametrize("task", ["drawer", "pick_place", "reach", "tray"])
+def test_the_time_limit_is_a_setting(task):
+    own = build_task(SessionConfig(task=task))
+    assert build_task(SessionConfig(task=task, time_limit=12.0)) == replace(own, horizon=12.0)
+    with pytest.raises(HandrailError, match="--time_limit -1"):
+        SessionConfig(task=task, time_limit=-1.0).check()
 
 
 def test_features_are_named_and_finite():
