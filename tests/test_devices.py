@@ -8,15 +8,18 @@ from collect_helpers import environment
 
 from handrail.collect.operators.devices import input_map
 from handrail.collect.operators.human import HumanSettings
+from handrail.collect.operators.joint_order import clear_order, sweep_clearance
 from handrail.collect.operators.modes import find_mode
 from handrail.collect.operators.operator import View
 from handrail.collect.operators.scripted import ScriptedOperator
 from handrail.collect.operators.wish import Target, Wish
 from handrail.collect.tasks.task import TaskState
+from handrail.controllers.collision import CollisionModel
 from handrail.controllers.controller import State
 from handrail.controllers.direct import DirectController
 from handrail.controllers.intent import Intent
 from handrail.controllers.model import Pose, load_model
+from handrail.controllers.shape import Obstacle, Shape
 from handrail.controllers.split_controller import split_controller
 
 MODEL = load_model()
@@ -146,3 +149,21 @@ def test_the_same_seed_is_the_same_operator(view, name):
     for a, b in zip(first, again, strict=True):
         np.testing.assert_array_equal(a.values, b.values)
         np.testing.assert_array_equal(a.raw.values, b.raw.values)
+
+
+def test_joints_are_moved_in_an_order_that_hits_nothing():
+    """A wall before the hand: what swings it forward has to wait for what lifts it."""
+    tool = MODEL.pose(HOME).position
+    wall = Obstacle("wall", Shape("box", np.array([0.1, 2.0, tool[2] + 0.1])), np.array([0.3, 0.0, 0.4]))
+    collision = CollisionModel(MODEL, (wall,))
+    goal = HOME.copy()
+    goal[[4, 5]] += [0.35, -0.9]  # shoulder forward, elbow up
+    for preferred in ([4, 5], [5, 4]):
+        order = clear_order(collision, HOME, goal, preferred, 0.02)
+        assert order == [5, 4]
+    q = HOME.copy()
+    for joint in order:
+        assert sweep_clearance(collision, q, joint, goal[joint] - q[joint]) >= 0.02
+        q[joint] = goal[joint]
+    blocked = Obstacle("wall", wall.shape, tool + [0.06, 0.0, 0.0])
+    assert clear_order(CollisionModel(MODEL, (blocked,)), HOME, goal, [4, 5], 0.02) == []

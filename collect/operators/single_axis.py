@@ -4,6 +4,7 @@ import numpy as np
 
 from handrail.collect.operators.human import HumanSettings
 from handrail.collect.operators.input_map import full_stick
+from handrail.collect.operators.joint_order import clear_order, sweep_clearance
 from handrail.collect.operators.operator import View
 from handrail.collect.operators.steering import Gains
 from handrail.collect.operators.wish import Target, Wish
@@ -18,7 +19,6 @@ _NEAR = 0.35  # share of the tolerance that one axis may use up
 _MOST_CARE = 0.1
 _PREPARATION = 1.35  # of the mind before it thinks again: M of the keystroke-level model [s]
 _SHARES = (1.0, 0.5, 0.25)  # of an axis' way that the operator considers
-_SWEEP = np.linspace(0.25, 1.0, 4)  # where on the way he looks whether something is hit
 _CLEAR = 0.03  # what a sweep shall keep clear [m]
 
 
@@ -26,8 +26,8 @@ class SingleAxisMap:
     """A single stick on the base's axes and the arm's joints, one at a time; changing is a mode switch.
 
     The operator knows which joints would put the hand there, but not exactly: `q* = q + (q_ik − q)(1 + σ z)`.
-    He moves the joint that is farthest off and would hit nothing on its way, then the next, and thinks anew
-    when all are near q*. The base likewise, axis by axis.
+    He moves one joint after the other, in an order in which nothing is hit, and thinks anew when all are near
+    q*. The base likewise, axis by axis.
 
     Args:
         model: of the robot.
@@ -57,6 +57,7 @@ class SingleAxisMap:
         self._goal = np.zeros(self._model.size)
         self._thought: tuple[float, ...] = ()
         self._thinks_at = -np.inf
+        self._order: list[int] = []
         self._care = 1.0  # share of the usual tolerance: less after each attempt that was not good enough
 
     def wanted(self, wish: Wish, state: State) -> tuple[BoolArray, FloatArray]:
@@ -89,7 +90,9 @@ class SingleAxisMap:
         if axis is not None and abs(errors[axis] - self._left) > tolerances[axis]:
             return axis
         off = np.abs(errors) / tolerances
-        candidates = [int(index) for index in np.argsort(-off) if off[index] > 1.0]
+        rank = {index: place for place, index in enumerate(self._order)}
+        farthest = sorted(np.flatnonzero(off > 1.0).tolist(), key=lambda index: -off[index])
+        candidates = sorted(farthest, key=lambda index: rank.get(index, len(rank)))
         best, widest = None, -np.inf
         for share in _SHARES:
             for index in candidates:
@@ -109,9 +112,8 @@ class SingleAxisMap:
         """Return how much an arm joint's motion keeps clear of everything, no more than is asked for [m]."""
         if index < self._arm.start:
             return _CLEAR  # the script says where to drive
-        path = np.tile(q, (len(_SWEEP), 1))
-        path[:, index - self.channels.joint_slice.start] += _SWEEP * way
-        return min(float(np.min(self._collision.values(path))), _CLEAR)
+        joint = index - self.channels.joint_slice.start
+        return min(sweep_clearance(self._collision, q, joint, way), _CLEAR)
 
     def _think(self, target: Target, state: State) -> None:
         """Work out which joints would do it, for a new target, or when they did not."""
@@ -123,7 +125,15 @@ class SingleAxisMap:
         self._goal = state.q + (exact - state.q) * (1.0 + self._error * self._rng.standard_normal(len(exact)))
         self._care = 1.0 if key != self._thought else max(0.5 * self._care, _MOST_CARE)
         self._thought, self._left = key, 0.0
+        self._order = self._plan(target, state.q)
         self._thinks_at = state.time + _PREPARATION
+
+    def _plan(self, target: Target, q: FloatArray) -> list[int]:
+        """Return the order in which the arm's axes shall be moved: the longest first where that is clear."""
+        off = self._goal_error(target, q)
+        joints = [self._base + int(index) for index in np.argsort(-off) if off[index] > 1.0]
+        order = clear_order(self._collision, q, self._goal, joints, _CLEAR)
+        return [self.channels.joint_slice.start + joint for joint in order]
 
     def _goal_error(self, target: Target, q: FloatArray) -> FloatArray:
         """Return how far each arm joint is from where it was thought to belong, over `_near`, (n − b,)."""
