@@ -15,7 +15,9 @@ from handrail.controllers.controller import State
 from handrail.controllers.model import RobotModel
 
 _DAMPING = 0.03
-_BASE_WEIGHT = 0.3
+_BASE_WEIGHT = 0.15
+_POSTURE = 0.1  # weight of the arm's posture at home, so that it does not fold the wrong way
+_RETURN = 0.5  # how fast it would go back there [1/s]
 
 
 class InputMap(Protocol):
@@ -54,7 +56,7 @@ class StickMap:
 
     Where the mode has joint channels, the operator solves for them himself, as an expert would, with the
     arm's angles as he imagines them, q + δ:
-    `min ‖J(q + δ) v - hand‖² + w_b ‖v_base - base‖² + λ ‖v / v_max‖²`.
+    `min ‖J(q + δ) v - hand‖² + w_b ‖v_base - base‖² + w_p ‖v_arm - k (q_home - q)‖² + λ ‖v / v_max‖²`.
 
     Args:
         model: of the robot.
@@ -106,8 +108,11 @@ class StickMap:
         jacobian = self._model.jacobian(q + self._imagined)
         base = self._base_world(wish, q)
         weights = np.full(self._model.size, _DAMPING) / self._model.description.limits.velocity
-        rows = [jacobian, np.diag(weights)]
-        targets = [wish.hand, np.zeros(self._model.size)]
+        home = self._model.description.home - q
+        home[: len(self.channels.base)] = 0.0
+        posture = _POSTURE * np.any(wish.hand) * np.eye(self._model.size)[len(self.channels.base) :]
+        rows = [jacobian, np.diag(weights), posture]
+        targets = [wish.hand, np.zeros(self._model.size), posture @ (_RETURN * home)]
         if len(base):
             rows.append(_BASE_WEIGHT * np.eye(len(base), self._model.size))
             targets.append(_BASE_WEIGHT * base)

@@ -61,7 +61,6 @@ MODES = {
             _always("joint"),
             "direct",
             "all joint velocities, clipped to limits only: the baseline",
-            gains=Gains(gain=1.6),
         ),
         TeleopMode(
             "direct_filtered",

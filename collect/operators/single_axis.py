@@ -4,11 +4,10 @@ import numpy as np
 
 from handrail.collect.operators.human import HumanSettings
 from handrail.collect.operators.input_map import full_stick
-from handrail.collect.operators.joint_order import clear_order, sweep_clearance
+from handrail.collect.operators.joint_order import plan_joints, sweep_clearance
 from handrail.collect.operators.operator import View
 from handrail.collect.operators.steering import Gains
 from handrail.collect.operators.wish import Target, Wish
-from handrail.controllers.arm_pose import arm_configuration
 from handrail.controllers.arrays import BoolArray, FloatArray
 from handrail.controllers.channels import Channels
 from handrail.controllers.collision import CollisionModel
@@ -121,19 +120,13 @@ class SingleAxisMap:
         done = np.all(self._goal_error(target, state.q) < 1.0) and state.time >= self._thinks_at
         if key == self._thought and not done:
             return
-        exact, _ = arm_configuration(self._model, state.q, target.hand)
-        self._goal = state.q + (exact - state.q) * (1.0 + self._error * self._rng.standard_normal(len(exact)))
+        plan = plan_joints(self._model, self._collision, state.q, target.hand, _CLEAR)
+        way = plan.goal - state.q
+        self._goal = state.q + way * (1.0 + self._error * self._rng.standard_normal(len(way)))
+        self._order = [self.channels.joint_slice.start + joint for joint in plan.order]
         self._care = 1.0 if key != self._thought else max(0.5 * self._care, _MOST_CARE)
         self._thought, self._left = key, 0.0
-        self._order = self._plan(target, state.q)
         self._thinks_at = state.time + _PREPARATION
-
-    def _plan(self, target: Target, q: FloatArray) -> list[int]:
-        """Return the order in which the arm's axes shall be moved: the longest first where that is clear."""
-        off = self._goal_error(target, q)
-        joints = [self._base + int(index) for index in np.argsort(-off) if off[index] > 1.0]
-        order = clear_order(self._collision, q, self._goal, joints, _CLEAR)
-        return [self.channels.joint_slice.start + joint for joint in order]
 
     def _goal_error(self, target: Target, q: FloatArray) -> FloatArray:
         """Return how far each arm joint is from where it was thought to belong, over `_near`, (n − b,)."""
