@@ -7,8 +7,10 @@ made.
 import gymnasium
 
 TASKS = {
+    "Drawer": "handrail.collect.tasks.drawer:Drawer",
     "Reach": "handrail.collect.tasks.reach:Reach",
     "PickPlace": "handrail.collect.tasks.pick_place:PickPlace",
+    "Tray": "handrail.collect.tasks.tray:Tray",
 }
 
 for _name, _entry in TASKS.items():

@@ -2,20 +2,24 @@
 
 import importlib.metadata
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
 
 import gymnasium
 import numpy as np
 
 from handrail.collect.config import SessionConfig, check_fps
 from handrail.collect.env import HandrailEnv
-from handrail.collect.operators.modes import Completion, TeleopMode, find_mode
+from handrail.collect.operators.drawer_script import DrawerScript
+from handrail.collect.operators.modes import Completion, TeleopMode, find_mode, without
 from handrail.collect.operators.pick_place_script import PickPlaceScript
 from handrail.collect.operators.reach_script import ReachScript
 from handrail.collect.operators.scripted import ScriptedOperator
-from handrail.collect.operators.steering import Gains
+from handrail.collect.operators.tray_script import TrayScript
 from handrail.collect.session import Observer, Session
+from handrail.collect.tasks.drawer import Drawer
+from handrail.collect.tasks.pick_place import PickPlace
 from handrail.collect.tasks.reach import Reach
+from handrail.collect.tasks.task import Task
+from handrail.collect.tasks.tray import Tray
 from handrail.controllers.cbf_filter import CbfFilter
 from handrail.controllers.channels import Channels
 from handrail.controllers.controller import Controller
@@ -23,18 +27,38 @@ from handrail.controllers.direct import DirectController
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.model import RobotModel
 from handrail.controllers.mpc import MaskedMpc
+from handrail.controllers.objective import Objective
+from handrail.controllers.objectives.tray import tray_levelling
 from handrail.controllers.safety_filter import safety_filter
+from handrail.controllers.split_controller import split_controller
 from handrail.datasets.frames import moment_features
 from handrail.datasets.schema import Feature
 
-ENVIRONMENTS = {"pick_place": "handrail/PickPlace-v0", "reach": "handrail/Reach-v0"}
-SCRIPTS = {"pick_place": PickPlaceScript, "reach": ReachScript}
+ENVIRONMENTS = {
+    "drawer": "handrail/Drawer-v0",
+    "pick_place": "handrail/PickPlace-v0",
+    "reach": "handrail/Reach-v0",
+    "tray": "handrail/Tray-v0",
+}
+TASK_CLASSES: Mapping[str, Callable[..., Task]] = {
+    "drawer": Drawer,
+    "pick_place": PickPlace,
+    "reach": Reach,
+    "tray": Tray,
+}
+SCRIPTS = {"drawer": DrawerScript, "pick_place": PickPlaceScript, "reach": ReachScript, "tray": TrayScript}
 CONTROLLERS: Mapping[Completion, Callable[[RobotModel, float], Controller]] = {
     "mpc": lambda model, period: MaskedMpc(model),
     "direct": DirectController,
     "filter": safety_filter,
     "cbf": CbfFilter,
+    "split": split_controller,
 }
+OBJECTIVES: Mapping[str, Callable[[Channels], tuple[Objective, ...]]] = {
+    "tray": lambda channels: (tray_levelling(channels, up=np.array([0.0, 0.0, -1.0]), level=LEVEL),)
+}
+LEFT = {"tray": ("ee.wx", "ee.wy")}  # a tray's tilt is the MPC's, not the operator's
+LEVEL = 20.0  # weight of a tray's tilt
 _VERSIONED = ("handrail", "lerobot", "mujoco", "pin", "coal", "casadi", "daqp", "numpy", "gymnasium")
 
 
@@ -51,17 +75,15 @@ def build_env(config: SessionConfig, fps: int, render: bool = False) -> Handrail
     """
     config.check()
     check_fps(fps)
-    moving = config.moving_obstacles
-    variant: dict[str, Any] = {"task": Reach(moving_obstacles=moving)} if moving else {}
     env = gymnasium.make(
         ENVIRONMENTS[config.task],
+        task=build_task(config),
         robot=config.robot,
         fps=fps,
         cameras=config.camera_names,
         image_size=(config.image_size, config.image_size),
         render_mode="rgb_array" if render else None,
         disable_env_checker=True,
-        **variant,
     )
     unwrapped = env.unwrapped
     if not isinstance(unwrapped, HandrailEnv):
@@ -69,20 +91,34 @@ def build_env(config: SessionConfig, fps: int, render: bool = False) -> Handrail
     return unwrapped
 
 
+def build_task(config: SessionConfig) -> Task:
+    """Return the task, with the time limit and the moving obstacles of the settings."""
+    limit = {"horizon": config.time_limit} if config.time_limit else {}
+    moving = {"moving_obstacles": config.moving_obstacles} if config.moving_obstacles else {}
+    return TASK_CLASSES[config.task](**limit, **moving)
+
+
 def build_session(config: SessionConfig, env: HandrailEnv, observers: Sequence[Observer] = ()) -> Session:
     """Return the session of an environment."""
     mode = build_mode(config, env.model)
-    gains = Gains()
-    script = SCRIPTS[config.task](env.model, gains, drives=config.mode == "switching")
-    human = config.human.scaled(config.noise)
-    operator = ScriptedOperator(env.model, script, mode, human, gains)
-    controller = build_controller(mode, env.model, env.fps)
+    mode = leave_to_objectives(mode, config.task)
+    script = SCRIPTS[config.task](env.model, mode.gains, drives=mode.drives)
+    human = config.human.scaled(config.noise).person(np.random.default_rng(config.person))
+    operator = ScriptedOperator(env.model, script, mode, human)
+    controller = build_controller(mode, env.model, env.fps, config.task)
     return Session(env, controller, operator, observers, config.realtime)
 
 
-def build_controller(mode: TeleopMode, model: RobotModel, fps: int) -> Controller:
-    """Return the controller of a mode."""
+def build_controller(mode: TeleopMode, model: RobotModel, fps: int, task: str = "") -> Controller:
+    """Return the controller of a mode; the masked MPC's knows the objectives that a task brings."""
+    if mode.controller == "mpc" and task in OBJECTIVES:
+        return MaskedMpc(model, objectives=OBJECTIVES[task](Channels.of(model.description)))
     return CONTROLLERS[mode.controller](model, 1.0 / fps)
+
+
+def leave_to_objectives(mode: TeleopMode, task: str) -> TeleopMode:
+    """Return the mode without the channels that a task's objectives look after under the masked MPC."""
+    return without(mode, LEFT.get(task, ())) if mode.controller == "mpc" else mode
 
 
 def build_mode(config: SessionConfig, model: RobotModel) -> TeleopMode:
@@ -101,7 +137,9 @@ def build_mode(config: SessionConfig, model: RobotModel) -> TeleopMode:
             f"one each for {', '.join(channels.names)}; got {len(config.mask)}"
         )
     names = tuple(np.array(channels.names)[np.array(list(config.mask)) == "1"])
-    return TeleopMode(f"mask:{config.mask}", lambda focus: names, mode.controller, "a mask of one's own")
+    return TeleopMode(
+        f"mask:{config.mask}", lambda focus: names, mode.controller, "a mask of one's own", gains=mode.gains
+    )
 
 
 def session_features(env: HandrailEnv) -> dict[str, Feature]:

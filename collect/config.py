@@ -10,12 +10,25 @@ import tyro
 from handrail.collect.operators.human import HumanSettings
 from handrail.controllers.errors import HandrailError, unknown_name
 
-TASKS = ("pick_place", "reach")
-MODE_NAMES = ("base", "base+ee", "direct", "direct_cbf", "direct_filtered", "ee", "joints", "switching")
+TASKS = ("drawer", "pick_place", "reach", "tray")
+MODE_NAMES = (
+    "base",
+    "base+ee",
+    "decoupled",
+    "direct",
+    "direct_cbf",
+    "direct_filtered",
+    "direct_single",
+    "ee",
+    "joints",
+    "leader",
+    "switching",
+)
 OPERATORS = ("scripted",)
 CAMERAS = ("wrist", "scene")
 FPS_RANGE = (10, 100)
 MOST_MOVING = 4
+MOST_TIME = 3600.0  # [s]
 
 
 @dataclass(frozen=True)
@@ -23,9 +36,10 @@ class SessionConfig:
     """Who steers what, how, and what is watched."""
 
     task: str = "pick_place"
-    """What to do: pick_place or reach."""
+    """What to do: drawer, pick_place, reach or tray."""
     mode: str = "ee"
-    """Teleop mode: ee, base, base+ee, joints, switching, direct (no MPC), direct_filtered or direct_cbf."""
+    """Teleop mode; through the MPC: ee, base, base+ee, joints, switching; safety filters: direct_filtered,
+    direct_cbf; neither: direct, direct_single, leader, decoupled."""
     mask: str = ""
     """A mask of your own instead of the mode's: 0 or 1 for each channel (base twist, tool twist, joints)."""
     operator: str = "scripted"
@@ -33,6 +47,10 @@ class SessionConfig:
     noise: float = 1.0
     """How human the scripted hand is: 0 perfect, 1 as measured in people."""
     human: HumanSettings = field(default_factory=HumanSettings)
+    person: int = 0
+    """Which person the scripted operator is; persons differ in delay, noise and all the rest."""
+    time_limit: float = 0.0
+    """Time after which an episode is given up [s]; the task's own when 0."""
     moving_obstacles: int = 0
     """Obstacles that cross the robot's way at up to 0.5 m/s, 0 to 4; task reach only."""
     robot: str = "ridgeback_ur10"
@@ -72,6 +90,12 @@ class SessionConfig:
             )
         if self.moving_obstacles and self.task != "reach":
             raise HandrailError(f"--moving_obstacles: expected --task reach, got --task {self.task}")
+        if not 0.0 <= self.time_limit <= MOST_TIME:
+            raise HandrailError(
+                f"--time_limit {self.time_limit}: expected 0 (the task's own) to {MOST_TIME} s"
+            )
+        if self.person < 0:
+            raise HandrailError(f"--person {self.person}: expected a whole number >= 0")
         if self.seed < 0:
             raise HandrailError(f"--seed {self.seed}: expected a whole number >= 0")
         if not 16 <= self.image_size <= 1024 or self.image_size % 2:

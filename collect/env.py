@@ -167,10 +167,12 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         super().reset(seed=seed)
         episode: Episode = (options or {}).get("episode") or self.task.sample(self.model, self.np_random)
         meshes = bool(self.cameras or self.render_mode)
-        self._simulation = Simulation(self.model, episode.scene, episode.q, 1.0 / self.fps, meshes=meshes)
+        self._simulation = Simulation(
+            self.model, episode.scene, episode.q, 1.0 / self.fps, meshes=meshes, grip=episode.grip
+        )
         self._episode = episode
         self._steps = 0
-        self._gripper = 0.0
+        self._gripper = float(episode.grip is not None)
         state = self.task_state()
         return self._observe(state), self._info(state, Outcome(), clipped=False, contacts=())
 

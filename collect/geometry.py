@@ -48,6 +48,15 @@ def shape_inertia(mass: float, shape: Shape) -> FloatArray:
     return box_inertia(mass, bounding_box(shape))
 
 
+def volume(shape: Shape) -> float:
+    """Return the volume of a shape [m³]."""
+    if shape.kind == "box":
+        return float(np.prod(shape.size))
+    radius = shape.size[0]
+    ball = 0.0 if shape.kind == "cylinder" else 4.0 / 3.0 * np.pi * radius**3
+    return float(ball + (np.pi * radius**2 * shape.size[1] if len(shape.size) > 1 else 0.0))
+
+
 def bounding_box(shape: Shape) -> FloatArray:
     """Return the full lengths of the box around a shape in its own frame, (3,) [m]."""
     if shape.kind == "box":

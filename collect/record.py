@@ -89,6 +89,7 @@ def _session_columns(config: RecordConfig) -> dict[str, str | float]:
         "operator": config.operator,
         "mode": config.mode,
         "noise": config.noise,
+        "person": config.person,
     }
     moving = config.moving_obstacles
     return columns | {"moving_obstacles": moving} if moving else columns

@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 
 from handrail.collect import geometry
-from handrail.collect.gl import MjSpec
+from handrail.collect.gl import MjsBody, MjSpec, mujoco
 from handrail.collect.patrol import Patrol
+from handrail.collect.slide import Slide
 from handrail.controllers.arrays import FloatArray, frozen
 from handrail.controllers.errors import HandrailError, unknown_name
 from handrail.controllers.shape import Obstacle, Shape
@@ -48,6 +49,7 @@ class SceneObject:
         parts: what is drawn and touched, if not the shape itself.
         friction: sliding friction coefficient.
         patrol: how it moves by itself, from `position` on; nothing stops it.
+        slide: the rail that it moves on, for a movable thing that is not loose.
     """
 
     name: str
@@ -61,6 +63,7 @@ class SceneObject:
     parts: tuple[Part, ...] = ()
     friction: float = 0.8
     patrol: Patrol | None = None
+    slide: Slide | None = None
 
     def __post_init__(self) -> None:
         """Copy the arrays and make them read-only."""
@@ -69,7 +72,7 @@ class SceneObject:
 
     @property
     def movable(self) -> bool:
-        """Whether it can be pushed, grasped and carried."""
+        """Whether it can be pushed, pulled, grasped."""
         return self.mass > 0
 
     @property
@@ -152,12 +155,12 @@ def _add_object(spec: MjSpec, item: SceneObject) -> None:
     placement = geometry.pose(item.position, item.rotation)
     body = spec.worldbody.add_body(name=item.name, mocap=item.patrol is not None, **placement)
     if item.movable:
-        body.add_freejoint(name=item.name)
-        body.explicitinertial = True
-        body.mass, body.ipos, body.iquat = item.mass, [0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0]
-        body.inertia = geometry.shape_inertia(item.mass, item.shape)
+        _add_freedom(body, item)
+    volume = sum(geometry.volume(part.shape) for part in item.parts)
     for index, part in enumerate(item.parts or (Part(item.shape, np.zeros(3)),)):
+        mass = item.mass * geometry.volume(part.shape) / volume if item.parts else 0.0
         body.add_geom(
+            mass=mass,
             name=item.name if index == 0 else f"{item.name}_{index}",
             rgba=part.rgba or item.rgba,
             group=geometry.VISIBLE_GROUP,
@@ -165,6 +168,26 @@ def _add_object(spec: MjSpec, item: SceneObject) -> None:
             **geometry.pose(part.position, part.rotation),
             **_contact(item),
         )
+
+
+def _add_freedom(body: MjsBody, item: SceneObject) -> None:
+    """Let a movable thing move; its mass is spread over its parts, or over the box around it."""
+    if item.slide is None:
+        body.add_freejoint(name=item.name)
+    else:
+        body.add_joint(
+            name=item.name,
+            type=mujoco.mjtJoint.mjJNT_SLIDE,
+            axis=item.slide.axis,
+            limited=True,
+            range=[0.0, item.slide.travel],
+            damping=[item.slide.damping, 0.0, 0.0],
+            frictionloss=item.slide.friction,
+        )
+    if not item.parts:
+        body.explicitinertial = True
+        body.mass, body.ipos, body.iquat = item.mass, [0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0]
+        body.inertia = geometry.shape_inertia(item.mass, item.shape)
 
 
 def _contact(item: SceneObject) -> dict[str, Any]:

@@ -42,7 +42,13 @@ class Simulation:
     """
 
     def __init__(
-        self, model: RobotModel, scene: Scene, q: FloatArray, step: float, meshes: bool = False
+        self,
+        model: RobotModel,
+        scene: Scene,
+        q: FloatArray,
+        step: float,
+        meshes: bool = False,
+        grip: float | None = None,
     ) -> None:
         self._model = model
         self._scene = scene
@@ -58,7 +64,7 @@ class Simulation:
         )
         self._index()
         self.commanded = np.zeros(model.size)
-        self._place(q)
+        self._place(q, grip)
 
     def _index(self) -> None:
         """Find where the robot is in MuJoCo's arrays."""
@@ -76,11 +82,12 @@ class Simulation:
         bodies = {item.name: int(compiled.body(item.name).mocapid[0]) for item in self._scene.movers}
         self._patrols = [(bodies[item.name], item.patrol) for item in self._scene.movers if item.patrol]
 
-    def _place(self, q: FloatArray) -> None:
+    def _place(self, q: FloatArray, grip: float | None) -> None:
+        """Put the robot at q, the gripper open, or closed around something of width `grip` [m]."""
         self.data.qpos[self._q_index] = q
         if self._stroke:
-            self.data.qpos[self._finger_index] = self._stroke / 2
-            self.data.ctrl[self._gripper_servo] = self._stroke
+            self.data.qpos[self._finger_index] = (self._stroke if grip is None else grip) / 2
+            self.data.ctrl[self._gripper_servo] = self._gripper_target(0.0 if grip is None else 1.0)
         mujoco.mj_forward(self.mujoco_model, self.data)
 
     def show(self, q: FloatArray) -> None:
@@ -115,10 +122,14 @@ class Simulation:
     def _move_gripper(self, gripper: float) -> None:
         if not self._stroke:
             return
-        wanted = (1.0 - gripper) * self._stroke - 0.01 * gripper
+        wanted = self._gripper_target(gripper)
         now = self.data.ctrl[self._gripper_servo]
         reach = self._speed * self._step / self.substeps
         self.data.ctrl[self._gripper_servo] = now + min(max(wanted - now, -reach), reach)
+
+    def _gripper_target(self, gripper: float) -> float:
+        """Return the opening that the gripper's servo is sent to [m]; closed is a little beyond touching."""
+        return (1.0 - gripper) * self._stroke - 0.01 * gripper
 
     def _move_obstacles(self) -> None:
         """Put what moves by itself where it is now."""
@@ -168,6 +179,8 @@ class Simulation:
     def _twist(self, name: str) -> Twist:
         velocity = self.data.joint(name).qvel
         rotation = self.data.body(name).xmat.reshape(3, 3)
+        if len(velocity) == 1:
+            return Twist(velocity[0] * self.data.joint(name).xaxis, np.zeros(3))
         return Twist(velocity[:3].copy(), rotation @ velocity[3:])
 
 

@@ -10,7 +10,7 @@ from handrail.controllers.description import RobotDescription
 from handrail.controllers.errors import unknown_name
 
 _BASE = ("base.vx", "base.vy", "base.wz")
-_TOOL = ("ee.vx", "ee.vy", "ee.vz", "ee.wx", "ee.wy", "ee.wz")
+TOOL = ("ee.vx", "ee.vy", "ee.vz", "ee.wx", "ee.wy", "ee.wz")
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class Channels:
     def of(cls, description: RobotDescription) -> "Channels":
         """Return the channels of a robot."""
         joints = tuple(f"joint.{name}" for name in description.joints)
-        return cls(_BASE if description.base_joints else (), _TOOL, joints)
+        return cls(_BASE if description.base_joints else (), TOOL, joints)
 
     @cached_property
     def names(self) -> tuple[str, ...]:
@@ -62,15 +62,18 @@ class Channels:
         return slice(len(self.base) + len(self.tool), self.size)
 
     def mask(self, *names: str) -> BoolArray:
-        """Return the mask of some channels, by name or by group (`base`, `ee`, `joint`), (m,).
+        """Return the mask of some channels, by name or by group (`base`, `ee`, `joint`, `arm`), (m,).
+
+        `arm` are the joints that are not the base's.
 
         Raises:
             HandrailError: a name is no channel and no group.
         """
         mask = np.zeros(self.size, dtype=bool)
         for name in names:
-            hit = [name in (channel, channel.split(".")[0]) for channel in self.names]
+            arm = self.joints[len(self.base) :] if name == "arm" else ()
+            hit = [name in (channel, channel.split(".")[0]) or channel in arm for channel in self.names]
             if not any(hit):
-                raise unknown_name("channel", name, ("base", "ee", "joint", *self.names))
+                raise unknown_name("channel", name, ("base", "ee", "joint", "arm", *self.names))
             mask |= hit
         return mask

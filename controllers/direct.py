@@ -10,12 +10,14 @@ from handrail.controllers.intent import Intent
 from handrail.controllers.model import RobotModel
 from handrail.controllers.reactive import ReactiveController
 from handrail.controllers.shape import Obstacle
+from handrail.controllers.twist_completion import base_velocity
 
 
 class DirectController:
     """Sends the commanded joint velocities, clipped to position, velocity and acceleration limits.
 
-    Joints that nobody commands brake. Distances are measured and reported, not kept.
+    A base twist is the base's joints; what nobody commands brakes. Distances are measured and reported, not
+    kept.
 
     Args:
         model: of the robot.
@@ -46,4 +48,6 @@ class DirectController:
     def _commanded(self, state: State, intent: Intent, previous: FloatArray) -> FloatArray:
         """Return the commanded joint velocities, zero where nobody commands, (n,)."""
         joints = self.channels.joint_slice
-        return np.where(intent.mask[joints], intent.values[joints], 0.0)
+        velocity = np.where(intent.mask[joints], intent.values[joints], 0.0)
+        velocity[: len(self.channels.base)] += base_velocity(intent, self.channels, state.q)
+        return velocity

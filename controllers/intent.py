@@ -12,6 +12,26 @@ from handrail.controllers.frames import Frames
 
 
 @dataclass(frozen=True)
+class RawInput:
+    """What the input device read, before it became a command.
+
+    Attributes:
+        values: deflection of each input from −1 to 1, or a leader arm's joint angles [rad], by channel, (m,);
+            (0,) if it is not known.
+        axes: how many inputs the operator moves now.
+        switches: how often he changed to other inputs in this episode so far.
+    """
+
+    values: FloatArray = field(default_factory=lambda: np.zeros(0))
+    axes: int = 0
+    switches: int = 0
+
+    def __post_init__(self) -> None:
+        """Copy the array and make it read-only."""
+        object.__setattr__(self, "values", frozen(self.values))
+
+
+@dataclass(frozen=True)
 class Intent:
     """A partial command.
 
@@ -23,6 +43,7 @@ class Intent:
         mode: name of the teleop mode that made it.
         time: when the operator asked [s], on the clock of the state.
         frames: in which frames the twists are meant, and for which point of the tool.
+        raw: what the input device read.
     """
 
     values: FloatArray
@@ -31,6 +52,7 @@ class Intent:
     mode: str = ""
     time: float = 0.0
     frames: Frames = field(default_factory=Frames)
+    raw: RawInput = field(default_factory=RawInput)
 
     def __post_init__(self) -> None:
         """Copy the arrays and make them read-only."""

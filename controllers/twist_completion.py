@@ -42,6 +42,15 @@ def twist_controller(
     return ReactiveController(model, ask, period, intent_timeout, channels.mask("ee"))
 
 
+def base_velocity(intent: Intent, channels: Channels, q: FloatArray) -> FloatArray:
+    """Return the commanded base twist as the base's joint velocities in the world, (3,), or (0,)."""
+    if not channels.base:
+        return np.zeros(0)
+    vx, vy, wz = np.where(intent.mask, intent.values, 0.0)[channels.base_slice]
+    c, s = (1.0, 0.0) if intent.frames.base == "world" else (np.cos(q[2]), np.sin(q[2]))
+    return np.array([c * vx - s * vy, s * vx + c * vy, wz])
+
+
 def tool_twist(intent: Intent, channels: Channels, tool: Pose) -> FloatArray:
     """Return the commanded twist (v, ω), world-aligned at the tool point of the robot, (6,) [m/s, rad/s].
 

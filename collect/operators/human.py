@@ -1,17 +1,17 @@
-"""The human-like hand: delay, intermittency, signal-dependent noise, drift."""
+"""How human an operator is: perception, delay, intermittency, noise, drift, switching; who it is."""
 
-from collections import deque
 from dataclasses import dataclass, fields
 
 import numpy as np
 
-from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import HandrailError
+
+_WIDEST = 2.0  # a person is at most this many standard deviations from the average
 
 
 @dataclass(frozen=True)
 class HumanSettings:
-    """How human the operator's hand is; all zero is a perfect hand.
+    """How human the operator is; all zero is a perfect one.
 
     Attributes:
         delay: from perception to hand [s]; 0.14–0.25 in people.
@@ -19,8 +19,15 @@ class HumanSettings:
         threshold: change of the wanted command, relative to full stick, below which the hand stays.
         noise: standard deviation of the signal-dependent noise over |command|; about 0.1.
         drift: standard deviation of the drift over full stick, while the stick is deflected.
-        correlation: how fast noise and drift wander, time constant [s].
-        switch_time: hands off the stick while changing the teleop mode [s].
+        correlation: how fast noise, drift and misjudgement wander, time constant [s].
+        switch_time: hands off the stick while changing to other inputs [s]; makes switching 17.4 % of the
+            time when steering joint by joint.
+        movement: of the hand from one deflection to the next, minimum jerk [s].
+        misjudgement: standard deviation of a distance to go as it is seen, over that distance.
+        inner_error: standard deviation of a joint angle as an operator of all joints imagines it [rad].
+        tremor: standard deviation of a hand that holds a leader arm, at the joints [rad].
+        persons: how much people differ, standard deviation of the logarithm of each number above.
+        moods: the same for the same person from episode to episode.
     """
 
     delay: float = 0.2
@@ -29,7 +36,13 @@ class HumanSettings:
     noise: float = 0.1
     drift: float = 0.02
     correlation: float = 0.5
-    switch_time: float = 0.4
+    switch_time: float = 0.34
+    movement: float = 0.15
+    misjudgement: float = 0.05
+    inner_error: float = 0.08
+    tremor: float = 0.003
+    persons: float = 0.15
+    moods: float = 0.08
 
     def __post_init__(self) -> None:
         """Check the numbers.
@@ -44,74 +57,24 @@ class HumanSettings:
 
     @classmethod
     def perfect(cls) -> "HumanSettings":
-        """Return a hand without delay, noise or drift."""
-        return cls(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        """Return an operator without delay, noise or drift."""
+        return cls(**{entry.name: 0.0 for entry in fields(cls)})
 
     def scaled(self, factor: float) -> "HumanSettings":
         """Return the settings with everything but the correlation time multiplied by a factor."""
         values = {entry.name: getattr(self, entry.name) * factor for entry in fields(self)}
         return HumanSettings(**values | {"correlation": self.correlation})
 
+    def person(self, rng: np.random.Generator) -> "HumanSettings":
+        """Draw a person around these settings: each number times `exp(persons · z)`."""
+        return self._drawn(self.persons, rng)
 
-class HumanHand:
-    """Turns the wanted command of each moment into what the hand does.
+    def episode(self, rng: np.random.Generator) -> "HumanSettings":
+        """Draw how this person is in one episode: each number times `exp(moods · z)`."""
+        return self._drawn(self.moods, rng)
 
-    The hand sees `wanted(t - delay)`; it moves to it only when that differs from what it holds by more
-    than the threshold and the refractory time has passed (intermittent control), or at once when it is
-    let go. On what it holds come `noise · |held| · a` and `drift · full · b`, where a and b are
-    Ornstein–Uhlenbeck processes of unit variance.
-
-    Args:
-        settings: of the hand.
-        full: full deflection of every input, (k,).
-    """
-
-    def __init__(self, settings: HumanSettings, full: FloatArray) -> None:
-        self._settings = settings
-        self._full = np.asarray(full, dtype=float)
-
-    def reset(self, rng: np.random.Generator) -> None:
-        """Begin an episode with the hand at rest."""
-        size = len(self._full)
-        self._rng = rng
-        self._seen: deque[tuple[float, FloatArray]] = deque()
-        self._held = np.zeros(size)
-        self._moved = -np.inf
-        self._time: float | None = None
-        self._wander = rng.standard_normal((2, size))
-
-    def move(self, wanted: FloatArray, time: float) -> FloatArray:
-        """Return what the hand commands at a time [s], given what the operator wants now, (k,)."""
-        self._hold(self._delayed(wanted, time), time)
-        noise, drift = self._step_wander(time)
-        settings = self._settings
-        touched = np.abs(self._held) > 0
-        moved = (
-            self._held
-            + settings.noise * np.abs(self._held) * noise
-            + settings.drift * self._full * drift * touched
-        )
-        return np.clip(moved, -self._full, self._full) if settings.noise or settings.drift else moved
-
-    def _delayed(self, wanted: FloatArray, time: float) -> FloatArray:
-        self._seen.append((time, np.array(wanted, dtype=float)))
-        while len(self._seen) > 1 and self._seen[1][0] <= time - self._settings.delay + 1e-9:
-            self._seen.popleft()
-        oldest, values = self._seen[0]
-        return values if oldest <= time - self._settings.delay + 1e-9 else np.zeros_like(self._full)
-
-    def _hold(self, wanted: FloatArray, time: float) -> None:
-        change = np.max(np.abs(wanted - self._held) / self._full)
-        released = not np.any(wanted)
-        rested = time - self._moved >= self._settings.refractory - 1e-9
-        if released or (change > self._settings.threshold and rested) or not self._settings.refractory:
-            self._moved = self._moved if np.array_equal(wanted, self._held) else time
-            self._held = wanted
-
-    def _step_wander(self, time: float) -> FloatArray:
-        if self._time is not None and self._settings.correlation > 0:
-            keep = np.exp(-(time - self._time) / self._settings.correlation)
-            fresh = self._rng.standard_normal(self._wander.shape)
-            self._wander = keep * self._wander + np.sqrt(1.0 - keep**2) * fresh
-        self._time = time
-        return self._wander
+    def _drawn(self, spread: float, rng: np.random.Generator) -> "HumanSettings":
+        factors = np.exp(spread * np.clip(rng.standard_normal(len(fields(self))), -_WIDEST, _WIDEST))
+        names = [entry.name for entry in fields(self)]
+        values = {name: getattr(self, name) * factor for name, factor in zip(names, factors, strict=True)}
+        return HumanSettings(**values | {"persons": self.persons, "moods": self.moods})

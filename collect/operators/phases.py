@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from handrail.collect.operators.modes import Focus, Wish
 from handrail.collect.operators.operator import View
 from handrail.collect.operators.steering import Gains, base_twist, hand_twist, pose_errors
+from handrail.collect.operators.wish import Focus, Target, Wish
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.model import Pose
 
@@ -67,10 +67,12 @@ class PhaseRunner:
         """Return what is wanted now, and go to the next phase when this one is done."""
         self._advance(view)
         phase = self.phase
-        still = self._index >= len(self._phases) or self._reached_at is not None
-        hand = np.zeros(6) if still else hand_twist(view.tool, phase.hand, self._gains, phase.pace)
-        base = np.zeros(3) if still else base_twist(view.state.q, phase.base, self._gains)
-        return Wish(hand, base, phase.focus, phase.gripper)
+        if self._index >= len(self._phases) or self._reached_at is not None:
+            return Wish.rest(phase.focus, phase.gripper)
+        hand = hand_twist(view.tool, phase.hand, self._gains, phase.pace)
+        base = base_twist(view.state.q, phase.base, self._gains)
+        target = Target(phase.hand, phase.base, phase.distance, phase.angle, phase.pace)
+        return Wish(hand, base, phase.focus, phase.gripper, target)
 
     def _enter(self, index: int, time: float) -> None:
         self._index = index
@@ -80,8 +82,8 @@ class PhaseRunner:
     def _advance(self, view: View) -> None:
         if self._index >= len(self._phases):
             return
-        time = view.state.time
-        if self._reached_at is None and (self._reached(view) or time - self._entered > self.phase.patience):
+        time, patience = view.state.time, self._gains.patience * self.phase.patience
+        if self._reached_at is None and (self._reached(view) or time - self._entered > patience):
             self._reached_at = time
         if self._reached_at is not None and time - self._reached_at >= self.phase.dwell:
             back = self._redo(view, self.phase.name)

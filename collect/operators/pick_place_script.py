@@ -4,20 +4,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from handrail.collect.operators.modes import Wish
 from handrail.collect.operators.operator import View
 from handrail.collect.operators.phases import Phase, PhaseRunner
-from handrail.collect.operators.standing import standing_point
+from handrail.collect.operators.route import Route, front_edge
 from handrail.collect.operators.steering import Gains, pose_errors
-from handrail.collect.scene import SceneObject
-from handrail.collect.tasks.task import TaskState
+from handrail.collect.operators.wish import Wish
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.model import Pose, RobotModel
 
 _HELD = 0.05  # a cube this near to the tool point is held [m]
+_GRASP = 0.010  # of the hand above the middle of the cube [m]
 _RETREAT = 0.40  # hand behind the table's edge while carrying [m]
 _AHEAD = 0.80  # hand before the base's centre while carrying [m]
-_CLEARANCE = 0.25  # of the chassis behind the floor obstacles [m]
 
 
 @dataclass(frozen=True)
@@ -63,24 +61,35 @@ class PickPlaceScript:
 
     def _phases(self, view: View) -> list[Phase]:
         task = view.task
+        self._route = Route(self._model, task)
         cube = task.pose("cube")
-        pick = _Place(_front_edge(task, "cube_table"), cube.position)
-        place = _Place(_front_edge(task, "bin_table"), task.pose("bin").position)
+        pick = _Place(front_edge(task, "cube_table"), cube.position)
+        place = _Place(front_edge(task, "bin_table"), task.pose("bin").position)
         down = grasp_rotation(view.tool.rotation, cube.rotation)
         rim = task.object("bin").top - place.thing[2]
         phases = self._pick(pick, down)
-        lane = self._lane(task)
-        phases += self._carry(pick, place, down, lane)
+        phases += self._carry(pick, place, down)
         phases += self._place(place, down, rim)
+        lane = self._route.lane
         if self._drives:
-            drive = self._drive(view.state.q[:3], self._stand(pick), phases[0].hand, lane, 0.0)
-            phases = drive + phases
-        elif self._blocked(task, view.state.q[:2], self._stand(pick)[:2]):
+            *across, up = self._route.drive(view.state.q[:3], self._stand(pick), phases[0].hand, 0.0)
+            phases = [
+                *across,
+                self._ready(across[-1].base if across else view.state.q, pick, down),
+                up,
+                *phases,
+            ]
+        elif self._route.blocked(view.state.q[:2], self._stand(pick)[:2]):
             height = cube.position[2] + 0.30
             around = Pose(np.array([lane + _AHEAD, cube.position[1], height]), down)
             base = np.array([lane, cube.position[1], 0.0])
             phases.insert(0, Phase("approach", around, base, distance=0.15, angle=0.5))
         return phases
+
+    def _ready(self, base: FloatArray, pick: _Place, down: FloatArray) -> Phase:
+        """Return the phase that folds the arm before it is driven up to the table, from where the base is."""
+        hand = np.array([base[0] + _AHEAD, base[1], pick.thing[2] + 0.30])
+        return Phase("ready", Pose(hand, down), base, distance=0.15, angle=0.5)
 
     def _pick(self, pick: _Place, down: FloatArray) -> list[Phase]:
         cube, base = pick.thing, self._stand(pick)
@@ -92,14 +101,15 @@ class PickPlaceScript:
         return [
             phase("stage", stage, distance=0.10, angle=0.30),
             phase("above", _above(cube, 0.14), distance=0.02, angle=0.10),
-            phase("descend", _above(cube, 0.004), distance=0.010, angle=0.10, pace=0.4, patience=8.0),
-            phase("grasp", _above(cube, 0.004), distance=1.0, angle=3.2, gripper=1.0, dwell=1.2),
+            phase("descend", _above(cube, _GRASP), distance=0.010, angle=0.10, pace=0.4, patience=8.0),
+            phase("grasp", _above(cube, _GRASP), distance=1.0, angle=3.2, gripper=1.0, dwell=1.2),
             phase("lift", _above(cube, 0.22), distance=0.04, angle=0.3, gripper=1.0, pace=0.6),
         ]
 
-    def _carry(self, pick: _Place, place: _Place, down: FloatArray, lane: float) -> list[Phase]:
+    def _carry(self, pick: _Place, place: _Place, down: FloatArray) -> list[Phase]:
         """Pull back until the base is behind the floor obstacles, cross, and go up to the other table."""
         height = max(pick.thing[2], place.thing[2]) + 0.30
+        lane = self._route.lane
         hand_lane = lane + _AHEAD
 
         def phase(name: str, x: float, at: _Place, base: FloatArray) -> Phase:
@@ -107,9 +117,9 @@ class PickPlaceScript:
             return Phase(name, hand, base, gripper=1.0, distance=0.12, angle=0.4)
 
         if self._drives:
-            retreat = phase("retreat", pick.edge - _RETREAT, pick, self._stand(pick))
-            front = phase("front", place.edge - _RETREAT, place, self._stand(place))
-            return [retreat, *self._drive(self._stand(pick), self._stand(place), front.hand, lane, 1.0)]
+            retreat = phase("retreat", self._stand(pick)[0] + _AHEAD, pick, self._stand(pick))
+            front = phase("front", self._stand(place)[0] + _AHEAD, place, self._stand(place))
+            return [retreat, *self._route.drive(self._stand(pick), self._stand(place), front.hand, 1.0)]
         return [
             phase("retreat", hand_lane, pick, np.array([lane, pick.thing[1], 0.0])),
             phase("cross", hand_lane, place, np.array([lane, place.thing[1], 0.0])),
@@ -131,55 +141,11 @@ class PickPlaceScript:
         ]
 
     def _stand(self, place: _Place) -> FloatArray:
-        """Return where the base stands: comfortable, and clear of the table."""
-        base = standing_point(self._model, place.thing)
-        length = self._model.description.base_size[0]
-        base[0] = min(base[0], place.edge - length / 2 - 0.25)
-        return base
-
-    def _drive(
-        self, start: FloatArray, goal: FloatArray, hand: Pose, lane: float, gripper: float
-    ) -> list[Phase]:
-        """Drive in the lane behind the obstacles, then up to the table."""
-        points = [goal]
-        if abs(goal[1] - start[1]) > 0.3:
-            back, across = (np.array([min(lane, start[0]), y, 0.0]) for y in (start[1], goal[1]))
-            points = [back, across, goal] if start[0] > lane else [across, goal]
-        return [
-            Phase("drive", hand, point, focus="base", gripper=gripper, distance=0.12, angle=0.15)
-            for point in points
-        ]
-
-    def _blocked(self, task: TaskState, start: FloatArray, goal: FloatArray) -> bool:
-        """Return whether something on the floor is in the chassis' way between two places, (2,) each."""
-        width = np.hypot(*self._model.description.base_size) / 2 + _CLEARANCE / 2
-        for item in _floor_obstacles(task):
-            along = np.clip(
-                (item.position[:2] - start) @ (goal - start) / max(np.sum((goal - start) ** 2), 1e-9), 0, 1
-            )
-            gap = np.linalg.norm(item.position[:2] - start - along * (goal - start))
-            if gap < width + np.hypot(*item.shape.size[:2]) / 2:
-                return True
-        return False
-
-    def _lane(self, task: TaskState) -> float:
-        """Return the x of the lane in which the base passes behind everything on the floor [m]."""
-        behind = [item.position[0] - np.hypot(*item.shape.size[:2]) / 2 for item in _floor_obstacles(task)]
-        return float(min(behind, default=0.0)) - self._model.description.base_size[0] / 2 - _CLEARANCE
-
-
-def _floor_obstacles(task: TaskState) -> list[SceneObject]:
-    return [item for item in task.episode.scene.objects if item.name.startswith("obstacle")]
+        return self._route.stand(place.thing, place.edge)
 
 
 def _above(position: FloatArray, height: float) -> FloatArray:
     return position + np.array([0.0, 0.0, height])
-
-
-def _front_edge(task: TaskState, table: str) -> float:
-    """Return the x of a table's edge that faces the robot [m]."""
-    item = task.object(table)
-    return float(item.position[0] - item.shape.size[0] / 2)
 
 
 def grasp_rotation(tool: FloatArray, cube: FloatArray) -> FloatArray:

@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from handrail.collect.operators.modes import Wish
 from handrail.collect.operators.operator import View
 from handrail.collect.operators.phases import Phase, PhaseRunner
-from handrail.collect.operators.standing import standing_point
+from handrail.collect.operators.standing import standing_pose
 from handrail.collect.operators.steering import Gains
+from handrail.collect.operators.wish import Wish
 from handrail.controllers.model import RobotModel
 
 
@@ -21,9 +21,10 @@ class ReachScript:
     def reset(self, view: View) -> None:
         """Plan to drive to where the goal is in comfortable reach, then to steer the hand to it."""
         goal = view.task.goal or view.tool
-        base = standing_point(self._model, goal.position)
-        phases = [Phase("reach", goal, base, distance=0.02, angle=0.05, patience=np.inf)]
-        if self._drives and np.hypot(*(base[:2] - view.state.q[:2])) > 0.4:
+        base = standing_pose(self._model, view.state.q, goal)
+        phases = [Phase("reach", goal, base, distance=0.06, angle=0.25)]
+        far = np.hypot(*(base[:2] - view.state.q[:2])) > 0.4 or abs(base[2] - view.state.q[2]) > 0.2
+        if self._drives and far:
             phases.insert(0, Phase("drive", goal, base, focus="base", distance=0.15, angle=0.2))
         self._runner.start(phases, view.state.time)
 

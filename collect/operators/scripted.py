@@ -1,14 +1,19 @@
-"""The scripted operator: a script that knows what it wants, through a human-like hand."""
+"""The scripted operator: a script that knows what it wants, seen and steered as a person would."""
 
+from dataclasses import replace
 from typing import Protocol
 
 import numpy as np
 
-from handrail.collect.operators.human import HumanHand, HumanSettings
-from handrail.collect.operators.modes import Focus, InputMap, TeleopMode, Wish
+from handrail.collect.operators.devices import input_map
+from handrail.collect.operators.hand import HumanHand
+from handrail.collect.operators.human import HumanSettings
+from handrail.collect.operators.modes import TeleopMode
 from handrail.collect.operators.operator import View
-from handrail.collect.operators.steering import Gains
-from handrail.controllers.intent import Intent
+from handrail.collect.operators.perception import Perception
+from handrail.collect.operators.wish import Wish
+from handrail.controllers.arrays import BoolArray
+from handrail.controllers.intent import Intent, RawInput
 from handrail.controllers.model import RobotModel
 
 
@@ -27,26 +32,24 @@ class Script(Protocol):
 class ScriptedOperator:
     """Follows a script in a teleop mode; an operator.
 
+    ```
+    script ─ wish ─▶ perception ─▶ input map ─ wanted ─▶ hand ─▶ input map ─ sent ─▶ intent
+                     (misjudges)   (of the mode)         (late, intermittent, noisy)
+    ```
+    Only the input map differs between modes.
+
     Args:
         model: of the robot.
         script: of the task.
         mode: the teleop mode.
-        human: how human the hand is.
-        gains: how briskly it steers.
+        human: who steers.
     """
 
-    def __init__(
-        self,
-        model: RobotModel,
-        script: Script,
-        mode: TeleopMode,
-        human: HumanSettings,
-        gains: Gains,
-    ) -> None:
+    def __init__(self, model: RobotModel, script: Script, mode: TeleopMode, human: HumanSettings) -> None:
         self._script = script
-        self._map = InputMap(model, mode, gains)
-        self._settings = human
-        self._hand = HumanHand(human, self._map.full)
+        self._mode = mode
+        self._map = input_map(model, mode)
+        self._human = replace(human, refractory=human.refractory * mode.refractory)
 
     @property
     def name(self) -> str:
@@ -54,29 +57,31 @@ class ScriptedOperator:
         return "scripted"
 
     def reset(self, view: View, rng: np.random.Generator) -> None:
-        """Begin an episode."""
+        """Begin an episode; how the person is today is drawn first."""
+        self._settings = self._human.episode(rng)
         self._script.reset(view)
-        self._hand.reset(rng)
-        self._focus: Focus | None = None
+        self._perception = Perception(self._settings, rng)
+        self._hand = HumanHand(self._settings, self._map.full, rng)
+        self._map.reset(view, self._settings, rng)
+        self._mask: BoolArray | None = None
+        self._switches = 0
         self._free_at = -np.inf
 
     def act(self, view: View) -> Intent:
         """Return the intent now: the wish in this mode's channels, as the hand manages it."""
-        wish = self._script.wish(view)
         time = view.state.time
-        self._switch(wish.focus, time)
-        wanted = self._map.values(wish, view.state.q)
-        if time < self._free_at:
-            wanted = np.zeros_like(wanted)
-        mask = self._map.mask(wish.focus)
-        values = np.where(mask, self._hand.move(wanted, time), 0.0)
-        return Intent(values, mask, wish.gripper, self._map.mode.name, time)
+        wish = self._perception.see(self._script.wish(view), view.tool, time)
+        mask, wanted = self._map.wanted(wish, view.state)
+        self._switch(mask, time)
+        moved = self._hand.move(np.zeros_like(wanted) if time < self._free_at else wanted, time)
+        moved = np.where(mask, moved, 0.0)
+        values = np.where(mask, self._map.sent(moved, view.state), 0.0)
+        raw = RawInput(self._map.raw(moved), int(np.count_nonzero(moved)), self._switches)
+        return Intent(values, mask, wish.gripper, self._mode.name, time, raw=raw)
 
-    def _switch(self, focus: Focus, time: float) -> None:
-        """Take the hand off the stick for a moment when the mode's channels change."""
-        changes = self._focus is not None and self._map.mode.groups(focus) != self._map.mode.groups(
-            self._focus
-        )
-        if changes:
+    def _switch(self, mask: BoolArray, time: float) -> None:
+        """Take the hand off the input for a moment when it acts on other channels from now on."""
+        if self._mask is not None and not np.array_equal(mask, self._mask):
+            self._switches += 1
             self._free_at = time + self._settings.switch_time
-        self._focus = focus
+        self._mask = mask

@@ -3,6 +3,7 @@
 import numpy as np
 
 from handrail.collect.scene import Colour, Part, SceneObject, box
+from handrail.controllers.arrays import FloatArray
 from handrail.controllers.rotation import matrix_from_rpy
 from handrail.controllers.shape import Shape
 
@@ -10,6 +11,10 @@ _WOOD: Colour = (0.72, 0.56, 0.40, 1.0)
 _CABINET: Colour = (0.87, 0.86, 0.83, 1.0)
 _WALL: Colour = (0.20, 0.42, 0.70, 1.0)
 _CONE: Colour = (0.90, 0.45, 0.10, 1.0)
+_STEEL: Colour = (0.45, 0.47, 0.50, 1.0)
+_TRAY: Colour = (0.30, 0.55, 0.42, 1.0)
+
+TRAY_BAR = 0.03  # width and height of a tray's handle [m]
 
 
 def table(name: str, x: float, y: float, size: tuple[float, float, float]) -> SceneObject:
@@ -82,3 +87,40 @@ def footprint(item: SceneObject) -> float:
     """Return the radius of the circle around an upright object, seen from above [m]."""
     size = item.shape.size
     return float(np.hypot(*size[:2]) / 2) if item.shape.kind == "box" else float(size[0])
+
+
+def tray(
+    name: str, handle: FloatArray, rotation: FloatArray, size: tuple[float, float, float], mass: float
+) -> SceneObject:
+    """Return a tray with a rim and an arched handle to hold it by from above.
+
+    Its frame is at the centre of the plate's upper face, z up, the handle's bar along y.
+
+    Args:
+        name: unique in the scene.
+        handle: centre of the handle's bar, (3,) [m].
+        rotation: world from tray, (3, 3).
+        size: length along x, width along y, height of the bar above the plate's upper face [m].
+        mass: [kg].
+    """
+    length, width, height = size
+    thick, rim, bar = 0.01, 0.012, TRAY_BAR
+    side, end = (length / 2 - thick / 2, 0.0), (0.0, width / 2 - thick / 2)
+    parts = [Part(box([length, width, thick]), np.array([0.0, 0.0, -thick / 2]))]
+    for sign in (-1.0, 1.0):
+        parts.append(Part(box([thick, width, rim]), np.array([sign * side[0], side[1], rim / 2])))
+        parts.append(Part(box([length - 2 * thick, thick, rim]), np.array([end[0], sign * end[1], rim / 2])))
+        post = np.array([0.0, sign * end[1], (rim + height) / 2])
+        parts.append(Part(box([bar, thick, height - rim]), post, rgba=_STEEL))
+    parts.append(Part(box([bar, width, bar]), np.array([0.0, 0.0, height]), rgba=_STEEL))
+    shape = box([length, width, 2 * (height + bar)])
+    position = handle - rotation @ np.array([0.0, 0.0, height])
+    return SceneObject(
+        name, shape, position, rotation, rgba=_TRAY, mass=mass, parts=tuple(parts), friction=0.35
+    )
+
+
+def can(name: str, position: FloatArray, radius: float, height: float, mass: float) -> SceneObject:
+    """Return an upright can centred at a place, (3,) [m]."""
+    shape = Shape("cylinder", np.array([radius, height]))
+    return SceneObject(name, shape, position, rgba=(0.85, 0.16, 0.14, 1.0), mass=mass, friction=0.35)

@@ -5,14 +5,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from handrail.collect.scene import Scene, SceneObject, View
-from handrail.collect.tasks.furniture import crate, cube, footprint, open_bin, pillar, table
+from handrail.collect.tasks.clutter import obstacle_features, obstacle_names, sample_obstacles
+from handrail.collect.tasks.furniture import cube, open_bin, table
 from handrail.collect.tasks.task import Episode, Outcome, TaskState
 from handrail.controllers.arrays import FloatArray
-from handrail.controllers.errors import HandrailError
 from handrail.controllers.model import RobotModel
 from handrail.controllers.rotation import quaternion_from_matrix
 
-_MOST_OBSTACLES = 3
 _EDGE, _MASS = 0.05, 0.1  # of the cube [m], [kg]
 _BIN_HEIGHT = 0.10
 _POSE = ("x", "y", "z", "qw", "qx", "qy", "qz")
@@ -45,9 +44,7 @@ class PickPlace:
         """Cube pose, bin centre, the tables' top centres, obstacles (absent ones are all zero)."""
         names = [f"cube.{axis}" for axis in _POSE]
         names += [f"{item}.{axis}" for item in ("bin", "cube_table", "bin_table") for axis in "xyz"]
-        for index in range(_MOST_OBSTACLES):
-            names += [f"obstacle_{index}.{quantity}" for quantity in ("x", "y", "radius", "height")]
-        return tuple(names)
+        return (*names, *obstacle_names())
 
     def sample(self, model: RobotModel, rng: np.random.Generator) -> Episode:
         """Draw tables, cube, bin, obstacles and the robot's start."""
@@ -60,7 +57,7 @@ class PickPlace:
             bin_table,
             _sample_cube(cube_table, rng),
             _sample_bin(bin_table, rng),
-            *self._sample_obstacles(model, q, rng),
+            *sample_obstacles(model, q, rng, self.clearance),
         )
         return Episode(Scene(objects, _VIEW), q)
 
@@ -71,10 +68,7 @@ class PickPlace:
         for name in ("cube_table", "bin_table"):
             item = state.object(name)
             numbers += [item.position[0], item.position[1], item.top]
-        for item in state.episode.scene.objects:
-            if item.name.startswith("obstacle"):
-                numbers += [item.position[0], item.position[1], footprint(item), item.top]
-        return np.pad(np.array(numbers), (0, len(self.state_names) - len(numbers)))
+        return np.concatenate([numbers, obstacle_features(state.episode.scene)])
 
     def outcome(self, state: TaskState) -> Outcome:
         """Judge where the cube is, whether it rests, and where the gripper is."""
@@ -84,32 +78,6 @@ class PickPlace:
         away = float(np.linalg.norm(state.tool.position - position)) >= self.retreat
         rests = _inside_bin(state, position) and state.twists["cube"].is_still
         return Outcome(success=rests and away and state.opening > 0.8)
-
-    def _sample_obstacles(
-        self, model: RobotModel, q: FloatArray, rng: np.random.Generator
-    ) -> list[SceneObject]:
-        """Draw two or three obstacles; reject those that overlap another or come close to the robot's start.
-
-        Raises:
-            HandrailError: there is no room for them.
-        """
-        wanted = int(rng.integers(2, _MOST_OBSTACLES + 1))
-        start, reach = _start_circle(model, q)
-        placed: list[SceneObject] = []
-        for _ in range(1000):
-            if len(placed) == wanted:
-                return placed
-            item = _sample_obstacle(f"obstacle_{len(placed)}", rng)
-            circles = [(start, reach), *((other.position[:2], footprint(other)) for other in placed)]
-            if all(
-                np.linalg.norm(item.position[:2] - centre) > radius + footprint(item) + self.clearance
-                for centre, radius in circles
-            ):
-                placed.append(item)
-        raise HandrailError(
-            f"task {self.name}: no room for {wanted} obstacles around robot {model.description.name}, "
-            f"which starts at {start.round(2).tolist()}"
-        )
 
 
 def _sample_table(name: str, side: float, rng: np.random.Generator) -> SceneObject:
@@ -136,26 +104,11 @@ def _sample_bin(on: SceneObject, rng: np.random.Generator) -> SceneObject:
     return open_bin("bin", x, y, on.top, inner, _BIN_HEIGHT)
 
 
-def _sample_obstacle(name: str, rng: np.random.Generator) -> SceneObject:
-    x, y = rng.uniform([-0.4, -0.45], [0.5, 0.45])
-    height = rng.uniform(0.2, 0.5)
-    if rng.random() < 0.6:
-        return pillar(name, x, y, rng.uniform(0.10, 0.18), height)
-    width, depth = rng.uniform(0.16, 0.26, 2)
-    return crate(name, x, y, rng.uniform(-np.pi / 4, np.pi / 4), (width, depth, height))
-
-
 def _sample_start(model: RobotModel, rng: np.random.Generator) -> FloatArray:
     """Return home with a little noise: 10 cm, 0.15 rad, 0.05 rad in the arm's joints."""
     base = len(model.description.base_joints)
     spread = np.concatenate([np.array([0.10, 0.10, 0.15])[:base], np.full(model.size - base, 0.05)])
     return model.description.home + rng.uniform(-spread, spread)
-
-
-def _start_circle(model: RobotModel, q: FloatArray) -> tuple[FloatArray, float]:
-    """Return a circle around the chassis where it starts: centre (2,) and radius [m]."""
-    base = model.pose(q, "planar_base").position[:2]
-    return base, float(np.hypot(*model.description.base_size) / 2)
 
 
 def _inside_bin(state: TaskState, position: FloatArray) -> bool:

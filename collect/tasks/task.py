@@ -16,11 +16,19 @@ from handrail.controllers.shape import Obstacle
 
 @dataclass(frozen=True)
 class Episode:
-    """A sampled beginning: the scene, where the robot starts, (n,), and the tool's goal if there is one."""
+    """A sampled beginning.
+
+    Attributes:
+        scene: everything around the robot.
+        q: where the robot starts, (n,).
+        goal: of the tool, if there is one.
+        grip: width of what the gripper already holds [m]; None begins with it open.
+    """
 
     scene: Scene
     q: FloatArray
     goal: Pose | None = None
+    grip: float | None = None
 
     def __post_init__(self) -> None:
         """Copy the array and make it read-only."""

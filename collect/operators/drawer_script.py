@@ -1,0 +1,80 @@
+"""How an operator pulls a drawer open."""
+
+import numpy as np
+
+from handrail.collect.operators.operator import View
+from handrail.collect.operators.phases import Phase, PhaseRunner
+from handrail.collect.operators.standing import standing_point
+from handrail.collect.operators.steering import Gains
+from handrail.collect.operators.wish import Wish
+from handrail.collect.tasks.cabinet import inward
+from handrail.collect.tasks.drawer import handle, opened
+from handrail.controllers.arrays import FloatArray
+from handrail.controllers.model import Pose, RobotModel
+
+_PULL = 0.26  # how far the operator means to open it [m]
+_ENOUGH = 0.21  # [m]
+
+
+class DrawerScript:
+    """Approach, grasp, pull, let go for `handrail/Drawer-v0`; a script.
+
+    Args:
+        model: of the robot.
+        gains: of the operator.
+        drives: whether the operator drives the base by itself first.
+    """
+
+    def __init__(self, model: RobotModel, gains: Gains, drives: bool) -> None:
+        self._model = model
+        self._drives = drives
+        self._runner = PhaseRunner(gains, self._redo)
+
+    def reset(self, view: View) -> None:
+        """Look at the scene and plan."""
+        self._runner.start(self._phases(view), view.state.time)
+
+    def wish(self, view: View) -> Wish:
+        """Return what is wanted now."""
+        return self._runner.wish(view)
+
+    def _redo(self, view: View, name: str) -> int | None:
+        """Begin again at the handle when the drawer did not come along."""
+        if name != "release" or opened(view.task) > _ENOUGH:
+            return None
+        phases = self._phases(view)
+        index = next(i for i, phase in enumerate(phases) if phase.name == "stage")
+        self._runner.start(phases, view.state.time, index)
+        return index
+
+    def _phases(self, view: View) -> list[Phase]:
+        into = inward(view.task.object("cabinet").rotation)
+        bar, grasp = handle(view.task), handle_rotation(view.tool.rotation, into)
+        pull = max(_PULL - opened(view.task), 0.05)
+        yaw = float(np.arctan2(into[1], into[0]))
+        base = standing_point(self._model, bar, yaw)
+
+        def phase(name: str, back: float, **options: float) -> Phase:
+            stand = base - np.array([pull * into[0], pull * into[1], 0.0]) * (name in ("pull", "release"))
+            return Phase(name, Pose(bar - back * into, grasp), stand, **options)  # type: ignore[arg-type]
+
+        phases = [
+            phase("stage", 0.16, distance=0.02, angle=0.10),
+            phase("approach", 0.0, distance=0.010, angle=0.10, pace=0.4, patience=8.0),
+            phase("grasp", 0.0, distance=1.0, angle=3.2, gripper=1.0, dwell=1.2),
+            phase("pull", pull, distance=0.03, angle=3.2, gripper=1.0, pace=0.5, patience=15.0),
+            phase("release", pull, distance=1.0, angle=3.2, dwell=0.8),
+            phase("leave", pull + 0.15, distance=0.03, angle=3.2, pace=0.5, patience=5.0),
+        ]
+        if self._drives:
+            hand = phases[0].hand
+            phases.insert(0, Phase("drive", hand, base, focus="base", distance=0.08, angle=0.08))
+        return phases
+
+
+def handle_rotation(tool: FloatArray, into: FloatArray) -> FloatArray:
+    """Return the rotation nearest to the tool's that points it into the cabinet, fingers above and below."""
+    candidates = [
+        np.column_stack([up, np.cross(into, up), into]) for up in ([0.0, 0.0, 1.0], [0.0, 0.0, -1.0])
+    ]
+    return max(candidates, key=lambda rotation: float(np.trace(rotation.T @ tool)))

@@ -1,0 +1,81 @@
+"""A leader arm: the operator moves a small copy of the arm; the robot's joints go where its joints are."""
+
+import numpy as np
+
+from handrail.collect.operators.human import HumanSettings
+from handrail.collect.operators.input_map import full_stick
+from handrail.collect.operators.operator import View
+from handrail.collect.operators.steering import Gains
+from handrail.collect.operators.wander import Wander
+from handrail.collect.operators.wish import Wish
+from handrail.controllers.arm_completion import ArmCompletion
+from handrail.controllers.arrays import BoolArray, FloatArray
+from handrail.controllers.channels import Channels
+from handrail.controllers.controller import State
+from handrail.controllers.model import RobotModel
+
+_FOLLOW = 6.0  # of the joints towards the leader's [1/s]
+
+
+class LeaderArmMap:
+    """Absolute joint targets from one hand, a stick for the base in the other; nothing to switch.
+
+    The hand takes the leader along, whose joints q_L follow by its mechanics: `q̇_L = J⁺ hand`. The robot is
+    sent `q̇ = q̇_L + k (q_L + tremor − q)`. The leader starts where the arm is, so that nothing jumps.
+
+    Args:
+        model: of the robot.
+        gains: full stick of hand and base.
+    """
+
+    def __init__(self, model: RobotModel, gains: Gains) -> None:
+        self.channels = Channels.of(model.description)
+        self._model = model
+        self._gains = gains
+        self._base = len(model.description.base_joints)
+        self._arm = slice(self.channels.joint_slice.start + self._base, self.channels.size)
+        self._mechanics = ArmCompletion(model)
+
+    @property
+    def full(self) -> FloatArray:
+        """Full stick of the base, fastest motion of the leader's joints, (m,)."""
+        return full_stick(self._model, self._gains)
+
+    def reset(self, view: View, settings: HumanSettings, rng: np.random.Generator) -> None:
+        """Take hold of the leader, which stands as the arm does."""
+        size = self._model.size - self._base
+        self._leader = view.state.q[self._base :].copy()
+        self._tremor = settings.tremor
+        self._wander = Wander((size,), settings.correlation, rng)
+        self._still = self._wander.at(view.state.time).copy()  # the tremor counts from how the hand took hold
+        self._time = view.state.time
+
+    def wanted(self, wish: Wish, state: State) -> tuple[BoolArray, FloatArray]:
+        """Return the mask, base stick and arm together, and how fast the leader shall be moved."""
+        values = np.zeros(self.channels.size)
+        if wish.focus == "base":
+            values[self.channels.base_slice] = wish.base[: self._base]
+        else:
+            nothing = np.zeros(self._base)
+            values[self._arm] = self._mechanics.arm_velocity(state.q, nothing, wish.hand)
+        return self.channels.mask(*(("base",) if self._base else ()), "arm"), values
+
+    def sent(self, moved: FloatArray, state: State) -> FloatArray:
+        """Return the base's stick, and the velocity that takes the arm's joints to the leader's."""
+        elapsed, self._time = state.time - self._time, state.time
+        lower, upper = self._limits()
+        self._leader = np.clip(self._leader + elapsed * moved[self._arm], lower, upper)
+        trembling = self._tremor * (self._wander.at(state.time) - self._still)
+        sent = moved.copy()
+        sent[self._arm] += _FOLLOW * (self._leader + trembling - state.q[self._base :])
+        return sent
+
+    def raw(self, moved: FloatArray) -> FloatArray:
+        """Return the base's deflection and the leader's joint angles [rad]."""
+        raw = moved / self.full
+        raw[self._arm] = self._leader
+        return raw
+
+    def _limits(self) -> tuple[FloatArray, FloatArray]:
+        limits = self._model.description.limits
+        return limits.position_lower[self._base :], limits.position_upper[self._base :]

@@ -1,0 +1,124 @@
+"""Carry an open tray with a loose can on it past obstacles on the floor, and put it down on a table."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from handrail.collect.scene import Scene, SceneObject, View
+from handrail.collect.tasks.clutter import obstacle_features, obstacle_names, sample_obstacles
+from handrail.collect.tasks.furniture import TRAY_BAR, can, table, tray
+from handrail.collect.tasks.task import Episode, Outcome, TaskState
+from handrail.controllers.arm_pose import arm_configuration
+from handrail.controllers.arrays import FloatArray
+from handrail.controllers.errors import HandrailError
+from handrail.controllers.model import Pose, RobotModel
+from handrail.controllers.rotation import quaternion_from_matrix
+
+_SIZE = (0.26, 0.32, 0.20)  # of the tray: length, width, handle above the plate [m]
+_TRAY_MASS, _CAN_MASS = 0.35, 0.20  # [kg]
+_RADIUS, _HEIGHT = 0.033, 0.10  # of the can [m]
+_POSE = ("x", "y", "z", "qw", "qx", "qy", "qz")
+_VIEW = View(position=(2.2, 0.0, 2.9), target=(-0.2, 0.0, 0.3), fovy=62.0)
+HANDLE = np.array([0.0, 0.0, _SIZE[2]])  # centre of the handle's bar in the tray's frame [m]
+
+
+@dataclass(frozen=True)
+class Tray:
+    """The robot starts with the tray's handle in its gripper; nothing fastens the can.
+
+    Success: the tray at rest on the table, the can standing on it, the gripper open and away.
+    Failure: the can fell off or over; the tray dropped.
+
+    Attributes:
+        name: of the task.
+        description: what the operator is asked to do.
+        horizon: time limit [s].
+        clearance: between the robot's start and anything on the floor, and between obstacles [m].
+        retreat: least distance of the tool point from the handle at the end [m].
+    """
+
+    name: str = "Tray"
+    description: str = "Carry the tray to the table and put it down without spilling the can."
+    horizon: float = 90.0
+    clearance: float = 0.15
+    retreat: float = 0.08
+
+    @property
+    def state_names(self) -> tuple[str, ...]:
+        """Tray pose, can pose, the table's top centre, obstacles (absent ones are all zero)."""
+        names = [f"{item}.{axis}" for item in ("tray", "can") for axis in _POSE]
+        return (*names, *(f"table.{axis}" for axis in "xyz"), *obstacle_names())
+
+    def sample(self, model: RobotModel, rng: np.random.Generator) -> Episode:
+        """Draw the table, the robot's start with the tray in hand, the can on it, and obstacles."""
+        side = rng.choice([-1.0, 1.0])
+        x, y = 1.05 + rng.uniform(-0.05, 0.05), side * 1.30 + rng.uniform(-0.10, 0.10)
+        goal = table("table", x, y, (0.6, 0.7, rng.uniform(0.55, 0.65)))
+        q = _sample_start(model, side, rng)
+        tool = model.pose(q)
+        held = tray("tray", tool.position, _level(tool.rotation), _SIZE, _TRAY_MASS)
+        objects = (goal, held, _sample_can(held, rng), *sample_obstacles(model, q, rng, self.clearance))
+        return Episode(Scene(objects, _VIEW), q, grip=TRAY_BAR)
+
+    def features(self, state: TaskState) -> FloatArray:
+        """Return the numbers that `state_names` names, (29,)."""
+        numbers: list[float] = []
+        for name in ("tray", "can"):
+            pose = state.pose(name)
+            numbers += [*pose.position, *quaternion_from_matrix(pose.rotation)]
+        goal = state.object("table")
+        numbers += [*goal.position[:2], goal.top]
+        return np.concatenate([numbers, obstacle_features(state.episode.scene)])
+
+    def outcome(self, state: TaskState) -> Outcome:
+        """Judge the tray, then the can on it, then whether the tray was left on the table."""
+        held, goal = state.pose("tray"), state.object("table")
+        if held.position[2] < goal.top - 0.05 or held.rotation[2, 2] < np.cos(0.8):
+            return Outcome(failure="tray_dropped")
+        if not _stands_on(held, state.pose("can")):
+            return Outcome(failure="can_fell")
+        inside = np.abs(held.position[:2] - goal.position[:2]) < goal.shape.size[:2] / 2
+        down = held.position[2] < goal.top + 0.02 and state.twists["tray"].is_still and inside.all()
+        handle = held.position + held.rotation @ HANDLE
+        away = float(np.linalg.norm(state.tool.position - handle)) >= self.retreat
+        return Outcome(success=bool(down) and away and state.opening > 0.8)
+
+
+def _stands_on(held: Pose, thing: Pose) -> bool:
+    """Return whether the can stands upright on the tray."""
+    local = held.rotation.T @ (thing.position - held.position)
+    inside = np.all(np.abs(local[:2]) < np.array(_SIZE[:2]) / 2) and 0.0 < local[2] < _HEIGHT
+    return bool(inside) and float(held.rotation[:, 2] @ thing.rotation[:, 2]) > np.cos(0.8)
+
+
+def _sample_start(model: RobotModel, side: float, rng: np.random.Generator) -> FloatArray:
+    """Return a start on the far side, the hand pointing down ahead of the base.
+
+    Raises:
+        HandrailError: the arm cannot hold the tray there.
+    """
+    q = np.array(model.description.home)
+    if model.description.base_joints:
+        q[:3] += rng.uniform([-0.10, -0.15, -0.15], [0.10, 0.15, 0.15])
+        q[1] -= 0.5 * side
+    ahead = np.array([np.cos(q[2]), np.sin(q[2]), 0.0]) if model.description.base_joints else np.eye(3)[0]
+    base = model.pose(q, "planar_base").position
+    place = base + rng.uniform(1.05, 1.20) * ahead + np.array([0.0, 0.0, rng.uniform(0.90, 1.00)])
+    down = np.column_stack([ahead, np.cross([0.0, 0.0, -1.0], ahead), [0.0, 0.0, -1.0]])
+    q, error = arm_configuration(model, q, Pose(place, down))
+    if error > 1e-3:
+        raise HandrailError(
+            f"task Tray: expected a robot that reaches {place.round(2).tolist()} from above, "
+            f"got {model.description.name}"
+        )
+    return q
+
+
+def _level(tool: FloatArray) -> FloatArray:
+    """Return the rotation of a level tray under a hand that points down, the bar along the hand's y."""
+    return tool @ np.diag([1.0, -1.0, -1.0])
+
+
+def _sample_can(on: SceneObject, rng: np.random.Generator) -> SceneObject:
+    offset = np.array([*rng.uniform([-0.05, -0.07], [0.05, 0.07]), _HEIGHT / 2])
+    return can("can", on.position + on.rotation @ offset, _RADIUS, _HEIGHT, _CAN_MASS)
