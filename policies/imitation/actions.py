@@ -121,11 +121,8 @@ class IntentActions:
         """(x, y) pairs along the world's axes; one that a mask splits stays so."""
         tool, joint = self.channels.tool_slice.start, self.channels.joint_slice.start
         starts = (tool, tool + 3, joint) if self.channels.base else (tool, tool + 3)
-        return [
-            [start, start + 1]
-            for start in starts
-            if all(mask[start] == mask[start + 1] for mask in self.masks)
-        ]
+        whole = [start for start in starts if all(mask[start] == mask[start + 1] for mask in self.masks)]
+        return [[start, start + 1] for start in whole]
 
 
 def masks_of(channels: Channels, episodes: Sequence[Columns]) -> tuple[Mask, ...]:
