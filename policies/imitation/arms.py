@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from handrail.collect.operators.modes import find_mode
 from handrail.collect.perturbations import Perturbation
 from handrail.controllers.errors import HandrailError
@@ -15,7 +17,7 @@ from handrail.policies.imitation.evaluate_config import EvaluateConfig
 FORMAT = "handrail.policy/1"
 META = "handrail.json"
 _NESTED = ("", "pretrained_model", "checkpoints/last/pretrained_model")
-_UNPROTECTED = ("direct", "split")  # completions of modes that keep nothing but the joints' limits
+UNPROTECTED = ("direct", "split")  # completions of modes that keep nothing but the joints' limits
 
 
 @dataclass(frozen=True)
@@ -36,6 +38,26 @@ class Checkpoint:
     def actions(self) -> str:
         """What it decides on: `realised` joint velocities, or the operator's `intent`."""
         return str(self.meta["interface"]["actions"])
+
+    @property
+    def environment(self) -> str:
+        """Which task it was trained for."""
+        return str(self.meta["environment"])
+
+    @property
+    def mode(self) -> str:
+        """Teleop mode of its demonstrations."""
+        return str(self.meta["mode"])
+
+    @property
+    def intent_mode(self) -> str:
+        """Teleop mode whose intents it decides on; empty for joint velocities."""
+        return self.mode if self.actions == "intent" else ""
+
+    @property
+    def fps(self) -> int:
+        """Decisions a second [Hz]."""
+        return int(self.meta["fps"])
 
     @property
     def key(self) -> tuple[int, int]:
@@ -103,7 +125,7 @@ def arms(config: EvaluateConfig) -> tuple[Arm, ...]:
             policy of an arm.
     """
     checkpoints = [read_checkpoint(folder) for folder in config.folders]
-    environments = {checkpoint.meta["environment"] for checkpoint in checkpoints}
+    environments = {checkpoint.environment for checkpoint in checkpoints}
     if len(environments) > 1:
         raise HandrailError(f"--policy: expected policies for one task, got {', '.join(sorted(environments))}")
     found: dict[tuple[str, tuple[int, int]], Arm] = {}
@@ -124,10 +146,10 @@ def arms(config: EvaluateConfig) -> tuple[Arm, ...]:
 def _arm(checkpoint: Checkpoint, protection: str, perturbation: Perturbation, label: str) -> Arm:
     own = _own(checkpoint)
     chosen = own if protection == "own" else protection
-    if chosen == "filter" and own != "filter" and not _commands_joints(checkpoint):
+    if chosen in ("mpc", "filter") and chosen != own and not _fits(checkpoint, chosen):
         raise HandrailError(
-            f"--protection filter: expected joint velocities, but {checkpoint.folder} decides on the intent of "
-            f"mode {checkpoint.meta['mode']}; expected own, none or mpc"
+            f"--protection {protection}: expected a policy that commands every joint, but {checkpoint.folder} "
+            f"decides on the intent of mode {checkpoint.mode}; expected own or none"
         )
     words = [label or _name(checkpoint), _protected(chosen, own), perturbation.words]
     return Arm(checkpoint, chosen, perturbation, " ".join(filter(None, words)))
@@ -135,22 +157,35 @@ def _arm(checkpoint: Checkpoint, protection: str, perturbation: Perturbation, la
 
 def _own(checkpoint: Checkpoint) -> str:
     """Return the protection that a policy's actions have by themselves."""
-    if checkpoint.actions == "realised":
+    if not checkpoint.intent_mode:
         return "none"
-    completion = find_mode(str(checkpoint.meta["mode"])).controller
-    return "none" if completion in _UNPROTECTED else completion
+    completion = find_mode(checkpoint.intent_mode).controller
+    return "none" if completion in UNPROTECTED else completion
 
 
-def _commands_joints(checkpoint: Checkpoint) -> bool:
-    """Return whether a policy leaves nothing to complete."""
-    if checkpoint.actions == "realised":
+def _fits(checkpoint: Checkpoint, protection: str) -> bool:
+    """Return whether a controller can stand in for a policy's own.
+
+    The filter completes nothing, so it needs every joint; so does the MPC where joints that nobody commands
+    are meant to rest.
+    """
+    if not checkpoint.intent_mode:
         return True
-    mode = find_mode(str(checkpoint.meta["mode"]))
-    return all(mode.groups(focus) in (("joint",), ("base", "arm")) for focus in ("base", "hand"))
+    completes = find_mode(checkpoint.intent_mode).controller != "direct"
+    return (protection == "mpc" and completes) or _commands_joints(checkpoint.meta["interface"])
+
+
+def _commands_joints(interface: Mapping[str, Any]) -> bool:
+    """Return whether every mask leaves nothing over: all joints, or the base's twist and the arm's joints."""
+    names, masks = interface["channels"], np.array(interface["masks"], bool)  # (k, m)
+    base, joint = (np.array([name.startswith(group) for name in names]) for group in ("base.", "joint."))
+    joints = masks[:, joint]  # (k, n), the base's first
+    driven = masks[:, base].all(axis=1) & joints[:, base.sum() :].all(axis=1) & base.any()
+    return bool(np.all(joints.all(axis=1) | driven))
 
 
 def _name(checkpoint: Checkpoint) -> str:
-    return str(checkpoint.meta["mode"]) + (" intent" if checkpoint.actions == "intent" else "")
+    return checkpoint.mode + (" intent" if checkpoint.actions == "intent" else "")
 
 
 def _protected(chosen: str, own: str) -> str:
