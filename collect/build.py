@@ -62,13 +62,16 @@ LEVEL = 20.0  # weight of a tray's tilt
 _VERSIONED = ("handrail", "lerobot", "mujoco", "pin", "coal", "casadi", "daqp", "numpy", "gymnasium")
 
 
-def build_env(config: SessionConfig, fps: int, render: bool = False) -> HandrailEnv:
+def build_env(
+    config: SessionConfig, fps: int, render: bool = False, task: Task | None = None
+) -> HandrailEnv:
     """Return the environment of a session.
 
     Args:
         config: of the session.
         fps: control and recording rate [Hz].
         render: whether `env.render()` shall give good-looking pictures.
+        task: instead of the one that the settings name.
 
     Raises:
         HandrailError: a setting is wrong, or cameras are asked for and GL is missing.
@@ -77,7 +80,7 @@ def build_env(config: SessionConfig, fps: int, render: bool = False) -> Handrail
     check_fps(fps)
     env = gymnasium.make(
         ENVIRONMENTS[config.task],
-        task=build_task(config),
+        task=task or build_task(config),
         robot=config.robot,
         fps=fps,
         cameras=config.camera_names,

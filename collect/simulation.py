@@ -8,7 +8,7 @@ import numpy as np
 
 from handrail.collect.contacts import ContactMonitor
 from handrail.collect.gl import mujoco
-from handrail.collect.robot import FINGERS, RobotSpec, build_robot
+from handrail.collect.robot import BASE_BODY, FINGERS, RobotSpec, build_robot
 from handrail.collect.scene import Scene, add_scene
 from handrail.collect.stage import set_stage
 from handrail.controllers.arrays import FloatArray
@@ -118,6 +118,20 @@ class Simulation:
         mujoco.mj_kinematics(self.mujoco_model, data)
         mujoco.mj_camlight(self.mujoco_model, data)
         return self._contacts.names
+
+    def push(self, base: FloatArray, hand: FloatArray) -> None:
+        """Let forces act from now on, until others are set.
+
+        Args:
+            base: on the base's centre of mass, in the world, (3,) [N].
+            hand: at the tool point, in the world, (3,) [N].
+        """
+        data = self.data
+        carrier = self.mujoco_model.site_bodyid[self._tool]
+        lever = data.site_xpos[self._tool] - data.xipos[carrier]
+        data.xfrc_applied[:] = 0.0
+        data.xfrc_applied[self.mujoco_model.body(BASE_BODY).id, :3] = base
+        data.xfrc_applied[carrier] += np.concatenate([hand, np.cross(lever, hand)])
 
     def _move_gripper(self, gripper: float) -> None:
         if not self._stroke:

@@ -1,0 +1,203 @@
+"""What is evaluated: a checkpoint under a condition, which together are an arm."""
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from handrail.collect.operators.modes import find_mode
+from handrail.collect.perturbations import Perturbation
+from handrail.controllers.errors import HandrailError
+from handrail.policies.imitation.evaluate_config import EvaluateConfig
+
+FORMAT = "handrail.policy/1"
+META = "handrail.json"
+_NESTED = ("", "pretrained_model", "checkpoints/last/pretrained_model")
+UNPROTECTED = ("direct", "split")  # completions of modes that keep nothing but the joints' limits
+
+
+@dataclass(frozen=True)
+class Checkpoint:
+    """A trained policy on the disk.
+
+    Attributes:
+        folder: that has its `handrail.json`.
+        meta: what it says.
+        digest: of all its files.
+    """
+
+    folder: Path
+    meta: Mapping[str, Any]
+    digest: str
+
+    @property
+    def actions(self) -> str:
+        """What it decides on: `realised` joint velocities, or the operator's `intent`."""
+        return str(self.meta["interface"]["actions"])
+
+    @property
+    def environment(self) -> str:
+        """Which task it was trained for."""
+        return str(self.meta["environment"])
+
+    @property
+    def mode(self) -> str:
+        """Teleop mode of its demonstrations."""
+        return str(self.meta["mode"])
+
+    @property
+    def intent_mode(self) -> str:
+        """Teleop mode whose intents it decides on; empty for joint velocities."""
+        return self.mode if self.actions == "intent" else ""
+
+    @property
+    def fps(self) -> int:
+        """Decisions a second [Hz]."""
+        return int(self.meta["fps"])
+
+    @property
+    def key(self) -> tuple[int, int]:
+        """Draw of the dataset and training seed."""
+        return int(self.meta.get("dataset_draw", 0)), int(self.meta["training_seed"])
+
+
+@dataclass(frozen=True)
+class Arm:
+    """A checkpoint under a condition.
+
+    Attributes:
+        checkpoint: which policy.
+        protection: what stands between it and the robot: `none`, `mpc`, `filter`, or a mode's `cbf`.
+        perturbation: what disturbs.
+        label: what it is called.
+    """
+
+    checkpoint: Checkpoint
+    protection: str
+    perturbation: Perturbation
+    label: str
+
+    @property
+    def conditions(self) -> dict[str, str]:
+        """What all rollouts of this label have in common."""
+        meta = self.checkpoint.meta
+        return {
+            **{name: str(meta[name]) for name in ("environment", "robot", "mode", "fps")},
+            "actions": self.checkpoint.actions,
+            "protection": self.protection,
+            "perturbation": self.perturbation.text,
+        }
+
+
+def read_checkpoint(folder: Path) -> Checkpoint:
+    """Return the checkpoint in a folder, or the last one of a training run's folder.
+
+    Raises:
+        HandrailError: there is none, or none of Handrail's.
+    """
+    found = next((folder / name for name in _NESTED if (folder / name / META).is_file()), None)
+    if found is None:
+        raise HandrailError(f"--policy {folder}: expected a checkpoint with a {META}, found none")
+    try:
+        meta = json.loads((found / META).read_bytes())
+        given = meta.get("format")
+    except (OSError, ValueError, AttributeError) as error:
+        raise HandrailError(f"--policy {found}: expected JSON in {META}, got {error}") from error
+    needed = ("environment", "robot", "mode", "fps", "training_seed", "interface")
+    missing = [name for name in needed if name not in meta]
+    if given != FORMAT or missing or "actions" not in meta["interface"]:
+        raise HandrailError(
+            f"--policy {found}: expected the format {FORMAT!r} with {', '.join(needed)}; "
+            f"got {given!r} without {', '.join(missing) or 'actions'}"
+        )
+    return Checkpoint(found, meta, _digest(found))
+
+
+def arms(config: EvaluateConfig) -> tuple[Arm, ...]:
+    """Return every checkpoint under every condition of the settings.
+
+    Raises:
+        HandrailError: a checkpoint is none, a protection does not fit it, or two of them are one and the same
+            policy of an arm.
+    """
+    checkpoints = [read_checkpoint(folder) for folder in config.folders]
+    environments = {checkpoint.environment for checkpoint in checkpoints}
+    if len(environments) > 1:
+        raise HandrailError(f"--policy: expected policies for one task, got {', '.join(sorted(environments))}")
+    found: dict[tuple[str, tuple[int, int]], Arm] = {}
+    for perturbation in config.perturbations:
+        for protection in config.protections:
+            for checkpoint in checkpoints:
+                arm = _arm(checkpoint, protection, perturbation, config.label)
+                if (arm.label, checkpoint.key) in found:
+                    before = found[arm.label, checkpoint.key].checkpoint.folder
+                    raise HandrailError(
+                        f"--policy {checkpoint.folder}: arm {arm.label!r} has another policy with dataset draw "
+                        f"and training seed {checkpoint.key}: {before}; expected each once, or --label"
+                    )
+                found[arm.label, checkpoint.key] = arm
+    return tuple(found.values())
+
+
+def _arm(checkpoint: Checkpoint, protection: str, perturbation: Perturbation, label: str) -> Arm:
+    own = _own(checkpoint)
+    chosen = own if protection == "own" else protection
+    if chosen in ("mpc", "filter") and chosen != own and not _fits(checkpoint, chosen):
+        raise HandrailError(
+            f"--protection {protection}: expected a policy that commands every joint, but {checkpoint.folder} "
+            f"decides on the intent of mode {checkpoint.mode}; expected own or none"
+        )
+    words = [label or _name(checkpoint), _protected(chosen, own), perturbation.words]
+    return Arm(checkpoint, chosen, perturbation, " ".join(filter(None, words)))
+
+
+def _own(checkpoint: Checkpoint) -> str:
+    """Return the protection that a policy's actions have by themselves."""
+    if not checkpoint.intent_mode:
+        return "none"
+    completion = find_mode(checkpoint.intent_mode).controller
+    return "none" if completion in UNPROTECTED else completion
+
+
+def _fits(checkpoint: Checkpoint, protection: str) -> bool:
+    """Return whether a controller can stand in for a policy's own.
+
+    The filter completes nothing, so it needs every joint; so does the MPC where joints that nobody commands
+    are meant to rest.
+    """
+    if not checkpoint.intent_mode:
+        return True
+    completes = find_mode(checkpoint.intent_mode).controller != "direct"
+    return (protection == "mpc" and completes) or _commands_joints(checkpoint.meta["interface"])
+
+
+def _commands_joints(interface: Mapping[str, Any]) -> bool:
+    """Return whether every mask leaves nothing over: all joints, or the base's twist and the arm's joints."""
+    names, masks = interface["channels"], np.array(interface["masks"], bool)  # (k, m)
+    base, joint = (np.array([name.startswith(group) for name in names]) for group in ("base.", "joint."))
+    joints = masks[:, joint]  # (k, n), the base's first
+    driven = masks[:, base].all(axis=1) & joints[:, base.sum() :].all(axis=1) & base.any()
+    return bool(np.all(joints.all(axis=1) | driven))
+
+
+def _name(checkpoint: Checkpoint) -> str:
+    return checkpoint.mode + (" intent" if checkpoint.actions == "intent" else "")
+
+
+def _protected(chosen: str, own: str) -> str:
+    if chosen == own:
+        return ""
+    return "unprotected" if chosen == "none" else chosen
+
+
+def _digest(folder: Path) -> str:
+    """Return a short digest of a folder's files."""
+    digest = hashlib.sha256()
+    for path in sorted(folder.iterdir()):
+        if path.is_file():
+            digest.update(path.name.encode() + path.read_bytes())
+    return digest.hexdigest()[:16]

@@ -1,0 +1,96 @@
+"""Shared by the tests of evaluation: checkpoint folders of policies that nobody trained."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from handrail.collect.build import build_env
+from handrail.collect.config import SessionConfig
+from handrail.collect.operators.modes import find_mode
+from handrail.controllers.channels import Channels
+from handrail.controllers.model import load_model
+from handrail.policies.imitation.interface import PolicyInterface
+
+HOLD = 15  # periods for which a random policy keeps to what it drew
+
+
+class StandIn:
+    """Sees and acts as a trained policy does; `kind` says how."""
+
+    def __init__(self, interface: PolicyInterface, kind: str) -> None:
+        self.interface = interface
+        self._kind = kind
+        self.reset()
+
+    def reset(self) -> None:
+        self._steps = 0
+
+    def act(self, state, environment, images):
+        self._steps += 1
+        return np.asarray(getattr(self, f"_{self._kind}")(state, environment), np.float32)
+
+    def _chase(self, state, environment):
+        """Steer the hand straight to the goal; as joint velocities, by damped least squares."""
+        turn = Rotation.from_matrix(environment[3:12].reshape(3, 3)).as_rotvec()
+        twist = np.clip(np.concatenate([1.5 * environment[:3], 1.5 * turn]), -0.4, 0.4)
+        if self.interface.actions == "intent":
+            return np.append(twist, 0.0)
+        jacobian = load_model().jacobian(np.concatenate([np.zeros(3), state[:6]]))
+        return np.append(jacobian.T @ np.linalg.solve(jacobian @ jacobian.T + 0.01 * np.eye(6), twist), 0.0)
+
+    def _random(self, state, environment):
+        """Draw something bold, and keep to it for a while."""
+        import torch
+
+        if self._steps % HOLD == 1:
+            self._drawn = 2.0 * torch.rand(len(self.interface.action_names)).numpy() - 1.0
+        return self._drawn
+
+    def _still(self, state, environment):
+        return np.zeros(len(self.interface.action_names))
+
+    def _nan(self, state, environment):
+        """Chase, but for every fifth action."""
+        action = self._chase(state, environment)
+        if self._steps % 5 == 0:
+            action[self._steps % len(action)] = np.nan
+        return action
+
+    def _short(self, state, environment):
+        return np.zeros(3)
+
+
+def load(folder: Path) -> StandIn:
+    meta = json.loads((folder / "handrail.json").read_text())
+    return StandIn(PolicyInterface.from_dict(meta["interface"]), meta["stand_in"])
+
+
+def checkpoint(
+    folder: Path, kind="chase", task="reach", mode="ee", actions="intent", training_seed=0, **more
+) -> Path:
+    """Write a checkpoint folder of a stand-in."""
+    env = build_env(SessionConfig(task=task), 20)
+    channels = Channels.of(env.model.description)
+    focuses = ("base", "hand")
+    masks = {tuple(channels.mask(*find_mode(mode).groups(focus)).tolist()) for focus in focuses}
+    owned = tuple(sorted(masks)) if actions == "intent" else ()
+    interface = PolicyInterface(actions, env.agent_names, env.state_names, channels.names, owned)
+    meta = {
+        "format": "handrail.policy/1",
+        "interface": interface.to_dict(),
+        "environment": task,
+        "mode": mode,
+        "robot": "ridgeback_ur10",
+        "fps": 20,
+        "training_seed": training_seed,
+        "dataset_draw": 0,
+        "trained_on": {"episodes": 50, "operator_time": 312.5, "mode": mode},
+        "policy": "act",
+        "stand_in": kind,
+    }
+    env.close()
+    folder.mkdir(parents=True)
+    (folder / "handrail.json").write_text(json.dumps(meta | more))
+    return folder
