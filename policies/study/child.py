@@ -1,7 +1,10 @@
-"""The process in which one job of a study is done: `python -m handrail.policies.study.child FOLDER PRESET JOB`."""
+"""The process in which one job of a study is done.
+
+Jobs are forked from a server that has loaded LeRobot, PyTorch and the simulator once (`preload.py`): that takes
+longer than many a job.
+"""
 
 import ctypes
-import json
 import os
 import signal
 import sys
@@ -9,38 +12,38 @@ import time
 from pathlib import Path
 
 from handrail.controllers.errors import HandrailError
+from handrail.policies.study.design import StudyDesign
+from handrail.policies.study.jobs import Job, Layout
+from handrail.policies.study.notes import write_json
+from handrail.policies.study.work import begin, fingerprint, work
 
 _PR_SET_PDEATHSIG = 1  # of <sys/prctl.h>
 FAILED = 1
 
 
-def main(folder: str, preset: str, name: str) -> int:
-    """Do a job of a study and write that it is done; return the exit code."""
+def do(job: Job, design: StudyDesign, root: Path) -> None:
+    """Do a job of a study, write that it is done, and leave the process with 0, or 1 and a line."""
+    layout = Layout(root)
     _end_with_parent()
-    os.environ.setdefault("HF_HUB_OFFLINE", "1")
-    from handrail.policies.study.design import load_design
-    from handrail.policies.study.jobs import Layout, jobs
-    from handrail.policies.study.work import fingerprint, work
-
-    design, layout = load_design(preset), Layout(Path(folder))
-    (job,) = [each for each in jobs(design) if each.name == name]
+    _say_into(layout.log(job))
     start = time.time()
     try:
+        begin(job, design, layout)
         result = work(job, design, layout)
     except HandrailError as error:
         print(f"error: {error}", file=sys.stderr)
-        return FAILED
-    content = {
-        "settings": fingerprint(job, design),
-        "result": result,
-        "seconds": round(time.time() - start, 1),
-    }
-    path = layout.done(job)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    staged = path.with_suffix(".part")
-    staged.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
-    os.replace(staged, path)
-    return 0
+        sys.exit(FAILED)
+    settings, seconds = fingerprint(job, design), round(time.time() - start, 1)
+    write_json(layout.done(job), {"settings": settings, "result": result, "seconds": seconds})
+
+
+def _say_into(log: Path) -> None:
+    """Send everything that this process says into a file."""
+    log.parent.mkdir(parents=True, exist_ok=True)
+    file = os.open(log, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o644)
+    for stream in (sys.stdout, sys.stderr):
+        os.dup2(file, stream.fileno())
+    os.close(file)
 
 
 def _end_with_parent() -> None:
@@ -48,7 +51,3 @@ def _end_with_parent() -> None:
     libc = ctypes.CDLL(None, use_errno=True)
     if hasattr(libc, "prctl"):
         libc.prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
-
-
-if __name__ == "__main__":
-    sys.exit(main(*sys.argv[1:]))

@@ -13,7 +13,7 @@ class StudyConfig:
     preset: str = "quick"
     """Which study: quick, full, or a file of your own that ends in .toml (see policies/study/presets)."""
     output: str = "outputs/study"
-    """Folder of datasets, policies, evaluations and the report; what is done there already is not done again."""
+    """Folder of datasets, policies, evaluations and report; what is done there is not done again."""
     workers: int = 2
     """Jobs at a time, one core each."""
     page: str = ""

@@ -36,7 +36,7 @@ def _mark(label: str) -> str:
 
 
 def _answer(design: StudyDesign, results: Sequence[TaskResults]) -> Any:
-    """One panel a task: success of every arm, thick its rollouts' interval, thin with training, ticks seeds."""
+    """One panel a task: success of every arm; thick: over rollouts, thin: over training too; ticks: seeds."""
     rows = max(len(each.conditions) for each in results)
     figure = new_figure(_WIDTH, 1.2 + 0.4 * rows)
     grid = figure.subplots(1, len(results), squeeze=False)[0]

@@ -10,6 +10,7 @@ from handrail.policies.study.design import MPC_MODES, StudyDesign
 
 Kind = Literal["collect", "policy", "compare"]
 Actions = Literal["realised", "intent"]
+CONDITIONS = ("nominal", "disturbed", "protected")
 
 
 @dataclass(frozen=True)
@@ -143,9 +144,17 @@ class Layout:
             self.root / "evaluations" / arm.cell.name / what / f"{arm.actions}-{arm.budget}-{arm.seed}.json"
         )
 
+    def evaluations(self, cell: Cell, what: str) -> list[Path]:
+        """Return the files of rollouts of a cell's policies that are there, by name."""
+        return sorted((self.root / "evaluations" / cell.name / what).glob("*.json"))
+
     def comparison(self, task: str) -> Path:
         """Return the folder of a task's report."""
         return self.root / "comparisons" / task
+
+    def begun(self, job: Job) -> Path:
+        """Return the file that says with which settings a job was begun."""
+        return self.root / "begun" / f"{job.name}.json"
 
     def done(self, job: Job) -> Path:
         """Return the file that says that a job is done, and with which settings."""

@@ -24,24 +24,24 @@ from handrail.policies.study.results import TaskResults, gather
 from handrail.policies.study.tables import Table, tables
 
 _CAPTIONS = {
-    "answer": "Success of the policies by task; thick: 95 % over rollouts, thin: over training too, ticks: seeds.",
+    "answer": "Success of the policies; thick: 95 % over rollouts, thin: over training too, ticks: each seed.",
     "robustness": "Success when pushed, started elsewhere, or seeing late.",
     "sweep": "How human the operator is, and what that does to policies and to his time.",
 }
 _HOW = (
-    "Policies of every mode were trained with the same settings for the same number of updates on what could be "
-    "demonstrated in the same operator time, failed attempts included, and driven from the same beginnings. "
-    "realised: the policy writes joint velocities, which go to the robot unprotected; intent: it writes the "
-    "operator's command, which the masked MPC completes. Intervals are 95 %: Wilson over rollouts; bootstrap over "
-    "training seeds and rollouts; differences: Newcombe's method 10, exact McNemar and Welch's test, Holm. "
-    "● marks a detected difference."
+    "Policies of every mode were trained with the same settings for the same number of updates on what could be"
+    " demonstrated in the same operator time, failed attempts included, and driven from the same beginnings."
+    " A policy named after a mode alone writes joint velocities, which go to the robot unprotected; with “intent”"
+    " it writes the operator's command, which the masked MPC completes. Intervals are 95 %: Wilson over rollouts;"
+    " bootstrap over training seeds and rollouts; differences: Newcombe's method 10, exact McNemar and Welch's"
+    " test, Holm. ● marks a detected difference."
 )
 _FORMAT = "handrail.study/1"
 _DPI = 110
 
 
 def write_study(config: StudyConfig, design: StudyDesign, layout: Layout) -> list[Path]:
-    """Write report.html and study.json, and the part of a Markdown page if one is asked for; return the files.
+    """Write report.html and study.json, and the part of a Markdown page if asked; return the files.
 
     Raises:
         HandrailError: a file cannot be written.
@@ -68,9 +68,8 @@ def _html(
 ) -> str:
     title = f"Study {design.name}: {', '.join(design.modes)}"
     parts = [f"<header><h1>{title}</h1></header>"]
-    for each in results:
-        if each.findings:
-            parts.append(markup.paragraph(f"{_title(each)}: {headline(each.findings)}", "headline"))
+    answers = [f"{_title(each)}: {headline(each.findings)}" for each in results if each.findings]
+    parts += [markup.paragraph(answer, "headline") for answer in answers]
     for name, figure in drawn.items():
         parts.append(markup.section(_CAPTIONS[name], markup.picture(svg(figure), name)))
     for each in results:

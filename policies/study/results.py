@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
@@ -17,7 +16,6 @@ from handrail.policies.study.design import StudyDesign
 from handrail.policies.study.jobs import Cell, Layout
 
 CONTACTS = "contacts"
-BRAKES = "brakes"
 
 
 @dataclass(frozen=True)
@@ -90,9 +88,8 @@ def _task(task: str, design: StudyDesign, layout: Layout, rng: np.random.Generat
     cells = {mode: Cell(task, mode) for mode in design.modes}
     data = {mode: _collected(layout, cell) for mode, cell in cells.items()}
     nominal = _arms(design, layout, task, "nominal")
-    main = {label: arm for label, arm in nominal.items() if label == design.baseline} | nominal
-    base = design.baseline if design.baseline in main else next(iter(main), "")
-    judged = judge(main, base, rng) if main else None
+    base = design.baseline if design.baseline in nominal else next(iter(nominal), "")
+    judged = judge(nominal, base, rng) if nominal else None
     found = tuple(outcome_findings(judged)) if judged else ()
     return TaskResults(
         task=task,
@@ -117,13 +114,8 @@ def _arms(design: StudyDesign, layout: Layout, task: str, what: str, noise: floa
     """Return the arms of a task under some conditions, in the order of the design's modes."""
     arms: dict[str, Arm] = {}
     for mode in design.modes:
-        arms |= read_evaluations(evaluation_files(layout, Cell(task, mode, noise), what))
+        arms |= read_evaluations(layout.evaluations(Cell(task, mode, noise), what))
     return arms
-
-
-def evaluation_files(layout: Layout, cell: Cell, what: str) -> list[Path]:
-    """Return the files of rollouts of a cell's policies, in the order of their names."""
-    return sorted((layout.root / "evaluations" / cell.name / what).glob("*.json"))
 
 
 def _conditions(arms: Mapping[str, Arm], rng: np.random.Generator) -> dict[str, Condition]:

@@ -1,13 +1,11 @@
-"""Runs a study: as many jobs at a time as there are workers, each in a process of its own, until all are done."""
+"""Runs a study: as many jobs at a time as there are workers, each in a process of its own."""
 
 import contextlib
-import json
-import os
-import subprocess
-import sys
+import multiprocessing
 import time
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Any
 
@@ -16,12 +14,15 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.lock import DatasetLock
+from handrail.policies.study.child import do
 from handrail.policies.study.config import StudyConfig
 from handrail.policies.study.design import StudyDesign, load_design
 from handrail.policies.study.jobs import Job, Layout, jobs
+from handrail.policies.study.notes import read_json
 from handrail.policies.study.work import fingerprint
 
 FAILED = 1
+_PRELOAD = "handrail.policies.study.preload"
 _ASLEEP = 0.2  # between two looks at the running jobs [s]
 _TAIL = 300  # characters of a failed job's last words
 
@@ -32,7 +33,7 @@ class _State:
 
     done: set[str] = field(default_factory=set)
     failed: dict[str, str] = field(default_factory=dict)
-    running: dict[str, tuple[Job, "subprocess.Popen[bytes]"]] = field(default_factory=dict)
+    running: dict[str, tuple[Job, BaseProcess]] = field(default_factory=dict)
 
     def ready(self, todo: list[Job]) -> Iterator[Job]:
         """Return the jobs that can begin, what matters most first."""
@@ -75,11 +76,7 @@ def is_done(job: Job, design: StudyDesign, layout: Layout) -> bool:
 
 def finished(job: Job, layout: Layout) -> Mapping[str, Any]:
     """Return what a job wrote when it was done; nothing if it is not."""
-    try:
-        content = json.loads(layout.done(job).read_bytes())
-    except (OSError, ValueError):
-        return {}
-    return content if isinstance(content, dict) else {}
+    return read_json(layout.done(job))
 
 
 def _run_all(
@@ -99,7 +96,7 @@ def _run_all(
             for job in state.ready(todo):
                 if len(state.running) >= config.workers:
                     break
-                state.running[job.name] = (job, _start(job, config, layout))
+                state.running[job.name] = (job, _start(job, design, layout))
             if not state.running:
                 break
             time.sleep(_ASLEEP)
@@ -110,37 +107,27 @@ def _run_all(
     state.failed |= dict.fromkeys(waiting, "what it needs failed")
 
 
-def _start(job: Job, config: StudyConfig, layout: Layout) -> "subprocess.Popen[bytes]":
-    log = layout.log(job)
-    log.parent.mkdir(parents=True, exist_ok=True)
-    preset = config.preset
-    if preset.endswith(".toml"):
-        preset = str(Path(preset).expanduser().absolute())
-    threads = {f"{name}_NUM_THREADS": "1" for name in ("OMP", "MKL", "OPENBLAS")}
-    with log.open("ab") as file:
-        return subprocess.Popen(
-            [sys.executable, "-m", "handrail.policies.study.child", str(layout.root), preset, job.name],
-            stdin=subprocess.DEVNULL,
-            stdout=file,
-            stderr=subprocess.STDOUT,
-            env=os.environ | threads,
-        )
+def _start(job: Job, design: StudyDesign, layout: Layout) -> BaseProcess:
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload([_PRELOAD])
+    process = context.Process(target=do, args=(job, design, layout.root), name=job.name)
+    process.start()
+    return process
 
 
 def _collect_finished(state: _State, layout: Layout) -> None:
     for name, (job, process) in list(state.running.items()):
-        code = process.poll()
-        if code is None:
+        if process.is_alive():
             continue
         del state.running[name]
-        if code == 0:
+        if process.exitcode == 0:
             state.done.add(name)
         else:
-            state.failed[name] = _last_words(layout.log(job), code)
+            state.failed[name] = _last_words(layout.log(job), process.exitcode)
 
 
-def _last_words(log: Path, code: int) -> str:
-    text = log.read_text(encoding="utf-8", errors="replace").strip()
+def _last_words(log: Path, code: int | None) -> str:
+    text = log.read_text(encoding="utf-8", errors="replace").strip() if log.is_file() else ""
     errors = [line for line in text.splitlines() if line.startswith("error: ")]
     words = errors[-1].removeprefix("error: ") if errors else text[-_TAIL:]
     return f"{words} (exit code {code}; {log})"
@@ -155,5 +142,5 @@ def _terminating(state: _State) -> Iterator[None]:
         for _, process in state.running.values():
             process.terminate()
         for _, process in state.running.values():
-            process.wait()
+            process.join()
         raise HandrailError("study: interrupted; the same command goes on where it was") from interrupt

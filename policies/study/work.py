@@ -1,4 +1,4 @@
-"""Does one job of a study, in a process of its own; every part of it can be killed and goes on where it was."""
+"""Does one job of a study, in a process of its own; whatever is killed goes on where it was."""
 
 import json
 from collections.abc import Mapping
@@ -7,12 +7,14 @@ from typing import Any
 
 from handrail.collect.config import DatasetConfig, RecordConfig
 from handrail.controllers.errors import HandrailError
+from handrail.datasets.atomic import remove
 from handrail.datasets.comparison.config import CompareConfig
 from handrail.datasets.reader import read_episodes, read_info
 from handrail.policies.imitation.config import SourceConfig, TrainConfig
 from handrail.policies.imitation.evaluate_config import EvaluateConfig
 from handrail.policies.study.design import StudyDesign, TaskDesign
-from handrail.policies.study.jobs import Cell, Job, Layout, PolicyArm
+from handrail.policies.study.jobs import CONDITIONS, Cell, Job, Layout, PolicyArm
+from handrail.policies.study.notes import read_json, write_json
 
 _BATCH = 10  # episodes, until the next person has a turn
 _MOST_ATTEMPTS = 6  # for each success that is wanted
@@ -30,7 +32,19 @@ def fingerprint(job: Job, design: StudyDesign) -> dict[str, Any]:
         settings |= {"rollouts": design.rollouts, "seed": design.seed}
         if job.robust and design.robustness:
             settings["robustness"] = asdict(design.robustness)
+    else:
+        settings["design"] = asdict(design)
     return json.loads(json.dumps(settings))
+
+
+def begin(job: Job, design: StudyDesign, layout: Layout) -> None:
+    """Note with which settings a job begins; remove what it made with others before."""
+    settings, path = fingerprint(job, design), layout.begun(job)
+    if read_json(path) not in ({}, settings) and job.arm:
+        remove(layout.policy(job.arm))
+        for what in CONDITIONS:
+            remove(layout.evaluation(job.arm, what))
+    write_json(path, settings)
 
 
 def work(job: Job, design: StudyDesign, layout: Layout) -> dict[str, Any]:
@@ -100,7 +114,7 @@ def _policy(arm: PolicyArm, robust: bool, design: StudyDesign, layout: Layout) -
     from handrail.policies.imitation.training import train
 
     task = design.tasks[arm.cell.task]
-    part = {"minutes": task.minutes} if arm.budget == "time" else {"episodes": task.episodes}
+    timed = arm.budget == "time"
     folder = train(
         TrainConfig(
             dataset=SourceConfig(root=str(layout.dataset(arm.cell))),
@@ -111,8 +125,9 @@ def _policy(arm: PolicyArm, robust: bool, design: StudyDesign, layout: Layout) -
             steps=task.steps,
             seed=arm.seed,
             policy_options=task.policy_options,
+            minutes=task.minutes if timed else 0.0,
+            episodes=0 if timed else task.episodes,
             resume=True,
-            **part,
         )
     )
     config = EvaluateConfig(
@@ -148,7 +163,7 @@ def _compare(task: str, design: StudyDesign, layout: Layout) -> dict[str, Any]:
     from handrail.datasets.comparison.report import write_report
 
     cells = [Cell(task, mode) for mode in design.modes]
-    files = [path for cell in cells for path in nominal_files(layout, cell)]
+    files = [path for cell in cells for path in layout.evaluations(cell, "nominal")]
     comparison = compare(
         CompareConfig(
             datasets=tuple(str(layout.dataset(cell)) for cell in cells),
@@ -160,8 +175,3 @@ def _compare(task: str, design: StudyDesign, layout: Layout) -> dict[str, Any]:
     )
     write_report(comparison)
     return {"findings": [finding.text for finding in findings(comparison)]}
-
-
-def nominal_files(layout: Layout, cell: Cell) -> list[Any]:
-    """Return the files of undisturbed rollouts of all policies of a cell."""
-    return sorted((layout.root / "evaluations" / cell.name / "nominal").glob("*.json"))
