@@ -127,7 +127,9 @@ def arms(config: EvaluateConfig) -> tuple[Arm, ...]:
     checkpoints = [read_checkpoint(folder) for folder in config.folders]
     environments = {checkpoint.environment for checkpoint in checkpoints}
     if len(environments) > 1:
-        raise HandrailError(f"--policy: expected policies for one task, got {', '.join(sorted(environments))}")
+        raise HandrailError(
+            f"--policy: expected policies for one task, got {', '.join(sorted(environments))}"
+        )
     found: dict[tuple[str, tuple[int, int]], Arm] = {}
     for perturbation in config.perturbations:
         for protection in config.protections:

@@ -5,6 +5,8 @@ With `R_wb` the base's heading and `(p_t, R_t)` the tool's pose, the pose `(p_o,
     p = R_wbᵀ (p_o − p_t)       where it is from the tool, in the base's axes [m], (3,)
     E = R_wbᵀ R_o R_tᵀ R_wb     what turns the tool's axes into the object's, in the base's axes, (9,)
 
+    n_r = p / √(|p|² + r²)      the same up close, for several r: a direction from afar, (3,) each
+
 and the tool itself is seen from the base: `R_wbᵀ (p_t − p_b)`, `R_wbᵀ R_t`. So a motion learnt in one place
 is the same motion everywhere, and what an operator steers to zero is an input. `E` is smooth, unlike a
 rotation vector; `p` and `E − Eᵀ` vanish at the goal.
@@ -24,6 +26,7 @@ _POSITION = ("x", "y", "z")
 _QUATERNION = ("qw", "qx", "qy", "qz")
 _POSE = (*_POSITION, *_QUATERNION)
 _DIRECTION = ("nx", "ny")
+_NEAR = (0.05, 0.25)  # r: from where on being near is told finely [m]
 _MATRIX = tuple(f"r{row}{column}" for row in range(3) for column in range(3))
 _TOOL = tuple(f"tool.{axis}" for axis in _POSE)
 
@@ -218,17 +221,18 @@ def grouped(names: Sequence[str]) -> tuple[Group, ...]:
 
 
 def _parts(group: Group) -> tuple[str, ...]:
+    offset = ("dx", "dy", "dz", *(f"near_{r:g}.{axis}" for r in _NEAR for axis in _POSITION))
     if group.parts == _POSE:
-        return ("dx", "dy", "dz", *_MATRIX)
+        return (*offset, *_MATRIX)
     if group.parts == _POSITION:
-        return ("dx", "dy", "dz")
+        return offset
     return group.parts
 
 
 def _seen(group: Group, numbers: FloatArray, frame: Frame) -> FloatArray:
     """Return a group as seen from the robot, (T, k)."""
     if group.parts[:3] == _POSITION and group.parts in (_POSE, _POSITION):
-        offset = frame.turned(numbers[:, :3] - frame.tool)
+        offset = _at_scales(frame.turned(numbers[:, :3] - frame.tool))
         if group.parts == _POSITION:
             return offset
         turn = Rotation.from_quat(numbers[:, 3:], scalar_first=True).as_matrix()
@@ -240,3 +244,9 @@ def _seen(group: Group, numbers: FloatArray, frame: Frame) -> FloatArray:
         place = frame.turned(numbers[:, :2] - frame.base)
         return np.column_stack([np.where(there, place, 0.0), numbers[:, 2:]])
     return numbers
+
+
+def _at_scales(offset: FloatArray) -> FloatArray:
+    """Return an offset, and how near it is at several scales, (T, 3 + 3 k)."""
+    square = np.sum(offset**2, axis=1, keepdims=True)
+    return np.column_stack([offset, *(offset / np.sqrt(square + r * r) for r in _NEAR)])

@@ -43,7 +43,9 @@ class Rollout:
     time_limit: float = 0.0
 
 
-def run_rollout(rollout: Rollout, load: Load, observers: Sequence[Observer] = (), render: bool = False) -> Row:
+def run_rollout(
+    rollout: Rollout, load: Load, observers: Sequence[Observer] = (), render: bool = False
+) -> Row:
     """Run a policy once and return how it went, as an evaluation file has it.
 
     Args:

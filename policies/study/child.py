@@ -1,7 +1,7 @@
 """The process in which one job of a study is done.
 
-Jobs are forked from a server that has loaded LeRobot, PyTorch and the simulator once (`preload.py`): that takes
-longer than many a job.
+Jobs are forked from a server that has loaded LeRobot, PyTorch and the simulator once (`preload.py`): that
+takes longer than many a job.
 """
 
 import ctypes

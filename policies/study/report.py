@@ -24,17 +24,17 @@ from handrail.policies.study.results import TaskResults, gather
 from handrail.policies.study.tables import Table, tables
 
 _CAPTIONS = {
-    "answer": "Success of the policies; thick: 95 % over rollouts, thin: over training too, ticks: each seed.",
+    "answer": "Success of the policies; thick: 95 % over rollouts, thin: over training too, ticks: seeds.",
     "robustness": "Success when pushed, started elsewhere, or seeing late.",
     "sweep": "How human the operator is, and what that does to policies and to his time.",
 }
 _HOW = (
-    "Policies of every mode were trained with the same settings for the same number of updates on what could be"
-    " demonstrated in the same operator time, failed attempts included, and driven from the same beginnings."
-    " A policy named after a mode alone writes joint velocities, which go to the robot unprotected; with “intent”"
-    " it writes the operator's command, which the masked MPC completes. Intervals are 95 %: Wilson over rollouts;"
-    " bootstrap over training seeds and rollouts; differences: Newcombe's method 10, exact McNemar and Welch's"
-    " test, Holm. ● marks a detected difference."
+    "Policies of every mode were trained with the same settings for the same number of updates on what could"
+    " be demonstrated in the same operator time, failed attempts included, and driven from the same"
+    " beginnings. A policy named after a mode alone writes joint velocities, which go to the robot"
+    " unprotected; with “intent” it writes the operator's command, which the masked MPC completes. Intervals"
+    " are 95 %: Wilson over rollouts; bootstrap over training seeds and rollouts; differences: Newcombe's"
+    " method 10, exact McNemar and Welch's test, Holm. ● marks a detected difference."
 )
 _FORMAT = "handrail.study/1"
 _DPI = 110

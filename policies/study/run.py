@@ -3,7 +3,7 @@
 import contextlib
 import multiprocessing
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from multiprocessing.process import BaseProcess
 from pathlib import Path
@@ -27,6 +27,9 @@ _ASLEEP = 0.2  # between two looks at the running jobs [s]
 _TAIL = 300  # characters of a failed job's last words
 
 
+Start = Callable[[Job, StudyDesign, Layout], BaseProcess]
+
+
 @dataclass
 class _State:
     """How it stands."""
@@ -43,8 +46,21 @@ class _State:
                 yield job
 
 
-def run_study(config: StudyConfig) -> int:
+def start_job(job: Job, design: StudyDesign, layout: Layout) -> BaseProcess:
+    """Begin a job in a process of its own."""
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload([_PRELOAD])
+    process = context.Process(target=do, args=(job, design, layout.root), name=job.name)
+    process.start()
+    return process
+
+
+def run_study(config: StudyConfig, start: Start = start_job) -> int:
     """Do what is not done yet, then write the report; return the exit code.
+
+    Args:
+        config: of the study.
+        start: begins a job.
 
     Raises:
         HandrailError: a setting is wrong, or another process works in the folder.
@@ -57,7 +73,7 @@ def run_study(config: StudyConfig) -> int:
         state = _State(done={job.name for job in jobs(design) if is_done(job, design, layout)})
         if not config.report_only:
             with _terminating(state):
-                _run_all(config, design, layout, state, console)
+                _run_all(start, config.workers, design, layout, state, console)
         from handrail.policies.study.report import write_study
 
         files = write_study(config, design, layout)
@@ -80,7 +96,7 @@ def finished(job: Job, layout: Layout) -> Mapping[str, Any]:
 
 
 def _run_all(
-    config: StudyConfig, design: StudyDesign, layout: Layout, state: _State, console: Console
+    start: Start, workers: int, design: StudyDesign, layout: Layout, state: _State, console: Console
 ) -> None:
     todo = jobs(design)
     columns = (
@@ -94,9 +110,9 @@ def _run_all(
         bar = progress.add_task(f"study {design.name}", total=len(todo), completed=len(state.done), now="")
         while True:
             for job in state.ready(todo):
-                if len(state.running) >= config.workers:
+                if len(state.running) >= workers:
                     break
-                state.running[job.name] = (job, _start(job, design, layout))
+                state.running[job.name] = (job, start(job, design, layout))
             if not state.running:
                 break
             time.sleep(_ASLEEP)
@@ -105,14 +121,6 @@ def _run_all(
             progress.update(bar, completed=len(state.done), now=now)
     waiting = [job.name for job in todo if job.name not in state.done | state.failed.keys()]
     state.failed |= dict.fromkeys(waiting, "what it needs failed")
-
-
-def _start(job: Job, design: StudyDesign, layout: Layout) -> BaseProcess:
-    context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload([_PRELOAD])
-    process = context.Process(target=do, args=(job, design, layout.root), name=job.name)
-    process.start()
-    return process
 
 
 def _collect_finished(state: _State, layout: Layout) -> None:
