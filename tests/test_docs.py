@@ -24,6 +24,7 @@ from handrail.datasets.comparison.config import CompareConfig
 from handrail.datasets.quality.catalogue import METRICS
 from handrail.policies.rl_config import TrainRlConfig
 from handrail.policies.rl_contender import RL
+from handrail.policies.study.config import StudyConfig
 from handrail.scripts import cli
 
 ROOT = Path(__file__).parent.parent
@@ -38,6 +39,7 @@ CONFIGS = {
     "handrail-train-rl": TrainRlConfig,
     "handrail-benchmark": BenchmarkConfig,
     "handrail-compare": CompareConfig,
+    "handrail-study": StudyConfig,
 }
 _LEROBOT = """
 import json, sys
