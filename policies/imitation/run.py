@@ -1,6 +1,6 @@
 """LeRobot's training, run inside this process with our data, our checkpoints and without its pages of logs.
 
-Nothing of LeRobot is edited: while `training_with` is entered, a few names that its script looks up lead here.
+Nothing of LeRobot is edited: while it trains, a few names that its script looks up lead here instead.
 """
 
 import logging
@@ -17,7 +17,6 @@ import torch
 from lerobot.common import train_utils
 from lerobot.configs.train import TrainPipelineConfig
 from lerobot.optim.factory import make_optimizer_and_scheduler
-from lerobot.optim.schedulers import CosineAnnealingWithWarmupSchedulerConfig
 from lerobot.scripts import lerobot_train
 from lerobot.utils.logging_utils import MetricsTracker
 
@@ -25,26 +24,20 @@ from handrail.policies.imitation.checkpoint import MODEL, point_to, publish
 from handrail.policies.imitation.curve import Bar, Curve
 from handrail.policies.imitation.memory import MemoryDataset
 
-_WARMUP = 500  # updates in which the learning rate rises, or a tenth of all if that is fewer
-
 
 @dataclass
 class Pipeline(TrainPipelineConfig):
-    """LeRobot's settings of a training, whose folder is ours to check."""
-
-    cosine: bool = False
+    """LeRobot's settings of a training, whose folder is ours to check and whose schedule may be given."""
 
     def validate(self) -> None:
         """Fill in what follows from the policy."""
         folder, self.output_dir = self.output_dir, None
+        schedule = self.scheduler
         super().validate()
         self.output_dir = folder
         assert self.policy is not None
         self.optimizer = self.policy.get_optimizer_preset()
-        self.scheduler = self.policy.get_scheduler_preset()
-        if self.cosine:
-            warmup = min(_WARMUP, self.steps // 10)
-            self.scheduler = CosineAnnealingWithWarmupSchedulerConfig(num_warmup_steps=warmup)
+        self.scheduler = schedule or self.policy.get_scheduler_preset()
 
 
 @dataclass(frozen=True)
