@@ -1,6 +1,7 @@
 """What is evaluated: a checkpoint under a condition, which together are an arm."""
 
 import hashlib
+import itertools
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -73,12 +74,14 @@ class Arm:
         checkpoint: which policy.
         protection: what stands between it and the robot: `none`, `mpc`, `filter`, or a mode's `cbf`.
         perturbation: what disturbs.
+        time_limit: after which a rollout is given up [s]; the task's own when 0.
         label: what it is called.
     """
 
     checkpoint: Checkpoint
     protection: str
     perturbation: Perturbation
+    time_limit: float
     label: str
 
     @property
@@ -90,6 +93,7 @@ class Arm:
             "actions": self.checkpoint.actions,
             "protection": self.protection,
             "perturbation": self.perturbation.text,
+            "time_limit": f"{self.time_limit:g}",
         }
 
 
@@ -127,32 +131,32 @@ def arms(config: EvaluateConfig) -> tuple[Arm, ...]:
     checkpoints = [read_checkpoint(folder) for folder in config.folders]
     environments = {checkpoint.environment for checkpoint in checkpoints}
     if len(environments) > 1:
-        raise HandrailError(f"--policy: expected policies for one task, got {', '.join(sorted(environments))}")
+        raise HandrailError(
+            f"--policy: expected policies for one task, got {', '.join(sorted(environments))}"
+        )
+    conditions = itertools.product(config.perturbations, config.protections, checkpoints)
     found: dict[tuple[str, tuple[int, int]], Arm] = {}
-    for perturbation in config.perturbations:
-        for protection in config.protections:
-            for checkpoint in checkpoints:
-                arm = _arm(checkpoint, protection, perturbation, config.label)
-                if (arm.label, checkpoint.key) in found:
-                    before = found[arm.label, checkpoint.key].checkpoint.folder
-                    raise HandrailError(
-                        f"--policy {checkpoint.folder}: arm {arm.label!r} has another policy with dataset draw "
-                        f"and training seed {checkpoint.key}: {before}; expected each once, or --label"
-                    )
-                found[arm.label, checkpoint.key] = arm
+    for perturbation, protection, checkpoint in conditions:
+        arm = _arm(checkpoint, protection, perturbation, config)
+        before = found.setdefault((arm.label, checkpoint.key), arm)
+        if before != arm:
+            raise HandrailError(
+                f"--policy {checkpoint.folder}: expected each dataset draw and training seed once, but arm "
+                f"{arm.label!r} has {checkpoint.key} already, {before.checkpoint.folder}; give it a --label"
+            )
     return tuple(found.values())
 
 
-def _arm(checkpoint: Checkpoint, protection: str, perturbation: Perturbation, label: str) -> Arm:
+def _arm(checkpoint: Checkpoint, protection: str, perturbation: Perturbation, config: EvaluateConfig) -> Arm:
     own = _own(checkpoint)
     chosen = own if protection == "own" else protection
     if chosen in ("mpc", "filter") and chosen != own and not _fits(checkpoint, chosen):
         raise HandrailError(
-            f"--protection {protection}: expected a policy that commands every joint, but {checkpoint.folder} "
-            f"decides on the intent of mode {checkpoint.mode}; expected own or none"
+            f"--protection {protection}: expected a policy that commands every joint, or own or none; "
+            f"{checkpoint.folder} decides on the intent of mode {checkpoint.mode}"
         )
-    words = [label or _name(checkpoint), _protected(chosen, own), perturbation.words]
-    return Arm(checkpoint, chosen, perturbation, " ".join(filter(None, words)))
+    words = [config.label or _name(checkpoint), _protected(chosen, own), perturbation.words]
+    return Arm(checkpoint, chosen, perturbation, config.time_limit, " ".join(filter(None, words)))
 
 
 def _own(checkpoint: Checkpoint) -> str:

@@ -10,7 +10,10 @@ from handrail.controllers.model import RobotModel
 from handrail.controllers.unprotected import unprotected_controller
 from handrail.policies.imitation.arms import UNPROTECTED
 
-_STAND_IN: Mapping[str, str] = {"mpc": "joints", "filter": "direct_filtered"}  # the mode whose controller it is
+_STAND_IN: Mapping[str, str] = {
+    "mpc": "joints",
+    "filter": "direct_filtered",
+}  # the mode whose controller it is
 
 
 def build_protection(protection: str, mode: str, task: str, model: RobotModel, fps: int) -> Controller:

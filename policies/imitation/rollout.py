@@ -35,25 +35,28 @@ class Rollout:
     Attributes:
         arm: policy and condition.
         seed: of the episode.
-        time_limit: [s]; the task's own when 0.
     """
 
     arm: Arm
     seed: int
-    time_limit: float = 0.0
 
 
-def run_rollout(rollout: Rollout, load: Load, observers: Sequence[Observer] = (), render: bool = False) -> Row:
+def run_rollout(
+    rollout: Rollout,
+    load: Load,
+    observers: Sequence[Observer] = (),
+    render: tuple[int, int] | bool = False,
+) -> Row:
     """Run a policy once and return how it went, as an evaluation file has it.
 
     Args:
         rollout: what to run.
         load: reads the policy of a folder.
         observers: shown every moment.
-        render: whether the environment draws good-looking pictures.
+        render: height and width of good-looking pictures that the environment draws [px], if it does.
     """
-    arm, limit = rollout.arm, rollout.time_limit
-    env = _env(_session_config(arm, limit), arm.checkpoint.fps, arm.perturbation.shift, render)
+    arm = rollout.arm
+    env = _env(_session_config(arm), arm.checkpoint.fps, arm.perturbation.shift, render)
     controller = _controller(arm.protection, arm.checkpoint.intent_mode, arm.checkpoint.environment, env)
     with _one_torch_thread():
         policy = _policy(arm.checkpoint.folder, arm.checkpoint.digest, load)
@@ -70,7 +73,7 @@ def run_rollout(rollout: Rollout, load: Load, observers: Sequence[Observer] = ()
     return _row(outcome, watch, operator.malformed)
 
 
-def _session_config(arm: Arm, time_limit: float) -> SessionConfig:
+def _session_config(arm: Arm) -> SessionConfig:
     meta = arm.checkpoint.meta
     return SessionConfig(
         task=arm.checkpoint.environment,
@@ -78,12 +81,12 @@ def _session_config(arm: Arm, time_limit: float) -> SessionConfig:
         moving_obstacles=int(meta.get("moving_obstacles", 0)),
         cameras=",".join(meta.get("cameras", ())),
         image_size=int(meta.get("image_size", 128)),
-        time_limit=time_limit,
+        time_limit=arm.time_limit,
     )
 
 
 @lru_cache(maxsize=8)
-def _env(config: SessionConfig, fps: int, shift: float, render: bool) -> HandrailEnv:
+def _env(config: SessionConfig, fps: int, shift: float, render: tuple[int, int] | bool) -> HandrailEnv:
     """Return an environment, built once a process."""
     task = build_task(config)
     return build_env(config, fps, render, ShiftedTask(task, shift) if shift else task)
