@@ -1,7 +1,6 @@
 """One rollout of a trained policy through the one session loop."""
 
-import contextlib
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -18,11 +17,13 @@ from handrail.collect.session import Observer, Outcome, Session
 from handrail.collect.shift import ShiftedTask
 from handrail.controllers.channels import Channels
 from handrail.controllers.controller import Controller
+from handrail.controllers.errors import HandrailError
 from handrail.datasets.frames import Moment
 from handrail.datasets.quality.safety import contacts_begun
 from handrail.policies.imitation.arms import Arm
 from handrail.policies.imitation.operator import Policy, PolicyOperator
 from handrail.policies.imitation.protection import build_protection
+from handrail.policies.imitation.torch_state import one_thread, repeatable
 
 Load = Callable[[Path], Policy]
 Row = dict[str, Any]
@@ -56,31 +57,30 @@ def run_rollout(
         render: height and width of good-looking pictures that the environment draws [px], if it does.
     """
     arm = rollout.arm
-    env = _env(_session_config(arm), arm.checkpoint.fps, arm.perturbation.shift, render)
-    controller = _controller(arm.protection, arm.checkpoint.intent_mode, arm.checkpoint.environment, env)
-    with _one_torch_thread():
-        policy = _policy(arm.checkpoint.folder, arm.checkpoint.digest, load)
-        operator = PolicyOperator(policy, Channels.of(env.model.description), arm.checkpoint.mode)
+    env = _env(_session_config(arm), arm.checkpoint.meta.fps, arm.perturbation.shift, render)
+    controller = _controller(arm.protection, arm.checkpoint.intent_mode, arm.checkpoint.meta.environment, env)
+    policy = _policy(arm.checkpoint.folder, arm.checkpoint.digest, load)
+    with one_thread(), repeatable(rollout.seed):
+        operator = PolicyOperator(policy, Channels.of(env.model.description), arm.checkpoint.meta.mode)
         perturbation, watch = arm.perturbation, _Watch()
-        session = Session(
-            env,
-            controller,
-            DelayedOperator(operator, perturbation.delay),
-            (watch, *observers),
-            disturbances=(Pusher(perturbation.push),) if perturbation.push else (),
-        )
+        late = DelayedOperator(operator, perturbation.delay)
+        pushers = (Pusher(perturbation.push),) if perturbation.push else ()
+        session = Session(env, controller, late, (watch, *observers), disturbances=pushers)
         outcome = session.run(rollout.seed)
     return _row(outcome, watch, operator.malformed)
 
 
 def _session_config(arm: Arm) -> SessionConfig:
-    meta = arm.checkpoint.meta
+    meta, pictures = arm.checkpoint.meta, arm.checkpoint.pictures
+    sizes = {size for picture in pictures.values() for size in picture} or {128}
+    if len(sizes) > 1:
+        raise HandrailError(f"{arm.checkpoint.folder}: expected square pictures of one size, got {pictures}")
     return SessionConfig(
-        task=arm.checkpoint.environment,
-        robot=str(meta["robot"]),
-        moving_obstacles=int(meta.get("moving_obstacles", 0)),
-        cameras=",".join(meta.get("cameras", ())),
-        image_size=int(meta.get("image_size", 128)),
+        task=meta.environment,
+        robot=meta.robot,
+        moving_obstacles=arm.checkpoint.movers,
+        cameras=",".join(pictures),
+        image_size=sizes.pop(),
         time_limit=arm.time_limit,
     )
 
@@ -136,16 +136,3 @@ def _row(outcome: Outcome, watch: _Watch, malformed: int) -> Row:
     parts = {"policy": "operator", "controller": "controller", "environment": "environment"}
     timing = {name: 1e3 * outcome.spent[part] / outcome.frames for name, part in parts.items()}
     return row | {"timing": {name: round(value, 3) for name, value in timing.items()}}
-
-
-@contextlib.contextmanager
-def _one_torch_thread() -> Iterator[None]:
-    """Let PyTorch use one thread: the networks are small, and processes share the cores."""
-    import torch
-
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)
-    try:
-        yield
-    finally:
-        torch.set_num_threads(before)
