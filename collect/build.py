@@ -63,14 +63,14 @@ _VERSIONED = ("handrail", "lerobot", "mujoco", "pin", "coal", "casadi", "daqp", 
 
 
 def build_env(
-    config: SessionConfig, fps: int, render: bool = False, task: Task | None = None
+    config: SessionConfig, fps: int, render: tuple[int, int] | bool = False, task: Task | None = None
 ) -> HandrailEnv:
     """Return the environment of a session.
 
     Args:
         config: of the session.
         fps: control and recording rate [Hz].
-        render: whether `env.render()` shall give good-looking pictures.
+        render: whether `env.render()` shall give good-looking pictures; or their height and width [px].
         task: instead of the one that the settings name.
 
     Raises:
@@ -86,6 +86,7 @@ def build_env(
         cameras=config.camera_names,
         image_size=(config.image_size, config.image_size),
         render_mode="rgb_array" if render else None,
+        **({"render_size": render} if isinstance(render, tuple) else {}),
         disable_env_checker=True,
     )
     unwrapped = env.unwrapped

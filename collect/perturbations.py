@@ -1,4 +1,4 @@
-"""What may disturb an episode: pushes, a start elsewhere, late observations; as typed settings, light to import.
+"""What may disturb an episode: pushes, a start elsewhere, late observations. Light to import.
 
 All of it is drawn from the episode's seed and from nothing that the robot does, so that whoever runs the same
 seed meets the same disturbance.
@@ -76,5 +76,7 @@ def _size(name: str, number: str) -> float:
     whole = name != "delay" or size == int(size if size == size else 0)
     if not (0.0 < size <= MOST[name] and whole):
         kind = "a whole number of control periods" if name == "delay" else "a number"
-        raise HandrailError(f"--perturbation {name}:{number}: expected {kind} above 0, at most {MOST[name]:g}")
+        raise HandrailError(
+            f"--perturbation {name}:{number}: expected {kind} above 0, at most {MOST[name]:g}"
+        )
     return size

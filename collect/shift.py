@@ -75,7 +75,11 @@ class ShiftedTask:
         """Return a displacement of the configuration, (n,)."""
         size, base = self.size * share, len(model.description.base_joints)
         step = rng.uniform(-size / 2, size / 2, model.size)
-        direction, distance, turn = rng.uniform(-np.pi, np.pi), rng.uniform(size / 2, size), rng.uniform(-1, 1)
+        direction, distance, turn = (
+            rng.uniform(-np.pi, np.pi),
+            rng.uniform(size / 2, size),
+            rng.uniform(-1, 1),
+        )
         step[:base] = np.array([np.cos(direction), np.sin(direction), 0.0])[:base] * distance
         if base == 3:
             step[2] = size * turn

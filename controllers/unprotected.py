@@ -1,4 +1,4 @@
-"""A completion that protects nothing: what is asked for, by damped least squares, inside the joints' limits."""
+"""A completion that protects nothing: what is asked for, by damped least squares, clipped to limits."""
 
 import numpy as np
 

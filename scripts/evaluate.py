@@ -20,12 +20,16 @@ def _evaluate(config: EvaluateConfig) -> int:
 
     from handrail.policies.imitation.evaluation import evaluate
     from handrail.policies.imitation.evaluation_table import evaluation_table
+    from handrail.policies.imitation.evaluation_video import film
 
     content = evaluate(config, Console(stderr=True))
     console = Console(highlight=False, soft_wrap=True)
     console.print(evaluation_table(content))
     if config.json:
         console.print(f"Written: {config.json}")
+    if config.video:
+        trouble = film(config)
+        console.print(f"Without a video: {trouble}" if trouble else f"Video: {config.video}")
     return 0
 
 

@@ -1,6 +1,5 @@
 """Shared by the tests of evaluation: checkpoint folders of policies that nobody trained."""
 
-import json
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +10,7 @@ from handrail.collect.config import SessionConfig
 from handrail.collect.operators.modes import find_mode
 from handrail.controllers.channels import Channels
 from handrail.controllers.model import load_model
+from handrail.policies.imitation.checkpoint import PolicyMeta, read_meta, write_meta
 from handrail.policies.imitation.interface import PolicyInterface
 
 HOLD = 15  # periods for which a random policy keeps to what it drew
@@ -26,6 +26,7 @@ class StandIn:
 
     def reset(self) -> None:
         self._steps = 0
+        self._rng = np.random.default_rng(0)
 
     def act(self, state, environment, images):
         self._steps += 1
@@ -42,11 +43,15 @@ class StandIn:
 
     def _random(self, state, environment):
         """Draw something bold, and keep to it for a while."""
+        if self._steps % HOLD == 1:
+            self._drawn = self._rng.uniform(-1.0, 1.0, len(self.interface.action_names))
+        return self._drawn
+
+    def _torch(self, state, environment):
+        """Draw as a diffusion policy does."""
         import torch
 
-        if self._steps % HOLD == 1:
-            self._drawn = 2.0 * torch.rand(len(self.interface.action_names)).numpy() - 1.0
-        return self._drawn
+        return 0.3 * torch.randn(len(self.interface.action_names)).numpy()
 
     def _still(self, state, environment):
         return np.zeros(len(self.interface.action_names))
@@ -63,12 +68,14 @@ class StandIn:
 
 
 def load(folder: Path) -> StandIn:
-    meta = json.loads((folder / "handrail.json").read_text())
-    return StandIn(PolicyInterface.from_dict(meta["interface"]), meta["stand_in"])
+    kind = (folder / "kind").read_text()
+    if kind == "torch":
+        import torch  # noqa: F401  (as a trained policy does)
+    return StandIn(read_meta(folder)[0], kind)
 
 
 def checkpoint(
-    folder: Path, kind="chase", task="reach", mode="ee", actions="intent", training_seed=0, **more
+    folder: Path, kind="chase", task="reach", mode="ee", actions="intent", training_seed=0
 ) -> Path:
     """Write a checkpoint folder of a stand-in."""
     env = build_env(SessionConfig(task=task), 20)
@@ -77,20 +84,11 @@ def checkpoint(
     masks = {tuple(channels.mask(*find_mode(mode).groups(focus)).tolist()) for focus in focuses}
     owned = tuple(sorted(masks)) if actions == "intent" else ()
     interface = PolicyInterface(actions, env.agent_names, env.state_names, channels.names, owned)
-    meta = {
-        "format": "handrail.policy/1",
-        "interface": interface.to_dict(),
-        "environment": task,
-        "mode": mode,
-        "robot": "ridgeback_ur10",
-        "fps": 20,
-        "training_seed": training_seed,
-        "dataset_draw": 0,
-        "trained_on": {"episodes": 50, "operator_time": 312.5, "mode": mode},
-        "policy": "act",
-        "stand_in": kind,
-    }
+    trained_on = {"episodes": 50, "operator_time": 312.5}
+    meta = PolicyMeta(*(task, mode, "ridgeback_ur10", 20, actions, training_seed, 0, trained_on, "act", 100))
     env.close()
     folder.mkdir(parents=True)
-    (folder / "handrail.json").write_text(json.dumps(meta | more))
+    write_meta(folder, interface, meta)
+    (folder / "config.json").write_text("{}")
+    (folder / "kind").write_text(kind)
     return folder

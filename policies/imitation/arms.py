@@ -1,23 +1,24 @@
 """What is evaluated: a checkpoint under a condition, which together are an arm."""
 
 import hashlib
+import itertools
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
+from handrail.collect.config import TASKS
 from handrail.collect.operators.modes import find_mode
 from handrail.collect.perturbations import Perturbation
 from handrail.controllers.errors import HandrailError
+from handrail.policies.imitation.checkpoint import MODEL, NAME, PolicyMeta, last_checkpoint, read_meta
 from handrail.policies.imitation.evaluate_config import EvaluateConfig
+from handrail.policies.imitation.interface import PolicyInterface
 
-FORMAT = "handrail.policy/1"
-META = "handrail.json"
-_NESTED = ("", "pretrained_model", "checkpoints/last/pretrained_model")
 UNPROTECTED = ("direct", "split")  # completions of modes that keep nothing but the joints' limits
+_IMAGES = "observation.images."
 
 
 @dataclass(frozen=True)
@@ -25,44 +26,34 @@ class Checkpoint:
     """A trained policy on the disk.
 
     Attributes:
-        folder: that has its `handrail.json`.
-        meta: what it says.
+        folder: its files.
+        meta: what it says of itself.
+        interface: what it reads and writes; None if that is what was recorded.
+        pictures: height and width of what it sees, by camera [px].
         digest: of all its files.
     """
 
     folder: Path
-    meta: Mapping[str, Any]
+    meta: PolicyMeta
+    interface: PolicyInterface | None
+    pictures: Mapping[str, tuple[int, int]]
     digest: str
-
-    @property
-    def actions(self) -> str:
-        """What it decides on: `realised` joint velocities, or the operator's `intent`."""
-        return str(self.meta["interface"]["actions"])
-
-    @property
-    def environment(self) -> str:
-        """Which task it was trained for."""
-        return str(self.meta["environment"])
-
-    @property
-    def mode(self) -> str:
-        """Teleop mode of its demonstrations."""
-        return str(self.meta["mode"])
 
     @property
     def intent_mode(self) -> str:
         """Teleop mode whose intents it decides on; empty for joint velocities."""
-        return self.mode if self.actions == "intent" else ""
+        return self.meta.mode if self.meta.actions == "intent" else ""
 
     @property
-    def fps(self) -> int:
-        """Decisions a second [Hz]."""
-        return int(self.meta["fps"])
+    def movers(self) -> int:
+        """How many moving obstacles it knows of."""
+        names = self.interface.environment_names if self.interface else ()
+        return len({name.split(".")[0] for name in names if name.startswith("mover_")})
 
     @property
     def key(self) -> tuple[int, int]:
         """Draw of the dataset and training seed."""
-        return int(self.meta.get("dataset_draw", 0)), int(self.meta["training_seed"])
+        return self.meta.dataset_draw, self.meta.training_seed
 
 
 @dataclass(frozen=True)
@@ -73,12 +64,14 @@ class Arm:
         checkpoint: which policy.
         protection: what stands between it and the robot: `none`, `mpc`, `filter`, or a mode's `cbf`.
         perturbation: what disturbs.
+        time_limit: after which a rollout is given up [s]; the task's own when 0.
         label: what it is called.
     """
 
     checkpoint: Checkpoint
     protection: str
     perturbation: Perturbation
+    time_limit: float
     label: str
 
     @property
@@ -86,10 +79,10 @@ class Arm:
         """What all rollouts of this label have in common."""
         meta = self.checkpoint.meta
         return {
-            **{name: str(meta[name]) for name in ("environment", "robot", "mode", "fps")},
-            "actions": self.checkpoint.actions,
+            **{name: str(getattr(meta, name)) for name in ("environment", "robot", "mode", "fps", "actions")},
             "protection": self.protection,
             "perturbation": self.perturbation.text,
+            "time_limit": f"{self.time_limit:g}",
         }
 
 
@@ -99,22 +92,28 @@ def read_checkpoint(folder: Path) -> Checkpoint:
     Raises:
         HandrailError: there is none, or none of Handrail's.
     """
-    found = next((folder / name for name in _NESTED if (folder / name / META).is_file()), None)
-    if found is None:
-        raise HandrailError(f"--policy {folder}: expected a checkpoint with a {META}, found none")
-    try:
-        meta = json.loads((found / META).read_bytes())
-        given = meta.get("format")
-    except (OSError, ValueError, AttributeError) as error:
-        raise HandrailError(f"--policy {found}: expected JSON in {META}, got {error}") from error
-    needed = ("environment", "robot", "mode", "fps", "training_seed", "interface")
-    missing = [name for name in needed if name not in meta]
-    if given != FORMAT or missing or "actions" not in meta["interface"]:
+    last = last_checkpoint(folder)
+    places = (folder, folder / MODEL, *((last / MODEL,) if last else ()))
+    place = next((place for place in places if (place / NAME).is_file()), None)
+    if place is None:
+        raise HandrailError(f"--policy {folder}: expected a checkpoint with a {NAME}, found none")
+    interface, meta = read_meta(place)
+    if meta.environment not in TASKS:
         raise HandrailError(
-            f"--policy {found}: expected the format {FORMAT!r} with {', '.join(needed)}; "
-            f"got {given!r} without {', '.join(missing) or 'actions'}"
+            f"--policy {place}: expected one trained for one of {', '.join(TASKS)}, got {meta.environment!r}"
         )
-    return Checkpoint(found, meta, _digest(found))
+    return Checkpoint(place, meta, interface, _pictures(place), _digest(place))
+
+
+def _pictures(place: Path) -> dict[str, tuple[int, int]]:
+    """Return what a policy sees, from LeRobot's own settings."""
+    path = place / "config.json"
+    try:
+        features = json.loads(path.read_bytes()).get("input_features") or {}
+        shapes = {name: feature["shape"] for name, feature in features.items() if name.startswith(_IMAGES)}
+        return {name.removeprefix(_IMAGES): (int(h), int(w)) for name, (_, h, w) in shapes.items()}
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        raise HandrailError(f"{str(path)!r}: expected a policy of LeRobot, got {error!r}") from error
 
 
 def arms(config: EvaluateConfig) -> tuple[Arm, ...]:
@@ -125,36 +124,34 @@ def arms(config: EvaluateConfig) -> tuple[Arm, ...]:
             policy of an arm.
     """
     checkpoints = [read_checkpoint(folder) for folder in config.folders]
-    environments = {checkpoint.environment for checkpoint in checkpoints}
+    environments = {checkpoint.meta.environment for checkpoint in checkpoints}
     if len(environments) > 1:
         raise HandrailError(
             f"--policy: expected policies for one task, got {', '.join(sorted(environments))}"
         )
+    conditions = itertools.product(config.perturbations, config.protections, checkpoints)
     found: dict[tuple[str, tuple[int, int]], Arm] = {}
-    for perturbation in config.perturbations:
-        for protection in config.protections:
-            for checkpoint in checkpoints:
-                arm = _arm(checkpoint, protection, perturbation, config.label)
-                if (arm.label, checkpoint.key) in found:
-                    before = found[arm.label, checkpoint.key].checkpoint.folder
-                    raise HandrailError(
-                        f"--policy {checkpoint.folder}: arm {arm.label!r} has another policy with dataset draw "
-                        f"and training seed {checkpoint.key}: {before}; expected each once, or --label"
-                    )
-                found[arm.label, checkpoint.key] = arm
+    for perturbation, protection, checkpoint in conditions:
+        arm = _arm(checkpoint, protection, perturbation, config)
+        before = found.setdefault((arm.label, checkpoint.key), arm)
+        if before != arm:
+            raise HandrailError(
+                f"--policy {checkpoint.folder}: expected each dataset draw and training seed once, but arm "
+                f"{arm.label!r} has {checkpoint.key} already, {before.checkpoint.folder}; give it a --label"
+            )
     return tuple(found.values())
 
 
-def _arm(checkpoint: Checkpoint, protection: str, perturbation: Perturbation, label: str) -> Arm:
+def _arm(checkpoint: Checkpoint, protection: str, perturbation: Perturbation, config: EvaluateConfig) -> Arm:
     own = _own(checkpoint)
     chosen = own if protection == "own" else protection
     if chosen in ("mpc", "filter") and chosen != own and not _fits(checkpoint, chosen):
         raise HandrailError(
-            f"--protection {protection}: expected a policy that commands every joint, but {checkpoint.folder} "
-            f"decides on the intent of mode {checkpoint.mode}; expected own or none"
+            f"--protection {protection}: expected a policy that commands every joint, or own or none; "
+            f"{checkpoint.folder} decides on the intent of mode {checkpoint.meta.mode}"
         )
-    words = [label or _name(checkpoint), _protected(chosen, own), perturbation.words]
-    return Arm(checkpoint, chosen, perturbation, " ".join(filter(None, words)))
+    words = [config.label or _name(checkpoint), _protected(chosen, own), perturbation.words]
+    return Arm(checkpoint, chosen, perturbation, config.time_limit, " ".join(filter(None, words)))
 
 
 def _own(checkpoint: Checkpoint) -> str:
@@ -174,12 +171,14 @@ def _fits(checkpoint: Checkpoint, protection: str) -> bool:
     if not checkpoint.intent_mode:
         return True
     completes = find_mode(checkpoint.intent_mode).controller != "direct"
-    return (protection == "mpc" and completes) or _commands_joints(checkpoint.meta["interface"])
+    return (protection == "mpc" and completes) or _commands_joints(checkpoint.interface)
 
 
-def _commands_joints(interface: Mapping[str, Any]) -> bool:
+def _commands_joints(interface: PolicyInterface | None) -> bool:
     """Return whether every mask leaves nothing over: all joints, or the base's twist and the arm's joints."""
-    names, masks = interface["channels"], np.array(interface["masks"], bool)  # (k, m)
+    if interface is None:
+        return True
+    names, masks = interface.channels, np.array(interface.masks, bool)  # (k, m)
     base, joint = (np.array([name.startswith(group) for name in names]) for group in ("base.", "joint."))
     joints = masks[:, joint]  # (k, n), the base's first
     driven = masks[:, base].all(axis=1) & joints[:, base.sum() :].all(axis=1) & base.any()
@@ -187,7 +186,7 @@ def _commands_joints(interface: Mapping[str, Any]) -> bool:
 
 
 def _name(checkpoint: Checkpoint) -> str:
-    return checkpoint.mode + (" intent" if checkpoint.actions == "intent" else "")
+    return checkpoint.meta.mode + (" intent" if checkpoint.intent_mode else "")
 
 
 def _protected(chosen: str, own: str) -> str:

@@ -10,7 +10,6 @@ from typing import Any
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from handrail.collect.gl import graphics_trouble
 from handrail.policies.imitation.arms import arms
 from handrail.policies.imitation.evaluate_config import EvaluateConfig
 from handrail.policies.imitation.evaluation_file import EvaluationFile
@@ -47,12 +46,7 @@ def evaluate(
     found = arms(config)
     file = EvaluationFile(config.file if config.json else None)
     file.open(found)
-    rollouts = [
-        Rollout(arm, seed, config.time_limit)
-        for arm in found
-        for seed in config.seeds
-        if seed not in file.done(arm)
-    ]
+    rollouts = [Rollout(arm, seed) for arm in found for seed in config.seeds if seed not in file.done(arm)]
     try:
         _run_all(rollouts, config.workers, load, file, console or Console(quiet=True))
     finally:

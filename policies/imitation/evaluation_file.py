@@ -38,11 +38,11 @@ class EvaluationFile:
             HandrailError: the file is of another task, an arm ran under other conditions, or a policy is
                 another.
         """
-        task = self.content.setdefault("task", arms[0].checkpoint.environment)
+        task = self.content.setdefault("task", arms[0].checkpoint.meta.environment)
         for arm in arms:
             where = f"--json {self._path}: arm {arm.label!r}"
-            if arm.checkpoint.environment != task:
-                raise HandrailError(f"{where}: expected task {task}, got {arm.checkpoint.environment}")
+            if arm.checkpoint.meta.environment != task:
+                raise HandrailError(f"{where}: expected task {task}, got {arm.checkpoint.meta.environment}")
             before = self.content["conditions"].get(arm.label)
             if arm.label in self.content["arms"] and before != arm.conditions:
                 raise HandrailError(
@@ -91,12 +91,10 @@ class EvaluationFile:
 
 def _new_entry(checkpoint: Checkpoint) -> dict[str, Any]:
     draw, seed = checkpoint.key
-    told = checkpoint.meta.get("trained_on") or {}
-    numbers = {name: value for name, value in told.items() if isinstance(value, int | float)}
     return {
         "training_seed": seed,
         "dataset_draw": draw,
-        "trained_on": numbers,
+        "trained_on": dict(checkpoint.meta.trained_on),
         "checkpoint": checkpoint.digest,
         "rollouts": [],
     }

@@ -46,9 +46,9 @@ def _caption(rows: Sequence[Mapping[str, Any]]) -> str:
     """Say what a step took, and what the intervals leave out."""
     timed = [row["timing"] for row in rows if "timing" in row]
     words = [
-        f"{part} {np.mean([timing[part] for timing in timed]):.2f} ms"
+        f"{part} {np.median([timing[part] for timing in timed]):.2f} ms"
         for part in ("policy", "controller", "environment")
         if timed
     ]
-    said = "mean time of a step: " + ", ".join(words) + "\n" if words else ""
+    said = "time of a step, median: " + ", ".join(words) + "\n" if words else ""
     return said + "intervals of the rollouts alone (Wilson); handrail-compare adds those of training"

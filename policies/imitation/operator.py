@@ -11,6 +11,8 @@ from handrail.controllers.arrays import FloatArray
 from handrail.controllers.channels import Channels
 from handrail.controllers.intent import Intent
 
+_CLOSED = 0.5  # a gripper command beyond it closes
+
 
 class Interface(Protocol):
     """How a policy's numbers come from and go to what Handrail records."""
@@ -34,7 +36,7 @@ class Policy(Protocol):
 
     @property
     def interface(self) -> Any:
-        """How it is spoken to: an `Interface`."""
+        """How it is spoken to: an `Interface`; None if it reads and writes what is recorded."""
         ...
 
     def reset(self) -> None:
@@ -44,6 +46,32 @@ class Policy(Protocol):
     def act(self, state: FloatArray, environment: FloatArray, images: Mapping[str, np.ndarray]) -> FloatArray:
         """Return the action, (a,)."""
         ...
+
+
+class AsRecorded:
+    """Observations and commanded joint velocities as the dataset has them; an interface.
+
+    Args:
+        channels: of the robot.
+    """
+
+    def __init__(self, channels: Channels) -> None:
+        self._channels = channels
+
+    @property
+    def action_names(self) -> tuple[str, ...]:
+        """The joints' velocities and the gripper, (n + 1,)."""
+        return (*self._channels.joints, "gripper")
+
+    def observe(self, state: FloatArray, environment: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the observation."""
+        return state, environment
+
+    def decode(self, action: FloatArray, state: FloatArray) -> Intent:
+        """Return an intent on every joint."""
+        values = np.zeros(self._channels.size)
+        values[self._channels.joint_slice] = action[:-1]
+        return Intent(values, self._channels.mask("joint"), gripper=float(action[-1] > _CLOSED))
 
 
 class PolicyOperator:
@@ -63,7 +91,7 @@ class PolicyOperator:
 
     def __init__(self, policy: Policy, channels: Channels, mode: str) -> None:
         self._policy = policy
-        self._interface: Interface = policy.interface
+        self._interface: Interface = policy.interface or AsRecorded(channels)
         self._channels = channels
         self._mode = mode
         self.malformed = 0
@@ -74,10 +102,7 @@ class PolicyOperator:
         return "policy"
 
     def reset(self, view: View, rng: np.random.Generator) -> None:
-        """Begin an episode; what the policy draws comes from the episode's seed."""
-        import torch
-
-        torch.manual_seed(int(rng.integers(2**31)))
+        """Begin an episode."""
         self._policy.reset()
         self.malformed = 0
 

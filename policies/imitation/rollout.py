@@ -1,7 +1,6 @@
 """One rollout of a trained policy through the one session loop."""
 
-import contextlib
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -18,11 +17,13 @@ from handrail.collect.session import Observer, Outcome, Session
 from handrail.collect.shift import ShiftedTask
 from handrail.controllers.channels import Channels
 from handrail.controllers.controller import Controller
+from handrail.controllers.errors import HandrailError
 from handrail.datasets.frames import Moment
 from handrail.datasets.quality.safety import contacts_begun
 from handrail.policies.imitation.arms import Arm
 from handrail.policies.imitation.operator import Policy, PolicyOperator
 from handrail.policies.imitation.protection import build_protection
+from handrail.policies.imitation.torch_state import one_thread, repeatable
 
 Load = Callable[[Path], Policy]
 Row = dict[str, Any]
@@ -35,16 +36,17 @@ class Rollout:
     Attributes:
         arm: policy and condition.
         seed: of the episode.
-        time_limit: [s]; the task's own when 0.
     """
 
     arm: Arm
     seed: int
-    time_limit: float = 0.0
 
 
 def run_rollout(
-    rollout: Rollout, load: Load, observers: Sequence[Observer] = (), render: bool = False
+    rollout: Rollout,
+    load: Load,
+    observers: Sequence[Observer] = (),
+    render: tuple[int, int] | bool = False,
 ) -> Row:
     """Run a policy once and return how it went, as an evaluation file has it.
 
@@ -52,40 +54,39 @@ def run_rollout(
         rollout: what to run.
         load: reads the policy of a folder.
         observers: shown every moment.
-        render: whether the environment draws good-looking pictures.
+        render: height and width of good-looking pictures that the environment draws [px], if it does.
     """
-    arm, limit = rollout.arm, rollout.time_limit
-    env = _env(_session_config(arm, limit), arm.checkpoint.fps, arm.perturbation.shift, render)
-    controller = _controller(arm.protection, arm.checkpoint.intent_mode, arm.checkpoint.environment, env)
-    with _one_torch_thread():
-        policy = _policy(arm.checkpoint.folder, arm.checkpoint.digest, load)
-        operator = PolicyOperator(policy, Channels.of(env.model.description), arm.checkpoint.mode)
+    arm = rollout.arm
+    env = _env(_session_config(arm), arm.checkpoint.meta.fps, arm.perturbation.shift, render)
+    controller = _controller(arm.protection, arm.checkpoint.intent_mode, arm.checkpoint.meta.environment, env)
+    policy = _policy(arm.checkpoint.folder, arm.checkpoint.digest, load)
+    with one_thread(), repeatable(rollout.seed):
+        operator = PolicyOperator(policy, Channels.of(env.model.description), arm.checkpoint.meta.mode)
         perturbation, watch = arm.perturbation, _Watch()
-        session = Session(
-            env,
-            controller,
-            DelayedOperator(operator, perturbation.delay),
-            (watch, *observers),
-            disturbances=(Pusher(perturbation.push),) if perturbation.push else (),
-        )
+        late = DelayedOperator(operator, perturbation.delay)
+        pushers = (Pusher(perturbation.push),) if perturbation.push else ()
+        session = Session(env, controller, late, (watch, *observers), disturbances=pushers)
         outcome = session.run(rollout.seed)
     return _row(outcome, watch, operator.malformed)
 
 
-def _session_config(arm: Arm, time_limit: float) -> SessionConfig:
-    meta = arm.checkpoint.meta
+def _session_config(arm: Arm) -> SessionConfig:
+    meta, pictures = arm.checkpoint.meta, arm.checkpoint.pictures
+    sizes = {size for picture in pictures.values() for size in picture} or {128}
+    if len(sizes) > 1:
+        raise HandrailError(f"{arm.checkpoint.folder}: expected square pictures of one size, got {pictures}")
     return SessionConfig(
-        task=arm.checkpoint.environment,
-        robot=str(meta["robot"]),
-        moving_obstacles=int(meta.get("moving_obstacles", 0)),
-        cameras=",".join(meta.get("cameras", ())),
-        image_size=int(meta.get("image_size", 128)),
-        time_limit=time_limit,
+        task=meta.environment,
+        robot=meta.robot,
+        moving_obstacles=arm.checkpoint.movers,
+        cameras=",".join(pictures),
+        image_size=sizes.pop(),
+        time_limit=arm.time_limit,
     )
 
 
 @lru_cache(maxsize=8)
-def _env(config: SessionConfig, fps: int, shift: float, render: bool) -> HandrailEnv:
+def _env(config: SessionConfig, fps: int, shift: float, render: tuple[int, int] | bool) -> HandrailEnv:
     """Return an environment, built once a process."""
     task = build_task(config)
     return build_env(config, fps, render, ShiftedTask(task, shift) if shift else task)
@@ -135,16 +136,3 @@ def _row(outcome: Outcome, watch: _Watch, malformed: int) -> Row:
     parts = {"policy": "operator", "controller": "controller", "environment": "environment"}
     timing = {name: 1e3 * outcome.spent[part] / outcome.frames for name, part in parts.items()}
     return row | {"timing": {name: round(value, 3) for name, value in timing.items()}}
-
-
-@contextlib.contextmanager
-def _one_torch_thread() -> Iterator[None]:
-    """Let PyTorch use one thread: the networks are small, and processes share the cores."""
-    import torch
-
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)
-    try:
-        yield
-    finally:
-        torch.set_num_threads(before)
