@@ -11,6 +11,7 @@ from handrail.collect.tasks.cabinet import inward
 from handrail.collect.tasks.drawer import handle, opened
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.model import Pose, RobotModel
+from handrail.controllers.rotation import matrix_from_rpy
 
 _PULL = 0.26  # how far the operator means to open it [m]
 _ENOUGH = 0.21  # [m]
@@ -18,6 +19,8 @@ _ENOUGH = 0.21  # [m]
 
 class DrawerScript:
     """Approach, grasp, pull, let go for `handrail/Drawer-v0`; a script.
+
+    Who drives the base by itself turns the hand first, where there is room, and drives up to the handle then.
 
     Args:
         model: of the robot.
@@ -67,9 +70,20 @@ class DrawerScript:
             phase("leave", pull + 0.15, distance=0.03, angle=3.2, pace=0.5, patience=5.0),
         ]
         if self._drives:
-            hand = phases[0].hand
-            phases.insert(0, Phase("drive", hand, base, focus="base", distance=0.08, angle=0.08))
+            hand, now = phases[0].hand, view.state.q[:3]
+            ready = Phase("ready", before_driving(hand, base, now), now, distance=0.05, angle=0.15)
+            phases = [ready, Phase("drive", hand, base, focus="base", distance=0.08, angle=0.08), *phases]
         return phases
+
+
+def before_driving(hand: Pose, base: FloatArray, now: FloatArray) -> Pose:
+    """Return where the hand is to be while the base is at `now`, so that driving to `base` brings it along.
+
+    `p = p_now + R_z(θ_now − θ) (p_hand − p_base)`, and the rotation likewise.
+    """
+    turn = matrix_from_rpy([0.0, 0.0, now[2] - base[2]])
+    away = hand.position - [base[0], base[1], 0.0]
+    return Pose(turn @ away + [now[0], now[1], 0.0], turn @ hand.rotation)
 
 
 def handle_rotation(tool: FloatArray, into: FloatArray) -> FloatArray:
