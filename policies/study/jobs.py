@@ -80,10 +80,12 @@ class Job:
 
 def jobs(design: StudyDesign) -> list[Job]:
     """Return all jobs, what matters most first: the main design seed by seed, then the sweep."""
-    main = [Cell(task, mode) for task, mode in product(design.tasks, design.modes)]
-    found = [_collect(cell) for cell in main]
-    for seed in design.seeds:
-        arms = [arm for budget in design.budgets for cell in main for arm in _arms(cell, budget, seed)]
+    found: list[Job] = []
+    for seed, task in product(design.seeds, design.tasks):
+        cells = [Cell(task, mode) for mode in design.modes]
+        if seed == design.seeds[0]:
+            found += map(_collect, cells)
+        arms = [arm for budget in design.budgets for cell in cells for arm in _arms(cell, budget, seed)]
         found += [_policy(arm, robust=arm.budget == design.budgets[0]) for arm in arms]
     found += [_compare(task, found) for task in design.tasks]
     return found + list(_sweep(design))

@@ -25,8 +25,9 @@ def fingerprint(job: Job, design: StudyDesign) -> dict[str, Any]:
     """Return all settings that a job's result depends on, as JSON has them."""
     settings: dict[str, Any] = {"job": asdict(job)}
     if job.cell:
-        settings |= {"task": asdict(design.tasks[job.cell.task]) | {"steps": 0}}
-        settings |= {"persons": design.persons, "seed": design.seed}
+        task = design.tasks[job.cell.task]
+        settings |= {"episodes": task.episodes, "minutes": task.minutes, "persons": design.persons}
+        settings |= {"time_limit": task.time_limit.get(job.cell.mode, 0.0), "seed": design.seed}
     elif job.arm:
         settings |= {"task": asdict(design.tasks[job.arm.cell.task]), "policy": design.policy}
         settings |= {"rollouts": design.rollouts, "seed": design.seed}
