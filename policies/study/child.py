@@ -4,11 +4,12 @@ Jobs are forked from a server that has loaded LeRobot, PyTorch and the simulator
 takes longer than many a job.
 """
 
-import ctypes
 import os
 import signal
 import sys
+import threading
 import time
+from multiprocessing import connection, parent_process
 from pathlib import Path
 
 from handrail.controllers.errors import HandrailError
@@ -17,7 +18,6 @@ from handrail.policies.study.jobs import Job, Layout
 from handrail.policies.study.notes import write_json
 from handrail.policies.study.work import begin, fingerprint, work
 
-_PR_SET_PDEATHSIG = 1  # of <sys/prctl.h>
 FAILED = 1
 
 
@@ -47,7 +47,13 @@ def _say_into(log: Path) -> None:
 
 
 def _end_with_parent() -> None:
-    """Ask Linux to end this process when the study ends, however that comes about."""
-    libc = ctypes.CDLL(None, use_errno=True)
-    if hasattr(libc, "prctl"):
-        libc.prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
+    """End this process when the study ends, also when that was killed; the server may outlive it."""
+    study = parent_process()
+    if study is None:
+        return
+
+    def watch() -> None:
+        connection.wait([study.sentinel])
+        os.kill(os.getpid(), signal.SIGTERM)
+
+    threading.Thread(target=watch, daemon=True).start()
