@@ -7,7 +7,7 @@ import gymnasium
 import numpy as np
 
 from handrail.collect.config import SessionConfig, check_fps
-from handrail.collect.env import HandrailEnv
+from handrail.collect.env import RENDER_SIZE, HandrailEnv
 from handrail.collect.operators.drawer_script import DrawerScript
 from handrail.collect.operators.modes import Completion, TeleopMode, find_mode, without
 from handrail.collect.operators.pick_place_script import PickPlaceScript
@@ -86,7 +86,7 @@ def build_env(
         cameras=config.camera_names,
         image_size=(config.image_size, config.image_size),
         render_mode="rgb_array" if render else None,
-        **({"render_size": render} if isinstance(render, tuple) else {}),
+        render_size=render if isinstance(render, tuple) else RENDER_SIZE,
         disable_env_checker=True,
     )
     unwrapped = env.unwrapped

@@ -17,11 +17,13 @@ from handrail.collect.benchmark_contenders import CONTENDERS
 from handrail.collect.build import build_env, session_features
 from handrail.collect.config import DemoConfig, InspectConfig, RecordConfig, ReplayConfig, SessionConfig
 from handrail.collect.operators.modes import MODES
+from handrail.collect.perturbations import DEFAULTS
 from handrail.collect.profile_config import ProfileConfig
 from handrail.collect.showcase_config import ShowcaseConfig
 from handrail.controllers.command import Status
 from handrail.datasets.comparison.config import CompareConfig
 from handrail.datasets.quality.catalogue import METRICS
+from handrail.policies.imitation.evaluate_config import PROTECTIONS, EvaluateConfig
 from handrail.policies.rl_config import TrainRlConfig
 from handrail.policies.rl_contender import RL
 from handrail.policies.study.config import StudyConfig
@@ -39,6 +41,7 @@ CONFIGS = {
     "handrail-train-rl": TrainRlConfig,
     "handrail-benchmark": BenchmarkConfig,
     "handrail-compare": CompareConfig,
+    "handrail-evaluate": EvaluateConfig,
     "handrail-study": StudyConfig,
 }
 _LEROBOT = """
@@ -130,6 +133,10 @@ def test_controllers_and_profiles_of_the_benchmark_are_all_there():
     source = (ROOT / "collect" / "benchmark_config.py").read_text()
     helped = re.findall(r'^    """(.*?)"""', source, re.MULTILINE | re.DOTALL)
     assert all(re.search(rf"\b{name}\b", " ".join(helped)) for name in (*CONTROLLERS, *PROFILES))
+
+
+def test_protections_and_perturbations_are_all_there():
+    assert table("Evaluate") == {*PROTECTIONS, *DEFAULTS, "none"}
 
 
 def test_metrics_are_all_there():
