@@ -3,7 +3,6 @@
 import importlib.metadata
 import io
 import json
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -16,6 +15,7 @@ from handrail.controllers.errors import HandrailError
 from handrail.datasets.comparison import markup
 from handrail.datasets.comparison.drawing import svg
 from handrail.datasets.comparison.findings import headline
+from handrail.datasets.comparison.report import plain
 from handrail.policies.study.config import StudyConfig
 from handrail.policies.study.design import StudyDesign
 from handrail.policies.study.figures import figures
@@ -98,17 +98,7 @@ def _json(design: StudyDesign, results: Sequence[TaskResults]) -> str:
         "versions": versions,
         "tasks": {each.task: asdict(each) for each in results},
     }
-    return json.dumps(_plain(content), indent=1, ensure_ascii=False) + "\n"
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, Mapping):
-        return {str(key): _plain(entry) for key, entry in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(entry) for entry in value]
-    if hasattr(value, "item"):
-        value = value.item()
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+    return json.dumps(plain(content), indent=1, ensure_ascii=False) + "\n"
 
 
 def _write_page(
