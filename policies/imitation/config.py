@@ -40,7 +40,7 @@ class TrainConfig:
     """Sizes that learn from the state on two CPU cores, or larger ones for a GPU and images."""
     actions: Literal["realised", "intent", "recorded"] = "realised"
     """What the policy writes: the joint velocities that came about; the operator's own command, which the
-    controller completes when the policy drives; or `recorded`, all columns as any LeRobot dataset has them."""
+    controller completes when the policy drives; or `recorded`, all columns as they are in any dataset."""
     images: bool = False
     """Let the policy see the cameras too."""
     mode: str = ""

@@ -40,25 +40,24 @@ def select(rows: Sequence[Row], fps: float, config: TrainConfig) -> Selection:
     attempts = _attempts(rows, config)
     order = np.random.default_rng(config.draw).permutation(len(attempts))
     kept: list[Row] = []
-    taken, seconds = 0, 0.0
+    taken, frames, most = 0, 0, config.minutes * _MINUTE * fps * (1.0 + 1e-9)
     for attempt in (attempts[place] for place in order):
-        length = attempt["length"] / fps
-        if config.minutes and seconds + length > config.minutes * _MINUTE * (1.0 + 1e-9):
+        if config.minutes and frames + attempt["length"] > most:
             break
-        taken, seconds = taken + 1, seconds + length
+        taken, frames = taken + 1, frames + attempt["length"]
         if not config.success_only or attempt.get("success"):
             kept.append(attempt)
         if len(kept) == config.episodes > 0:
             break
     else:
-        _check_enough(config, len(kept), seconds)
+        _check_enough(config, len(kept), frames / fps)
     if not kept:
         raise HandrailError(
             f"no episode left to train on: expected one or more among {len(attempts)}"
             f"{' that succeeded' if config.success_only else ''}"
             f"{f' within {config.minutes:g} min' if config.minutes else ''}"
         )
-    return Selection(tuple(sorted(kept, key=lambda row: row["episode_index"])), taken, seconds)
+    return Selection(tuple(sorted(kept, key=lambda row: row["episode_index"])), taken, frames / fps)
 
 
 def _attempts(rows: Sequence[Row], config: TrainConfig) -> list[Row]:
@@ -74,7 +73,7 @@ def _attempts(rows: Sequence[Row], config: TrainConfig) -> list[Row]:
 def _check_enough(config: TrainConfig, kept: int, seconds: float) -> None:
     if config.minutes and seconds < config.minutes * _MINUTE * (1.0 - 1e-9):
         raise HandrailError(
-            f"--minutes {config.minutes:g}: expected at most the {seconds / _MINUTE:.2f} min that were recorded"
+            f"--minutes {config.minutes:g}: expected at most the {seconds / _MINUTE:.2f} min recorded"
         )
     if config.episodes and not config.minutes and kept < config.episodes:
         raise HandrailError(f"--episodes {config.episodes}: expected at most the {kept} that there are")

@@ -1,10 +1,10 @@
 """Training of an imitation policy: a part of a dataset, through an interface, with LeRobot's own training."""
 
 import json
+import logging
 import os
 import shutil
 import time
-import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, fields
@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any
 from handrail.controllers.errors import HandrailError
 from handrail.policies.imitation.checkpoint import (
     MODEL,
-    NAME,
     PolicyMeta,
     last_checkpoint,
     read_meta,
@@ -29,7 +28,8 @@ if TYPE_CHECKING:
     from handrail.policies.imitation.run import Pipeline
 
 RECORD = "training.json"
-_LOG_EVERY = 50
+_LOG_EVERY = 50  # updates
+_WARMUP = 500  # updates in which the learning rate rises, or a tenth of all if that is fewer
 
 
 def train(config: TrainConfig, quiet: bool = False) -> Path:
@@ -48,7 +48,7 @@ def train(config: TrainConfig, quiet: bool = False) -> Path:
     if checkpoint is not None and int(checkpoint.name) >= steps:
         return checkpoint / MODEL
     source = read_source(config)
-    with _threads(config.threads):
+    with _threads(config.threads), _no_pages_of_logs(), _in_one_line(config):
         _run(config, source, steps, checkpoint, quiet)
     last = last_checkpoint(config.folder)
     assert last is not None
@@ -69,8 +69,7 @@ def _run(config: TrainConfig, source: Source, steps: int, checkpoint: Path | Non
         quiet,
     )
     began = time.monotonic()
-    with _as_handrail_errors(config):
-        curve = run.train()
+    curve = run.train()
     if curve is not None:
         seconds = time.monotonic() - began
         done = steps - (int(checkpoint.name) if checkpoint else 0)
@@ -82,12 +81,13 @@ def _run(config: TrainConfig, source: Source, steps: int, checkpoint: Path | Non
 
 def _pipeline(config: TrainConfig, steps: int, checkpoint: Path | None) -> "Pipeline":
     from lerobot.configs.default import DatasetConfig
+    from lerobot.optim.schedulers import CosineAnnealingWithWarmupSchedulerConfig as Cosine
 
     from handrail.policies.imitation.run import Pipeline
 
     preset = preset_of(config)
     return Pipeline(
-        dataset=DatasetConfig(config.dataset.repo_id, root=str(config.dataset.folder)),
+        dataset=DatasetConfig(config.dataset.repo_id, root=str(config.dataset.folder), video_backend="pyav"),
         policy=policy_config(config),
         output_dir=config.folder,
         resume=checkpoint is not None,
@@ -98,7 +98,7 @@ def _pipeline(config: TrainConfig, steps: int, checkpoint: Path | None) -> "Pipe
         log_freq=_LOG_EVERY,
         save_freq=config.save_freq,
         env_eval_freq=0,
-        cosine=preset.cosine,
+        scheduler=Cosine(min(_WARMUP, steps // 10)) if preset.cosine else None,
     )
 
 
@@ -109,7 +109,7 @@ def _begin(config: TrainConfig) -> Path | None:
     if config.resume and last is not None:
         _check_continues(config, read_meta(last / MODEL)[1].training)
         return last
-    if config.resume or not folder.exists():
+    if config.resume or not folder.exists() or not _is_main_process():
         return None
     if not folder.is_dir():
         raise HandrailError(f"--output {config.output}: expected a folder, found a file")
@@ -120,8 +120,7 @@ def _begin(config: TrainConfig) -> Path | None:
         raise HandrailError(
             f"--output {config.output}: there is a training already; say --resume or --overwrite"
         )
-    if _is_main_process():
-        shutil.rmtree(folder)
+    shutil.rmtree(folder)
     return None
 
 
@@ -177,10 +176,20 @@ def _threads(count: int) -> Iterator[None]:
 
 
 @contextmanager
-def _as_handrail_errors(config: TrainConfig) -> Iterator[None]:
-    """Say in one line what LeRobot refuses before it trains."""
+def _no_pages_of_logs() -> Iterator[None]:
+    """Keep to oneself what LeRobot says on its way, such as which decoders of videos it could not load."""
+    before = logging.root.manager.disable
+    logging.disable(logging.WARNING)
     try:
-        with warnings.catch_warnings():
-            yield
+        yield
+    finally:
+        logging.disable(before)
+
+
+@contextmanager
+def _in_one_line(config: TrainConfig) -> Iterator[None]:
+    """Raise what LeRobot refuses as an error of ours."""
+    try:
+        yield
     except (ValueError, ImportError, NotImplementedError) as error:
         raise HandrailError(f"policy {config.policy}: {' '.join(str(error).split())}") from error
