@@ -81,7 +81,10 @@ def checkpoint(
     env = build_env(SessionConfig(task=task), 20)
     channels = Channels.of(env.model.description)
     focuses = ("base", "hand")
-    masks = {tuple(channels.mask(*find_mode(mode).groups(focus)).tolist()) for focus in focuses}
+    groups = [find_mode(mode).groups(focus) for focus in focuses]
+    if mode == "direct_single":  # one axis at a time
+        groups = [(name,) for name in (*channels.base, *channels.joints[3:])]
+    masks = {tuple(channels.mask(*names).tolist()) for names in groups}
     owned = tuple(sorted(masks)) if actions == "intent" else ()
     interface = PolicyInterface(actions, env.agent_names, env.state_names, channels.names, owned)
     trained_on = {"episodes": 50, "operator_time": 312.5}

@@ -23,6 +23,7 @@ from handrail.collect.showcase_config import ShowcaseConfig
 from handrail.controllers.command import Status
 from handrail.datasets.comparison.config import CompareConfig
 from handrail.datasets.quality.catalogue import METRICS
+from handrail.policies.imitation.config import TrainConfig
 from handrail.policies.imitation.evaluate_config import PROTECTIONS, EvaluateConfig
 from handrail.policies.rl_config import TrainRlConfig
 from handrail.policies.rl_contender import RL
@@ -38,6 +39,7 @@ CONFIGS = {
     "handrail-demo": DemoConfig,
     "handrail-showcase": ShowcaseConfig,
     "handrail-profile": ProfileConfig,
+    "handrail-train": TrainConfig,
     "handrail-train-rl": TrainRlConfig,
     "handrail-benchmark": BenchmarkConfig,
     "handrail-compare": CompareConfig,

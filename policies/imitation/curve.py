@@ -2,6 +2,7 @@
 
 import csv
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 from rich.console import Console
@@ -47,7 +48,7 @@ def read_curve(folder: Path) -> list[dict[str, float]]:
 
 
 class Bar:
-    """A progress bar with the last loss; takes the place of LeRobot's.
+    """A progress bar with the last loss.
 
     Args:
         done: updates already made.
@@ -63,9 +64,9 @@ class Bar:
         self._task = self._progress.add_task("", total=total, completed=done)
         self._progress.start()
 
-    def update(self, steps: int = 1) -> None:
-        """Count updates."""
-        self._progress.advance(self._task, steps)
+    def advance(self) -> None:
+        """Count an update."""
+        self._progress.advance(self._task)
 
     def say(self, loss: float) -> None:
         """Show a loss."""
@@ -74,3 +75,22 @@ class Bar:
     def close(self) -> None:
         """Leave the bar as it is."""
         self._progress.stop()
+
+
+@dataclass(frozen=True)
+class Watch:
+    """What is seen of a training.
+
+    Attributes:
+        curve: of the loss; None in a process that does not write it.
+        bar: its progress.
+    """
+
+    curve: Curve | None
+    bar: Bar
+
+    def see(self, row: Row) -> None:
+        """Write down and show the means of some updates."""
+        if self.curve is not None:
+            self.curve.add(row)
+            self.bar.say(row["loss"])

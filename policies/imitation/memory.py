@@ -6,6 +6,7 @@ Here a batch is one indexing operation on columns that lie in memory. The tensor
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -85,16 +86,6 @@ class MemoryDataset(Dataset):
     episodes: None = None  # LeRobot's names for a part of a dataset: this one is whole
     absolute_to_relative_idx: None = None
 
-    def __post_init__(self):
-        lengths = torch.tensor(self.meta.lengths)
-        ends = torch.cumsum(lengths, 0)
-        episode = torch.repeat_interleave(torch.arange(len(lengths)), lengths)
-        object.__setattr__(self, "_episode", episode)
-        object.__setattr__(self, "_start", (ends - lengths)[episode])
-        object.__setattr__(self, "_end", ends[episode])
-        offsets = {key: torch.tensor(list(offsets)) for key, offsets in self.windows.items()}
-        object.__setattr__(self, "_offsets", offsets)
-
     @property
     def num_frames(self) -> int:
         """How many samples."""
@@ -125,7 +116,7 @@ class MemoryDataset(Dataset):
                 batch[key], batch[f"{key}_is_pad"] = self._window(values, rows, self._offsets[key])
             else:
                 batch[key] = values[rows]
-        batch["task"] = [self.tasks[episode] for episode in self._episode[rows].tolist()]
+        batch["task"] = [self.tasks[episode] for episode in self._spans[0][rows].tolist()]
         return batch
 
     def _window(
@@ -133,13 +124,26 @@ class MemoryDataset(Dataset):
     ) -> tuple[torch.Tensor, torch.Tensor]:
         """Return the windows around rows, (B, W, …), and which of them lie outside, (B, W)."""
         places = rows[:, None] + offsets
-        first, last = self._start[rows][:, None], self._end[rows][:, None] - 1
+        _, starts, ends = self._spans
+        first, last = starts[rows][:, None], ends[rows][:, None] - 1
         inside = places.clamp(first, last)
         return values[inside], places != inside
 
+    @cached_property
+    def _spans(self) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
+        """For each sample its episode, where that begins and where it ends, (N,) each."""
+        lengths = torch.tensor(self.meta.lengths)
+        ends = torch.cumsum(lengths, 0)
+        episode = torch.repeat_interleave(torch.arange(len(lengths)), lengths)
+        return episode, (ends - lengths)[episode], ends[episode]
+
+    @cached_property
+    def _offsets(self) -> dict[str, torch.Tensor]:
+        return {key: torch.tensor(list(offsets)) for key, offsets in self.windows.items()}
+
     def _pictures_of(self, indices: Sequence[int]) -> dict[str, torch.Tensor]:
         assert self.pictures is not None
-        samples = [self.pictures[int(index)] for index in indices]
+        samples: list[Any] = [self.pictures[int(index)] for index in indices]
         keys = self.meta.camera_keys
         windows = [f"{key}_is_pad" for key in keys if f"{key}_is_pad" in samples[0]]
         return {key: torch.stack([sample[key] for sample in samples]) for key in (*keys, *windows)}

@@ -82,7 +82,6 @@ def policy_config(config: TrainConfig) -> "PreTrainedConfig":
         HandrailError: there is no such policy or setting, or a value does not fit.
     """
     import draccus
-    from lerobot.configs.policies import PreTrainedConfig
 
     kind = _registered(config.policy)
     known = {entry.name for entry in fields(kind)}
@@ -90,7 +89,7 @@ def policy_config(config: TrainConfig) -> "PreTrainedConfig":
     wanted = {"pretrained_backbone_weights": None, "push_to_hub": False, "device": device_of(config)}
     settings = {key: value for key, value in wanted.items() if key in known} | given
     try:
-        policy: PreTrainedConfig = draccus.decode(kind, settings)
+        policy: Any = draccus.decode(kind, settings)
     except (draccus.utils.DecodingError, ValueError, TypeError, NotImplementedError) as error:
         raise HandrailError(f"policy {config.policy}: {_one_line(error)}") from error
     mapping = policy.normalization_mapping

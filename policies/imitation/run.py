@@ -21,7 +21,7 @@ from lerobot.scripts import lerobot_train
 from lerobot.utils.logging_utils import MetricsTracker
 
 from handrail.policies.imitation.checkpoint import MODEL, point_to, publish
-from handrail.policies.imitation.curve import Bar, Curve
+from handrail.policies.imitation.curve import Bar, Curve, Watch
 from handrail.policies.imitation.memory import MemoryDataset
 
 
@@ -58,22 +58,26 @@ class Run:
     finish: Callable[[Path, int], None]
     quiet: bool = False
 
-    def train(self) -> Curve:
-        """Train to the end; return the curve of the loss."""
-        curves: list[Curve] = []
-        with self._substituted(curves):
-            lerobot_train.train.__wrapped__(self.pipeline)  # pyright: ignore[reportFunctionMemberAccess]
-        return curves[0]
+    def train(self) -> Curve | None:
+        """Train to the end; return the curve of the loss in the process that writes it."""
+        watches: list[Watch] = []
+        try:
+            with self._substituted(watches):
+                lerobot_train.train.__wrapped__(self.pipeline)  # pyright: ignore[reportFunctionMemberAccess]
+        finally:
+            for watch in watches:
+                watch.bar.close()
+        return watches[0].curve
 
     @contextmanager
-    def _substituted(self, curves: list[Curve]) -> Iterator[None]:
+    def _substituted(self, watches: list[Watch]) -> Iterator[None]:
         arguments = [] if self.checkpoint is None else [f"--config_path={self.checkpoint / MODEL}"]
         names: dict[str, Any] = {
             "make_train_eval_datasets": lambda _: (self.dataset, None),
             "make_optimizer_and_scheduler": _fused,
             "save_checkpoint": self._save,
             "update_last_checkpoint": point_to,
-            "MetricsTracker": self._tracker(curves),
+            "MetricsTracker": self._tracker(watches),
             "tqdm": lambda **_: _Silent(),
             "cycle": _endless,
             "init_logging": lambda **_: None,
@@ -89,30 +93,26 @@ class Run:
         self.finish(draft / MODEL, step)
         publish(draft, checkpoint_dir)
 
-    def _tracker(self, curves: list[Curve]) -> type[MetricsTracker]:
+    def _tracker(self, watches: list[Watch]) -> type[MetricsTracker]:
         folder, total, quiet = self.pipeline.output_dir, self.pipeline.steps, self.quiet
         assert folder is not None
 
         class Tracker(MetricsTracker):
-            """LeRobot's means, written down whenever it would print them."""
+            """LeRobot's means, shown and written down whenever it would print them."""
 
             def __init__(self, *arguments: Any, initial_step: int, accelerator: Any, **rest: Any) -> None:
                 super().__init__(*arguments, initial_step=initial_step, accelerator=accelerator, **rest)
                 main = accelerator.is_main_process
-                self.__dict__["curve"] = Curve(folder, initial_step) if main else None
-                self.__dict__["bar"] = Bar(initial_step, total, shown=main and not quiet)
-                curves.append(self.curve)
+                curve = Curve(folder, initial_step) if main else None
+                watches.append(Watch(curve, Bar(initial_step, total, shown=main and not quiet)))
 
             def step(self) -> None:
                 super().step()
-                self.bar.update()
-                if self.steps == total:
-                    self.bar.close()
+                watches[0].bar.advance()
 
             def reset_averages(self) -> None:
-                if self.curve is not None:
-                    self.curve.add(self.to_dict() | {"step": self.steps})
-                    self.bar.say(self.loss.avg)
+                row = self.to_dict()
+                watches[0].see(row | {"step": row["steps"]})
                 super().reset_averages()
 
         return Tracker
