@@ -21,6 +21,7 @@ class Target:
         distance: from it that is near enough [m].
         angle: the same for orientation [rad].
         pace: share of the full stick.
+        tilt: how far the hand may lean from the pose's axis on the way there [rad].
     """
 
     hand: Pose
@@ -28,6 +29,7 @@ class Target:
     distance: float = 0.05
     angle: float = 0.2
     pace: float = 1.0
+    tilt: float = np.inf
 
 
 @dataclass(frozen=True)
