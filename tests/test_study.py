@@ -32,6 +32,7 @@ steps = 10
 perturbations = ["push"]
 protections = ["filter"]
 rollouts = 5
+seeds = [0, 1]
 [sweep]
 tasks = ["reach"]
 noises = [0.0]

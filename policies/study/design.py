@@ -48,6 +48,7 @@ class TaskDesign:
         episodes: successful demonstrations of each mode, at least; the budget `number`.
         minutes: of the operator's time with each mode, failed attempts included; the budget `time`.
         steps: updates of each policy.
+        batch_size: samples an update; 0 for the preset's.
         time_limit: of an episode by mode [s]; the task's own where a mode is not named.
         policy_options: more of LeRobot's settings of the policy, `key=value` each.
     """
@@ -55,23 +56,26 @@ class TaskDesign:
     episodes: int = 50
     minutes: float = 0.0
     steps: int = 4000
+    batch_size: int = 0
     time_limit: Mapping[str, float] = field(default_factory=dict)
     policy_options: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
 class Robustness:
-    """What else every policy of the main design goes through.
+    """What else policies of the main design go through.
 
     Attributes:
         perturbations: each a condition of its own.
         protections: of policies that command joint velocities.
         rollouts: under each condition.
+        seeds: of the trainings whose policies do.
     """
 
     perturbations: tuple[str, ...] = ("push", "shift", "delay")
     protections: tuple[str, ...] = ("filter",)
     rollouts: int = 50
+    seeds: tuple[int, ...] = (0,)
 
 
 @dataclass(frozen=True)

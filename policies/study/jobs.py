@@ -86,7 +86,8 @@ def jobs(design: StudyDesign) -> list[Job]:
         if seed == design.seeds[0]:
             found += map(_collect, cells)
         arms = [arm for budget in design.budgets for cell in cells for arm in _arms(cell, budget, seed)]
-        found += [_policy(arm, robust=arm.budget == design.budgets[0]) for arm in arms]
+        robust = design.robustness is not None and seed in design.robustness.seeds
+        found += [_policy(arm, robust and arm.budget == design.budgets[0]) for arm in arms]
     found += [_compare(task, found) for task in design.tasks]
     return found + list(_sweep(design))
 

@@ -124,6 +124,7 @@ def _policy(arm: PolicyArm, robust: bool, design: StudyDesign, layout: Layout) -
             actions=arm.actions,
             success_only=True,
             steps=task.steps,
+            batch_size=task.batch_size,
             seed=arm.seed,
             policy_options=task.policy_options,
             minutes=task.minutes if timed else 0.0,
