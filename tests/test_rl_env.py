@@ -170,7 +170,7 @@ def test_an_episode_that_leaves_the_plan_is_given_up_after_twenty_steps():
 
 
 def touch(env: GoalReachingEnv) -> tuple[int, float, bool, bool]:
-    """Let the arm turn the tool, the base at rest, until the robot touches itself; what the last step said."""
+    """Let the arm turn the tool until the robot touches itself; return what the last step said."""
     env.reset(options={"goal": FOLDED})
     for t in range(T_MAX):
         *_, reward, terminated, _, info = env.step(np.zeros(3))
