@@ -97,7 +97,7 @@ class LeaderArmMap:
 
     def _brought(self, target: Target, q: FloatArray) -> FloatArray:
         """Return the velocity straight to where the joints belong, no faster than the hand may go."""
-        key = (*target.base, *target.hand.rotation.ravel(), target.distance, target.pace)
+        key = (*target.base.tolist(), *target.hand.rotation.ravel().tolist(), target.distance, target.pace)
         if key != self._thought:
             way = straight_solution(self._model, self._collision, q, target.hand, _CLEAR) - q
             self._goal = q + way * (1.0 + self._error * self._rng.standard_normal(len(way)))

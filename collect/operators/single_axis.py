@@ -145,7 +145,7 @@ class SingleAxisMap:
 
     def _think(self, target: Target, state: State) -> None:
         """Work out which joints would do it, for a new target, or when they did not."""
-        key = (*target.base, *target.hand.rotation.ravel(), target.distance, target.pace)
+        key = (*target.base.tolist(), *target.hand.rotation.ravel().tolist(), target.distance, target.pace)
         done = np.all(self._goal_error(target, state.q) < 1.0) and state.time >= self._thinks_at
         if key == self._thought and not done:
             return
