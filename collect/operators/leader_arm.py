@@ -54,7 +54,7 @@ class LeaderArmMap:
         self._rng = rng
         self._error = settings.misjudgement
         self._collision = CollisionModel(self._model, view.task.obstacles)
-        self._thought: tuple[float, ...] = ()
+        self._thought = b""
         self._goal = view.state.q.copy()
         self._leader = view.state.q[self._base :].copy()
         self._tremor = settings.tremor
@@ -97,11 +97,10 @@ class LeaderArmMap:
 
     def _brought(self, target: Target, q: FloatArray) -> FloatArray:
         """Return the velocity straight to where the joints belong, no faster than the hand may go."""
-        key = (*target.base.tolist(), *target.hand.rotation.ravel().tolist(), target.distance, target.pace)
-        if key != self._thought:
+        if target.identity != self._thought:
             way = straight_solution(self._model, self._collision, q, target.hand, _CLEAR) - q
             self._goal = q + way * (1.0 + self._error * self._rng.standard_normal(len(way)))
-            self._thought = key
+            self._thought = target.identity
         velocity = self._gains.gain * (self._goal - q)[self._base :]
         hand = self._model.jacobian(q)[:, self._base :] @ velocity
         fastest = target.pace * self._gains.full[[0, 3]]  # of the hand, and how fast it may turn

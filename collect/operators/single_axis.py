@@ -56,7 +56,7 @@ class SingleAxisMap:
         self._axis_holds = False  # until the operator thinks again
         self._left = 0.0  # of the way that the axis shall not go this time
         self._goal = np.zeros(self._model.size)
-        self._thought: tuple[float, ...] = ()
+        self._thought = b""
         self._thinks_at = -np.inf
         self._order: list[int] = []
         self._care = 1.0  # share of the usual tolerance: less after each attempt that was not good enough
@@ -145,16 +145,15 @@ class SingleAxisMap:
 
     def _think(self, target: Target, state: State) -> None:
         """Work out which joints would do it, for a new target, or when they did not."""
-        key = (*target.base.tolist(), *target.hand.rotation.ravel().tolist(), target.distance, target.pace)
         done = np.all(self._goal_error(target, state.q) < 1.0) and state.time >= self._thinks_at
-        if key == self._thought and not done:
+        if target.identity == self._thought and not done:
             return
         plan = plan_joints(self._model, self._collision, state.q, target.hand, _CLEAR)
         way = plan.goal - state.q
         self._goal = state.q + way * (1.0 + self._error * self._rng.standard_normal(len(way)))
         self._order = [self.channels.joint_slice.start + joint for joint in plan.order]
-        self._care = 1.0 if key != self._thought else max(0.5 * self._care, _MOST_CARE)
-        self._thought, self._axis_holds = key, False
+        self._care = 1.0 if target.identity != self._thought else max(0.5 * self._care, _MOST_CARE)
+        self._thought, self._axis_holds = target.identity, False
         self._thinks_at = state.time + _PREPARATION
 
     def _goal_error(self, target: Target, q: FloatArray) -> FloatArray:

@@ -31,6 +31,12 @@ class Target:
     pace: float = 1.0
     tilt: float = np.inf
 
+    @property
+    def identity(self) -> bytes:
+        """What stays the same while the operator only sees better how far the hand has to go."""
+        numbers = [self.base, self.hand.rotation.ravel(), [self.distance, self.pace]]
+        return np.concatenate(numbers).tobytes()
+
 
 @dataclass(frozen=True)
 class Wish:
