@@ -215,11 +215,11 @@ def test_a_resumed_training_is_the_same_to_the_bit(trained, tmp_path):
 
 
 def test_a_killed_training_goes_on(recorded, tmp_path):
-    steps = 40
-    whole = tiny(recorded, tmp_path / "whole", steps=steps, save_freq=5)
+    steps = 400
+    whole = tiny(recorded, tmp_path / "whole", steps=steps, save_freq=20)
     killed = dataclasses.replace(whole, output=str(tmp_path / "killed"), resume=True)
     flags = ["--dataset.root", recorded, "--output", killed.output, "--steps", steps, "--batch_size", 8]
-    flags += ["--save_freq", 5, "--resume", "--policy_options", *TINY]
+    flags += ["--save_freq", 20, "--resume", "--policy_options", *TINY]
     process = subprocess.Popen(
         [sys.executable, "-m", "handrail.scripts.train", *map(str, flags)],
         stdout=subprocess.DEVNULL,
@@ -273,7 +273,7 @@ def test_a_policy_sees_cameras_where_it_is_asked_to(tmp_path):
         ({"policy_options": ("chunk=5",)}, "unknown setting of the policy act 'chunk'"),
         ({"policy_options": ("chunk_size",)}, "expected key=value"),
         ({"policy_options": ("chunk_size=many",)}, "policy act: .*chunk_size"),
-        ({"policy_options": ("chunk_size=2",)}, "policy act: .*n_action_steps"),
+        ({"policy_options": ("n_action_steps=500",)}, "policy act: .*n_action_steps"),
         ({"device": "tpu"}, "expected one of cpu"),
         ({"images": True}, "expected cameras"),
         ({"steps": -1}, "expected 0 or more"),
