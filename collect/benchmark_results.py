@@ -17,6 +17,7 @@ from handrail.datasets.paired import paired_difference, paired_success, wilson
 
 Row = Mapping[str, Any]
 _COMPARED = tuple(name for name in METRICS if name != "success")
+_PLACES = ("json", "report", "page")  # settings that say where results are written on a machine
 _VERSIONED = ("casadi", "coal", "daqp", "mujoco", "numpy", "pin", "scipy")
 
 
@@ -44,7 +45,7 @@ def summarise(
         "paired": {profile: _paired(rows, profile, names, config.seed) for profile in profiles},
         "titles": {contender.name: contender.title for contender in contenders},
         "skipped": dict(skipped),
-        "config": asdict(config),
+        "config": {name: value for name, value in asdict(config).items() if name not in _PLACES},
         "mpc_settings": asdict(goal_reaching_settings()),
         "machine": {"cores": os.cpu_count(), "load": os.getloadavg()[0]},
         "versions": {name: metadata.version(name) for name in _VERSIONED},
