@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from handrail.collect.benchmark_config import BenchmarkConfig
-from handrail.collect.benchmark_contenders import Contender, goal_reaching_settings
+from handrail.collect.benchmark_contenders import TAKE_UP, TAKE_UP_TURN, Contender, goal_reaching_settings
 from handrail.collect.benchmark_metrics import COST_METRICS, METRICS, SAFETY_METRICS, SETTLED_METRICS
 from handrail.datasets.paired import paired_difference, paired_success, wilson
 
@@ -46,7 +46,7 @@ def summarise(
         "titles": {contender.name: contender.title for contender in contenders},
         "skipped": dict(skipped),
         "config": {name: value for name, value in asdict(config).items() if name not in _PLACES},
-        "mpc_settings": asdict(goal_reaching_settings()),
+        "mpc_settings": asdict(goal_reaching_settings()) | {"take_up": TAKE_UP, "take_up_turn": TAKE_UP_TURN},
         "machine": {"cores": os.cpu_count(), "load": os.getloadavg()[0]},
         "versions": {name: metadata.version(name) for name in _VERSIONED},
         "episodes": [dict(row) for row in rows],

@@ -108,9 +108,9 @@ class Bounded:
 class Smoothed:
     """Let the hand take up a command gradually: a low-pass that is known ahead.
 
-    `τ ḟ = u - f` from rest, and with Ψ the prediction it smooths `û(t) = Ψ(t) + exp(-t / τ) (f - u)`, which is
-    f itself as long as the command holds. The gain at rest is 1: a hand that follows arrives where the command
-    leads, τ later. Steps and tremor become what a heavy arm can follow without effort.
+    `τ ḟ = u - f` from rest, and with Ψ the prediction it smooths `û(t) = Ψ(t) + exp(-t / τ) (f - u)`, which
+    is f itself as long as the command holds. The gain at rest is 1: a hand that follows arrives where the
+    command leads, τ later. Steps and tremor become what a heavy arm can follow without effort.
 
     Args:
         predict: Ψ.
