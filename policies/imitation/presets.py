@@ -92,13 +92,9 @@ def policy_config(config: TrainConfig) -> "PreTrainedConfig":
     settings = {key: value for key, value in wanted.items() if key in known} | given
     try:
         policy: Any = draccus.decode(kind, settings)
-    except (
-        draccus.utils.DecodingError,
-        draccus.utils.ParsingError,
-        ValueError,
-        TypeError,
-        NotImplementedError,
-    ) as error:
+    except draccus.utils.DecodingError as error:
+        raise HandrailError(f"policy {config.policy}: {_one_line(error)}") from error
+    except (draccus.utils.ParsingError, ValueError, TypeError, NotImplementedError) as error:
         raise HandrailError(f"policy {config.policy}: {_one_line(error.__cause__ or error)}") from error
     mapping = policy.normalization_mapping
     if "STATE" in mapping and "ENV" not in mapping:
