@@ -9,12 +9,14 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from handrail.collect.benchmark_config import BenchmarkConfig
 from handrail.collect.benchmark_contenders import Contender
+from handrail.collect.benchmark_episode import Conditions
 from handrail.collect.benchmark_figures import figures
+from handrail.collect.benchmark_metrics import Trace
 from handrail.collect.benchmark_page import write_page
 from handrail.collect.benchmark_report import write_report
 from handrail.collect.benchmark_results import save_json, summarise
 from handrail.collect.benchmark_run import Episode, available, goals, run, trace_of
-from handrail.collect.benchmark_video import film
+from handrail.collect.benchmark_video import film, strip
 from handrail.collect.gl import graphics_trouble
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.model import load_model
@@ -43,10 +45,12 @@ def benchmark(
     if config.json:
         save_json(results, Path(config.json).expanduser())
     pictures = figures(results, episodes, goals(config)) if report or config.page else {}
+    example = _example(config, present, console)
     if report:
         save_json(results, report / "benchmark.json")
-        write_report(results, pictures, _video(config, present, report, console), report / "benchmark.html")
+        write_report(results, pictures, _video(example, report), report / "benchmark.html")
     if config.page:
+        pictures |= {"example": strip(load_model(), *example)} if example else {}
         write_page(results, pictures, Path(config.page).expanduser(), config)
     return results
 
@@ -74,14 +78,23 @@ def _folder(config: BenchmarkConfig) -> Path | None:
     return folder
 
 
-def _video(
-    config: BenchmarkConfig, present: tuple[Contender, ...], folder: Path, console: Console
-) -> Path | None:
-    """Film the first two controllers on the first goal; None without OpenGL, which is said."""
+def _example(
+    config: BenchmarkConfig, present: tuple[Contender, ...], console: Console
+) -> tuple[Conditions, list[tuple[Contender, Trace]]] | None:
+    """Return what the first two controllers do on the first goal; None without OpenGL, which is said."""
+    if not (config.report or config.page):
+        return None
     trouble = graphics_trouble() if config.video else "not asked for"
     if trouble:
-        console.print(f"without a video: {trouble}", highlight=False)
+        console.print(f"without an example to look at: {trouble}", highlight=False)
         return None
     runs = [(who, trace_of(config, who, 0)) for who in present[:2]]
-    film(load_model(), runs[0][1][0], [(who, trace) for who, (_, trace) in runs], folder / "benchmark.mp4")
+    return runs[0][1][0], [(who, trace) for who, (_, trace) in runs]
+
+
+def _video(example: tuple[Conditions, list[tuple[Contender, Trace]]] | None, folder: Path) -> Path | None:
+    """Film the example, if there is one."""
+    if example is None:
+        return None
+    film(load_model(), *example, folder / "benchmark.mp4")
     return folder / "benchmark.mp4"

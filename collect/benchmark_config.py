@@ -44,7 +44,7 @@ class BenchmarkConfig:
     page: str = ""
     """Put the tables into this Markdown page, between marks of this kind of run; figures go beside it."""
     video: bool = True
-    """Whether the report has a video (needs OpenGL)."""
+    """Whether the report has an example video, the page a strip of pictures (needs OpenGL)."""
 
     @property
     def controller_names(self) -> tuple[str, ...]:

@@ -65,9 +65,8 @@ def run_episode(
     last = T_MAX if conditions.early_stop else min(T_MAX, operator.end + _SETTLING)
     drive = _Drive(controller, contender.period)
     for step in range(last):
-        state = plant.state()
-        operator.send(step, state, plant.tool)
-        velocity = drive.velocity(step, state, operator)
+        operator.send(step, tally.state, tally.tool)
+        velocity = drive.velocity(step, tally.state, operator)
         tally.add(plant.advance(velocity, 0.0))
         if conditions.early_stop and tally.reached:
             break
@@ -128,11 +127,12 @@ class _Drive:
 
 
 class _Tally:
-    """Notes what happens, step by step."""
+    """Notes what happens, step by step; knows where the robot is now."""
 
     def __init__(self, plant: Plant, goal: Goal) -> None:
         self._plant, self._goal = plant, goal
-        self._q, self._hand = [plant.state().q], [plant.tool.position]
+        self.state, self.tool = plant.state(), plant.tool
+        self._q, self._hand = [self.state.q], [self.tool.position]
         self._v: list[FloatArray] = []
         self._errors: list[tuple[float, float]] = []
         self._contacts: list[tuple[str, ...]] = []
@@ -144,7 +144,7 @@ class _Tally:
 
     def add(self, contacts: tuple[str, ...]) -> None:
         """Note where the robot is after a step."""
-        state, tool = self._plant.state(), self._plant.tool
+        self.state, self.tool = state, tool = self._plant.state(), self._plant.tool
         self._q.append(state.q)
         self._v.append(state.v)
         self._hand.append(tool.position)

@@ -11,12 +11,13 @@ from typing import Any
 import numpy as np
 
 from handrail.collect.benchmark_config import BenchmarkConfig
-from handrail.collect.benchmark_contenders import Contender, goal_reaching_settings
+from handrail.collect.benchmark_contenders import TAKE_UP, TAKE_UP_TURN, Contender, goal_reaching_settings
 from handrail.collect.benchmark_metrics import COST_METRICS, METRICS, SAFETY_METRICS, SETTLED_METRICS
 from handrail.datasets.paired import paired_difference, paired_success, wilson
 
 Row = Mapping[str, Any]
 _COMPARED = tuple(name for name in METRICS if name != "success")
+_PLACES = ("json", "report", "page")  # settings that say where results are written on a machine
 _VERSIONED = ("casadi", "coal", "daqp", "mujoco", "numpy", "pin", "scipy")
 
 
@@ -44,8 +45,8 @@ def summarise(
         "paired": {profile: _paired(rows, profile, names, config.seed) for profile in profiles},
         "titles": {contender.name: contender.title for contender in contenders},
         "skipped": dict(skipped),
-        "config": asdict(config),
-        "mpc_settings": asdict(goal_reaching_settings()),
+        "config": {name: value for name, value in asdict(config).items() if name not in _PLACES},
+        "mpc_settings": asdict(goal_reaching_settings()) | {"take_up": TAKE_UP, "take_up_turn": TAKE_UP_TURN},
         "machine": {"cores": os.cpu_count(), "load": os.getloadavg()[0]},
         "versions": {name: metadata.version(name) for name in _VERSIONED},
         "episodes": [dict(row) for row in rows],

@@ -54,6 +54,7 @@ class Simulation:
         self._scene = scene
         self._step = step
         self.substeps = math.ceil(step / _LARGEST_TIMESTEP - 1e-9)
+        self._weights = np.arange(1, self.substeps + 1)[:, None] / self.substeps
         robot = _robot(model, meshes, step / self.substeps)
         spec = robot.spec.copy()
         add_scene(spec, scene)
@@ -105,18 +106,15 @@ class Simulation:
             gripper: 0 open, 1 closed; approached at the gripper's speed.
         """
         self._contacts.clear()
-        start, data = self.commanded, self.data
-        for index in range(1, self.substeps + 1):
-            weight = index / self.substeps
-            data.ctrl[self._servo_index] = (1.0 - weight) * start + weight * velocity
-            self._move_gripper(gripper)
+        model, data, control = self.mujoco_model, self.data, self.data.ctrl
+        for control[:] in self._ramp(velocity, gripper):
             self._move_obstacles()
-            mujoco.mj_step(self.mujoco_model, data)
+            mujoco.mj_step(model, data)
             self._contacts.look(data)
         self.commanded = np.array(velocity, dtype=np.float64)
         self._move_obstacles()
-        mujoco.mj_kinematics(self.mujoco_model, data)
-        mujoco.mj_camlight(self.mujoco_model, data)
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_camlight(model, data)
         return self._contacts.names
 
     def push(self, base: FloatArray, hand: FloatArray) -> None:
@@ -133,13 +131,15 @@ class Simulation:
         data.xfrc_applied[self.mujoco_model.body(BASE_BODY).id, :3] = base
         data.xfrc_applied[carrier] += np.concatenate([hand, np.cross(lever, hand)])
 
-    def _move_gripper(self, gripper: float) -> None:
-        if not self._stroke:
-            return
-        wanted = self._gripper_target(gripper)
-        now = self.data.ctrl[self._gripper_servo]
-        reach = self._speed * self._step / self.substeps
-        self.data.ctrl[self._gripper_servo] = now + min(max(wanted - now, -reach), reach)
+    def _ramp(self, velocity: FloatArray, gripper: float) -> FloatArray:
+        """Return what the servos are sent at every substep: linear to the velocity, (substeps, servos)."""
+        ramp = np.empty((self.substeps, self.mujoco_model.nu))
+        ramp[:, self._servo_index] = (1.0 - self._weights) * self.commanded + self._weights * velocity
+        if self._stroke:
+            now, wanted = self.data.ctrl[self._gripper_servo], self._gripper_target(gripper)
+            reach = self._speed * self._step * self._weights[:, 0]
+            ramp[:, self._gripper_servo] = now + np.minimum(np.maximum(wanted - now, -reach), reach)
+        return ramp
 
     def _gripper_target(self, gripper: float) -> float:
         """Return the opening that the gripper's servo is sent to [m]; closed is a little beyond touching."""

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field
 from enum import StrEnum
+from functools import cached_property
 
 import numpy as np
 
@@ -73,7 +74,7 @@ class Command:
         """Copy the array and make it read-only."""
         object.__setattr__(self, "velocities", frozen(self.velocities))
 
-    @property
+    @cached_property
     def trajectory(self) -> Trajectory:
         """The velocities as a trajectory."""
         return Trajectory(self.velocities, self.dt, self.elapsed)

@@ -270,8 +270,10 @@ def built_in_objectives(
     base = len(model.description.base_joints)
     arm = np.arange(model.size) >= base
     velocity = np.where(arm, settings.arm_velocity, settings.base_velocity)
+    commanded = np.full(channels.size, settings.tracking)
+    commanded[channels.tool_slice][3:] = settings.turn_tracking
     return (
-        tracking(channels, np.full(channels.size, settings.tracking)),
+        tracking(channels, commanded),
         velocity_regularisation(channels, velocity),
         acceleration_regularisation(np.full(model.size, settings.acceleration)),
         posture(channels, model.description.home, settings.posture * arm),

@@ -105,6 +105,51 @@ class Bounded:
         return values
 
 
+class Smoothed:
+    """Let the hand take up a command gradually: a low-pass that is known ahead.
+
+    `τ ḟ = u - f` from rest, and with Ψ the prediction it smooths `û(t) = Ψ(t) + exp(-t / τ) (f - u)`, which
+    is f itself as long as the command holds. The gain at rest is 1: a hand that follows arrives where the
+    command leads, τ later. Steps and tremor become what a heavy arm can follow without effort.
+
+    Args:
+        predict: Ψ.
+        time_constant: τ, one or one a channel [s].
+    """
+
+    def __init__(self, predict: Prediction, time_constant: float | FloatArray) -> None:
+        self._predict = predict
+        self._time_constant = np.asarray(time_constant, dtype=float)
+        self.reset()
+
+    def reset(self) -> None:
+        """Begin at rest."""
+        self._last: Intent | None = None
+        self._level: FloatArray = np.zeros(0)
+        getattr(self._predict, "reset", lambda: None)()
+
+    def __call__(self, intent: Intent, times: FloatArray) -> FloatArray:
+        """Return the predicted values, (N, m)."""
+        command = _commanded(intent)
+        self._level = np.where(intent.mask, self._now(intent.time, command), 0.0)
+        self._last = intent
+        fade = np.exp(-times[:, None] / self._time_constant)
+        return self._predict(intent, times) + fade * (self._level - command)
+
+    def _now(self, time: float, command: FloatArray) -> FloatArray:
+        """Return the level at a time, under the command before, (m,)."""
+        if self._last is None:
+            return np.zeros_like(command)
+        before = _commanded(self._last)
+        passed = max(time - self._last.time, 0.0)
+        return before + np.exp(-passed / self._time_constant) * (self._level - before)
+
+
+def _commanded(intent: Intent) -> FloatArray:
+    """Return the commanded values, zero on every other channel, (m,)."""
+    return np.where(intent.mask, intent.values, 0.0)
+
+
 class Preview:
     """Follow a plan that is known, `û(t) = plan(now + t)`.
 

@@ -16,7 +16,8 @@ class MpcSettings:
         dt: length of a stage [s].
         decay: γ; stage k tracks the intent with weight γᵏ.
         tracked_stages: stages M at which the intent is tracked; 0 for all.
-        tracking: weight of the commanded channels.
+        tracking: weight of the commanded channels, the tool's rotation left out.
+        turn_tracking: weight of the tool's commanded rotation.
         base_velocity: weight of base velocities that nobody commands.
         arm_velocity: weight of arm velocities that nobody commands.
         acceleration: weight of all accelerations.
@@ -40,6 +41,7 @@ class MpcSettings:
     decay: float = 0.9
     tracked_stages: int = 0
     tracking: float = 1000.0
+    turn_tracking: float = 1000.0
     base_velocity: float = 0.01
     arm_velocity: float = 0.1
     acceleration: float = 0.01

@@ -7,6 +7,8 @@ import numpy as np
 from handrail.controllers.arrays import FloatArray, frozen
 from handrail.controllers.jit import jit
 
+_ROUNDING = 1e-5  # of a time, relative: no later than the last knot
+
 
 @dataclass(frozen=True)
 class Trajectory:
@@ -31,7 +33,7 @@ class Trajectory:
         knot = (max(time, 0.0) + self.elapsed) / self.dt
         index, last = int(knot), len(self.velocities) - 1
         if index >= last:
-            over = not np.isclose(knot, last)
+            over = knot - last > _ROUNDING * last
             return np.zeros_like(self.velocities[0]) if over else self.velocities[-1]
         weight = knot - index
         return (1.0 - weight) * self.velocities[index] + weight * self.velocities[index + 1]

@@ -34,8 +34,11 @@ class StandIn:
 
     def _chase(self, state, environment):
         """Steer the hand straight to the goal; as joint velocities, by damped least squares."""
-        turn = Rotation.from_matrix(environment[3:12].reshape(3, 3)).as_rotvec()
-        twist = np.clip(np.concatenate([1.5 * environment[:3], 1.5 * turn]), -0.4, 0.4)
+        seen = dict(zip(self.interface.observation_names[1], environment, strict=True))
+        way = np.array([seen[f"goal.{axis}"] for axis in ("dx", "dy", "dz")])
+        matrix = [[seen[f"goal.r{row}{column}"] for column in range(3)] for row in range(3)]
+        turn = Rotation.from_matrix(matrix).as_rotvec()
+        twist = np.clip(np.concatenate([1.5 * way, 1.5 * turn]), -0.4, 0.4)
         if self.interface.actions == "intent":
             return np.append(twist, 0.0)
         jacobian = load_model().jacobian(np.concatenate([np.zeros(3), state[:6]]))

@@ -13,7 +13,7 @@ from handrail.controllers.intent import Intent
 from handrail.controllers.limiter import Limiter
 from handrail.controllers.model import load_model
 from handrail.controllers.mpc import MaskedMpc
-from handrail.controllers.prediction import Bounded, Decaying, Extrapolated, Preview, constant
+from handrail.controllers.prediction import Bounded, Decaying, Extrapolated, Preview, Smoothed, constant
 from handrail.controllers.settings import MpcSettings
 from handrail.controllers.shape import Obstacle, Shape
 
@@ -87,6 +87,57 @@ def test_extrapolated_forgets_at_a_mode_switch():
         predict(intent(np.full(18, time), "ee", time=time), TIMES)
     asked = intent(np.full(18, 0.3), "base", time=0.3)
     np.testing.assert_allclose(predict(asked, TIMES), constant(asked, TIMES))
+
+
+def test_smoothed_is_what_a_low_pass_will_do():
+    """What is predicted for a held command is the level at that time, in steps of any length."""
+    asked = np.linspace(-1.0, 1.0, 18)
+    once, often = Smoothed(constant, 0.5), Smoothed(constant, 0.5)
+    ahead = once(intent(asked, "ee", time=2.0), TIMES)
+    np.testing.assert_allclose(ahead[:, 3:9], (1.0 - np.exp(-TIMES[:, None] / 0.5)) * asked[3:9])
+    np.testing.assert_array_equal(ahead[:, 9:], 0.0)
+    for time in 2.0 + np.concatenate([[0.0], TIMES]):
+        level = often(intent(asked, "ee", time=time), np.zeros(1))[0]
+    np.testing.assert_allclose(level, ahead[-1], atol=1e-12)
+
+
+@pytest.mark.parametrize("time_constant", [0.3, np.linspace(0.2, 1.0, 18)])
+def test_smoothed_leads_where_the_command_does(time_constant):
+    """Bursts of 0.2 s: the level's integral is the command's in the end, however slow the channel."""
+    predict, step = Smoothed(constant, time_constant), 0.01
+    asked = [np.full(18, 0.5 * (k // 20 % 2 == 0) * (k < 200)) for k in range(1600)]
+    levels = [predict(intent(values, "ee", time=k * step), np.zeros(1))[0] for k, values in enumerate(asked)]
+    np.testing.assert_allclose(
+        step * np.sum(levels, axis=0)[3:9], step * np.sum(asked, axis=0)[3:9], rtol=0.02
+    )
+    steepest = np.abs(np.diff(levels, axis=0)).max(axis=0)[3:9]
+    assert np.all(steepest <= 0.5 * step / np.broadcast_to(time_constant, 18)[3:9] + 1e-9)
+
+
+def test_smoothed_begins_at_rest_after_a_reset_and_on_new_channels():
+    predict = Smoothed(constant, 0.5)
+    for time in (0.0, 1.0, 2.0):
+        predict(intent(np.ones(18), "ee", time=time), TIMES)
+    switched = predict(intent(np.ones(18), "base", time=2.1), np.zeros(1))[0]
+    assert 0.0 <= switched[:3].max() < 0.2
+    np.testing.assert_array_equal(switched[3:9], 0.0)
+    predict.reset()
+    np.testing.assert_array_equal(predict(intent(np.ones(18), "ee", time=9.0), np.zeros(1)), 0.0)
+
+
+def test_turns_may_be_followed_less_closely_than_the_way():
+    """A small weight of the tool's turning leaves the way alone and costs some of the turn."""
+    asked = np.zeros(18)
+    asked[CHANNELS.tool_slice] = [0.1, 0.0, 0.05, 0.0, 0.3, 0.0]
+    errors = []
+    for weight in (1000.0, 0.5):
+        controller = MaskedMpc(MODEL, MpcSettings(turn_tracking=weight))
+        q, v = roll(controller, lambda time: intent(asked, "ee", time=time))
+        twist = MODEL.jacobian(q) @ v
+        errors.append(np.abs(twist - asked[CHANNELS.tool_slice]))
+    assert errors[0].max() < 0.01
+    assert errors[1][:3].max() < 0.01
+    assert errors[1][3:].max() > 0.02
 
 
 def test_preview_looks_ahead_and_tracks_better():

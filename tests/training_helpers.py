@@ -74,5 +74,5 @@ def write_dataset(
 def tiny(root: Path, output: Path, *options: str, **settings) -> TrainConfig:
     """Return the settings of a training of a moment."""
     source = SourceConfig("handrail/test", str(root))
-    size = {"steps": 6, "batch_size": 8, "save_freq": 3} | settings
-    return TrainConfig(source, str(output), policy_options=(*TINY, *options), **size)
+    size = {"steps": 6, "batch_size": 8, "save_freq": 3, "policy_options": (*TINY, *options)} | settings
+    return TrainConfig(source, str(output), **size)

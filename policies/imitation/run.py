@@ -138,10 +138,12 @@ def _fused(pipeline: Pipeline, policy: Any) -> tuple[Any, Any]:
 
 
 def _endless(loader: Any) -> Iterator[Any]:
-    """Yield batches for ever; that one begins anew must not change what is random in the policy.
+    """Yield batches for ever, so that a training that was cut off goes on as if it had not been, to the bit.
 
-    So a training that was cut off and goes on is the same, to the bit, as one that was not.
+    Accelerate would set LeRobot's sampler back to the first epoch, and PyTorch draws a number when a loader
+    begins, which would change what is random in the policy.
     """
+    loader.iteration = loader.get_sampler().state_dict()["epoch"]
     while True:
         state = torch.get_rng_state()
         batches = iter(loader)
