@@ -140,8 +140,8 @@ def _fused(pipeline: Pipeline, policy: Any) -> tuple[Any, Any]:
 def _endless(loader: Any) -> Iterator[Any]:
     """Yield batches for ever, so that a training that was cut off goes on as if it had not been, to the bit.
 
-    Accelerate would set LeRobot's sampler back to the first epoch, and PyTorch draws a number whenever a
-    loader begins, which would change what is random in the policy.
+    Accelerate would set LeRobot's sampler back to the first epoch, and PyTorch draws a number when a loader
+    begins, which would change what is random in the policy.
     """
     loader.iteration = loader.get_sampler().state_dict()["epoch"]
     while True:

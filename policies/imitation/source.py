@@ -23,7 +23,7 @@ Columns = dict[str, np.ndarray]
 STATE, ENVIRONMENT, ACTION = "observation.state", "observation.environment_state", "action"
 _LEARNT = ("observation", "action", "next.")
 _COUNTERS = ("timestamp", "frame_index", "episode_index", "index", "task_index")
-_FLOOR = 1e-3  # [m, rad, m/s, …] least spread of a number: what hardly moved in training must not explode
+_FLOOR = 1e-2  # [m, rad, m/s, …] least spread of a number: what hardly moved in training must not explode
 _RANGES = (("min", "max"), ("q01", "q99"), ("q10", "q90"))
 
 
@@ -105,7 +105,7 @@ def read_source(config: TrainConfig) -> Source:
 
 
 def steadied(stats: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Return statistics in which nothing is steadier than 1e-3.
+    """Return statistics in which nothing is steadier than 0.01.
 
     A number that was the same throughout would otherwise be divided by (almost) nothing, and the least
     change of it when the policy drives would be huge.
