@@ -270,12 +270,17 @@ def test_the_command_says_bad_input_in_one_line():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("processes", [1, 2])
-def test_accelerate_launches_it(processes, recorded, tmp_path):
-    launch = f"-m accelerate.commands.accelerate_cli launch --cpu --num_processes {processes}"
+@pytest.mark.parametrize(
+    ("launcher", "processes"),
+    [
+        ("accelerate.commands.accelerate_cli launch --cpu --num_processes 1", 1),
+        ("torch.distributed.run --nproc_per_node 2", 2),  # what accelerate uses where there are several GPUs
+    ],
+)
+def test_several_processes_train_one_policy(launcher, processes, recorded, tmp_path):
     options = f"--dataset.root {recorded} --output {tmp_path / 'policy'} --steps 6 --batch_size 4"
-    words = [*launch.split(), "-m", "handrail.scripts.train", *options.split(), "--policy_options", *TINY]
-    done = subprocess.run([sys.executable, *words], capture_output=True, text=True)
+    words = ["-m", *launcher.split(), "-m", "handrail.scripts.train", *options.split()]
+    done = subprocess.run([sys.executable, *words, "--policy_options", *TINY], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr[-2000:]
     assert load_policy(tmp_path / "policy").meta.steps == 6
     state = tmp_path / "policy" / "checkpoints" / "last" / "training_state" / "training_step.json"

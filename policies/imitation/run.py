@@ -143,7 +143,8 @@ def _endless(loader: Any) -> Iterator[Any]:
     Accelerate would set LeRobot's sampler back to the first epoch, and PyTorch draws a number when a loader
     begins, which would change what is random in the policy.
     """
-    loader.iteration = loader.get_sampler().state_dict()["epoch"]
+    batches = getattr(loader.batch_sampler, "batch_sampler", loader.batch_sampler)  # a share of it, or all
+    loader.iteration = batches.sampler.state_dict()["epoch"]
     while True:
         state = torch.get_rng_state()
         batches = iter(loader)
