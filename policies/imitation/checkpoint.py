@@ -128,6 +128,7 @@ def load_policy(folder: str | Path, device: str = "cpu") -> TrainedPolicy:
     except (OSError, ValueError, KeyError, RuntimeError) as error:
         raise HandrailError(f"policy {str(place)!r}: {' '.join(str(error).split())}") from error
     policy.eval()
+    policy.eval = lambda: policy  # LeRobot asks for it twice an action: a third of its time
     return TrainedPolicy(interface, meta, policy, before, after)
 
 
