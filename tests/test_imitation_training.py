@@ -15,10 +15,10 @@ import pytest
 import torch
 from training_helpers import FPS, TINY, features, tiny, write_dataset
 
+from handrail.collect.config import StoredConfig
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.reader import read_episodes, read_frames
 from handrail.policies.imitation.checkpoint import last_checkpoint, load_policy, read_meta
-from handrail.policies.imitation.config import SourceConfig
 from handrail.policies.imitation.curve import read_curve
 from handrail.policies.imitation.interface import PolicyInterface
 from handrail.policies.imitation.presets import policy_config
@@ -178,7 +178,7 @@ def test_a_killed_training_goes_on(recorded, tmp_path):
     reached = last_checkpoint(killed.folder)
     assert reached is not None
     assert reached.name < f"{steps:06d}", "killed too late to see anything"
-    killed = dataclasses.replace(killed, dataset=SourceConfig(root=str(recorded)))
+    killed = dataclasses.replace(killed, dataset=StoredConfig(root=str(recorded)))
     assert weights(train(killed, quiet=True)) == weights(train(whole, quiet=True))
 
 
@@ -222,7 +222,7 @@ def test_a_policy_sees_cameras_where_it_is_asked_to(tmp_path):
         ({"steps": -1}, "expected 0 or more"),
         ({"threads": 0}, "expected 1 or more"),
         ({"resume": True, "overwrite": True}, "expected one of them"),
-        ({"dataset": SourceConfig(root="nowhere")}, "expected a folder"),
+        ({"dataset": StoredConfig(root="nowhere")}, "expected a folder"),
     ],
 )
 def test_wrong_settings_are_one_line_and_leave_nothing(settings, said, recorded, tmp_path):

@@ -5,12 +5,13 @@ from pathlib import Path
 
 import numpy as np
 
+from handrail.collect.config import StoredConfig
 from handrail.controllers.channels import Channels
 from handrail.controllers.description import load_description
 from handrail.datasets.frames import moment_features
 from handrail.datasets.schema import Feature
 from handrail.datasets.writer import EpisodeWriter
-from handrail.policies.imitation.config import SourceConfig, TrainConfig
+from handrail.policies.imitation.config import TrainConfig
 
 FPS = 20
 CHANNELS = Channels.of(load_description("ridgeback_ur10"))
@@ -73,6 +74,6 @@ def write_dataset(
 
 def tiny(root: Path, output: Path, *options: str, **settings) -> TrainConfig:
     """Return the settings of a training of a moment."""
-    source = SourceConfig("handrail/test", str(root))
+    source = StoredConfig("handrail/test", str(root))
     size = {"steps": 6, "batch_size": 8, "save_freq": 3, "policy_options": (*TINY, *options)} | settings
     return TrainConfig(source, str(output), **size)

@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
-from handrail.collect.config import dataset_folder
+from handrail.collect.config import StoredConfig
 from handrail.controllers.errors import HandrailError
 
 ACTION_SPACES = ("realised", "intent", "recorded")
@@ -13,25 +13,10 @@ FREE_ON_RESUME = ("output", "save_freq", "threads", "device", "resume", "overwri
 
 
 @dataclass(frozen=True)
-class SourceConfig:
-    """Which dataset; the flags are LeRobot's."""
-
-    repo_id: str = "handrail/demo"
-    """Name of the dataset, owner/name."""
-    root: str = ""
-    """Its folder; LeRobot's own place for the name when empty."""
-
-    @property
-    def folder(self) -> Path:
-        """The dataset's folder."""
-        return dataset_folder(self.repo_id, self.root)
-
-
-@dataclass(frozen=True)
 class TrainConfig:
     """Train an imitation policy with LeRobot's own training, on a dataset or a part of it."""
 
-    dataset: SourceConfig = field(default_factory=SourceConfig)
+    dataset: StoredConfig = field(default_factory=StoredConfig)
     output: str = "outputs/policy"
     """Folder for checkpoints and the curve of the loss."""
     policy: str = "act"

@@ -5,12 +5,12 @@ from collections.abc import Mapping
 from dataclasses import asdict, replace
 from typing import Any
 
-from handrail.collect.config import DatasetConfig, RecordConfig
+from handrail.collect.config import DatasetConfig, RecordConfig, StoredConfig
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.atomic import remove
 from handrail.datasets.comparison.config import CompareConfig
 from handrail.datasets.reader import read_episodes, read_info
-from handrail.policies.imitation.config import SourceConfig, TrainConfig
+from handrail.policies.imitation.config import TrainConfig
 from handrail.policies.imitation.evaluate_config import EvaluateConfig
 from handrail.policies.study.design import StudyDesign, TaskDesign
 from handrail.policies.study.jobs import CONDITIONS, Cell, Job, Layout, PolicyArm
@@ -118,7 +118,7 @@ def _policy(arm: PolicyArm, robust: bool, design: StudyDesign, layout: Layout) -
     timed = arm.budget == "time"
     folder = train(
         TrainConfig(
-            dataset=SourceConfig(root=str(layout.dataset(arm.cell))),
+            dataset=StoredConfig(root=str(layout.dataset(arm.cell))),
             output=str(layout.policy(arm)),
             policy=design.policy,
             actions=arm.actions,
