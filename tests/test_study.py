@@ -183,6 +183,7 @@ def test_presets_are_whole(name):
         (("[tasks.reach]", "[tasks.dance]"), "unknown task"),
         (("minutes = 0.1", ""), "needs minutes"),
         (("seeds = [0, 1]", "seeds = [0, 0]"), "seeds"),
+        (("minutes = 0.1", "minutes = 0.1\nrollout_limit = -1.0"), "rollout_limit expected 0"),
         (("[tasks.reach]", "[tasks.reach"), "expected TOML"),
     ],
 )

@@ -12,6 +12,7 @@ episodes = 50                   successful demonstrations of each mode, at least
 minutes = 10.0                  of the operator's time with each mode, failed attempts included
 steps = 4000                    updates of each policy
 time_limit = {direct_single = 60.0}     [s]
+rollout_limit = 20.0            after which a policy's rollout has failed [s]; the task's own without it
 
 [robustness]                    optional
 perturbations = ["push", "shift", "delay"]
@@ -32,7 +33,7 @@ from typing import Any
 
 import draccus
 
-from handrail.collect.config import MODE_NAMES, TASKS
+from handrail.collect.config import MODE_NAMES, MOST_TIME, TASKS
 from handrail.controllers.errors import HandrailError, unknown_name
 
 PRESETS = Path(__file__).parent / "presets"
@@ -50,6 +51,7 @@ class TaskDesign:
         steps: updates of each policy.
         batch_size: samples an update; 0 for the preset's.
         time_limit: of an episode by mode [s]; the task's own where a mode is not named.
+        rollout_limit: after which a policy's rollout has failed [s]; the task's own when 0.
         policy_options: more of LeRobot's settings of the policy, `key=value` each.
     """
 
@@ -58,6 +60,7 @@ class TaskDesign:
     steps: int = 4000
     batch_size: int = 0
     time_limit: Mapping[str, float] = field(default_factory=dict)
+    rollout_limit: float = 0.0
     policy_options: tuple[str, ...] = ()
 
 
@@ -154,6 +157,11 @@ class StudyDesign:
                 raise HandrailError(
                     f"study {self.name}, task {task}: expected episodes ≥ 2, steps ≥ 1, minutes ≥ 0, "
                     f"got {design.episodes}, {design.steps}, {design.minutes}"
+                )
+            if not 0.0 <= design.rollout_limit <= MOST_TIME:
+                raise HandrailError(
+                    f"study {self.name}, task {task}: rollout_limit expected 0 (the task's own) to "
+                    f"{MOST_TIME} s, got {design.rollout_limit}"
                 )
             if "time" in self.budgets and not design.minutes:
                 raise HandrailError(f"study {self.name}, task {task}: the budget 'time' needs minutes")

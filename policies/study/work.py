@@ -133,7 +133,11 @@ def _policy(arm: PolicyArm, robust: bool, design: StudyDesign, layout: Layout) -
         )
     )
     config = EvaluateConfig(
-        policy=(str(folder),), episodes=design.rollouts, seed=design.seed, label=arm.label
+        policy=(str(folder),),
+        episodes=design.rollouts,
+        seed=design.seed,
+        label=arm.label,
+        time_limit=task.rollout_limit,
     )
     shares = {"nominal": _evaluate(config, layout, arm, "nominal")}
     if robust and design.robustness:
