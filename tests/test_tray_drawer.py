@@ -217,3 +217,12 @@ def test_features_are_named_and_finite():
             assert numbers.shape == (len(task.state_names),)
             assert np.isfinite(numbers).all()
             assert len(set(task.state_names)) == len(task.state_names)
+
+
+@pytest.mark.parametrize("seed", [160, 165])  # 165: the arm cannot hold the tray at the first place drawn
+def test_every_seed_has_a_start(seed):
+    episode = Tray().sample(MODEL, np.random.default_rng(seed))
+    hand, held = MODEL.pose(episode.q), episode.scene.objects[1]
+    assert np.allclose(hand.rotation[:, 2], [0.0, 0.0, -1.0], atol=1e-3)
+    assert np.allclose(held.position, hand.position)
+    assert 0.85 < hand.position[2] < 1.05

@@ -18,6 +18,7 @@ _SIZE = (0.26, 0.32, 0.20)  # of the tray: length, width, handle above the plate
 _TRAY_MASS, _CAN_MASS = 0.35, 0.20  # [kg]
 _RADIUS, _HEIGHT = 0.033, 0.10  # of the can [m]
 _POSE = ("x", "y", "z", "qw", "qx", "qy", "qz")
+_MOST_TRIES = 20  # starts drawn, until the arm can hold the tray there
 _VIEW = View(position=(2.2, 0.0, 2.9), target=(-0.2, 0.0, 0.3), fovy=62.0)
 HANDLE = np.array([0.0, 0.0, _SIZE[2]])  # centre of the handle's bar in the tray's frame [m]
 
@@ -95,8 +96,24 @@ def _sample_start(model: RobotModel, side: float, rng: np.random.Generator) -> F
     """Return a start on the far side, the hand pointing down ahead of the base.
 
     Raises:
-        HandrailError: the arm cannot hold the tray there.
+        HandrailError: the arm can hold the tray at none of the places that were tried.
     """
+    place = np.zeros(3)
+    for _ in range(_MOST_TRIES):
+        q, place, rotation = _draw_start(model, side, rng)
+        q, error = arm_configuration(model, q, Pose(place, rotation))
+        if error <= 1e-3:
+            return q
+    raise HandrailError(
+        f"task Tray: expected a robot that reaches places such as {place.round(2).tolist()} from above, "
+        f"got {model.description.name}"
+    )
+
+
+def _draw_start(
+    model: RobotModel, side: float, rng: np.random.Generator
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return where the base starts, and position and rotation of the hand."""
     q = np.array(model.description.home)
     if model.description.base_joints:
         q[:3] += rng.uniform([-0.10, -0.15, -0.15], [0.10, 0.15, 0.15])
@@ -104,14 +121,7 @@ def _sample_start(model: RobotModel, side: float, rng: np.random.Generator) -> F
     ahead = np.array([np.cos(q[2]), np.sin(q[2]), 0.0]) if model.description.base_joints else np.eye(3)[0]
     base = model.pose(q, "planar_base").position
     place = base + rng.uniform(1.05, 1.20) * ahead + np.array([0.0, 0.0, rng.uniform(0.90, 1.00)])
-    down = np.column_stack([ahead, np.cross([0.0, 0.0, -1.0], ahead), [0.0, 0.0, -1.0]])
-    q, error = arm_configuration(model, q, Pose(place, down))
-    if error > 1e-3:
-        raise HandrailError(
-            f"task Tray: expected a robot that reaches {place.round(2).tolist()} from above, "
-            f"got {model.description.name}"
-        )
-    return q
+    return q, place, np.column_stack([ahead, np.cross([0.0, 0.0, -1.0], ahead), [0.0, 0.0, -1.0]])
 
 
 def _level(tool: FloatArray) -> FloatArray:
