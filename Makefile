@@ -22,7 +22,7 @@ demo: $(STAMP)
 	$(BIN)/handrail-demo --root $(DEMO) --overwrite
 
 test: $(STAMP)
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest -n auto --dist loadfile
 
 check: $(STAMP)
 	$(BIN)/ruff check .

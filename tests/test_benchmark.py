@@ -3,13 +3,12 @@
 import base64
 import json
 import re
-import subprocess
-import sys
 from dataclasses import replace
 from io import StringIO
 
 import numpy as np
 import pytest
+from command_helpers import command
 from rich.console import Console
 
 from handrail.collect.benchmark import benchmark
@@ -204,8 +203,7 @@ WRONG = {
 @pytest.mark.parametrize("case", WRONG)
 def test_wrong_input_is_one_clear_line(case):
     arguments, words = WRONG[case]
-    command = [sys.executable, "-m", "handrail.scripts.benchmark", *arguments]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=120)
+    done = command(*arguments, name="benchmark")
     assert done.returncode == 2, done.stderr
     assert words in done.stderr
     assert done.stderr.startswith("error: ")

@@ -17,20 +17,8 @@ from handrail.controllers.errors import HandrailError
 CAMERAS = ("wrist", "scene")
 
 
-def has_graphics() -> bool:
-    try:
-        with environment("Reach", cameras=("scene",), image_size=(16, 16)) as env:
-            env.reset(seed=0)
-    except HandrailError:
-        return False
-    return True
-
-
-needs_graphics = pytest.mark.skipif(not has_graphics(), reason="no OpenGL on this machine")
-
-
 @pytest.mark.parametrize("name", ["Reach", "PickPlace"])
-@pytest.mark.parametrize("cameras", [(), pytest.param(CAMERAS, marks=needs_graphics)])
+@pytest.mark.parametrize("cameras", [(), pytest.param(CAMERAS, marks=pytest.mark.needs_gl)])
 def test_gymnasium_is_content(name, cameras):
     env = gymnasium.make(
         f"handrail/{name}-v0", cameras=cameras, image_size=(32, 32), disable_env_checker=True
@@ -64,13 +52,13 @@ def test_the_same_seed_gives_the_same_bytes(name):
         assert play(fresh, 5) != play(fresh, 6)
 
 
-@needs_graphics
+@pytest.mark.needs_gl
 def test_cameras_change_nothing():
     with environment() as blind, environment(cameras=CAMERAS, image_size=(16, 16)) as seeing:
         assert play(blind, 2, steps=10) == play(seeing, 2, steps=10)
 
 
-@needs_graphics
+@pytest.mark.needs_gl
 def test_pictures_follow_the_episode():
     """One OpenGL context serves all episodes, each with its own model."""
     with environment(cameras=CAMERAS) as env, environment(cameras=CAMERAS) as other:
@@ -84,7 +72,7 @@ def test_pictures_follow_the_episode():
         assert np.any(first["scene"] != second["scene"])
 
 
-@needs_graphics
+@pytest.mark.needs_gl
 def test_render_is_a_picture_of_the_asked_size():
     with environment(render_mode="rgb_array", render_size=(120, 160)) as env:
         env.reset(seed=0)

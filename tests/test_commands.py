@@ -10,6 +10,7 @@ import time
 
 import numpy as np
 import pytest
+from command_helpers import command
 
 from handrail.datasets.reader import read_episodes, read_frames, read_info
 
@@ -17,11 +18,8 @@ RECORD = [sys.executable, "-m", "handrail.scripts.record"]
 REACH = ["--task", "reach", "--dataset.num_episodes", "2"]
 
 
-def command(*arguments, name="record", **options):
-    module = [sys.executable, "-m", f"handrail.scripts.{name}"]
-    return subprocess.run(
-        [*module, *map(str, arguments)], capture_output=True, text=True, timeout=300, **options
-    )
+def in_its_own_process(*arguments):
+    return subprocess.run([*RECORD, *map(str, arguments)], capture_output=True, text=True, timeout=300)
 
 
 def digest(root):
@@ -31,7 +29,7 @@ def digest(root):
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory):
     root = tmp_path_factory.mktemp("recorded") / "reach"
-    done = command(*REACH, "--dataset.root", root)
+    done = in_its_own_process(*REACH, "--dataset.root", root)
     assert done.returncode == 0, done.stderr
     return root
 
@@ -75,6 +73,12 @@ def test_wrong_input_is_one_clear_line_and_nothing_written(case, tmp_path):
     assert done.stderr.startswith("error: ")
     assert done.stderr.count("\n") == 1, done.stderr
     assert not root.exists()
+
+
+def test_a_shell_gets_the_same_line_and_code(tmp_path):
+    arguments = ["--task", "juggle", "--dataset.root", tmp_path / "dataset"]
+    shell, here = in_its_own_process(*arguments), command(*arguments)
+    assert (shell.returncode, shell.stdout, shell.stderr) == (here.returncode, here.stdout, here.stderr)
 
 
 def test_an_existing_dataset_is_never_overwritten(recorded):
@@ -208,6 +212,7 @@ def test_resume_goes_on_with_new_seeds(recorded, tmp_path):
 
 
 def test_the_same_seed_records_the_same_data(recorded, tmp_path):
+    """Here as in the process of its own that recorded the first."""
     done = command(*REACH, "--dataset.root", tmp_path / "again")
     assert done.returncode == 0
     first, again = read_frames(recorded, 1), read_frames(tmp_path / "again", 1)

@@ -1,12 +1,11 @@
 """Evaluation's laws: paired, the same in parallel, never twice, protected where it says so."""
 
 import json
-import subprocess
-import sys
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from command_helpers import command
 from policy_helpers import StandIn, checkpoint, load
 
 from handrail.controllers.errors import HandrailError
@@ -227,12 +226,10 @@ def test_a_file_of_something_else_is_not_added_to(folder, tmp_path):
 
 
 def test_the_command_says_one_line():
-    command = [sys.executable, "-m", "handrail.scripts.evaluate"]
-    done = subprocess.run([*command, "--policy", "nowhere"], capture_output=True, text=True, timeout=300)
+    done = command("--policy", "nowhere", name="evaluate")
     assert (done.returncode, done.stderr.count("\n")) == (2, 1), done.stderr
     assert "expected a checkpoint with a handrail.json" in done.stderr
-    helped = subprocess.run([*command, "--help"], capture_output=True, text=True, timeout=300)
-    assert "--perturbation" in helped.stdout
+    assert "--perturbation" in command("--help", name="evaluate").stdout
 
 
 @pytest.mark.needs_gl

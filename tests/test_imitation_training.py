@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 import torch
+from command_helpers import command
 from training_helpers import FPS, TINY, features, tiny, write_dataset
 
 from handrail.collect.config import StoredConfig
@@ -158,7 +159,7 @@ def test_a_resumed_training_is_the_same_to_the_bit(trained, tmp_path):
 
 
 def test_a_killed_training_goes_on(recorded, tmp_path):
-    steps = 400
+    steps = 150
     whole = tiny(recorded, tmp_path / "whole", steps=steps, save_freq=20)
     killed = dataclasses.replace(whole, output=str(tmp_path / "killed"), resume=True)
     flags = ["--dataset.root", recorded, "--output", killed.output, "--steps", steps, "--batch_size", 8]
@@ -263,8 +264,7 @@ def test_a_dataset_of_another_tool_needs_its_columns_as_they_are(tmp_path):
 
 
 def test_the_command_says_bad_input_in_one_line():
-    command = [sys.executable, "-m", "handrail.scripts.train", "--dataset.root", "nowhere"]
-    done = subprocess.run(command, capture_output=True, text=True)
+    done = command("--dataset.root", "nowhere", name="train")
     assert done.returncode == 2
     assert len(done.stderr.splitlines()) == 1
 

@@ -1,14 +1,13 @@
 """The showcase's laws: one controller for all cases, safe and exact in each; files that say what happened."""
 
 import json
-import subprocess
-import sys
 from dataclasses import fields, replace
 from functools import cache
 
 import av
 import numpy as np
 import pytest
+from command_helpers import command
 
 from handrail.collect.env import HandrailEnv
 from handrail.collect.showcase import showcase
@@ -144,9 +143,8 @@ def test_wrong_settings_are_named(case):
 
 
 def test_the_command_says_what_came_out(tmp_path):
-    command = [sys.executable, "-m", "handrail.scripts.showcase", "b", "--no_video", "--seconds", "1"]
-    done = subprocess.run([*command, "--output", str(tmp_path)], capture_output=True, text=True)
+    done = command("b", "--no_video", "--seconds", 1, "--output", tmp_path, name="showcase")
     assert done.returncode == 0, done.stderr
     assert "tracking error" in done.stdout
-    wrong = subprocess.run([*command[:3], "d"], capture_output=True, text=True)
+    wrong = command("d", name="showcase")
     assert (wrong.returncode, wrong.stderr.count("\n")) == (2, 1), wrong.stderr

@@ -1,0 +1,35 @@
+"""Commands, run as their entry points run them but without a new interpreter that imports everything."""
+
+import contextlib
+import importlib
+import io
+import sys
+from dataclasses import dataclass
+from typing import Any
+from unittest import mock
+
+import pytest
+
+
+@dataclass(frozen=True)
+class Done:
+    """What a command said and the code it ended with."""
+
+    returncode: int
+    stdout: str
+    stderr: str
+
+
+def command(*arguments: Any, name: str = "record") -> Done:
+    """Run `handrail-<name>` with its command line, in this process."""
+    main = importlib.import_module(f"handrail.scripts.{name}").main
+    words = [f"handrail-{name}", *map(str, arguments)]
+    out, error = io.StringIO(), io.StringIO()
+    with (
+        mock.patch.object(sys, "argv", words),
+        contextlib.redirect_stdout(out),
+        contextlib.redirect_stderr(error),
+        pytest.raises(SystemExit) as stop,
+    ):
+        main()
+    return Done(int(stop.value.code or 0), out.getvalue(), error.getvalue())
