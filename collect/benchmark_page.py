@@ -7,7 +7,6 @@ from typing import Any
 from handrail.collect.benchmark_config import BenchmarkConfig
 from handrail.collect.benchmark_format import (
     COMPARED,
-    Table,
     main_table,
     paired_table,
     profile_table,
@@ -15,6 +14,7 @@ from handrail.collect.benchmark_format import (
 )
 from handrail.collect.benchmark_metrics import COST_METRICS, METRICS, SETTLED_METRICS
 from handrail.collect.benchmark_results import save_json
+from handrail.collect.markdown import markdown_table, with_part
 
 
 def write_page(
@@ -36,17 +36,7 @@ def write_page(
     save_json({k: v for k, v in results.items() if k != "episodes"}, page.parent / f"{stem}.json")
     body = "\n\n".join(_parts(results, pictures, stem))
     text = page.read_text(encoding="utf-8") if page.exists() else "# Goal reaching\n"
-    page.write_text(_replaced(text, config.label, body), encoding="utf-8")
-
-
-def _replaced(text: str, label: str, body: str) -> str:
-    """Return the text with the body between the label's marks; at its end where there are none."""
-    begin, end = f"<!-- {label} -->", f"<!-- end {label} -->"
-    block = f"{begin}\n\n{body}\n\n{end}"
-    before, found, rest = text.partition(begin)
-    if not found:
-        return f"{text.rstrip()}\n\n{block}\n"
-    return before + block + rest.partition(end)[2]
+    page.write_text(with_part(text, config.label, body), encoding="utf-8")
 
 
 def _parts(results: Mapping[str, Any], pictures: Mapping[str, bytes], stem: str) -> list[str]:
@@ -54,22 +44,16 @@ def _parts(results: Mapping[str, Any], pictures: Mapping[str, bytes], stem: str)
     profiles = list(results["profiles"])
     for profile in profiles:
         parts += [f"**Profile {profile}**"] if len(profiles) > 1 else []
-        parts.append(_markdown(main_table(results, (*METRICS, COST_METRICS[0]), profile)))
+        parts.append(markdown_table(main_table(results, (*METRICS, COST_METRICS[0]), profile)))
         if not results["config"]["early_stop"]:
-            parts.append(_markdown(main_table(results, SETTLED_METRICS, profile)))
-        parts.append(_markdown(safety_table(results, profile)))
+            parts.append(markdown_table(main_table(results, SETTLED_METRICS, profile)))
+        parts.append(markdown_table(safety_table(results, profile)))
         if results["paired"][profile]:
-            parts.append(_markdown(paired_table(results, COMPARED, profile)))
+            parts.append(markdown_table(paired_table(results, COMPARED, profile)))
     if len(profiles) > 1:
-        parts.append(_markdown(profile_table(results)))
+        parts.append(markdown_table(profile_table(results)))
     parts += [f"![{name}]({stem}_{name}.png)" for name in pictures]
     return parts + [f"Left out: {name} ({reason})." for name, reason in results["skipped"].items()]
-
-
-def _markdown(table: Table) -> str:
-    headings, rows = table
-    lines = [headings, ["---"] * len(headings), *rows]
-    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
 
 
 def _command(results: Mapping[str, Any]) -> str:

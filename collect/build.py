@@ -107,11 +107,16 @@ def build_session(config: SessionConfig, env: HandrailEnv, observers: Sequence[O
     """Return the session of an environment."""
     mode = build_mode(config, env.model)
     mode = leave_to_objectives(mode, config.task)
-    script = SCRIPTS[config.task](env.model, mode.gains, drives=mode.drives)
-    human = config.human.scaled(config.noise).person(np.random.default_rng(config.person))
-    operator = ScriptedOperator(env.model, script, mode, human)
+    operator = build_operator(config, mode, env.model)
     controller = build_controller(mode, env.model, env.fps, config.task)
     return Session(env, controller, operator, observers, config.realtime)
+
+
+def build_operator(config: SessionConfig, mode: TeleopMode, model: RobotModel) -> ScriptedOperator:
+    """Return the scripted operator of a task in a mode: the person that the settings name."""
+    script = SCRIPTS[config.task](model, mode.gains, drives=mode.drives)
+    human = config.human.scaled(config.noise).person(np.random.default_rng(config.person))
+    return ScriptedOperator(model, script, mode, human)
 
 
 def build_controller(mode: TeleopMode, model: RobotModel, fps: int, task: str = "") -> Controller:

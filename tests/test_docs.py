@@ -20,6 +20,7 @@ from handrail.collect.operators.modes import MODES
 from handrail.collect.perturbations import DEFAULTS
 from handrail.collect.profile_config import ProfileConfig
 from handrail.collect.showcase_config import ShowcaseConfig
+from handrail.collect.trials_config import TrialsConfig
 from handrail.controllers.command import Status
 from handrail.datasets.comparison.config import CompareConfig
 from handrail.datasets.quality.catalogue import METRICS
@@ -45,6 +46,7 @@ CONFIGS = {
     "handrail-compare": CompareConfig,
     "handrail-evaluate": EvaluateConfig,
     "handrail-study": StudyConfig,
+    "handrail-trials": TrialsConfig,
 }
 _LEROBOT = """
 import json, sys

@@ -56,6 +56,11 @@ class ScriptedOperator:
         """What the dataset says of who steered."""
         return "scripted"
 
+    @property
+    def free_at(self) -> float:
+        """When the hand is back on the input after the last change to other channels [s]; −∞ before any."""
+        return self._free_at
+
     def reset(self, view: View, rng: np.random.Generator) -> None:
         """Begin an episode; how the person is today is drawn first."""
         self._settings = self._human.episode(rng)

@@ -1,0 +1,40 @@
+"""`handrail-trials`: let the scripted operators do every task in every mode, and count how it went."""
+
+from handrail.collect.trials_config import TrialsConfig
+from handrail.scripts import cli
+
+
+def main() -> None:
+    """Run the command."""
+    cli.run(lambda: _trials(cli.parse(TrialsConfig, "handrail-trials")))
+
+
+def _trials(config: TrialsConfig) -> int:
+    config.check()
+    from rich.console import Console
+    from rich.table import Table
+
+    from handrail.collect.trials import run_trials
+    from handrail.collect.trials_table import trials_table, write_page
+
+    console = Console(highlight=False, markup=False, soft_wrap=True)
+    trials = run_trials(
+        config,
+        lambda done: console.print(
+            f"{done.task} {done.mode} {done.episode}: {done.failure_reason or 'done'}, {done.seconds:.1f} s"
+        ),
+    )
+    for task in config.task_names:
+        headings, lines = trials_table([trial for trial in trials if trial.task == task], config.mode_names)
+        table = Table(*headings, title=task)
+        for line in lines:
+            table.add_row(*line)
+        console.print(table)
+    if config.page:
+        write_page(trials, config)
+        console.print(f"Written: {config.page}")
+    return 0
+
+
+if __name__ == "__main__":
+    main()
