@@ -1,15 +1,20 @@
 """Large motions of the hand: without folding the arm, without leaning, without hitting the cabinet."""
 
+from contextlib import closing
+
 import numpy as np
 import pytest
 from device_helpers import HOME, MODEL, drive, first_view
 
+from handrail.collect.build import build_env, build_session
+from handrail.collect.config import SessionConfig
 from handrail.collect.operators.arm_solutions import REACHED, arm_solutions, straight_solution
 from handrail.collect.operators.drawer_script import before_driving
 from handrail.collect.operators.human import HumanSettings
 from handrail.collect.operators.operator import View
 from handrail.collect.operators.steering import Gains, hand_twist, pose_errors
 from handrail.collect.operators.wish import Target, Wish
+from handrail.collect.record import episode_seed
 from handrail.controllers.arm_pose import arm_configuration
 from handrail.controllers.collision import CollisionModel
 from handrail.controllers.model import Pose
@@ -115,3 +120,13 @@ def test_the_hand_is_made_ready_where_the_base_will_bring_it():
     ready = before_driving(there, stand, now)
     np.testing.assert_allclose(ready.position, MODEL.pose(q).position, atol=1e-9)
     np.testing.assert_allclose(ready.rotation, MODEL.pose(q).rotation, atol=1e-9)
+
+
+@pytest.mark.parametrize("episode", [1, 3])
+def test_an_expert_by_joints_turns_the_hand_over_without_touching_himself(episode):
+    """By the hand's way, the palm was pressed against the forearm for 20 s."""
+    config = SessionConfig(task="reach", mode="direct", person=episode)
+    with closing(build_env(config, 20)) as env:
+        outcome = build_session(config, env).run(episode_seed(900, episode))
+    assert outcome.success
+    assert outcome.contacts == 0

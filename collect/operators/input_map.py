@@ -5,6 +5,7 @@ from typing import Protocol
 import numpy as np
 
 from handrail.collect.operators.human import HumanSettings
+from handrail.collect.operators.large_turn import LargeTurn
 from handrail.collect.operators.modes import TeleopMode
 from handrail.collect.operators.operator import View
 from handrail.collect.operators.steering import Gains
@@ -17,6 +18,7 @@ from handrail.controllers.model import RobotModel
 _DAMPING = 0.03
 _BASE_WEIGHT = 0.15
 _POSTURE = 0.1  # weight of the arm's posture at home, so that it does not fold the wrong way
+_LARGE = 2.0  # turn of the hand from which on the expert thinks of where the arm's joints belong [rad]
 _RETURN = 0.5  # how fast it would go back there [1/s]
 
 
@@ -57,6 +59,8 @@ class StickMap:
     Where the mode has joint channels, the operator solves for them himself, as an expert would, with the
     arm's angles as he imagines them, q + δ:
     `min ‖J(q + δ) v - hand‖² + w_b ‖v_base - base‖² + w_p ‖v_arm - k (q_home - q)‖² + λ ‖v / v_max‖²`.
+    A large turn would fold the arm into itself that way; there he brings the arm's joints straight to where
+    they belong (`LargeTurn`), while the base drives.
 
     Args:
         model: of the robot.
@@ -70,6 +74,7 @@ class StickMap:
         self._model = model
         self._gains = gains
         self._imagined = np.zeros(model.size)
+        self._turn = LargeTurn(model, gains, _LARGE)
 
     @property
     def full(self) -> FloatArray:
@@ -80,6 +85,8 @@ class StickMap:
         """Draw the error of the arm's angles as this operator imagines them."""
         self._imagined = settings.inner_error * rng.standard_normal(self._model.size)
         self._imagined[: len(self.channels.base)] = 0.0
+        if self.mask("hand")[self.channels.joint_slice].any():
+            self._turn.reset(view, settings.misjudgement, rng)
 
     def mask(self, focus: Focus) -> BoolArray:
         """Return the channels that the operator owns, (m,)."""
@@ -104,6 +111,14 @@ class StickMap:
         return moved / self.full
 
     def _joint_velocities(self, wish: Wish, q: FloatArray) -> FloatArray:
+        """Return what the expert makes of a wish on all joints, (n,), within full stick."""
+        if wish.target is not None and self._turn.is_ahead(wish.target, q):
+            base = wish.target.base[: len(self.channels.base)]
+            arm = self._turn.arm_velocity(wish.target, q, base)
+            return np.concatenate([self._base_world(wish, q), arm])
+        return self._inner_kinematics(wish, q)
+
+    def _inner_kinematics(self, wish: Wish, q: FloatArray) -> FloatArray:
         """Return the expert's inner inverse kinematics, (n,): the hand first, the base when it can."""
         jacobian = self._model.jacobian(q + self._imagined)
         base = self._base_world(wish, q)
