@@ -7,9 +7,9 @@ import gymnasium
 import numpy as np
 
 from handrail.collect.config import SessionConfig, check_fps
-from handrail.collect.env import HandrailEnv
+from handrail.collect.env import RENDER_SIZE, HandrailEnv
 from handrail.collect.operators.drawer_script import DrawerScript
-from handrail.collect.operators.modes import Completion, TeleopMode, find_mode, without
+from handrail.collect.operators.modes import Completion, TeleopMode, find_mode, minding, without
 from handrail.collect.operators.pick_place_script import PickPlaceScript
 from handrail.collect.operators.reach_script import ReachScript
 from handrail.collect.operators.scripted import ScriptedOperator
@@ -58,17 +58,21 @@ OBJECTIVES: Mapping[str, Callable[[Channels], tuple[Objective, ...]]] = {
     "tray": lambda channels: (tray_levelling(channels, up=np.array([0.0, 0.0, -1.0]), level=LEVEL),)
 }
 LEFT = {"tray": ("ee.wx", "ee.wy")}  # a tray's tilt is the MPC's, not the operator's
+MINDED = {"tray": ("ee.vz",)}  # who drives with a tray in hand minds how high it is
 LEVEL = 20.0  # weight of a tray's tilt
 _VERSIONED = ("handrail", "lerobot", "mujoco", "pin", "coal", "casadi", "daqp", "numpy", "gymnasium")
 
 
-def build_env(config: SessionConfig, fps: int, render: bool = False) -> HandrailEnv:
+def build_env(
+    config: SessionConfig, fps: int, render: tuple[int, int] | bool = False, task: Task | None = None
+) -> HandrailEnv:
     """Return the environment of a session.
 
     Args:
         config: of the session.
         fps: control and recording rate [Hz].
-        render: whether `env.render()` shall give good-looking pictures.
+        render: whether `env.render()` shall give good-looking pictures; or their height and width [px].
+        task: instead of the one that the settings name.
 
     Raises:
         HandrailError: a setting is wrong, or cameras are asked for and GL is missing.
@@ -77,12 +81,13 @@ def build_env(config: SessionConfig, fps: int, render: bool = False) -> Handrail
     check_fps(fps)
     env = gymnasium.make(
         ENVIRONMENTS[config.task],
-        task=build_task(config),
+        task=task or build_task(config),
         robot=config.robot,
         fps=fps,
         cameras=config.camera_names,
         image_size=(config.image_size, config.image_size),
         render_mode="rgb_array" if render else None,
+        render_size=render if isinstance(render, tuple) else RENDER_SIZE,
         disable_env_checker=True,
     )
     unwrapped = env.unwrapped
@@ -117,8 +122,13 @@ def build_controller(mode: TeleopMode, model: RobotModel, fps: int, task: str = 
 
 
 def leave_to_objectives(mode: TeleopMode, task: str) -> TeleopMode:
-    """Return the mode without the channels that a task's objectives look after under the masked MPC."""
-    return without(mode, LEFT.get(task, ())) if mode.controller == "mpc" else mode
+    """Return the mode without the channels that a task's objectives look after under the masked MPC.
+
+    And with those that are not to be left to it while only the base is steered.
+    """
+    if mode.controller != "mpc":
+        return mode
+    return minding(without(mode, LEFT.get(task, ())), MINDED.get(task, ()))
 
 
 def build_mode(config: SessionConfig, model: RobotModel) -> TeleopMode:

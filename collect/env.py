@@ -23,6 +23,7 @@ from handrail.controllers.model import RobotModel, load_model
 from handrail.controllers.shape import Obstacle
 
 Observation = dict[str, Any]
+RENDER_SIZE = (480, 640)  # height, width [px]
 
 
 class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
@@ -63,7 +64,7 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         cameras: Sequence[str] = (),
         image_size: tuple[int, int] = (128, 128),
         render_mode: str | None = None,
-        render_size: tuple[int, int] = (480, 640),
+        render_size: tuple[int, int] = RENDER_SIZE,
     ) -> None:
         _check(fps, cameras, render_mode)
         self.task: Task = load_env_creator(task)() if isinstance(task, str) else task  # pyright: ignore

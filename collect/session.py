@@ -4,12 +4,13 @@ import contextlib
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
 from handrail.collect.env import HandrailEnv
 from handrail.collect.operators.operator import Operator, View
+from handrail.collect.simulation import Simulation
 from handrail.controllers.command import Command, Status
 from handrail.controllers.controller import Controller
 from handrail.controllers.model import RobotModel
@@ -62,6 +63,18 @@ class Observer(Protocol):
         ...
 
 
+class Disturbance(Protocol):
+    """Something from outside that acts on the robot: pushes."""
+
+    def begin(self, env: HandrailEnv, seed: int) -> None:
+        """Take note that an episode begins."""
+        ...
+
+    def act(self, simulation: Simulation) -> None:
+        """Act during the control period that begins now."""
+        ...
+
+
 class Session:
     """Runs episodes.
 
@@ -71,6 +84,7 @@ class Session:
         operator: whoever steers.
         observers: shown every moment.
         realtime: pace the loop by the wall clock.
+        disturbances: what acts on the robot from outside.
     """
 
     def __init__(
@@ -80,12 +94,14 @@ class Session:
         operator: Operator,
         observers: Sequence[Observer] = (),
         realtime: bool = False,
+        disturbances: Sequence[Disturbance] = (),
     ) -> None:
         self.env = env
         self._controller = controller
         self._operator = operator
         self._observers = observers
         self._realtime = realtime
+        self._disturbances = disturbances
 
     @property
     def model(self) -> RobotModel:
@@ -100,21 +116,23 @@ class Session:
     def _run(self, seed: int) -> Outcome:
         observation, info = self.env.reset(seed=seed)
         self._controller.reset(self.env.obstacles())
-        self._operator.reset(self._view(), np.random.default_rng([seed, 1]))
-        for observer in self._observers:
-            observer.begin(self.env, seed)
+        self._operator.reset(self._view(observation), np.random.default_rng([seed, 1]))
+        for other in (*self._observers, *self._disturbances):
+            other.begin(self.env, seed)
         tally = _Tally(seed, 1.0 / self.env.fps)
         moving, done = bool(self.env.episode.scene.movers), False
         while not done:
             wall_clock = tally.elapsed
             with tally.timed("operator"):
-                intent = self._operator.act(self._view())
+                intent = self._operator.act(self._view(observation))
             with tally.timed("controller"):
                 if moving:
                     self._controller.observe(self.env.obstacles())
                 command = self._controller.update(self.env.state(), intent)
             action = action_of(command, 1.0 / self.env.fps)
             with tally.timed("environment"):
+                for disturbance in self._disturbances:
+                    disturbance.act(self.env.simulation)
                 following, _, terminated, truncated, info = self.env.step(action)
             moment = Moment(
                 state=observation["agent_pos"],
@@ -135,9 +153,9 @@ class Session:
                 tally.pace()
         return tally.outcome(info)
 
-    def _view(self) -> View:
+    def _view(self, observation: Mapping[str, Any]) -> View:
         task = self.env.task_state()
-        return View(self.env.state(), task.tool, task.opening, task)
+        return View(self.env.state(), task.tool, task.opening, task, observation)
 
 
 def action_of(command: Command, period: float) -> np.ndarray:

@@ -3,19 +3,21 @@
 import contextlib
 import json
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from handrail.collect.env import HandrailEnv
+from handrail.collect.film import SIZE, Filmer
 from handrail.collect.gl import graphics_trouble
 from handrail.collect.showcase_cases import Case, cases
 from handrail.collect.showcase_config import ShowcaseConfig
 from handrail.collect.showcase_figure import save_figure
 from handrail.collect.showcase_metrics import summary
 from handrail.collect.showcase_run import FPS, ShowcaseTask, Trace, build_controller, run_case
-from handrail.collect.showcase_video import SIZE, Filmer
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.model import load_model
 from handrail.controllers.mpc import MaskedMpc
+from handrail.datasets.frames import Moment
 
 
 def showcase(config: ShowcaseConfig) -> dict[str, Any]:
@@ -48,5 +50,14 @@ def _run(case: Case, mpc: MaskedMpc, config: ShowcaseConfig, film: bool) -> Trac
         env = HandrailEnv(ShowcaseTask(case), fps=FPS, render_mode=mode, render_size=SIZE)
         stack.callback(env.close)
         path = config.folder / f"{case.name}.mp4"
-        filmers = (stack.enter_context(Filmer(case, path, FPS)),) if film else ()
+        filmers = (stack.enter_context(Filmer(path, FPS, case.title, partial(_words, case))),) if film else ()
         return run_case(case, env, mpc, filmers)
+
+
+def _words(case: Case, moment: Moment) -> str:
+    """Say what is steered and how near things are."""
+    health = moment.health
+    return (
+        f"{moment.intent.time:5.1f} s     commanded: {', '.join(case.channels)}     "
+        f"nearest: {health.smallest_distance:.3f} m     update: {1e3 * health.solve_time:.1f} ms"
+    )

@@ -8,7 +8,7 @@ import numpy as np
 
 from handrail.collect.contacts import ContactMonitor
 from handrail.collect.gl import mujoco
-from handrail.collect.robot import FINGERS, RobotSpec, build_robot
+from handrail.collect.robot import BASE_BODY, FINGERS, RobotSpec, build_robot
 from handrail.collect.scene import Scene, add_scene
 from handrail.collect.stage import set_stage
 from handrail.controllers.arrays import FloatArray
@@ -116,6 +116,20 @@ class Simulation:
         mujoco.mj_kinematics(model, data)
         mujoco.mj_camlight(model, data)
         return self._contacts.names
+
+    def push(self, base: FloatArray, hand: FloatArray) -> None:
+        """Let forces act from now on, until others are set.
+
+        Args:
+            base: on the base's centre of mass, in the world, (3,) [N].
+            hand: at the tool point, in the world, (3,) [N].
+        """
+        data = self.data
+        carrier = self.mujoco_model.site_bodyid[self._tool]
+        lever = data.site_xpos[self._tool] - data.xipos[carrier]
+        data.xfrc_applied[:] = 0.0
+        data.xfrc_applied[self.mujoco_model.body(BASE_BODY).id, :3] = base
+        data.xfrc_applied[carrier] += np.concatenate([hand, np.cross(lever, hand)])
 
     def _ramp(self, velocity: FloatArray, gripper: float) -> FloatArray:
         """Return what the servos are sent at every substep: linear to the velocity, (substeps, servos)."""

@@ -4,6 +4,7 @@ import json
 import shutil
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 from stable_baselines3 import SAC
 
@@ -45,6 +46,18 @@ def resume_run(config: TrainRlConfig) -> tuple[SAC, Curve]:
     model = SAC.load(last / "model.zip", device="cpu")
     model.load_replay_buffer(last / "replay_buffer.pkl")
     return model, json.loads((last / "curve.json").read_text())
+
+
+def last_networks(folder: Path) -> dict[str, Any]:
+    """Return actor, critics and target critics of a run's last checkpoint, without the optimisers' memory.
+
+    Raises:
+        HandrailError: there is no checkpoint.
+    """
+    last = _last(folder)
+    if last is None:
+        raise HandrailError(f"--start_from: expected a run with a checkpoint in {folder}, found none")
+    return SAC.load(last / "model.zip", device="cpu").policy.state_dict()
 
 
 def write_checkpoint(folder: Path, model: SAC, actor: Actor, curve: Curve) -> None:

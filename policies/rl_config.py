@@ -19,6 +19,8 @@ class TrainRlConfig:
     """Folder for checkpoints, TensorBoard curves and the actor."""
     steps: int = 500_000
     """Environment steps, those before a resume included."""
+    start_from: str = ""
+    """Folder of another run whose last networks this one begins with; its transitions are not taken."""
     seed: int = 0
     """Of the goals, the networks and the exploration."""
     learning_rate: float = 1e-4
@@ -47,8 +49,12 @@ class TrainRlConfig:
     """Weight of the squared action in the reward."""
     failure_cost: float = 0.0
     """Subtracted from the reward when an episode is given up; without it, giving up early can pay."""
+    physics: bool = True
+    """Train in MuJoCo physics; without it an ideal robot that does what it is told."""
     reward_scale: float = 1.0
     """Factor of the whole reward."""
+    repeat_missed: float = 0.0
+    """Share of the episodes that try again a goal that was missed before."""
     save_every: int = 20_000
     """Steps between checkpoints, each with an evaluation."""
     goals: int = 50
@@ -85,6 +91,8 @@ class TrainRlConfig:
         for name in ("gamma", "tau", "learning_rate"):
             if not 0.0 < getattr(self, name) <= 1.0:
                 raise HandrailError(f"--{name} {getattr(self, name)}: expected a number in (0, 1]")
+        if not 0.0 <= self.repeat_missed <= 1.0:
+            raise HandrailError(f"--repeat_missed {self.repeat_missed}: expected a share from 0 to 1")
         for name in ("temperature", "reward_scale"):
             if not getattr(self, name) > 0.0:
                 raise HandrailError(f"--{name} {getattr(self, name)}: expected a positive number")

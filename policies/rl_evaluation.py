@@ -27,6 +27,7 @@ class EpisodeScore:
         arm_effort: Σ ‖q̇_arm‖².
         base_path: Σ ‖Δp_base‖ [m].
         jerkiness: mean ‖Δq̇‖ / h.
+        contacts: steps in which the robot touched itself or the floor.
     """
 
     success: bool
@@ -36,6 +37,7 @@ class EpisodeScore:
     arm_effort: float
     base_path: float
     jerkiness: float
+    contacts: int
 
 
 def evaluation_goals(count: int, seed: int = EVALUATION_SEED) -> tuple[Goal, ...]:
@@ -47,26 +49,28 @@ def evaluation_goals(count: int, seed: int = EVALUATION_SEED) -> tuple[Goal, ...
 def run_episode(env: GoalReachingEnv, policy: Policy, goal: Goal) -> EpisodeScore:
     """Run a policy until the episode ends."""
     observation, _ = env.reset(options={"goal": goal})
-    velocities, done, info = [env.velocity], False, {}
+    velocities, contacts, done, info = [], 0, False, {}
     while not done:
         observation, _, terminated, truncated, info = env.step(policy(observation))
         velocities.append(env.velocity)
+        contacts += info["touches"]
         done = terminated or truncated
-    v = np.array(velocities)  # (T + 1, 9)
+    v = np.array(velocities)  # (T, 9)
     return EpisodeScore(
         success=info["is_success"],
         position_error=info["position_error"],
         orientation_error=info["orientation_error"],
-        length=len(v) - 1,
+        length=len(v),
         arm_effort=float(np.sum(v[:, 3:] ** 2)),
         base_path=float(STEP * np.linalg.norm(v[:, :2], axis=1).sum()),
         jerkiness=float(np.linalg.norm(np.diff(v, axis=0), axis=1).mean() / STEP),
+        contacts=contacts,
     )
 
 
-def evaluate(policy: Policy, goals: Sequence[Goal]) -> list[EpisodeScore]:
+def evaluate(policy: Policy, goals: Sequence[Goal], physics: bool = True) -> list[EpisodeScore]:
     """Return the score of every goal, early failure off."""
-    env = GoalReachingEnv(early_failure=False)
+    env = GoalReachingEnv(early_failure=False, physics=physics)
     return [run_episode(env, policy, goal) for goal in goals]
 
 

@@ -2,6 +2,7 @@
 
 import json
 import time
+from pathlib import Path
 from typing import Any
 
 import gymnasium
@@ -17,6 +18,7 @@ from handrail.policies.rl_checkpoint import (
     Curve,
     begin_run,
     evaluated_actors,
+    last_networks,
     resume_run,
     write_checkpoint,
 )
@@ -49,7 +51,7 @@ def train(config: TrainRlConfig) -> dict[str, Any]:
         model.learn(remaining, callback, log_interval=20, reset_num_timesteps=not config.resume)
     actor = Actor.mean(evaluated_actors(config.folder, config.average))
     actor.save(config.folder / "actor.npz")
-    final = spreads(evaluate(actor, evaluation_goals(config.final_goals, FINAL_SEED)))
+    final = spreads(evaluate(actor, evaluation_goals(config.final_goals, FINAL_SEED), config.physics))
     record = training_record(config, curve, final)
     (config.folder / "actor.json").write_text(json.dumps(record, indent=1) + "\n")
     save_curve(curve, config.folder / "curve.png")
@@ -97,7 +99,7 @@ class Watch(BaseCallback):
 
     def _evaluate_and_save(self) -> None:
         actor = actor_of(self.model)
-        score = means(evaluate(actor, self._goals))
+        score = means(evaluate(actor, self._goals, self._config.physics))
         seconds = time.monotonic() - self._began
         updates = float(self.model._n_updates)
         row = {"steps": self.num_timesteps, "updates": updates, "seconds": seconds}
@@ -127,11 +129,13 @@ def _new(config: TrainRlConfig) -> tuple[SAC, Curve]:
         gradient_steps=config.gradient_steps,
         ent_coef=f"auto_{config.temperature}",
         target_entropy=_TARGET_ENTROPY,
-        policy_kwargs={"net_arch": list(config.layers)},
+        policy_kwargs={"net_arch": list(config.layers), "optimizer_kwargs": {"fused": True}},
         tensorboard_log=str(config.folder / "tensorboard"),
         seed=config.seed,
         device="cpu",
     )
+    if config.start_from:
+        model.policy.load_state_dict(last_networks(Path(config.start_from).expanduser()))
     return model, []
 
 
@@ -154,5 +158,5 @@ def _environment(config: TrainRlConfig) -> gymnasium.Env:
     )
     matrix = conditioning()
     space = spaces.Box(-np.inf, np.inf, (len(matrix),), np.float32)
-    env = GoalReachingEnv(reward=reward)
+    env = GoalReachingEnv(reward=reward, physics=config.physics, repeat_missed=config.repeat_missed)
     return TransformObservation(env, lambda values: (matrix @ values).astype(np.float32), space)

@@ -37,7 +37,7 @@ def recorded(tmp_path_factory):
 
 
 WRONG = {
-    "task": (["--task", "juggle"], "unknown task 'juggle': expected one of pick_place, reach"),
+    "task": (["--task", "juggle"], "unknown task 'juggle': expected one of drawer, pick_place, reach, tray"),
     "mode": (["--mode", "telepathy"], "unknown mode 'telepathy': expected one of base"),
     "operator": (["--operator", "cat"], "unknown operator 'cat'"),
     "camera": (["--cameras", "wrist,roof"], "unknown camera 'roof'"),

@@ -4,74 +4,26 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from collect_helpers import environment
+from device_helpers import GOAL, HOME, MODEL, PERIOD, Wisher, drive, first_view
 
 from handrail.collect.operators.devices import input_map
 from handrail.collect.operators.human import HumanSettings
 from handrail.collect.operators.joint_order import clear_order, sweep_clearance
 from handrail.collect.operators.modes import find_mode
 from handrail.collect.operators.operator import View
-from handrail.collect.operators.scripted import ScriptedOperator
-from handrail.collect.operators.wish import Target, Wish
-from handrail.collect.tasks.task import TaskState
+from handrail.collect.operators.wish import Wish
 from handrail.controllers.collision import CollisionModel
 from handrail.controllers.controller import State
-from handrail.controllers.direct import DirectController
 from handrail.controllers.intent import Intent
-from handrail.controllers.model import Pose, load_model
 from handrail.controllers.shape import Obstacle, Shape
 from handrail.controllers.split_controller import split_controller
 
-MODEL = load_model()
-HOME = np.array(MODEL.description.home)
-PERIOD = 0.05
 NAMES = ["direct_single", "leader", "decoupled", "direct"]
-GOAL = Pose(MODEL.pose(HOME).position + [0.10, -0.10, 0.15], MODEL.pose(HOME).rotation)
-
-
-class Wisher:
-    """Wants the base moved first, then the hand at the goal, then rests; a script."""
-
-    def __init__(self, base_until=1.0):
-        self._until = base_until
-
-    def reset(self, view):
-        pass
-
-    def wish(self, view):
-        stand = HOME[:3] + [0.2, 0.1, 0.0]
-        hand = np.concatenate([GOAL.position - view.tool.position, np.zeros(3)])
-        focus = "base" if view.state.time < self._until else "hand"
-        return Wish(hand, np.array([0.3, 0.1, 0.0]), focus, target=Target(GOAL, stand, distance=0.02))
 
 
 @pytest.fixture(scope="module")
 def view() -> View:
-    with environment("Reach") as env:
-        env.reset(seed=0)
-        return View(env.state(), env.task_state().tool, 1.0, env.task_state())
-
-
-def drive(view, mode, human, seconds=12.0, script=None):
-    """Integrate what the operator asks for, without physics; return intents and configurations."""
-    mode = find_mode(mode)
-    operator = ScriptedOperator(MODEL, script or Wisher(), mode, human)
-    controller = split_controller(MODEL) if mode.controller == "split" else DirectController(MODEL)
-    q, v, intents, path = HOME.copy(), np.zeros(MODEL.size), [], [HOME.copy()]
-    operator.reset(at(view, q, v, 0.0), np.random.default_rng(0))
-    for step in range(int(seconds / PERIOD)):
-        now = at(view, q, v, step * PERIOD)
-        intents.append(operator.act(now))
-        v = controller.update(now.state, intents[-1]).velocity(PERIOD)
-        q = q + PERIOD * v
-        path.append(q)
-    return intents, np.array(path)
-
-
-def at(view, q, v, time) -> View:
-    tool = MODEL.pose(q)
-    task = TaskState(time, tool, 1.0, view.task.episode, view.task.poses)
-    return View(State(q, v, time), tool, 1.0, task)
+    return first_view()
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -17,13 +17,17 @@ from handrail.collect.benchmark_contenders import CONTENDERS
 from handrail.collect.build import build_env, session_features
 from handrail.collect.config import DemoConfig, InspectConfig, RecordConfig, ReplayConfig, SessionConfig
 from handrail.collect.operators.modes import MODES
+from handrail.collect.perturbations import DEFAULTS
 from handrail.collect.profile_config import ProfileConfig
 from handrail.collect.showcase_config import ShowcaseConfig
 from handrail.controllers.command import Status
 from handrail.datasets.comparison.config import CompareConfig
 from handrail.datasets.quality.catalogue import METRICS
+from handrail.policies.imitation.config import TrainConfig
+from handrail.policies.imitation.evaluate_config import PROTECTIONS, EvaluateConfig
 from handrail.policies.rl_config import TrainRlConfig
 from handrail.policies.rl_contender import RL
+from handrail.policies.study.config import StudyConfig
 from handrail.scripts import cli
 
 ROOT = Path(__file__).parent.parent
@@ -35,9 +39,12 @@ CONFIGS = {
     "handrail-demo": DemoConfig,
     "handrail-showcase": ShowcaseConfig,
     "handrail-profile": ProfileConfig,
+    "handrail-train": TrainConfig,
     "handrail-train-rl": TrainRlConfig,
     "handrail-benchmark": BenchmarkConfig,
     "handrail-compare": CompareConfig,
+    "handrail-evaluate": EvaluateConfig,
+    "handrail-study": StudyConfig,
 }
 _LEROBOT = """
 import json, sys
@@ -128,6 +135,10 @@ def test_controllers_and_profiles_of_the_benchmark_are_all_there():
     source = (ROOT / "collect" / "benchmark_config.py").read_text()
     helped = re.findall(r'^    """(.*?)"""', source, re.MULTILINE | re.DOTALL)
     assert all(re.search(rf"\b{name}\b", " ".join(helped)) for name in (*CONTROLLERS, *PROFILES))
+
+
+def test_protections_and_perturbations_are_all_there():
+    assert table("Evaluate") == {*PROTECTIONS, *DEFAULTS, "none"}
 
 
 def test_metrics_are_all_there():

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 from test_rl_policy import random_actor
 
+from handrail.collect.benchmark_plants import IdealRobot
 from handrail.collect.goal_reaching import STEP, Goal
+from handrail.collect.scene import Scene
 from handrail.controllers.channels import Channels
 from handrail.controllers.command import Status
 from handrail.controllers.controller import State
@@ -32,17 +34,18 @@ def controller():
 
 def test_the_controller_moves_like_the_environment(controller):
     """Law: fed with the planner's twists, it commands the velocities that the actor was trained with."""
-    env, actor = GoalReachingEnv(early_failure=False), random_actor()
+    env, actor = GoalReachingEnv(early_failure=False, physics=False), random_actor()
+    home = MODEL.description.home
     for seed in (0, 1):
         observation, _ = env.reset(seed=seed)
         controller.reset()
         controller.aim(env.planner.goal)
-        q, v = env.q, env.velocity
+        robot = IdealRobot(MODEL, Scene(), home)
         for t in range(80):
-            command = controller.update(State(q, v, t * STEP), intent(env.planner.twist(t), t * STEP))
+            command = controller.update(robot.state(), intent(env.planner.twist(t), t * STEP))
             observation, *_ = env.step(actor(observation))
             v = command.velocities[-1]
-            q = q + STEP * v
+            robot.advance(v, 0.0)
             assert command.health.status is Status.OK
             assert np.allclose(v, env.velocity, atol=1e-5)
         assert np.abs(v[:3]).max() > 0.01

@@ -4,6 +4,7 @@ import re
 
 import gymnasium
 import numpy as np
+import pinocchio as pin
 import pytest
 from collect_helpers import SMALL_ROBOT
 from gymnasium.utils.env_checker import check_env
@@ -11,14 +12,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import handrail.policies  # noqa: F401  (registers the environment)
-from handrail.collect.goal_reaching import STEP, T_MAX, Goal, pose_error
+from handrail.collect.goal_reaching import STEP, T_MAX, Goal, pose_error, sample_goal
 from handrail.controllers.arm_completion import ArmCompletion
 from handrail.controllers.errors import HandrailError
+from handrail.controllers.model import load_model
 from handrail.policies.rl_env import GoalReachingEnv, Reward
 from handrail.policies.rl_observation import Situation, base_velocity, observe, planar_rotation
 
 SEEDS = st.integers(0, 2**32 - 1)
 NEAR = Goal(np.array([-0.6, 0.3, 0.9]), np.eye(3))
+HOME = load_model().pose(load_model().description.home)
+FOLDED = Goal(HOME.position, pin.exp3(np.array([0.0, 0.0, -2.2])) @ HOME.rotation)
+"""Reached with a base at rest, the palm meets the forearm on the way, without any tracking error."""
 
 
 def poses(rng):
@@ -101,15 +106,27 @@ def test_the_same_seed_gives_the_same_episode():
 @settings(max_examples=20)
 @given(SEEDS)
 def test_the_robot_keeps_its_limits_whatever_the_policy_does(seed):
-    env = GoalReachingEnv(early_failure=False)
+    env = GoalReachingEnv(early_failure=False, physics=False)
     env.reset(seed=seed)
     rng, limits = np.random.default_rng(seed), env.model.description.limits
     for _ in range(60):
         before_q, before_v = env.q, env.velocity
         env.step(rng.choice([-1.0, 1.0], 3))
+        assert np.array_equal(env.velocity, env.command)
         assert np.all(np.abs(env.velocity) <= limits.velocity + 1e-9)
         assert np.all(np.abs(env.velocity - before_v) <= limits.acceleration * STEP + 1e-9)
-        assert np.allclose(env.q, before_q + STEP * env.velocity)
+        assert np.allclose(env.q, before_q + 0.5 * STEP * (before_v + env.velocity))
+
+
+def test_physics_are_the_ideal_robot_s_but_for_the_servos():
+    """Law: the same actions lead to the same place within millimetres, and not exactly."""
+    one, other = GoalReachingEnv(early_failure=False), GoalReachingEnv(early_failure=False, physics=False)
+    for env in (one, other):
+        env.reset(seed=2)
+        for t in range(60):
+            env.step(np.array([np.sin(t / 20), 0.3, -0.2]))
+    assert np.allclose(one.q, other.q, atol=5e-3)
+    assert not np.allclose(one.q, other.q, atol=1e-9)
 
 
 def test_the_arm_follows_the_planner_where_nothing_limits_it():
@@ -150,6 +167,55 @@ def test_an_episode_that_leaves_the_plan_is_given_up_after_twenty_steps():
     assert (lost, terminated, truncated) == (20, True, False)
     assert info["failed"]
     assert not info["is_success"]
+
+
+def touch(env: GoalReachingEnv) -> tuple[int, float, bool, bool]:
+    """Let the arm turn the tool until the robot touches itself; return what the last step said."""
+    env.reset(options={"goal": FOLDED})
+    for t in range(T_MAX):
+        *_, reward, terminated, _, info = env.step(np.zeros(3))
+        if terminated or info["touches"]:
+            return t, reward, terminated, info["failed"]
+    raise RuntimeError("it never touched itself")
+
+
+@pytest.mark.parametrize("physics", [True, False])
+def test_an_episode_in_which_the_robot_touches_itself_is_given_up_at_its_cost(physics):
+    """Law: the contact ends the episode at once, and costs what giving up costs."""
+    ends = touch(GoalReachingEnv(physics=physics, reward=Reward(failure=50.0)))
+    goes_on = touch(GoalReachingEnv(physics=physics, early_failure=False))
+    assert ends[0] == goes_on[0]
+    assert ends[2:] == (True, True)
+    assert goes_on[2:] == (False, False)
+    assert ends[1] == pytest.approx(goes_on[1] - 50.0)
+
+
+def give_up(env: GoalReachingEnv) -> None:
+    """Drive away until the episode is given up."""
+    terminated = False
+    while not terminated:
+        *_, terminated, _, info = env.step(np.array([-1.0, 0.0, 0.0]))
+    assert info["failed"]
+
+
+def test_a_missed_goal_is_tried_again():
+    env = GoalReachingEnv(physics=False, repeat_missed=1.0)
+    env.reset(seed=5, options={"goal": NEAR})
+    for _ in range(3):
+        give_up(env)
+        env.reset()
+        assert env.planner.goal is NEAR
+    env.reset()  # it was not missed again
+    assert env.planner.goal is not NEAR
+
+
+def test_goals_are_new_unless_misses_are_asked_for():
+    env, rng = GoalReachingEnv(physics=False), np.random.default_rng(5)
+    env.reset(seed=5)
+    for _ in range(3):
+        assert np.array_equal(env.planner.goal.position, sample_goal(rng).position)
+        give_up(env)
+        env.reset()
 
 
 def test_an_evaluation_goes_on_to_the_last_step():

@@ -46,7 +46,7 @@ def test_the_record_is_the_actor_s():
     """Law: what the record says of goals reached is true of goals drawn in the same way."""
     record = json.loads((SHIPPED / "actor.json").read_text())
     said = record["final"]
-    scores = evaluate(Actor.load(), evaluation_goals(30, FINAL_SEED))
+    scores = evaluate(Actor.load(), evaluation_goals(30, FINAL_SEED), record["settings"]["physics"])
     assert said["success"]["mean"] >= 0.9
     assert sum(score.success for score in scores) >= 27
     lengths = [score.length for score in scores]

@@ -65,6 +65,17 @@ def test_a_resumed_run_remembers_and_meets_new_goals(run):
     assert not np.allclose(first[30:42], resumed[30:42])  # the goal
 
 
+def test_a_run_may_start_from_the_networks_of_another(run, tmp_path):
+    """Law: before any update the new run's actor is the last one of the other."""
+    config, *_ = run
+    other = replace(TINY, output_dir=str(tmp_path / "rl"), start_from=config.output_dir, steps=20)
+    train(other)
+    pair = Actor.load(other.folder / "actor.npz"), Actor.load(config.folder / "actors" / "00000100.npz")
+    assert all(np.array_equal(*weights) for weights in zip(*(actor.weights for actor in pair), strict=True))
+    with pytest.raises(HandrailError, match="--start_from: expected a run with a checkpoint"):
+        train(replace(other, start_from=str(tmp_path / "nothing"), output_dir=str(tmp_path / "another")))
+
+
 def test_the_folder_holds_what_is_needed_and_no_more(run):
     config, *_ = run
     assert [path.name for path in (config.folder / "checkpoints").iterdir()] == ["00000100"]
@@ -104,6 +115,7 @@ def test_the_same_seed_gives_the_same_actor(tmp_path):
         ({}, "there is something already"),
         ({"resume": True, "gamma": 0.9}, "--resume with --gamma 0.9: expected 0.99"),
         ({"resume": True, "layers": (8,)}, "--layers"),
+        ({"resume": True, "physics": False}, "--physics"),
         ({"resume": True, "overwrite": True}, "expected one of them"),
     ],
 )
@@ -132,7 +144,10 @@ def test_only_a_training_run_is_overwritten(tmp_path):
 
 @pytest.mark.parametrize(
     "change",
-    [{"steps": 0}, {"gamma": 1.5}, {"tau": 0.0}, {"layers": ()}, {"seed": -1}, {"reward_scale": 0.0}],
+    [
+        *({"steps": 0}, {"gamma": 1.5}, {"tau": 0.0}, {"layers": ()}, {"seed": -1}, {"reward_scale": 0.0}),
+        {"repeat_missed": 1.5},
+    ],
 )
 def test_settings_that_make_no_sense_are_refused(change):
     with pytest.raises(HandrailError, match="expected"):

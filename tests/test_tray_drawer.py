@@ -9,6 +9,7 @@ from collect_helpers import action, environment, moved
 from handrail.collect.build import build_env, build_session, build_task
 from handrail.collect.config import SessionConfig
 from handrail.collect.env import HandrailEnv
+from handrail.collect.record import episode_seed
 from handrail.collect.tasks.cabinet import HANDLE, TRAVEL, inward
 from handrail.collect.tasks.drawer import Drawer, handle, opened
 from handrail.collect.tasks.task import Episode
@@ -60,6 +61,14 @@ def test_a_perfect_operator_carries_the_tray_level():
     assert watcher.tilt < 0.1
     (mask,) = {np.frombuffer(mask, dtype=bool).sum() for mask in watcher.masks}
     assert mask == 4  # where and which way; the tilt is the MPC's
+
+
+def test_who_drives_with_a_tray_minds_its_height():
+    """The arm begins nearer to itself than the MPC likes; left alone it would lower the hand by 0.2 m."""
+    outcome, watcher = run("tray", mode="switching", noise=1.0, seed=episode_seed(900, 2))
+    assert outcome.success, outcome
+    driving, steering = sorted(np.frombuffer(mask, dtype=bool).sum() for mask in watcher.masks)
+    assert (driving, steering) == (4, 4)  # base and height; where the hand is and which way it points
 
 
 def test_a_perfect_operator_opens_the_drawer():

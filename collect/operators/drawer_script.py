@@ -11,13 +11,18 @@ from handrail.collect.tasks.cabinet import inward
 from handrail.collect.tasks.drawer import handle, opened
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.model import Pose, RobotModel
+from handrail.controllers.rotation import matrix_from_rpy
 
 _PULL = 0.26  # how far the operator means to open it [m]
 _ENOUGH = 0.21  # [m]
+_BACK = 0.16  # hand before the handle at the beginning and at the end [m]
+_AWAY = 0.10  # from it that is far enough to leave it alone [m]
 
 
 class DrawerScript:
     """Approach, grasp, pull, let go for `handrail/Drawer-v0`; a script.
+
+    Who drives the base by itself turns the hand first, where there is room, and drives up to the handle then.
 
     Args:
         model: of the robot.
@@ -39,13 +44,24 @@ class DrawerScript:
         return self._runner.wish(view)
 
     def _redo(self, view: View, name: str) -> int | None:
-        """Begin again at the handle when the drawer did not come along."""
-        if name != "release" or opened(view.task) > _ENOUGH:
-            return None
-        phases = self._phases(view)
-        index = next(i for i, phase in enumerate(phases) if phase.name == "stage")
-        self._runner.start(phases, view.state.time, index)
-        return index
+        """Begin again at the handle when the drawer did not come along; leave it as long as it is near."""
+        if name == "release" and opened(view.task) <= _ENOUGH:
+            phases = self._phases(view)
+            index = next(i for i, phase in enumerate(phases) if phase.name == "stage")
+            self._runner.start(phases, view.state.time, index)
+            return index
+        away = np.linalg.norm(view.tool.position - handle(view.task))
+        if name == "release" or (name == "leave" and away < _AWAY):
+            self._runner.start([self._leave(view)], view.state.time)
+            return 0
+        return None
+
+    def _leave(self, view: View) -> Phase:
+        """Return the phase that backs off from where the handle is now, the base where it is."""
+        into = inward(view.task.object("cabinet").rotation)
+        back = Pose(handle(view.task) - _BACK * into, handle_rotation(view.tool.rotation, into))
+        base = view.state.q[:3] if self._model.description.base_joints else np.zeros(3)
+        return Phase("leave", back, base, distance=0.03, angle=3.2, pace=0.5, patience=5.0)
 
     def _phases(self, view: View) -> list[Phase]:
         into = inward(view.task.object("cabinet").rotation)
@@ -59,17 +75,27 @@ class DrawerScript:
             return Phase(name, Pose(bar - back * into, grasp), stand, **options)  # type: ignore[arg-type]
 
         phases = [
-            phase("stage", 0.16, distance=0.02, angle=0.10),
+            phase("stage", _BACK, distance=0.02, angle=0.10),
             phase("approach", 0.0, distance=0.010, angle=0.10, pace=0.4, patience=8.0),
             phase("grasp", 0.0, distance=1.0, angle=3.2, gripper=1.0, dwell=1.2),
             phase("pull", pull, distance=0.03, angle=3.2, gripper=1.0, pace=0.5, patience=15.0),
             phase("release", pull, distance=1.0, angle=3.2, dwell=0.8),
-            phase("leave", pull + 0.15, distance=0.03, angle=3.2, pace=0.5, patience=5.0),
         ]
         if self._drives:
-            hand = phases[0].hand
-            phases.insert(0, Phase("drive", hand, base, focus="base", distance=0.08, angle=0.08))
+            hand, now = phases[0].hand, view.state.q[:3]
+            ready = Phase("ready", before_driving(hand, base, now), now, distance=0.05, angle=0.15)
+            phases = [ready, Phase("drive", hand, base, focus="base", distance=0.08, angle=0.08), *phases]
         return phases
+
+
+def before_driving(hand: Pose, base: FloatArray, now: FloatArray) -> Pose:
+    """Return where the hand is to be while the base is at `now`, so that driving to `base` brings it along.
+
+    `p = p_now + R_z(θ_now − θ) (p_hand − p_base)`, and the rotation likewise.
+    """
+    turn = matrix_from_rpy([0.0, 0.0, now[2] - base[2]])
+    away = hand.position - [base[0], base[1], 0.0]
+    return Pose(turn @ away + [now[0], now[1], 0.0], turn @ hand.rotation)
 
 
 def handle_rotation(tool: FloatArray, into: FloatArray) -> FloatArray:

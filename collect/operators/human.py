@@ -36,7 +36,7 @@ class HumanSettings:
     noise: float = 0.1
     drift: float = 0.02
     correlation: float = 0.5
-    switch_time: float = 0.34
+    switch_time: float = 0.3
     movement: float = 0.15
     misjudgement: float = 0.05
     inner_error: float = 0.08

@@ -4,13 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from handrail.controllers.arm_pose import arm_configuration
+from handrail.collect.operators.arm_solutions import REACHED, arm_solutions
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.collision import CollisionModel
 from handrail.controllers.model import Pose, RobotModel
 
-_TURNS = (1.5, -1.5)  # of one joint from where it is, to look for another solution from [rad]
-_REACHED = 0.01  # largest error of a solution [m, rad]
 _SWEEP = np.linspace(0.25, 1.0, 4)  # where on a joint's way one looks whether something is hit
 
 
@@ -40,14 +38,11 @@ def plan_joints(
     best, most = JointPlan(q, ()), -1.0
     arm = list(range(len(model.description.base_joints), model.size))
     at_start = _nearest(collision, q)
-    for joint, angle in ((arm[0], 0.0), *((joint, angle) for joint in arm for angle in _TURNS)):
-        start = q.copy()
-        start[joint] += angle
-        there, error = arm_configuration(model, start, goal)
+    for there, error in arm_solutions(model, q, goal):
         kept = min(clear, 0.9 * at_start, 0.9 * _nearest(collision, there))
         preferred = sorted(arm, key=lambda index: -abs(there[index] - q[index]))
         order = clear_order(collision, q, there, preferred, kept) if kept > 0.0 else []
-        share = len(order) / len(arm) - (error > _REACHED)
+        share = len(order) / len(arm) - (error > REACHED)
         if share > most:
             best, most = JointPlan(there, tuple(order)), share
         if share == 1.0:

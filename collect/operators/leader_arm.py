@@ -2,25 +2,32 @@
 
 import numpy as np
 
+from handrail.collect.operators.arm_solutions import straight_solution
 from handrail.collect.operators.human import HumanSettings
 from handrail.collect.operators.input_map import full_stick
 from handrail.collect.operators.operator import View
 from handrail.collect.operators.steering import Gains
 from handrail.collect.operators.wander import Wander
-from handrail.collect.operators.wish import Wish
+from handrail.collect.operators.wish import Target, Wish
 from handrail.controllers.arm_completion import ArmCompletion
 from handrail.controllers.arrays import BoolArray, FloatArray
 from handrail.controllers.channels import Channels
+from handrail.controllers.collision import CollisionModel
 from handrail.controllers.controller import State
 from handrail.controllers.model import RobotModel
+from handrail.controllers.rotation import rotation_vector
 
 _FOLLOW = 6.0  # of the joints towards the leader's [1/s]
+_LARGE = 0.6  # turn of the hand from which the operator brings the leader's joints there, not its hand [rad]
+_CLEAR = 0.03  # what that motion shall keep clear [m]
 
 
 class LeaderArmMap:
     """Absolute joint targets from one hand, a stick for the base in the other; nothing to switch.
 
-    The hand takes the leader along, whose joints q_L follow by its mechanics: `q̇_L = J⁺ hand`. The robot is
+    The hand takes the leader along, whose joints q_L follow by its mechanics: `q̇_L = J⁺ hand`. A large turn
+    would fold the arm on the way; there the operator brings all joints at once to where he thinks they
+    belong, no faster than the hand: `q̇_L = s k_h (q* − q)`, `q* = q₀ + (q_ik − q₀)(1 + σ z)`. The robot is
     sent `q̇ = q̇_L + k (q_L + tremor − q)`. The leader starts where the arm is, so that nothing jumps.
 
     Args:
@@ -44,6 +51,11 @@ class LeaderArmMap:
     def reset(self, view: View, settings: HumanSettings, rng: np.random.Generator) -> None:
         """Take hold of the leader, which stands as the arm does."""
         size = self._model.size - self._base
+        self._rng = rng
+        self._error = settings.misjudgement
+        self._collision = CollisionModel(self._model, view.task.obstacles)
+        self._thought = b""
+        self._goal = view.state.q.copy()
         self._leader = view.state.q[self._base :].copy()
         self._tremor = settings.tremor
         self._wander = Wander((size,), settings.correlation, rng)
@@ -56,8 +68,7 @@ class LeaderArmMap:
         if wish.focus == "base":
             values[self.channels.base_slice] = wish.base[: self._base]
         else:
-            nothing = np.zeros(self._base)
-            values[self._arm] = self._mechanics.arm_velocity(state.q, nothing, wish.hand)
+            values[self._arm] = self._taken_along(wish, state.q)
         return self.channels.mask(*(("base",) if self._base else ()), "arm"), values
 
     def sent(self, moved: FloatArray, state: State) -> FloatArray:
@@ -75,6 +86,27 @@ class LeaderArmMap:
         raw = moved / self.full
         raw[self._arm] = self._leader
         return raw
+
+    def _taken_along(self, wish: Wish, q: FloatArray) -> FloatArray:
+        """Return how fast the operator moves the leader's joints, (n − b,) [rad/s]."""
+        if wish.target is not None:
+            turn = wish.target.hand.rotation @ self._model.pose(q).rotation.T
+            if np.linalg.norm(rotation_vector(turn)) > _LARGE:
+                return self._brought(wish.target, q)
+        return self._mechanics.arm_velocity(q, np.zeros(self._base), wish.hand)
+
+    def _brought(self, target: Target, q: FloatArray) -> FloatArray:
+        """Return the velocity straight to where the joints belong, no faster than the hand may go."""
+        if target.identity != self._thought:
+            way = straight_solution(self._model, self._collision, q, target.hand, _CLEAR) - q
+            self._goal = q + way * (1.0 + self._error * self._rng.standard_normal(len(way)))
+            self._thought = target.identity
+        velocity = self._gains.gain * (self._goal - q)[self._base :]
+        hand = self._model.jacobian(q)[:, self._base :] @ velocity
+        fastest = target.pace * self._gains.full[[0, 3]]  # of the hand, and how fast it may turn
+        excess = np.array([np.linalg.norm(hand[:3]), np.linalg.norm(hand[3:])]) / fastest
+        excess_of_joints = np.max(np.abs(velocity)) / self._gains.joint_rate
+        return velocity / max(1.0, float(np.max(excess)), float(excess_of_joints))
 
     def _limits(self) -> tuple[FloatArray, FloatArray]:
         limits = self._model.description.limits

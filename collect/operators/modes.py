@@ -113,6 +113,17 @@ def without(mode: TeleopMode, left: tuple[str, ...]) -> TeleopMode:
     return replace(mode, groups=groups)
 
 
+def minding(mode: TeleopMode, minded: tuple[str, ...]) -> TeleopMode:
+    """Return a mode whose operator also owns some channels while he drives the base by itself."""
+    if not minded or not mode.drives:
+        return mode
+
+    def groups(focus: Focus) -> tuple[str, ...]:
+        return (*mode.groups(focus), *(minded if focus == "base" else ()))
+
+    return replace(mode, groups=groups)
+
+
 def find_mode(name: str) -> TeleopMode:
     """Return a mode by name.
 

@@ -1,7 +1,8 @@
 """The protocol of an operator, and what it sees."""
 
-from dataclasses import dataclass
-from typing import Protocol
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -20,12 +21,14 @@ class View:
         tool: pose of the tool point.
         opening: of the gripper, 0 closed, 1 open.
         task: the truth of this moment.
+        observation: what is recorded of it: `agent_pos`, `environment_state`, and `pixels` by camera.
     """
 
     state: State
     tool: Pose
     opening: float
     task: TaskState
+    observation: Mapping[str, Any] = field(default_factory=dict)
 
 
 class Operator(Protocol):

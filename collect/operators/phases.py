@@ -25,6 +25,7 @@ class Phase:
         distance: from the goal at which the phase ends [m].
         angle: the same for orientation [rad].
         pace: share of the full stick.
+        tilt: how far the hand may lean on the way [rad].
         dwell: time to wait, hands still, before the next phase [s].
         patience: time after which the operator goes on anyway [s].
     """
@@ -37,6 +38,7 @@ class Phase:
     distance: float = 0.05
     angle: float = 0.2
     pace: float = 1.0
+    tilt: float = np.inf
     dwell: float = 0.0
     patience: float = np.inf
 
@@ -71,7 +73,7 @@ class PhaseRunner:
             return Wish.rest(phase.focus, phase.gripper)
         hand = hand_twist(view.tool, phase.hand, self._gains, phase.pace)
         base = base_twist(view.state.q, phase.base, self._gains)
-        target = Target(phase.hand, phase.base, phase.distance, phase.angle, phase.pace)
+        target = Target(phase.hand, phase.base, phase.distance, phase.angle, phase.pace, phase.tilt)
         return Wish(hand, base, phase.focus, phase.gripper, target)
 
     def _enter(self, index: int, time: float) -> None:

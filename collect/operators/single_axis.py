@@ -18,6 +18,7 @@ _NEAR = 0.35  # share of the tolerance that one axis may use up
 _MOST_CARE = 0.1
 _PREPARATION = 1.35  # of the mind before it thinks again: M of the keystroke-level model [s]
 _SHARES = (1.0, 0.5, 0.25)  # of an axis' way that the operator considers
+_SMALL_SHARES = (1.0, 0.5, 0.25, 0.12, 0.06)  # the same where the hand must not lean
 _CLEAR = 0.03  # what a sweep shall keep clear [m]
 
 
@@ -52,9 +53,10 @@ class SingleAxisMap:
         self._least = 1.2 * settings.threshold
         self._collision = CollisionModel(self._model, view.task.obstacles)
         self._axis: int | None = None
+        self._axis_holds = False  # until the operator thinks again
         self._left = 0.0  # of the way that the axis shall not go this time
         self._goal = np.zeros(self._model.size)
-        self._thought: tuple[float, ...] = ()
+        self._thought = b""
         self._thinks_at = -np.inf
         self._order: list[int] = []
         self._care = 1.0  # share of the usual tolerance: less after each attempt that was not good enough
@@ -65,7 +67,7 @@ class SingleAxisMap:
         if wish.target is not None:
             self._think(wish.target, state)
             errors, tolerances = self._errors(wish, wish.target, state.q)
-            axis = self._choose(errors, tolerances, state.q)
+            axis = self._choose(wish.target, errors, tolerances, state.q)
             if axis is not None:
                 speed = self._fastest(wish.target, state.q)[axis]
                 values[axis] = self._push(errors[axis] - self._left, speed, self._least * self.full[axis])
@@ -83,27 +85,47 @@ class SingleAxisMap:
         """Return the speed at which an axis is driven on its way; nobody pushes a stick below `slowest`."""
         return float(np.sign(way) * np.clip(self._gains.gain * abs(way), min(slowest, fastest), fastest))
 
-    def _choose(self, errors: FloatArray, tolerances: FloatArray, q: FloatArray) -> int | None:
+    def _choose(
+        self, target: Target, errors: FloatArray, tolerances: FloatArray, q: FloatArray
+    ) -> int | None:
         """Return the axis to push: the same until it is where it shall be, then another; None rests."""
         axis = self._axis
-        if axis is not None and abs(errors[axis] - self._left) > tolerances[axis]:
+        if self._axis_holds and axis is not None and abs(errors[axis] - self._left) > tolerances[axis]:
             return axis
         off = np.abs(errors) / tolerances
         rank = {index: place for place, index in enumerate(self._order)}
         farthest = sorted(np.flatnonzero(off > 1.0).tolist(), key=lambda index: -off[index])
         candidates = sorted(farthest, key=lambda index: rank.get(index, len(rank)))
         best, widest = None, -np.inf
-        for share in _SHARES:
-            for index in candidates:
-                clear = self._clearance(index, share * errors[index], q)
-                if clear > widest:
-                    best, widest = (index, share), clear
-                if clear >= _CLEAR:
-                    return self._take(index, share, errors)
+        for index, share in self._options(target, candidates, errors, off, q):
+            clear = self._clearance(index, share * errors[index], q)
+            if clear > widest:
+                best, widest = (index, share), clear
+            if clear >= _CLEAR:
+                break
         return self._take(*best, errors) if best else None
+
+    def _options(
+        self, target: Target, candidates: list[int], errors: FloatArray, off: FloatArray, q: FloatArray
+    ) -> list[tuple[int, float]]:
+        """Return the axes and shares of their ways that matter, the best first.
+
+        All of the way before a part of it; where the hand must not lean, only what keeps it upright enough,
+        or straightens it most if nothing does.
+        """
+        shares = _SHARES if np.isinf(target.tilt) else _SMALL_SHARES
+        options = [(index, share) for share in shares for index in candidates if share * off[index] > 1.0]
+        if np.isinf(target.tilt):
+            return options
+        lean = {
+            (index, share): self._lean(target, index, share * errors[index], q) for index, share in options
+        }
+        upright = [option for option in options if lean[option] <= target.tilt]
+        return upright or sorted(options, key=lambda option: lean[option])
 
     def _take(self, index: int, share: float, errors: FloatArray) -> int:
         """Take an axis and go a share of its way."""
+        self._axis_holds = True
         self._axis, self._left = index, (1.0 - share) * errors[index]
         return index
 
@@ -114,18 +136,24 @@ class SingleAxisMap:
         joint = index - self.channels.joint_slice.start
         return min(sweep_clearance(self._collision, q, joint, way), _CLEAR)
 
+    def _lean(self, target: Target, index: int, way: float, q: FloatArray) -> float:
+        """Return how far the hand leans from the target's axis after an axis' motion [rad]."""
+        there = q.copy()
+        there[index - self.channels.joint_slice.start if index >= self._arm.start else index] += way
+        upright = self._model.pose(there).rotation[:, 2] @ target.hand.rotation[:, 2]
+        return float(np.arccos(np.clip(upright, -1.0, 1.0)))
+
     def _think(self, target: Target, state: State) -> None:
         """Work out which joints would do it, for a new target, or when they did not."""
-        key = (*target.base, *target.hand.rotation.ravel(), target.distance, target.pace)
         done = np.all(self._goal_error(target, state.q) < 1.0) and state.time >= self._thinks_at
-        if key == self._thought and not done:
+        if target.identity == self._thought and not done:
             return
         plan = plan_joints(self._model, self._collision, state.q, target.hand, _CLEAR)
         way = plan.goal - state.q
         self._goal = state.q + way * (1.0 + self._error * self._rng.standard_normal(len(way)))
         self._order = [self.channels.joint_slice.start + joint for joint in plan.order]
-        self._care = 1.0 if key != self._thought else max(0.5 * self._care, _MOST_CARE)
-        self._thought, self._left = key, 0.0
+        self._care = 1.0 if target.identity != self._thought else max(0.5 * self._care, _MOST_CARE)
+        self._thought, self._axis_holds = target.identity, False
         self._thinks_at = state.time + _PREPARATION
 
     def _goal_error(self, target: Target, q: FloatArray) -> FloatArray:

@@ -15,6 +15,7 @@ _OVER = 0.10  # the tray above the table while it comes near [m]
 _ABOVE = 0.012  # the tray above the table when it is let go [m]
 _INSIDE = 0.22  # the tray's middle behind the table's edge [m]
 _DOWN = np.diag([1.0, -1.0, -1.0])  # of the tool: pointing down, its x ahead
+_TILT = 0.06  # that a person who minds the can allows himself on the way [rad]
 _AHEAD = 1.0  # hand before the base's centre while carrying [m]
 
 
@@ -50,12 +51,12 @@ class TrayScript:
         def phase(name: str, hand: FloatArray, base: FloatArray, **options: float) -> Phase:
             return Phase(name, Pose(hand, _DOWN), base, **({"gripper": 1.0} | options))  # type: ignore[arg-type]
 
-        over = place + np.array([0.0, 0.0, _OVER])
+        over, up = (place + np.array([0.0, 0.0, rise]) for rise in (_OVER, _OVER + 0.08))
         phases = [
-            phase("over", over, stand, distance=0.02, angle=0.15, pace=0.7),
-            phase("lower", place, stand, distance=0.012, angle=3.2, pace=0.25, patience=8.0),
+            phase("over", over, stand, distance=0.02, angle=0.15, pace=0.7, tilt=_TILT),
+            phase("lower", place, stand, distance=0.012, angle=3.2, pace=0.25, tilt=_TILT, patience=8.0),
             phase("release", place, stand, distance=1.0, angle=3.2, gripper=0.0, dwell=1.0),
-            phase("rise", over + np.array([0.0, 0.0, 0.08]), stand, distance=0.03, angle=3.2, gripper=0.0),
+            phase("rise", up, stand, distance=0.03, angle=3.2, tilt=_TILT, gripper=0.0),
         ]
         if self._drives:
             return route.drive(view.state.q[:3], stand, Pose(over, _DOWN), 1.0) + phases

@@ -21,6 +21,7 @@ class Target:
         distance: from it that is near enough [m].
         angle: the same for orientation [rad].
         pace: share of the full stick.
+        tilt: how far the hand may lean from the pose's axis on the way there [rad].
     """
 
     hand: Pose
@@ -28,6 +29,13 @@ class Target:
     distance: float = 0.05
     angle: float = 0.2
     pace: float = 1.0
+    tilt: float = np.inf
+
+    @property
+    def identity(self) -> bytes:
+        """What stays the same while the operator only sees better how far the hand has to go."""
+        numbers = [self.base, self.hand.rotation.ravel(), [self.distance, self.pace]]
+        return np.concatenate(numbers).tobytes()
 
 
 @dataclass(frozen=True)

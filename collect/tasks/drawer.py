@@ -38,7 +38,7 @@ class Drawer:
     def state_names(self) -> tuple[str, ...]:
         """Handle now, direction into the cabinet, how far the drawer is open, the cabinet's top centre."""
         names = [f"handle.{axis}" for axis in "xyz"]
-        return (*names, "inward.x", "inward.y", "drawer.opening", *(f"cabinet.{axis}" for axis in "xyz"))
+        return (*names, "inward.nx", "inward.ny", "drawer.opening", *(f"cabinet.{axis}" for axis in "xyz"))
 
     def sample(self, model: RobotModel, rng: np.random.Generator) -> Episode:
         """Draw the cabinet and the robot's start: home with 10 cm, 0.15 rad, 0.05 rad in the arm."""

@@ -46,7 +46,7 @@ class Finding:
 
 def findings(comparison: Comparison) -> list[Finding]:
     """Return all findings, what matters most first."""
-    found = [*_outcomes(comparison.outcomes)] if comparison.outcomes else []
+    found = [*outcome_findings(comparison.outcomes)] if comparison.outcomes else []
     found += [*_collection(comparison), *_quality(comparison)]
     return found + [Finding("caution", text) for text in _cautions(comparison)]
 
@@ -60,7 +60,8 @@ def headline(found: Sequence[Finding]) -> str:
     return found[0].text
 
 
-def _outcomes(outcomes: Outcomes) -> Iterator[Finding]:
+def outcome_findings(outcomes: Outcomes) -> Iterator[Finding]:
+    """Return what the policies' success says, one finding for each arm that is not the baseline."""
     arms = {arm.label: arm for arm in outcomes.arms}
     for difference in outcomes.differences:
         one, other = arms[difference.label], arms[difference.baseline]

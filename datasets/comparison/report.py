@@ -4,6 +4,7 @@ import csv
 import io
 import json
 import math
+from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -54,7 +55,7 @@ def write_report(comparison: Comparison) -> list[Path]:
 
 def as_json(comparison: Comparison, found: list[Finding]) -> dict[str, Any]:
     """Return everything as plain values; what is no number is null."""
-    return _plain(
+    return plain(
         {
             "format": "handrail.comparison/1",
             "baseline": comparison.baseline,
@@ -134,15 +135,16 @@ def _csv(rows: list[dict[str, Any]]) -> str:
     stream = io.StringIO()
     writer = csv.DictWriter(stream, rows[0].keys(), lineterminator="\n")
     writer.writeheader()
-    writer.writerows([{key: _plain(value) for key, value in row.items()} for row in rows])
+    writer.writerows([{key: plain(value) for key, value in row.items()} for row in rows])
     return stream.getvalue()
 
 
-def _plain(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {str(key): _plain(entry) for key, entry in value.items()}
+def plain(value: Any) -> Any:
+    """Return a value as JSON has it; what is no finite number is None."""
+    if isinstance(value, Mapping):
+        return {str(key): plain(entry) for key, entry in value.items()}
     if isinstance(value, list | tuple):
-        return [_plain(entry) for entry in value]
+        return [plain(entry) for entry in value]
     if hasattr(value, "item"):
         value = value.item()
     return None if isinstance(value, float) and not math.isfinite(value) else value

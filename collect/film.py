@@ -1,5 +1,6 @@
-"""The video of a case: the scene camera's pictures with a caption."""
+"""The video of an episode: the scene camera's pictures with a caption."""
 
+from collections.abc import Callable
 from pathlib import Path
 from types import TracebackType
 
@@ -8,7 +9,6 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
 from handrail.collect.env import HandrailEnv
-from handrail.collect.showcase_cases import Case
 from handrail.collect.video_file import VideoFile
 from handrail.datasets.frames import Moment
 
@@ -17,10 +17,19 @@ _BAR = 64  # height of the caption [px]; both even, as h264 wants
 
 
 class Filmer:
-    """Encodes one picture a control period; an observer, and a context that closes the file."""
+    """Encodes one picture a control period; an observer, and a context that closes the file.
 
-    def __init__(self, case: Case, path: Path, fps: int) -> None:
-        self._case = case
+    The environment renders pictures of `SIZE`.
+
+    Args:
+        path: of the file, .mp4.
+        fps: pictures a second.
+        title: first line of the caption.
+        words: second line, at a moment.
+    """
+
+    def __init__(self, path: Path, fps: int, title: str, words: Callable[[Moment], str]) -> None:
+        self._title, self._words = title, words
         self._file = VideoFile(path, (SIZE[0] + _BAR, SIZE[1]), fps)
         self._large, self._small = (ImageFont.load_default(size) for size in (20, 16))
 
@@ -45,16 +54,12 @@ class Filmer:
             self._file.add(self._captioned(picture, moment))
 
     def _captioned(self, picture: NDArray[np.uint8], moment: Moment) -> NDArray[np.uint8]:
-        """Return the picture on top of a bar that says what is steered and how near things are."""
+        """Return the picture on top of a bar with the caption."""
         height, width = picture.shape[:2]
         image = Image.new("RGB", (width, height + _BAR), (24, 26, 30))
         image.paste(Image.fromarray(picture))
         draw = ImageDraw.Draw(image)
-        draw.text((16, height + 9), self._case.title, font=self._large, fill=(245, 245, 245))
-        health = moment.health
-        words = (
-            f"{moment.intent.time:5.1f} s     commanded: {', '.join(self._case.channels)}     "
-            f"nearest: {health.smallest_distance:.3f} m     update: {1e3 * health.solve_time:.1f} ms"
-        )
+        draw.text((16, height + 9), self._title, font=self._large, fill=(245, 245, 245))
+        words = self._words(moment)
         draw.text((16, height + 37), words, font=self._small, fill=(190, 195, 205))
         return np.array(image)

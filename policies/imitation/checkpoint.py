@@ -1,0 +1,197 @@
+"""A trained policy on disk: LeRobot's own checkpoint, and beside it what Handrail needs to let it drive.
+
+    OUTPUT/checkpoints/<step>/pretrained_model/{config.json, model.safetensors, …, handrail.json}
+    OUTPUT/checkpoints/<step>/training_state/…
+
+A checkpoint appears under its name only when it is whole.
+"""
+
+import json
+import os
+import shutil
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, field
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from handrail.controllers.arrays import FloatArray
+from handrail.controllers.errors import HandrailError
+from handrail.policies.imitation.interface import PolicyInterface
+
+FORMAT = "handrail.policy/1"
+NAME = "handrail.json"
+MODEL, STATE = "pretrained_model", "training_state"
+_KEYS = ("observation.state", "observation.environment_state")
+_VERSIONED = ("handrail", "lerobot", "torch", "numpy")
+
+
+@dataclass(frozen=True)
+class PolicyMeta:
+    """What a policy is and how it came about.
+
+    Attributes:
+        environment: the task of its episodes; "" if they do not say.
+        mode: their teleop mode; "mixed" if there were several, "" if they do not say.
+        robot: their robot.
+        fps: decisions a second [Hz].
+        actions: `realised`, `intent` or `recorded`.
+        training_seed: of the first weights and the order of samples.
+        dataset_draw: seed of the choice of episodes.
+        trained_on: `episodes`, `attempts`, `operator_time` [s].
+        policy: its type in LeRobot.
+        steps: updates.
+        training: the settings of the training.
+        versions: of the software.
+    """
+
+    environment: str
+    mode: str
+    robot: str
+    fps: int
+    actions: str
+    training_seed: int
+    dataset_draw: int
+    trained_on: Mapping[str, float]
+    policy: str
+    steps: int
+    training: Mapping[str, Any] = field(default_factory=dict)
+    versions: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class TrainedPolicy:
+    """A policy that can drive.
+
+    Attributes:
+        interface: what it reads and writes; None if that is what was recorded.
+        meta: what it is.
+        policy: LeRobot's policy.
+        before: LeRobot's preprocessor: normalises.
+        after: LeRobot's postprocessor: the reverse.
+    """
+
+    interface: PolicyInterface | None
+    meta: PolicyMeta
+    policy: Any
+    before: Callable[[dict[str, Any]], dict[str, Any]]
+    after: Callable[[Any], Any]
+
+    def reset(self) -> None:
+        """Forget the last episode."""
+        self.policy.reset()
+
+    def act(
+        self,
+        state: FloatArray,
+        environment: FloatArray | None = None,
+        images: Mapping[str, np.ndarray] | None = None,
+    ) -> FloatArray:
+        """Return the next action, (a,) float32.
+
+        Args:
+            state: as the interface observes it, (s',).
+            environment: the same, (e',); None or empty if there is none.
+            images: pictures by camera, (height, width, 3) uint8 each.
+        """
+        import torch
+
+        seen = zip(_KEYS, (state, environment), strict=True)
+        numbers = {key: np.asarray(values, np.float32) for key, values in seen if values is not None}
+        batch = {key: torch.from_numpy(values)[None] for key, values in numbers.items() if values.size}
+        for camera, picture in (images or {}).items():
+            pixels = torch.from_numpy(np.ascontiguousarray(picture)).permute(2, 0, 1)
+            batch[f"observation.images.{camera}"] = pixels[None].float() / 255.0
+        with torch.inference_mode():
+            return self.after(self.policy.select_action(self.before(batch)))[0].cpu().numpy()
+
+
+def load_policy(folder: str | Path, device: str = "cpu") -> TrainedPolicy:
+    """Load a policy from a `pretrained_model` folder, a checkpoint, or a training's folder (the last one).
+
+    Raises:
+        HandrailError: there is none, or it is broken.
+    """
+    place = _model_folder(Path(folder).expanduser())
+    interface, meta = read_meta(place)
+    import lerobot.policies  # noqa: F401  (registers them)
+    from lerobot.configs.policies import PreTrainedConfig
+    from lerobot.policies.factory import get_policy_class, make_pre_post_processors
+
+    override = {"device_processor": {"device": device}}
+    try:
+        config = PreTrainedConfig.from_pretrained(place, cli_overrides=[f"--device={device}"])
+        policy = get_policy_class(config.type).from_pretrained(place, config=config)
+        before, after = make_pre_post_processors(config, str(place), preprocessor_overrides=override)
+    except (OSError, ValueError, KeyError, RuntimeError) as error:
+        raise HandrailError(f"policy {str(place)!r}: {' '.join(str(error).split())}") from error
+    policy.eval()
+    return TrainedPolicy(interface, meta, policy, before, after)
+
+
+def read_meta(folder: Path) -> tuple[PolicyInterface | None, PolicyMeta]:
+    """Return what `handrail.json` in a `pretrained_model` folder says.
+
+    Raises:
+        HandrailError: it is not there, or not of this version.
+    """
+    path = folder / NAME
+    try:
+        content = json.loads(path.read_bytes())
+        known, interface = content.pop("format"), content.pop("interface")
+        meta = PolicyMeta(**content) if known == FORMAT else None
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        raise HandrailError(f"{str(path)!r}: expected a policy of handrail-train, got {error!r}") from error
+    if meta is None:
+        raise HandrailError(f"{str(path)!r}: expected the format {FORMAT}, got {known!r}")
+    return (None if interface is None else PolicyInterface.from_dict(interface)), meta
+
+
+def write_meta(folder: Path, interface: PolicyInterface | None, meta: PolicyMeta) -> None:
+    """Write `handrail.json` into a `pretrained_model` folder."""
+    described = None if interface is None else interface.to_dict()
+    content = {"format": FORMAT, "interface": described} | asdict(meta)
+    (folder / NAME).write_text(json.dumps(content, indent=1) + "\n")
+
+
+def last_checkpoint(training: Path) -> Path | None:
+    """Return the whole checkpoint with the most updates in a training's folder; None if there is none."""
+    found = [path for path in (training / "checkpoints").glob("*") if path.name.isdigit()]
+    return max(found, key=lambda path: int(path.name), default=None)
+
+
+def publish(draft: Path, final: Path) -> None:
+    """Give a finished draft of a checkpoint its name, durably; one of that name is replaced.
+
+    Raises:
+        OSError: the disk does not take it.
+    """
+    for path in draft.rglob("*"):
+        if path.is_file():
+            with open(path, "rb") as file:
+                os.fsync(file.fileno())
+    shutil.rmtree(final, ignore_errors=True)
+    os.replace(draft, final)
+
+
+def point_to(checkpoint: Path) -> None:
+    """Let `checkpoints/last` lead to a checkpoint, at once."""
+    link, fresh = checkpoint.parent / "last", checkpoint.parent / ".last"
+    fresh.unlink(missing_ok=True)
+    fresh.symlink_to(checkpoint.name)
+    os.replace(fresh, link)
+
+
+def software_versions() -> dict[str, str]:
+    """Return the versions of what trains."""
+    return {name: metadata.version(name) for name in _VERSIONED}
+
+
+def _model_folder(folder: Path) -> Path:
+    last = last_checkpoint(folder)
+    for place in (folder, folder / MODEL, *([last / MODEL] if last else [])):
+        if (place / NAME).is_file():
+            return place
+    raise HandrailError(f"{str(folder)!r}: expected a policy of handrail-train, found no {NAME}")

@@ -1,0 +1,108 @@
+"""Settings of imitation training; light to import."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+
+from handrail.collect.config import dataset_folder
+from handrail.controllers.errors import HandrailError
+
+ACTION_SPACES = ("realised", "intent", "recorded")
+PRESETS = ("cpu", "gpu")
+FREE_ON_RESUME = ("output", "save_freq", "threads", "device", "resume", "overwrite", "steps", "dataset")
+
+
+@dataclass(frozen=True)
+class SourceConfig:
+    """Which dataset; the flags are LeRobot's."""
+
+    repo_id: str = "handrail/demo"
+    """Name of the dataset, owner/name."""
+    root: str = ""
+    """Its folder; LeRobot's own place for the name when empty."""
+
+    @property
+    def folder(self) -> Path:
+        """The dataset's folder."""
+        return dataset_folder(self.repo_id, self.root)
+
+
+@dataclass(frozen=True)
+class TrainConfig:
+    """Train an imitation policy with LeRobot's own training, on a dataset or a part of it."""
+
+    dataset: SourceConfig = field(default_factory=SourceConfig)
+    output: str = "outputs/policy"
+    """Folder for checkpoints and the curve of the loss."""
+    policy: str = "act"
+    """A policy that LeRobot has registered: act, diffusion, vqbet, …"""
+    preset: Literal["cpu", "gpu"] = "cpu"
+    """Sizes that learn from the state on two CPU cores, or larger ones for a GPU and images."""
+    actions: Literal["realised", "intent", "recorded"] = "realised"
+    """What the policy writes: the joint velocities that came about; the operator's own command, which the
+    controller completes when the policy drives; or `recorded`, all columns as they are in any dataset."""
+    images: bool = False
+    """Let the policy see the cameras too."""
+    mode: str = ""
+    """Only episodes of this teleop mode."""
+    success_only: bool = False
+    """Only episodes that succeeded."""
+    episodes: int = 0
+    """Only so many of them, drawn at random; 0 for all."""
+    minutes: float = 0.0
+    """Only what fits into so much of the operator's time, failed attempts included [min]; 0 for all."""
+    draw: int = 0
+    """Seed of the order in which episodes are drawn; more episodes or minutes only add to the fewer."""
+    steps: int = 0
+    """Updates of the policy; 0 for the preset's."""
+    batch_size: int = 0
+    """Samples an update; 0 for the preset's."""
+    lr: float = 0.0
+    """Highest learning rate; 0 for the preset's."""
+    seed: int = 0
+    """Of the policy's first weights and the order of the samples."""
+    threads: int = 1
+    """Of PyTorch; two trainings with one thread each are faster than one after the other with two."""
+    device: str = ""
+    """cpu, cuda, cuda:1, mps; the preset's when empty."""
+    save_freq: int = 2000
+    """Updates between checkpoints; there is always one at the end."""
+    policy_options: tuple[str, ...] = ()
+    """More of LeRobot's settings of the policy, `key=value` each: chunk_size=50 use_vae=true."""
+    resume: bool = False
+    """Go on from the last checkpoint in the folder; begin if there is none."""
+    overwrite: bool = False
+    """Remove the training that is there."""
+
+    @property
+    def folder(self) -> Path:
+        """The folder of the training."""
+        return Path(self.output).expanduser()
+
+    def check(self) -> None:
+        """Check what can be checked without the dataset.
+
+        Raises:
+            HandrailError: a setting is wrong.
+        """
+        for name in ("episodes", "minutes", "draw", "steps", "batch_size", "lr", "seed"):
+            if not 0 <= getattr(self, name) < float("inf"):
+                raise HandrailError(f"--{name} {getattr(self, name)}: expected 0 or more")
+        for name in ("threads", "save_freq"):
+            if getattr(self, name) < 1:
+                raise HandrailError(f"--{name} {getattr(self, name)}: expected 1 or more")
+        if self.resume and self.overwrite:
+            raise HandrailError("--resume and --overwrite: expected one of them, got both")
+        self.options()
+
+    def options(self) -> dict[str, str]:
+        """Return `policy_options` by key.
+
+        Raises:
+            HandrailError: one is not `key=value`.
+        """
+        pairs = [option.partition("=") for option in self.policy_options]
+        for option, (key, sign, _) in zip(self.policy_options, pairs, strict=True):
+            if not key.strip() or not sign:
+                raise HandrailError(f"--policy_options {option}: expected key=value, as in chunk_size=50")
+        return {key.strip(): value.strip() for key, _, value in pairs}

@@ -1,0 +1,252 @@
+"""What a policy sees: the recorded numbers, seen from the robot instead of from the world.
+
+With `R_wb` the base's heading and `(p_t, R_t)` the tool's pose, the pose `(p_o, R_o)` of an object becomes
+
+    p = R_wbᵀ (p_o − p_t)       where it is from the tool, in the base's axes [m], (3,)
+    E = R_wbᵀ R_o R_tᵀ R_wb     what turns the tool's axes into the object's, in the base's axes, (9,)
+
+    n_r = p / √(|p|² + r²)      the same up close, for several r: a direction from afar, (3,) each
+
+and the tool itself is seen from the base: `R_wbᵀ (p_t − p_b)`, `R_wbᵀ R_t`. So a motion learnt in one place
+is the same motion everywhere, and what an operator steers to zero is an input. `E` is smooth, unlike a
+rotation vector; `p` and `E − Eᵀ` vanish at the goal.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from handrail.controllers.arrays import FloatArray
+from handrail.controllers.errors import HandrailError
+
+_POSITION = ("x", "y", "z")
+_QUATERNION = ("qw", "qx", "qy", "qz")
+_POSE = (*_POSITION, *_QUATERNION)
+_DIRECTION = ("nx", "ny")
+_NEAR = (0.05, 0.25)  # r: from where on being near is told finely [m]
+_MATRIX = tuple(f"r{row}{column}" for row in range(3) for column in range(3))
+_TOOL = tuple(f"tool.{axis}" for axis in _POSE)
+
+
+@dataclass(frozen=True)
+class Group:
+    """Numbers of the environment that belong together.
+
+    Attributes:
+        name: of the object.
+        parts: what follows the dot in each name.
+        start: where they begin.
+    """
+
+    name: str
+    parts: tuple[str, ...]
+    start: int
+
+    @property
+    def end(self) -> int:
+        """Where they end."""
+        return self.start + len(self.parts)
+
+
+@dataclass(frozen=True)
+class Frame:
+    """Where the robot is, at T moments.
+
+    Attributes:
+        base: the base's x and y, (T, 2) [m].
+        heading: cosine and sine of the base's heading, (T, 2).
+        tool: the tool's position, (T, 3) [m].
+        rotation: the tool's rotation, (T, 3, 3).
+    """
+
+    base: FloatArray
+    heading: FloatArray
+    tool: FloatArray
+    rotation: FloatArray
+
+    def turned(self, vectors: FloatArray) -> FloatArray:
+        """Return world vectors in the base's axes; z stays, (T, 2 or 3)."""
+        c, s = self.heading[:, 0], self.heading[:, 1]
+        x, y = vectors[:, 0], vectors[:, 1]
+        return np.column_stack([c * x + s * y, c * y - s * x, vectors[:, 2:]])
+
+    def turned_back(self, vectors: FloatArray) -> FloatArray:
+        """Return vectors in the base's axes in the world's; z stays, (T, 2 or 3)."""
+        return Frame(self.base, self.heading * [1.0, -1.0], self.tool, self.rotation).turned(vectors)
+
+    def conjugated(self, rotations: FloatArray) -> FloatArray:
+        """Return `R_wbᵀ R R_wb`, (T, 9)."""
+        base = self.matrices()
+        return (base.transpose(0, 2, 1) @ rotations @ base).reshape(-1, 9)
+
+    def matrices(self) -> FloatArray:
+        """Return `R_wb`, (T, 3, 3)."""
+        base = np.zeros((len(self.heading), 3, 3))
+        base[:, 0, 0] = base[:, 1, 1] = self.heading[:, 0]
+        base[:, 1, 0], base[:, 0, 1], base[:, 2, 2] = self.heading[:, 1], -self.heading[:, 1], 1.0
+        return base
+
+
+@dataclass(frozen=True)
+class RelativeView:
+    """Turns recorded observations into what a policy reads.
+
+    Attributes:
+        state_names: of `observation.state` as recorded, (s,).
+        environment_names: of `observation.environment_state` as recorded, (e,).
+        joints: of the robot, (n,).
+        mobile: whether the first three joints are a base's x, y and heading.
+    """
+
+    state_names: tuple[str, ...]
+    environment_names: tuple[str, ...]
+    joints: tuple[str, ...]
+    mobile: bool
+
+    def __post_init__(self) -> None:
+        """Check that what the view starts from is there.
+
+        Raises:
+            HandrailError: the state lacks the tool's pose or a joint.
+        """
+        needed = (*_TOOL, *(f"{joint}.{kind}" for joint in self.joints for kind in ("pos", "vel")))
+        missing = [name for name in needed if name not in self.state_names]
+        if missing:
+            raise HandrailError(
+                f"observation.state: expected {', '.join(needed[:9])}, … as handrail-record writes it;"
+                f" missing: {', '.join(missing)}"
+            )
+
+    @property
+    def names(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
+        """What the numbers are called: of the state, of the environment."""
+        velocities = tuple(f"{joint}.vel" for joint in self.joints)
+        arm = tuple(f"{joint}.pos" for joint in self._arm)
+        tool = (*_TOOL[:3], *(f"tool.{entry}" for entry in _MATRIX))
+        environment = tuple(f"{group.name}.{part}" for group in self._groups for part in _parts(group))
+        return (*arm, *velocities, *self._other, *tool), environment
+
+    def __call__(self, state: FloatArray, environment: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return both as the policy reads them, (T, s') and (T, e') float32.
+
+        Args:
+            state: as recorded, (T, s).
+            environment: as recorded, (T, e).
+        """
+        state, environment = np.asarray(state, float), np.asarray(environment, float)
+        frame = self.frame(state)
+        place = np.column_stack([frame.tool[:, :2] - frame.base, frame.tool[:, 2]])
+        own = (
+            state[:, self._positions],
+            self.to_base(frame, self.velocities(state)),
+            state[:, self._others],
+            frame.turned(place),
+            (frame.matrices().transpose(0, 2, 1) @ frame.rotation).reshape(-1, 9),
+        )
+        seen = [_seen(group, environment[:, group.start : group.end], frame) for group in self._groups]
+        around = np.column_stack(seen) if seen else np.zeros((len(state), 0))
+        return np.column_stack(own).astype(np.float32), around.astype(np.float32)
+
+    def frame(self, state: FloatArray) -> Frame:
+        """Return where the robot is, from recorded states, (T, s)."""
+        if self.mobile:
+            base = state[:, [self._at(f"{joint}.pos") for joint in self.joints[:3]]]
+        else:
+            base = np.zeros((len(state), 3))
+        tool = state[:, [self._at(name) for name in _TOOL]]
+        rotation = Rotation.from_quat(tool[:, 3:], scalar_first=True).as_matrix()
+        heading = np.column_stack([np.cos(base[:, 2]), np.sin(base[:, 2])])
+        return Frame(base[:, :2], heading, tool[:, :3], rotation)
+
+    def velocities(self, state: FloatArray) -> FloatArray:
+        """Return the joint velocities in recorded states, (T, n)."""
+        return state[:, self._velocities]
+
+    def to_base(self, frame: Frame, velocities: FloatArray) -> FloatArray:
+        """Return joint velocities with the base's in its own axes, (T, n)."""
+        if not self.mobile:
+            return velocities
+        return np.column_stack([frame.turned(velocities[:, :2]), velocities[:, 2:]])
+
+    def to_world(self, frame: Frame, velocities: FloatArray) -> FloatArray:
+        """Return joint velocities with the base's in the world's axes, as channels have them, (T, n)."""
+        if not self.mobile:
+            return velocities
+        return np.column_stack([frame.turned_back(velocities[:, :2]), velocities[:, 2:]])
+
+    @property
+    def _arm(self) -> tuple[str, ...]:
+        return self.joints[3:] if self.mobile else self.joints
+
+    @cached_property
+    def _positions(self) -> list[int]:
+        return [self._at(f"{joint}.pos") for joint in self._arm]
+
+    @cached_property
+    def _velocities(self) -> list[int]:
+        return [self._at(f"{joint}.vel") for joint in self.joints]
+
+    @cached_property
+    def _other(self) -> tuple[str, ...]:
+        """Numbers of the state that are neither a joint's nor the tool's."""
+        known = {*_TOOL, *(f"{joint}.{kind}" for joint in self.joints for kind in ("pos", "vel"))}
+        return tuple(name for name in self.state_names if name not in known)
+
+    @cached_property
+    def _others(self) -> list[int]:
+        return [self._at(name) for name in self._other]
+
+    @cached_property
+    def _groups(self) -> tuple[Group, ...]:
+        return grouped(self.environment_names)
+
+    def _at(self, name: str) -> int:
+        return self.state_names.index(name)
+
+
+def grouped(names: Sequence[str]) -> tuple[Group, ...]:
+    """Return neighbouring names with the same beginning as groups."""
+    groups: list[Group] = []
+    for index, name in enumerate(names):
+        head, _, part = name.rpartition(".")
+        if groups and groups[-1].name == head and part not in groups[-1].parts:
+            last = groups[-1]
+            groups[-1] = Group(last.name, (*last.parts, part), last.start)
+        else:
+            groups.append(Group(head, (part,), index))
+    return tuple(groups)
+
+
+def _parts(group: Group) -> tuple[str, ...]:
+    offset = ("dx", "dy", "dz", *(f"near_{r:g}.{axis}" for r in _NEAR for axis in _POSITION))
+    if group.parts == _POSE:
+        return (*offset, *_MATRIX)
+    if group.parts == _POSITION:
+        return offset
+    return group.parts
+
+
+def _seen(group: Group, numbers: FloatArray, frame: Frame) -> FloatArray:
+    """Return a group as seen from the robot, (T, k)."""
+    if group.parts[:3] == _POSITION and group.parts in (_POSE, _POSITION):
+        offset = _at_scales(frame.turned(numbers[:, :3] - frame.tool))
+        if group.parts == _POSITION:
+            return offset
+        turn = Rotation.from_quat(numbers[:, 3:], scalar_first=True).as_matrix()
+        return np.column_stack([offset, frame.conjugated(turn @ frame.rotation.transpose(0, 2, 1))])
+    if group.parts == _DIRECTION:
+        return frame.turned(numbers)
+    if group.parts[:2] == ("x", "y"):
+        there = numbers.any(axis=1, keepdims=True)  # what is not there stays zero
+        place = frame.turned(numbers[:, :2] - frame.base)
+        return np.column_stack([np.where(there, place, 0.0), numbers[:, 2:]])
+    return numbers
+
+
+def _at_scales(offset: FloatArray) -> FloatArray:
+    """Return an offset, and how near it is at several scales, (T, 3 + 3 k)."""
+    square = np.sum(offset**2, axis=1, keepdims=True)
+    return np.column_stack([offset, *(offset / np.sqrt(square + r * r) for r in _NEAR)])

@@ -1,0 +1,79 @@
+"""Which episodes a policy is trained on, and how much of an operator's time they took."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from handrail.controllers.errors import HandrailError, unknown_name
+from handrail.policies.imitation.config import TrainConfig
+
+Row = Mapping[str, Any]
+_MINUTE = 60.0
+
+
+@dataclass(frozen=True)
+class Selection:
+    """Episodes to train on.
+
+    Attributes:
+        rows: their lines of metadata, in the order of the dataset.
+        attempts: how many episodes it took, failed ones included.
+        operator_time: simulated length of all attempts [s].
+    """
+
+    rows: tuple[Row, ...]
+    attempts: int
+    operator_time: float
+
+
+def select(rows: Sequence[Row], fps: float, config: TrainConfig) -> Selection:
+    """Return the episodes that a config asks for.
+
+    All attempts of the mode are put into a random order that depends on `draw` alone, and are taken from the
+    front until there are enough: the operator would have had to make the failed ones too.
+
+    Raises:
+        HandrailError: there is no such episode, or there are fewer than asked for.
+    """
+    attempts = _attempts(rows, config)
+    order = np.random.default_rng(config.draw).permutation(len(attempts))
+    kept: list[Row] = []
+    taken, frames, most = 0, 0, config.minutes * _MINUTE * fps * (1.0 + 1e-9)
+    for attempt in (attempts[place] for place in order):
+        if config.minutes and frames + attempt["length"] > most:
+            break
+        taken, frames = taken + 1, frames + attempt["length"]
+        if not config.success_only or attempt.get("success"):
+            kept.append(attempt)
+        if len(kept) == config.episodes > 0:
+            break
+    else:
+        _check_enough(config, len(kept), frames / fps)
+    if not kept:
+        raise HandrailError(
+            f"no episode left to train on: expected one or more among {len(attempts)}"
+            f"{' that succeeded' if config.success_only else ''}"
+            f"{f' within {config.minutes:g} min' if config.minutes else ''}"
+        )
+    return Selection(tuple(sorted(kept, key=lambda row: row["episode_index"])), taken, frames / fps)
+
+
+def _attempts(rows: Sequence[Row], config: TrainConfig) -> list[Row]:
+    for column, wanted in (("mode", config.mode), ("success", config.success_only)):
+        if wanted and not all(column in row for row in rows):
+            raise HandrailError(f"--{column}: expected episodes that say their {column}; these do not")
+    modes = {str(row.get("mode")) for row in rows}
+    if config.mode and config.mode not in modes:
+        raise unknown_name("mode in the dataset", config.mode, modes)
+    return [row for row in rows if not config.mode or row["mode"] == config.mode]
+
+
+def _check_enough(config: TrainConfig, kept: int, seconds: float) -> None:
+    if config.minutes and seconds < config.minutes * _MINUTE * (1.0 - 1e-9):
+        raise HandrailError(
+            f"--minutes {config.minutes:g}: expected at most the {seconds / _MINUTE:.2f} min recorded"
+        )
+    if config.episodes and not config.minutes and kept < config.episodes:
+        raise HandrailError(f"--episodes {config.episodes}: expected at most the {kept} that there are")

@@ -1,0 +1,195 @@
+"""Training of an imitation policy: a part of a dataset, through an interface, with LeRobot's own training."""
+
+import json
+import logging
+import os
+import shutil
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import asdict, fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from handrail.controllers.errors import HandrailError
+from handrail.policies.imitation.checkpoint import (
+    MODEL,
+    PolicyMeta,
+    last_checkpoint,
+    read_meta,
+    software_versions,
+    write_meta,
+)
+from handrail.policies.imitation.config import FREE_ON_RESUME, TrainConfig
+from handrail.policies.imitation.presets import policy_config, preset_of
+from handrail.policies.imitation.source import Source, read_source
+
+if TYPE_CHECKING:
+    from handrail.policies.imitation.run import Pipeline
+
+RECORD = "training.json"
+_LOG_EVERY = 50  # updates
+_WARMUP = 500  # updates in which the learning rate rises, or a tenth of all if that is fewer
+
+
+def train(config: TrainConfig, quiet: bool = False) -> Path:
+    """Train, or go on training, and return the folder of the policy in the last checkpoint.
+
+    Args:
+        config: what to train on what.
+        quiet: show no progress.
+
+    Raises:
+        HandrailError: a setting is wrong, the dataset does not fit, or there is a training already.
+    """
+    config.check()
+    checkpoint = _begin(config)
+    steps = config.steps or preset_of(config).steps
+    if checkpoint is not None and int(checkpoint.name) >= steps:
+        return checkpoint / MODEL
+    source = read_source(config)
+    with _threads(config.threads), _no_pages_of_logs(), _in_one_line(config):
+        _run(config, source, steps, checkpoint, quiet)
+    last = last_checkpoint(config.folder)
+    assert last is not None
+    return last / MODEL
+
+
+def _run(config: TrainConfig, source: Source, steps: int, checkpoint: Path | None, quiet: bool) -> None:
+    from handrail.policies.imitation.run import Run
+
+    pipeline = _pipeline(config, steps, checkpoint)
+    assert pipeline.policy is not None
+    dataset = source.dataset(pipeline.policy)
+    run = Run(
+        pipeline,
+        dataset,
+        checkpoint,
+        lambda folder, step: write_meta(folder, source.interface, _meta(source, step)),
+        quiet,
+    )
+    began = time.monotonic()
+    curve = run.train()
+    if curve is not None:
+        seconds = time.monotonic() - began
+        done = steps - (int(checkpoint.name) if checkpoint else 0)
+        record = {"seconds": seconds, "steps_a_second": done / seconds, "steps": steps}
+        record |= {"frames": len(dataset), "loss": curve.rows[-1]["loss"] if curve.rows else None}
+        content = record | asdict(_meta(source, steps))
+        (config.folder / RECORD).write_text(json.dumps(content, indent=1) + "\n")
+
+
+def _pipeline(config: TrainConfig, steps: int, checkpoint: Path | None) -> "Pipeline":
+    from lerobot.configs.default import DatasetConfig
+    from lerobot.optim.schedulers import CosineAnnealingWithWarmupSchedulerConfig as Cosine
+
+    from handrail.policies.imitation.run import Pipeline
+
+    preset = preset_of(config)
+    return Pipeline(
+        dataset=DatasetConfig(config.dataset.repo_id, root=str(config.dataset.folder), video_backend="pyav"),
+        policy=policy_config(config),
+        output_dir=config.folder,
+        resume=checkpoint is not None,
+        seed=config.seed,
+        num_workers=0,
+        batch_size=config.batch_size or preset.batch_size,
+        steps=steps,
+        log_freq=_LOG_EVERY,
+        save_freq=config.save_freq,
+        env_eval_freq=0,
+        scheduler=Cosine(min(_WARMUP, steps // 10)) if preset.cosine else None,
+    )
+
+
+def _begin(config: TrainConfig) -> Path | None:
+    """Make room for a training; return the checkpoint that it goes on from, if any."""
+    folder = config.folder
+    last = last_checkpoint(folder)
+    if config.resume and last is not None:
+        _check_continues(config, read_meta(last / MODEL)[1].training)
+        return last
+    if config.resume or not folder.exists() or not _is_main_process():
+        return None
+    if not folder.is_dir():
+        raise HandrailError(f"--output {config.output}: expected a folder, found a file")
+    ours = {"checkpoints", RECORD, "curve.csv"}
+    if any(path.name not in ours for path in folder.iterdir()):
+        raise HandrailError(f"--output {config.output}: expected a missing or empty folder; choose another")
+    if any(folder.iterdir()) and not config.overwrite:
+        raise HandrailError(
+            f"--output {config.output}: there is a training already; say --resume or --overwrite"
+        )
+    shutil.rmtree(folder)
+    return None
+
+
+def _check_continues(config: TrainConfig, earlier: Any) -> None:
+    for entry in fields(config):
+        if entry.name in FREE_ON_RESUME or entry.name not in earlier:
+            continue
+        now, then = getattr(config, entry.name), earlier[entry.name]
+        if (list(now) if isinstance(now, tuple) else now) != then:
+            raise HandrailError(f"--resume with --{entry.name} {now}: expected {then} as the training began")
+
+
+def _meta(source: Source, steps: int) -> PolicyMeta:
+    config, rows = source.config, source.selection.rows
+    return PolicyMeta(
+        environment=_common([str(row.get("environment") or "") for row in rows]),
+        mode=_common([str(row.get("mode") or "") for row in rows]),
+        robot=source.info.robot_type,
+        fps=source.info.fps,
+        actions=config.actions,
+        training_seed=config.seed,
+        dataset_draw=config.draw,
+        trained_on={
+            "episodes": len(rows),
+            "attempts": source.selection.attempts,
+            "operator_time": source.selection.operator_time,
+        },
+        policy=config.policy,
+        steps=steps,
+        training=asdict(config),
+        versions=software_versions(),
+    )
+
+
+def _common(values: list[str]) -> str:
+    return values[0] if len(set(values)) == 1 else "mixed"
+
+
+def _is_main_process() -> bool:
+    return os.environ.get("RANK", "0") == "0"
+
+
+@contextmanager
+def _threads(count: int) -> Iterator[None]:
+    import torch
+
+    before = torch.get_num_threads()
+    torch.set_num_threads(count)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(before)
+
+
+@contextmanager
+def _no_pages_of_logs() -> Iterator[None]:
+    """Keep to oneself what LeRobot says on its way, such as which decoders of videos it could not load."""
+    before = logging.root.manager.disable
+    logging.disable(logging.WARNING)
+    try:
+        yield
+    finally:
+        logging.disable(before)
+
+
+@contextmanager
+def _in_one_line(config: TrainConfig) -> Iterator[None]:
+    """Raise what LeRobot refuses as an error of ours."""
+    try:
+        yield
+    except (ValueError, ImportError, NotImplementedError) as error:
+        raise HandrailError(f"policy {config.policy}: {' '.join(str(error).split())}") from error

@@ -1,0 +1,41 @@
+"""Settings of `handrail-study`; light to import."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from handrail.controllers.errors import HandrailError
+
+
+@dataclass(frozen=True)
+class StudyConfig:
+    """Collect, train, evaluate and compare: teleop modes × tasks × training seeds, from one design."""
+
+    preset: str = "quick"
+    """Which study: quick, full, or a file of your own that ends in .toml (see policies/study/presets)."""
+    output: str = "outputs/study"
+    """Folder of datasets, policies, evaluations and report; what is done there is not done again."""
+    workers: int = 2
+    """Jobs at a time, one core each."""
+    page: str = ""
+    """Also write tables and figures into this Markdown file (.md), between marks."""
+    report_only: bool = False
+    """Only write the report of what is done so far."""
+
+    @property
+    def folder(self) -> Path:
+        """The study's folder."""
+        return Path(self.output).expanduser().absolute()
+
+    def check(self) -> None:
+        """Check the settings.
+
+        Raises:
+            HandrailError: one is wrong.
+        """
+        if not 1 <= self.workers <= 256:
+            raise HandrailError(f"--workers {self.workers}: expected a whole number from 1 to 256")
+        if self.folder.exists() and not self.folder.is_dir():
+            raise HandrailError(f"--output {self.output}: expected a folder, found a file")
+        page = Path(self.page).expanduser()
+        if self.page and not (page.suffix == ".md" and page.absolute().parent.is_dir()):
+            raise HandrailError(f"--page {self.page}: expected a .md file in an existing folder")

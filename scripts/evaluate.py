@@ -1,0 +1,37 @@
+"""`handrail-evaluate`: run trained policies on declared seeds, protected or not, disturbed or not."""
+
+from importlib.util import find_spec
+
+from handrail.controllers.errors import HandrailError
+from handrail.policies.imitation.evaluate_config import EvaluateConfig
+from handrail.scripts import cli
+
+
+def main() -> None:
+    """Run the command."""
+    cli.run(lambda: _evaluate(cli.parse(EvaluateConfig, "handrail-evaluate")))
+
+
+def _evaluate(config: EvaluateConfig) -> int:
+    config.check()
+    if find_spec("torch") is None:
+        raise HandrailError("handrail-evaluate: expected torch, found none; pip install '.[train]'")
+    from rich.console import Console
+
+    from handrail.policies.imitation.evaluation import evaluate
+    from handrail.policies.imitation.evaluation_table import evaluation_table
+    from handrail.policies.imitation.evaluation_video import film
+
+    content = evaluate(config, Console(stderr=True))
+    console = Console(highlight=False, soft_wrap=True)
+    console.print(evaluation_table(content))
+    if config.json:
+        console.print(f"Written: {config.json}")
+    if config.video:
+        trouble = film(config)
+        console.print(f"Without a video: {trouble}" if trouble else f"Video: {config.video}")
+    return 0
+
+
+if __name__ == "__main__":
+    main()
