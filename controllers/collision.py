@@ -1,19 +1,18 @@
 """Signed distances and their gradients: coal's shapes on pinocchio's model."""
 
 from dataclasses import dataclass
-from functools import lru_cache
 
 import coal
 import numpy as np
 import pinocchio as pin
 
 from handrail.controllers.arrays import BoolArray, FloatArray, IntArray, frozen
-from handrail.controllers.description import PlacedShape
 from handrail.controllers.errors import HandrailError
+from handrail.controllers.levers import all_lever_arms
 from handrail.controllers.model import RobotModel
 from handrail.controllers.pair_data import PairData
 from handrail.controllers.shape import Obstacle, Shape
-from handrail.controllers.witnesses import gradients, lower_bounds, measured
+from handrail.controllers.witnesses import gradients, lower_bounds, measured, raise_bounds
 
 FLOOR = "floor"
 _STRETCH = 13  # configurations after which all pairs are measured again
@@ -97,7 +96,8 @@ class CollisionModel:
         """Return the signed distances along a trajectory, and gradients of those below `reach`.
 
         On every stretch of the way a pair that cannot come below its reach is measured at the beginning only;
-        after that its value is a lower bound: `d(q_k) ≥ d(q_0) - Σ_j L_j |q_k - q_0|_j - |v_obstacle| t_k`.
+        after that its value is a lower bound: `d(q_k) ≥ d(q_0) - Σ_j L_j |q_k - q_0|_j - |v_obstacle| t_k`,
+        or what the last trajectory's distances leave of it: the next one is seldom far from it.
 
         Args:
             q: configurations, (K, n).
@@ -120,12 +120,16 @@ class CollisionModel:
             bounds, close = lower_bounds(
                 values[begin], q[begin], q[stretch], ahead, self._levers, self._speeds, reaches
             )
+            if self._last is not None and self._last[0].shape == q.shape:
+                there, known = self._last[0][stretch], self._last[1][stretch]
+                close = raise_bounds(bounds, q[stretch], known, there, self._levers, reaches)
             chosen = self._along.select(close)
             if len(chosen):
                 after = slice(begin + 1, begin + len(bounds))
                 self._measure(self._along, q[after], times[after], witnesses[after], jacobians[after])
             measured(witnesses[stretch], chosen, bounds)
             values[stretch] = bounds
+        self._last = None if self._moving else (q.copy(), values)
         near, rows = gradients(witnesses, jacobians, self._moves, values, reaches)
         return Distances(values, near, rows)
 
@@ -206,6 +210,7 @@ class CollisionModel:
         if names != tuple(self._obstacles):
             raise HandrailError(f"obstacles: expected {', '.join(self._obstacles)}, got {', '.join(names)}")
         self._moving = []
+        self._last: tuple[FloatArray, FloatArray] | None = None
         for obstacle in obstacles:
             geometry = self._geometry.geometryObjects[self._obstacles[obstacle.name]]
             geometry.placement = pin.SE3(np.array(obstacle.rotation), np.array(obstacle.position))
@@ -251,7 +256,7 @@ class CollisionModel:
         A coordinate that moves both shapes alike does not; of one that moves a single shape it is the
         shape's lever arm.
         """
-        arms = _all_lever_arms(model)
+        arms = all_lever_arms(model)
         none = np.zeros(model.size)
         either = (
             self._moves[:, 0] != self._moves[:, 1] if self.size else np.zeros((0, model.size), dtype=bool)
@@ -263,33 +268,6 @@ class CollisionModel:
 def _nothing(count: int, size: int) -> Distances:
     """Return the distances of no pairs at all at `count` configurations."""
     return Distances(np.zeros((count, 0)), np.zeros((0, 2), dtype=int), np.zeros((0, size)))
-
-
-@lru_cache(maxsize=8)
-def _all_lever_arms(model: RobotModel) -> dict[str, FloatArray]:
-    """Return the lever arms of every shape of a robot, by name."""
-    return {shape.name: lever_arms(model, shape) for shape in model.description.collision}
-
-
-def lever_arms(model: RobotModel, placed: PlacedShape) -> FloatArray:
-    """Return bounds on how far a point of a shape moves per unit of each coordinate, (n,) [m].
-
-    1 for a prismatic joint; for a revolute one the length of the chain from its axis to the shape, and the
-    shape's own size; 0 for a joint that does not move it.
-    """
-    pinocchio, arms = model.pinocchio, np.zeros(model.size)
-    frame = pinocchio.frames[model.frame_id(placed.frame)]
-    size = float(np.linalg.norm(placed.shape.size)) if placed.shape.kind == "box" else placed.shape.size.sum()
-    reach = size + float(
-        np.linalg.norm(frame.placement.translation + frame.placement.rotation @ placed.placement.translation)
-    )
-    joint = frame.parentJoint
-    while joint > 0:
-        prismatic = pinocchio.joints[joint].shortname().startswith("JointModelP")
-        arms[pinocchio.joints[joint].idx_v] = 1.0 if prismatic else reach
-        reach += float(np.linalg.norm(pinocchio.jointPlacements[joint].translation))
-        joint = pinocchio.parents[joint]
-    return arms
 
 
 def _coal_shape(shape: Shape) -> coal.ShapeBase:
