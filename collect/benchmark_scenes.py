@@ -10,7 +10,7 @@ from handrail.controllers.collision import CollisionModel
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.model import RobotModel
 
-VIEW = View(position=(-2.9, -3.4, 3.0), target=(-0.3, 0.0, 0.4), fovy=48.0)
+VIEW = View(position=(-2.9, -3.4, 3.0), target=(-0.3, 0.0, 0.4), fovy=36.0)
 _LOW, _TALL = (0.3, 0.3), (0.25, 1.5)  # radius and height of the showcase's cylinders [m]
 _COUNTS = ((2, _LOW), (1, _TALL))
 _AREA = (-1.2, -1.2), (1.2, 1.2)  # of their centres [m]

@@ -25,7 +25,7 @@ from handrail.controllers.model import Pose, RobotModel
 _SIZE = (360, 480)  # of one picture of the video [px]
 _SMALL = (252, 336)  # of one in a strip [px]
 _MOMENTS = 5  # of a strip
-_COLOURS = 160  # of a strip
+_COLOURS = 256  # of a strip
 _BAR = 44  # height of the caption [px]
 _EVERY = 3  # steps between pictures
 _REST = 10  # pictures after the end

@@ -11,8 +11,9 @@ from handrail.collect.gl import mujoco
 from handrail.collect.robot import BASE_BODY, FINGERS, RobotSpec, build_robot
 from handrail.collect.scene import Scene, add_scene
 from handrail.collect.stage import set_stage
-from handrail.controllers.arrays import FloatArray
+from handrail.controllers.arrays import FloatArray, IntArray
 from handrail.controllers.controller import State
+from handrail.controllers.jit import exact_jit
 from handrail.controllers.model import Pose, RobotModel
 
 _LARGEST_TIMESTEP = 0.002
@@ -54,7 +55,7 @@ class Simulation:
         self._scene = scene
         self._step = step
         self.substeps = math.ceil(step / _LARGEST_TIMESTEP - 1e-9)
-        self._weights = np.arange(1, self.substeps + 1)[:, None] / self.substeps
+        self._shares = np.arange(1, self.substeps + 1) / self.substeps
         robot = _robot(model, meshes, step / self.substeps)
         spec = robot.spec.copy()
         add_scene(spec, scene)
@@ -70,13 +71,14 @@ class Simulation:
     def _index(self) -> None:
         """Find where the robot is in MuJoCo's arrays."""
         compiled, names = self.mujoco_model, self._model.joints
-        self._q_index = np.array([compiled.joint(name).qposadr[0] for name in names])
-        self._v_index = np.array([compiled.joint(name).dofadr[0] for name in names])
+        self._q_index = _span([compiled.joint(name).qposadr[0] for name in names])
+        self._v_index = _span([compiled.joint(name).dofadr[0] for name in names])
         self._servo_index = np.array([compiled.actuator(name).id for name in names])
         self._tool = compiled.site("tool").id
         gripper = self._model.description.gripper
         self._stroke = gripper.stroke if gripper else 0.0
         self._speed = gripper.speed if gripper else 0.0
+        self._gripper_servo = -1
         if gripper:
             self._finger_index = np.array([compiled.joint(name).qposadr[0] for name in FINGERS])
             self._gripper_servo = compiled.actuator("gripper").id
@@ -105,13 +107,16 @@ class Simulation:
             velocity: commanded at the end of the step, (n,) [m/s, rad/s].
             gripper: 0 open, 1 closed; approached at the gripper's speed.
         """
-        self._contacts.clear()
+        contacts, patrols = self._contacts, self._patrols
+        contacts.clear()
         model, data, control = self.mujoco_model, self.data, self.data.ctrl
-        for control[:] in self._ramp(velocity, gripper):
-            self._move_obstacles()
+        self.commanded, before = np.array(velocity, dtype=np.float64), self.commanded
+        for control[:] in self._ramp(before, gripper):
+            if patrols:
+                self._move_obstacles()
             mujoco.mj_step(model, data)
-            self._contacts.look(data)
-        self.commanded = np.array(velocity, dtype=np.float64)
+            if data.ncon:
+                contacts.look(data)
         self._move_obstacles()
         mujoco.mj_kinematics(model, data)
         mujoco.mj_camlight(model, data)
@@ -131,15 +136,10 @@ class Simulation:
         data.xfrc_applied[self.mujoco_model.body(BASE_BODY).id, :3] = base
         data.xfrc_applied[carrier] += np.concatenate([hand, np.cross(lever, hand)])
 
-    def _ramp(self, velocity: FloatArray, gripper: float) -> FloatArray:
-        """Return what the servos are sent at every substep: linear to the velocity, (substeps, servos)."""
-        ramp = np.empty((self.substeps, self.mujoco_model.nu))
-        ramp[:, self._servo_index] = (1.0 - self._weights) * self.commanded + self._weights * velocity
-        if self._stroke:
-            now, wanted = self.data.ctrl[self._gripper_servo], self._gripper_target(gripper)
-            reach = self._speed * self._step * self._weights[:, 0]
-            ramp[:, self._gripper_servo] = now + np.minimum(np.maximum(wanted - now, -reach), reach)
-        return ramp
+    def _ramp(self, before: FloatArray, gripper: float) -> FloatArray:
+        """Return what the servos are sent at every substep: linear to the command, (substeps, servos)."""
+        fingers = self._gripper_servo, self._gripper_target(gripper), self._speed * self._step
+        return _ramp(self.data.ctrl, before, self.commanded, self._shares, self._servo_index, fingers)
 
     def _gripper_target(self, gripper: float) -> float:
         """Return the opening that the gripper's servo is sent to [m]; closed is a little beyond touching."""
@@ -198,8 +198,30 @@ class Simulation:
         return Twist(velocity[:3].copy(), rotation @ velocity[3:])
 
 
+@exact_jit
+def _ramp(control, before, after, shares, servos, fingers):
+    """Return controls on the way from one velocity to another, and the fingers' towards their opening."""
+    ramp = np.empty((len(shares), len(control)))
+    finger, opening, reach = fingers
+    for k in range(len(shares)):
+        for joint in range(len(servos)):
+            ramp[k, servos[joint]] = (1.0 - shares[k]) * before[joint] + shares[k] * after[joint]
+        if finger >= 0:
+            way = opening - control[finger]
+            ramp[k, finger] = control[finger] + min(max(way, -(reach * shares[k])), reach * shares[k])
+    return ramp
+
+
+def _span(places: list[int]) -> slice | IntArray:
+    """Return places that follow each other as a slice, for which numpy needs no copy."""
+    index = np.array(places)
+    together = np.array_equal(index, np.arange(index[0], index[0] + len(index)))
+    return slice(int(index[0]), int(index[-1]) + 1) if together else index
+
+
 @lru_cache(maxsize=8)
 def _robot(model: RobotModel, meshes: bool, timestep: float) -> RobotSpec:
     robot = build_robot(model, meshes)
+    robot.spec.compiler.usethread = meshes  # without any, waking a second thread takes longer than its work
     set_stage(robot.spec, timestep)
     return robot

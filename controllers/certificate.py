@@ -70,7 +70,7 @@ class StopCertificate:
 
     def along(self, path: FloatArray, times: FloatArray, now: tuple[FloatArray, FloatArray]) -> FloatArray:
         """Return the same at every point of a motion, (K,)."""
-        distances = self._collision.values(path, times, now)
+        distances = self._collision.values(path, times, now, self._floors)
         bounds = self._limits.position_lower, self._limits.position_upper
         return _shortfalls(path, distances, *now, self._floors, *bounds)
 

@@ -7,12 +7,12 @@ import numpy as np
 import pinocchio as pin
 
 from handrail.controllers.arrays import BoolArray, FloatArray, IntArray, frozen
-from handrail.controllers.description import PlacedShape
 from handrail.controllers.errors import HandrailError
+from handrail.controllers.levers import all_lever_arms
 from handrail.controllers.model import RobotModel
 from handrail.controllers.pair_data import PairData
 from handrail.controllers.shape import Obstacle, Shape
-from handrail.controllers.witnesses import gradients, lower_bounds, measured
+from handrail.controllers.witnesses import gradients, lower_bounds, measured, raise_bounds
 
 FLOOR = "floor"
 _STRETCH = 13  # configurations after which all pairs are measured again
@@ -96,7 +96,8 @@ class CollisionModel:
         """Return the signed distances along a trajectory, and gradients of those below `reach`.
 
         On every stretch of the way a pair that cannot come below its reach is measured at the beginning only;
-        after that its value is a lower bound: `d(q_k) ≥ d(q_0) - Σ_j L_j |q_k - q_0|_j - |v_obstacle| t_k`.
+        after that its value is a lower bound: `d(q_k) ≥ d(q_0) - Σ_j L_j |q_k - q_0|_j - |v_obstacle| t_k`,
+        or what the last trajectory's distances leave of it: the next one is seldom far from it.
 
         Args:
             q: configurations, (K, n).
@@ -112,56 +113,92 @@ class CollisionModel:
         values = np.empty((len(q), self.size))
         for begin in range(0, len(q), _STRETCH):
             stretch = slice(begin, begin + _STRETCH)
-            self._measure(self._all, q[begin], times[begin], witnesses[begin])
-            jacobians[begin] = pin.computeJointJacobians(self._model, self._data)
-            measured(witnesses[begin : begin + 1], self._every, values[begin : begin + 1])
+            first = slice(begin, begin + 1)
+            self._measure(self._all, q[first], times[first], witnesses[first], jacobians[first])
+            measured(witnesses[first], self._every, values[first])
             ahead = times[stretch] - times[begin]
             bounds, close = lower_bounds(
                 values[begin], q[begin], q[stretch], ahead, self._levers, self._speeds, reaches
             )
+            if self._last is not None and self._last[0].shape == q.shape:
+                there, known = self._last[0][stretch], self._last[1][stretch]
+                close = raise_bounds(bounds, q[stretch], known, there, self._levers, reaches)
             chosen = self._along.select(close)
-            for node in range(begin + 1, begin + len(bounds)) if len(chosen) else ():
-                self._measure(self._along, q[node], times[node], witnesses[node])
-                jacobians[node] = pin.computeJointJacobians(self._model, self._data)
+            if len(chosen):
+                after = slice(begin + 1, begin + len(bounds))
+                self._measure(self._along, q[after], times[after], witnesses[after], jacobians[after])
             measured(witnesses[stretch], chosen, bounds)
             values[stretch] = bounds
+        self._last = None if self._moving else (q.copy(), values)
         near, rows = gradients(witnesses, jacobians, self._moves, values, reaches)
         return Distances(values, near, rows)
 
     def values(
-        self, q: FloatArray, times: FloatArray | None = None, now: tuple[FloatArray, FloatArray] | None = None
+        self,
+        q: FloatArray,
+        times: FloatArray | None = None,
+        now: tuple[FloatArray, FloatArray] | None = None,
+        reach: FloatArray | None = None,
     ) -> FloatArray:
         """Return the signed distances at configurations (K, n) and times (K,), (K, P) [m].
 
         Args:
             q: configurations.
             times: from now on [s].
-            now: a configuration, (n,), and its distances, (P,), if they are known: pairs that are far from
-                each other then get a lower bound instead, infinitely cheaper.
+            now: a configuration, (n,), and its distances, (P,), if they are known: pairs that cannot come
+                below their reach then get a lower bound instead, infinitely cheaper.
+            reach: distance below which a pair's own value is wanted, (P,) [m]; 0.15 m when None.
         """
         if not self.size:
             return np.empty((len(q), 0))
         times = np.zeros(len(q)) if times is None else times
-        witnesses = np.empty((len(q), self.size, 9))
         if now is None:
             data, chosen, values = self._all, self._every, np.empty((len(q), self.size))
         else:
             data, (start, there) = self._after, now
-            values, close = lower_bounds(there, start, q, times, self._levers, self._speeds, self._far)
+            reach = self._far if reach is None else reach
+            values, close = lower_bounds(there, start, q, times, self._levers, self._speeds, reach)
+            if not close.any():
+                return values
             chosen = data.select(close)
-        for node in range(len(q) if len(chosen) else 0):
-            self._measure(data, q[node], times[node], witnesses[node])
+        witnesses = np.empty((len(q), self.size, 9))
+        self._measure(data, q, times, witnesses)
         measured(witnesses, chosen, values)
         return values
 
-    def _measure(self, data: "PairData", q: FloatArray, time: float, out: FloatArray) -> None:
-        """Let coal compute the pairs of `data` at q, with moving obstacles where they are after a time."""
+    def _measure(
+        self,
+        data: "PairData",
+        q: FloatArray,
+        times: FloatArray,
+        witnesses: FloatArray,
+        jacobians: FloatArray | None = None,
+    ) -> None:
+        """Let coal compute some pairs at configurations, with moving obstacles where they are then.
+
+        Args:
+            data: of the pairs.
+            q: configurations, (K, n).
+            times: of them from now on, (K,) [s].
+            witnesses: filled with normals and nearest points, (K, P, 9).
+            jacobians: filled with the joints' spatial Jacobians, if wanted, (K, 6, n).
+        """
+        model, kinematics, geometry = self._model, self._data, self._geometry
+        pairs, results = data.geometry, data.results
+        for k in range(len(q)):
+            if self._moving:
+                self._move_obstacles(times[k])
+            pin.computeDistances(model, kinematics, geometry, pairs, q[k])
+            witnesses[k] = results.read()
+            if jacobians is not None:
+                jacobians[k] = pin.computeJointJacobians(model, kinematics)
+
+    def _move_obstacles(self, time: float) -> None:
+        """Put moving obstacles where they are after a time."""
         for geometry, obstacle in self._moving:
             geometry.placement = pin.SE3(
                 np.array(obstacle.rotation), obstacle.position + time * obstacle.velocity
             )
-        pin.computeDistances(self._model, self._data, self._geometry, data.geometry, q)
-        out[:] = data.results.read()
 
     def observe(self, obstacles: tuple[Obstacle, ...]) -> None:
         """Take where the obstacles are now and how fast they move.
@@ -173,6 +210,7 @@ class CollisionModel:
         if names != tuple(self._obstacles):
             raise HandrailError(f"obstacles: expected {', '.join(self._obstacles)}, got {', '.join(names)}")
         self._moving = []
+        self._last: tuple[FloatArray, FloatArray] | None = None
         for obstacle in obstacles:
             geometry = self._geometry.geometryObjects[self._obstacles[obstacle.name]]
             geometry.placement = pin.SE3(np.array(obstacle.rotation), np.array(obstacle.position))
@@ -203,8 +241,14 @@ class CollisionModel:
         return self._geometry.addGeometryObject(thing)
 
     def _pair_moves(self) -> FloatArray:
-        moves = [self._ancestors(pair) for pair in self._geometry.collisionPairs]
-        return np.array(moves).reshape(-1, 2, self._model.nv)
+        """Return which coordinates move the two shapes of every pair: 1 or 0, (P, 2, n)."""
+        moved = np.zeros((self._model.njoints, self._model.nv))
+        for joint in range(1, self._model.njoints):
+            moved[joint] = moved[self._model.parents[joint]]
+            moved[joint, self._model.joints[joint].idx_v] = 1.0
+        joints = [thing.parentJoint for thing in self._geometry.geometryObjects]
+        pairs = [(joints[pair.first], joints[pair.second]) for pair in self._geometry.collisionPairs]
+        return moved[np.array(pairs, dtype=int).reshape(-1, 2)]
 
     def _pair_levers(self, model: RobotModel) -> FloatArray:
         """Return how far a unit of each coordinate can bring a pair together at most, (n, P) [m].
@@ -212,7 +256,7 @@ class CollisionModel:
         A coordinate that moves both shapes alike does not; of one that moves a single shape it is the
         shape's lever arm.
         """
-        arms = {shape.name: lever_arms(model, shape) for shape in model.description.collision}
+        arms = all_lever_arms(model)
         none = np.zeros(model.size)
         either = (
             self._moves[:, 0] != self._moves[:, 1] if self.size else np.zeros((0, model.size), dtype=bool)
@@ -220,41 +264,10 @@ class CollisionModel:
         longer = [np.maximum(arms.get(a, none), arms.get(b, none)) for a, b in self.pairs]
         return (either * np.array(longer).reshape(-1, model.size)).T
 
-    def _ancestors(self, pair: pin.CollisionPair) -> FloatArray:
-        """Return which coordinates move the two shapes of a pair, (2, n)."""
-        moves = np.zeros((2, self._model.nv))
-        for row, index in enumerate((pair.first, pair.second)):
-            joint = self._geometry.geometryObjects[index].parentJoint
-            while joint > 0:
-                moves[row, self._model.joints[joint].idx_v] = 1.0
-                joint = self._model.parents[joint]
-        return moves
-
 
 def _nothing(count: int, size: int) -> Distances:
     """Return the distances of no pairs at all at `count` configurations."""
     return Distances(np.zeros((count, 0)), np.zeros((0, 2), dtype=int), np.zeros((0, size)))
-
-
-def lever_arms(model: RobotModel, placed: PlacedShape) -> FloatArray:
-    """Return bounds on how far a point of a shape moves per unit of each coordinate, (n,) [m].
-
-    1 for a prismatic joint; for a revolute one the length of the chain from its axis to the shape, and the
-    shape's own size; 0 for a joint that does not move it.
-    """
-    pinocchio, arms = model.pinocchio, np.zeros(model.size)
-    frame = pinocchio.frames[model.frame_id(placed.frame)]
-    size = float(np.linalg.norm(placed.shape.size)) if placed.shape.kind == "box" else placed.shape.size.sum()
-    reach = size + float(
-        np.linalg.norm(frame.placement.translation + frame.placement.rotation @ placed.placement.translation)
-    )
-    joint = frame.parentJoint
-    while joint > 0:
-        prismatic = pinocchio.joints[joint].shortname().startswith("JointModelP")
-        arms[pinocchio.joints[joint].idx_v] = 1.0 if prismatic else reach
-        reach += float(np.linalg.norm(pinocchio.jointPlacements[joint].translation))
-        joint = pinocchio.parents[joint]
-    return arms
 
 
 def _coal_shape(shape: Shape) -> coal.ShapeBase:

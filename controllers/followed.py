@@ -1,8 +1,7 @@
 """What the robot follows: the command that was sent last, and since when."""
 
+import math
 from dataclasses import dataclass
-
-import numpy as np
 
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.command import Command
@@ -24,7 +23,7 @@ class Followed:
 
     def elapsed(self, time: float) -> float:
         """Return how long ago it was sent, at a time, which may be no number [s]: then, one period."""
-        return max(time - self.time, 0.0) if np.isfinite(time) else self.period
+        return max(time - self.time, 0.0) if math.isfinite(time) else self.period
 
     def velocity(self, time: float) -> FloatArray:
         """Return what is commanded at a time, which may be no number, (n,)."""
@@ -32,9 +31,9 @@ class Followed:
 
     def accelerations(self, time: float, count: int) -> FloatArray:
         """Return what is commanded over `count` intervals from a time on, (count, n); zero after the end."""
-        return self.command.trajectory.after(self.elapsed(time)).accelerations(count)
+        return self.command.trajectory.accelerations(count, self.elapsed(time))
 
     def then(self, command: Command, time: float) -> "Followed":
         """Return what is followed after the next command, sent at a time, which may be no number."""
         elapsed = self.elapsed(time)
-        return Followed(command, time if np.isfinite(time) else self.time + elapsed, elapsed)
+        return Followed(command, time if math.isfinite(time) else self.time + elapsed, elapsed)

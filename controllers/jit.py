@@ -10,7 +10,16 @@ _SUMS = {"reassoc", "contract", "nsz"}  # sums may be reordered, so that they ru
 
 def jit(function: Callable[..., Any]) -> Callable[..., Any]:
     """Compile a function of numbers and arrays at its first call; the machine code is kept on disk."""
-    options = {"fastmath": _SUMS, "error_model": "numpy"}
+    return _compiled(function, fastmath=_SUMS)
+
+
+def exact_jit(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Compile a function without reordering anything, so that it returns numpy's numbers."""
+    return _compiled(function)
+
+
+def _compiled(function: Callable[..., Any], **options: Any) -> Callable[..., Any]:
+    options["error_model"] = "numpy"
     try:
         return numba.njit(cache=True, **options)(function)
     except RuntimeError:  # no folder to keep it in: compiled anew in every process

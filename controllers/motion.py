@@ -1,6 +1,8 @@
 """Arithmetic of motions under accelerations held over stages, in machine code."""
 
-from handrail.controllers.jit import jit
+import numpy as np
+
+from handrail.controllers.jit import exact_jit, jit
 
 
 @jit
@@ -48,11 +50,32 @@ def clipped_sum(first, second, limit, out):
 
 
 @jit
-def cut(values, limit, out):
-    """Write values, (N, m), within ± limit, (m,), to the first columns of an array."""
+def changed(q, v, dt, u, change, limit):
+    """Return positions and velocities, (N + 1, n), under changed accelerations, and these, within ± limit."""
+    horizon, n = u.shape
+    positions, velocities = np.empty((horizon + 1, n)), np.empty((horizon + 1, n))
+    within = np.empty((horizon, n))
+    clipped_sum(u, change, limit, within)
+    rollout(q, v, dt, within, positions, velocities)
+    return positions, velocities, within
+
+
+@exact_jit
+def near(commanded, measured, tolerance, limit):
+    """Return commanded velocities, within a tolerance of the measured ones and within ± limit, (n,)."""
+    velocity = np.empty(len(measured))
+    for j in range(len(measured)):
+        close = min(max(commanded[j], measured[j] - tolerance[j]), measured[j] + tolerance[j])
+        velocity[j] = min(max(close, -limit[j]), limit[j])
+    return velocity
+
+
+@jit
+def cut(values, mask, limit, out):
+    """Write values, (N, m), within ± limit, (m,), to the first columns of an array; 0 where mask is false."""
     for k in range(values.shape[0]):
         for j in range(values.shape[1]):
-            out[k, j] = min(max(values[k, j], -limit[j]), limit[j])
+            out[k, j] = min(max(values[k, j], -limit[j]), limit[j]) if mask[j] else 0.0
 
 
 @jit

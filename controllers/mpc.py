@@ -1,6 +1,7 @@
 """The masked model predictive controller: the operator steers a part, the optimum completes the rest."""
 
-from dataclasses import dataclass, replace
+import math
+from dataclasses import dataclass
 from time import perf_counter
 
 import numpy as np
@@ -18,7 +19,7 @@ from handrail.controllers.guard import check_inputs
 from handrail.controllers.intent import Intent
 from handrail.controllers.limiter import Limiter
 from handrail.controllers.model import RobotModel
-from handrail.controllers.motion import cut
+from handrail.controllers.motion import cut, near
 from handrail.controllers.objective import Objective
 from handrail.controllers.objectives.regularisation import (
     acceleration_regularisation,
@@ -132,8 +133,7 @@ class MaskedMpc:
         motion, planned = self._motion(state, plan, distances, status)
         if plan is not None and not planned:
             status = Status.BACKUP
-        health = self._health(state, intent, status, plan, distances)
-        health = replace(health, solve_time=perf_counter() - start)
+        health = self._health(state, intent, status, plan, distances, start)
         command = Command(motion.velocities, motion.dt, self._gripper(intent), health, motion.elapsed)
         self._plan = plan if planned else None
         self._remember(command, state.time)
@@ -144,8 +144,8 @@ class MaskedMpc:
         settings, size = self.settings, self.channels.size
         masked = self._of_mask(np.asarray(intent.mask), state.q)
         reference = self._reference.copy()
-        predicted = np.where(intent.mask, self._predict(intent, self._times), 0.0)
-        cut(predicted, self._largest, reference)
+        predicted = np.asarray(self._predict(intent, self._times), dtype=np.float64)
+        cut(predicted, intent.mask, self._largest, reference)
         self._parameters[self._frames] = intent.frames.parameters
         return Problem(
             q=state.q,
@@ -202,7 +202,8 @@ class MaskedMpc:
             velocity = np.zeros(self.model.size) if followed is None else followed.velocity(state.time)
             return self._backup.brake(velocity), False
         elapsed = 0.0 if self._followed is None else self._followed.elapsed(state.time)
-        situation = Situation(state.q, self._start_velocity(state), distances, elapsed)
+        start = self._start_velocity(state) if plan is None else plan.v[0]
+        situation = Situation(state.q, start, distances, elapsed)
         halt = status in (Status.INVALID_INTENT, Status.STALE_INTENT)
         way = self._backup.choose(situation, plan, halt)
         if plan is not None and way.planned:
@@ -211,13 +212,8 @@ class MaskedMpc:
 
     def _start_velocity(self, state: State) -> FloatArray:
         """Return the velocity that a command starts from: the commanded one, if the robot follows it."""
-        velocity, limit = state.v, self.model.description.limits.velocity
-        if self._followed is not None:
-            commanded = self._followed.velocity(state.time)
-            velocity = np.minimum(
-                np.maximum(commanded, velocity - self._tolerance), velocity + self._tolerance
-            )
-        return np.minimum(np.maximum(velocity, -limit), limit)
+        commanded = state.v if self._followed is None else self._followed.velocity(state.time)
+        return near(commanded, state.v, self._tolerance, self.model.description.limits.velocity)
 
     def _guess(self, time: float) -> FloatArray:
         """Return the accelerations that are being followed from a time on, (N, n)."""
@@ -234,7 +230,7 @@ class MaskedMpc:
     def _gripper(self, intent: Intent) -> float:
         """Return how far the gripper is closed: as asked, or as before where that is no number."""
         last = 0.0 if self._followed is None else self._followed.command.gripper
-        asked = float(intent.gripper) if np.isfinite(intent.gripper) else last
+        asked = float(intent.gripper) if math.isfinite(intent.gripper) else last
         return min(max(asked, 0.0), 1.0)
 
     def _distances(self, state: State, plan: Plan | None, status: Status) -> FloatArray | None:
@@ -244,16 +240,22 @@ class MaskedMpc:
         return self._collision.values(state.q[None, :])[0] if plan is None else plan.distances
 
     def _health(
-        self, state: State, intent: Intent, status: Status, plan: Plan | None, distances: FloatArray | None
+        self,
+        state: State,
+        intent: Intent,
+        status: Status,
+        plan: Plan | None,
+        distances: FloatArray | None,
+        start: float,
     ) -> Health:
         if distances is None:
-            return Health(status)
-        work = self._collision.work
-        smallest, at_work = smallest_distances(distances, work)
+            return Health(status, perf_counter() - start)
+        smallest, at_work = smallest_distances(distances, self._collision.work)
         if plan is None:
-            return Health(status, smallest_distance=smallest, work_distance=at_work)
+            return Health(status, perf_counter() - start, smallest_distance=smallest, work_distance=at_work)
         return Health(
             status,
+            solve_time=perf_counter() - start,
             smallest_distance=smallest,
             work_distance=at_work,
             slack=max(plan.collision_slack, plan.limit_slack),

@@ -8,6 +8,7 @@ import numpy as np
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.channels import Channels
 from handrail.controllers.intent import Intent
+from handrail.controllers.jit import copy, exact_jit, jit
 
 Prediction = Callable[[Intent, FloatArray], FloatArray]
 """The intent now and times ahead, (N,) [s] → predicted values on every channel, (N, m).
@@ -91,18 +92,30 @@ class Bounded:
     """
 
     def __init__(self, channels: Channels, distance: float = 0.4, angle: float = 1.5) -> None:
-        self._tool = channels.tool_slice
+        self._tool = channels.tool_slice.start
         self._distance, self._angle = distance, angle
 
     def __call__(self, intent: Intent, times: FloatArray) -> FloatArray:
         """Return the predicted values, (N, m)."""
-        values = np.array(constant(intent, times))
-        twist = np.where(intent.mask, intent.values, 0.0)[self._tool]
-        pace = max(
-            float(np.linalg.norm(twist[:3])) / self._distance, float(np.linalg.norm(twist[3:])) / self._angle
-        )
-        values[(times * pace > 1.0) & (times > times[0]), self._tool] = 0.0
-        return values
+        return _bounded(intent.values, intent.mask, times, self._tool, self._distance, self._angle)
+
+
+@jit
+def _bounded(values, mask, times, tool, distance, angle):
+    speed, rate = 0.0, 0.0
+    for axis in range(3):
+        if mask[tool + axis]:
+            speed += values[tool + axis] ** 2
+        if mask[tool + 3 + axis]:
+            rate += values[tool + 3 + axis] ** 2
+    pace = max(speed**0.5 / distance, rate**0.5 / angle)
+    predicted = np.empty((len(times), len(values)))
+    for k in range(len(times)):
+        copy(values, len(values), predicted[k])
+        if times[k] * pace > 1.0 and times[k] > times[0]:
+            for axis in range(6):
+                predicted[k, tool + axis] = 0.0
+    return predicted
 
 
 class Smoothed:
@@ -124,30 +137,39 @@ class Smoothed:
 
     def reset(self) -> None:
         """Begin at rest."""
-        self._last: Intent | None = None
-        self._level: FloatArray = np.zeros(0)
+        self._last: tuple[float, FloatArray, FloatArray] | None = None  # time, command and level
+        self._faded = b"", np.zeros(0)
         getattr(self._predict, "reset", lambda: None)()
 
     def __call__(self, intent: Intent, times: FloatArray) -> FloatArray:
         """Return the predicted values, (N, m)."""
-        command = _commanded(intent)
-        self._level = np.where(intent.mask, self._now(intent.time, command), 0.0)
-        self._last = intent
-        fade = np.exp(-times[:, None] / self._time_constant)
-        return self._predict(intent, times) + fade * (self._level - command)
-
-    def _now(self, time: float, command: FloatArray) -> FloatArray:
-        """Return the level at a time, under the command before, (m,)."""
         if self._last is None:
-            return np.zeros_like(command)
-        before = _commanded(self._last)
-        passed = max(time - self._last.time, 0.0)
-        return before + np.exp(-passed / self._time_constant) * (self._level - before)
+            rest = np.zeros(len(intent.values))
+            self._time_constant = self._time_constant + rest
+            self._last = intent.time, rest, rest
+        time, before, level = self._last
+        left = np.exp(-max(intent.time - time, 0.0) / self._time_constant)
+        command, level = _taken_up(intent.values, intent.mask, before, level, left)
+        self._last = intent.time, command, level
+        return self._predict(intent, times) + self._fade(times) * (level - command)
+
+    def _fade(self, times: FloatArray) -> FloatArray:
+        """Return `exp(-t / τ)`, remembered for the last times asked for, (N, m)."""
+        key = times.tobytes()
+        if key != self._faded[0]:
+            self._faded = key, np.exp(-times[:, None] / self._time_constant)
+        return self._faded[1]
 
 
-def _commanded(intent: Intent) -> FloatArray:
-    """Return the commanded values, zero on every other channel, (m,)."""
-    return np.where(intent.mask, intent.values, 0.0)
+@exact_jit
+def _taken_up(values, mask, before, level, left):
+    """Return command and level now: what is left of the way to the command before is `left` of it, (m,)."""
+    command, now = np.zeros(len(values)), np.zeros(len(values))
+    for channel in range(len(values)):
+        if mask[channel]:
+            command[channel] = values[channel]
+            now[channel] = before[channel] + left[channel] * (level[channel] - before[channel])
+    return command, now
 
 
 class Preview:

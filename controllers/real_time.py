@@ -11,7 +11,7 @@ from handrail.controllers.arrays import FloatArray
 from handrail.controllers.banded import factor
 from handrail.controllers.collision import Distances
 from handrail.controllers.constraints import SLACKS
-from handrail.controllers.motion import clipped_sum, largest_share
+from handrail.controllers.motion import changed, largest_share
 from handrail.controllers.nodes import Nodes
 from handrail.controllers.problem import Plan, Problem
 from handrail.controllers.residuals import StageResiduals
@@ -63,7 +63,7 @@ class RealTimeSolver:
         Right after the intent or the scene has jumped, the guess is far off; a step that is still large, and
         did not lead where its linearisation said, is followed by another.
         """
-        spent = np.zeros(len(_PHASES))
+        spent = [0.0] * len(_PHASES)
         for _ in range(1 + _MORE_STEPS):
             step = self._step(problem, guess, spent)
             if not step.again:
@@ -81,10 +81,10 @@ class RealTimeSolver:
             iterations=step.answer.changes,
             tracking_error=self.cost.tracking_error(problem),
             rows=step.rows,
-            phases=tuple(zip(_PHASES, spent.tolist(), strict=True)),
+            phases=tuple(zip(_PHASES, spent, strict=True)),
         )
 
-    def _step(self, problem: Problem, guess: FloatArray, spent: FloatArray) -> "_Step":
+    def _step(self, problem: Problem, guess: FloatArray, spent: list[float]) -> "_Step":
         """Take one step; add the time that its phases take."""
         start = perf_counter()
         begin = self._linearisation(problem, guess)
@@ -95,7 +95,9 @@ class RealTimeSolver:
         answer = self._solve(problem, quadratic, rows)
         moved = self._damped(problem, begin.u, quadratic.value, answer.slack, rows.needed)
         again = answer.solved and self._is_far(problem, quadratic.value, answer, moved)
-        spent += measured - start, built - measured, perf_counter() - built
+        spent[0] += measured - start
+        spent[1] += built - measured
+        spent[2] += perf_counter() - built
         return _Step(answer, moved, begin.distances.values[0], len(rows.names), again)
 
     def _is_far(self, problem: Problem, before: float, answer: "_Answer", moved: "_Moved") -> bool:
@@ -201,9 +203,7 @@ class _Moved(NamedTuple):
 
 def _rolled_out(problem: Problem, guess: FloatArray, change: FloatArray) -> tuple[FloatArray, ...]:
     """Return positions and velocities at the nodes, and accelerations within their limits."""
-    u = np.empty_like(guess)
-    clipped_sum(guess, change, problem.limits.acceleration, u)
-    return *problem.rollout(u), u
+    return changed(problem.q, problem.v, problem.dt, guess, change, problem.limits.acceleration)
 
 
 def _measured(problem: Problem, q: FloatArray, v: FloatArray, u: FloatArray) -> _Guess:

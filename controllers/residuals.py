@@ -97,13 +97,14 @@ class StageResiduals:
         return self._z, self._values
 
     def _take(self, q: FloatArray, v: FloatArray, u: FloatArray, parameters: FloatArray) -> None:
-        n = q.shape[1]
-        self._z[:, :n], self._z[:, n : 2 * n], self._z[:, 2 * n :] = q, v, u
+        for part, given in zip(self._parts, (q, v, u), strict=True):
+            part[:] = given
         self._p[:] = parameters
 
     def _compile(self, residual: ca.SX, z: ca.SX, p: ca.SX, horizon: int, n: int) -> None:
         curved = ca.densify(residual[self.curved.tolist()])
         self._z = np.zeros((horizon, 3 * n))
+        self._parts = self._z[:, :n], self._z[:, n : 2 * n], self._z[:, 2 * n :]
         self._p = np.zeros((horizon, p.shape[0]))
         self._values = np.zeros((horizon, len(self.curved)))
         self._jacobians = np.zeros((horizon, 3 * n, len(self.curved)))  # column-major in CasADi

@@ -24,23 +24,25 @@ class Rows:
         constraints: with keys that hold for this update only.
         names: of the distance rows, (R,): above all other keys, the same in the next update.
         needed: slacks that the guess itself needs, (2,).
+        first: key of the first distance row.
     """
 
     constraints: Constraints
     names: IntArray
     needed: FloatArray
+    first: int
 
     def any_distance(self, keys: IntArray) -> bool:
         """Whether there are distance rows among some keys."""
-        return bool(_largest(keys) >= first_distance(*self.constraints.guess.shape))
+        return bool(_largest(keys) >= self.first)
 
     def keys(self, names: IntArray) -> IntArray:
         """Return the keys of rows that were named in an earlier update, as far as they still exist."""
-        return _keys(names, self.names, first_distance(*self.constraints.guess.shape))
+        return _keys(names, self.names, self.first)
 
     def named(self, keys: IntArray) -> IntArray:
         """Return the lasting names of keys."""
-        return _names(keys, self.names, first_distance(*self.constraints.guess.shape))
+        return _names(keys, self.names, self.first)
 
 
 def rows_around(
@@ -58,7 +60,7 @@ def rows_around(
         matrix: of basis.py.
     """
     limits = problem.limits
-    constraints, names, needed = _rows(
+    constraints, names, needed, first = _rows(
         matrix,
         *motion,
         (limits.position_lower, limits.position_upper, limits.velocity, limits.acceleration),
@@ -68,7 +70,7 @@ def rows_around(
         problem.margins,
         nodes.gains,
     )
-    return Rows(Constraints(*constraints), names, needed)
+    return Rows(Constraints(*constraints), names, needed, first)
 
 
 @jit
@@ -110,7 +112,7 @@ def _rows(matrix, q, v, u, limits, near, gradients, values, margins, gains):
         names[kept] = first + pair * _NODES + node
         kept += 1
     needed[1] = max(over[0], over[1] / VELOCITY_SLACK)
-    return (matrix, guess, acceleration, offsets, scales, stage, coefficients, left), names, needed
+    return (matrix, guess, acceleration, offsets, scales, stage, coefficients, left), names, needed, first
 
 
 @jit

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray, frozen
-from handrail.controllers.jit import jit
+from handrail.controllers.jit import exact_jit, jit
 
 _ROUNDING = 1e-5  # of a time, relative: no later than the last knot
 
@@ -40,14 +40,18 @@ class Trajectory:
 
     def after(self, time: float) -> "Trajectory":
         """Return what is left of it `time` [s] from now: the same curve, without knots long past."""
-        passed = self.elapsed + max(time, 0.0)
-        whole = min(int(passed / self.dt), len(self.velocities) - 2)
-        return Trajectory(self.velocities[whole:], self.dt, passed - whole * self.dt)
+        whole, elapsed = self._past(time)
+        return Trajectory(self.velocities[whole:], self.dt, elapsed)
 
-    def accelerations(self, count: int) -> FloatArray:
-        """Return the mean accelerations over intervals dt from now on, (count, n); zero after the end."""
-        velocities = self._held(self.dt * np.arange(count + 1))
-        return (velocities[1:] - velocities[:-1]) / self.dt
+    def accelerations(self, count: int, time: float = 0.0) -> FloatArray:
+        """Return the mean accelerations over intervals dt, (count, n); zero after the end.
+
+        Args:
+            count: of intervals.
+            time: when the first one begins, from now [s].
+        """
+        whole, elapsed = self._past(time)
+        return _accelerations(self.velocities[whole:], self.dt, elapsed, count)
 
     def path(self, q: FloatArray, samples: int = 1) -> tuple[FloatArray, FloatArray]:
         """Return where it leads from q: positions, (K, n), and their times from now, (K,) [s].
@@ -62,6 +66,12 @@ class Trajectory:
         velocities = self._held(times)
         moves = 0.5 * np.diff(times)[:, None] * (velocities[:-1] + velocities[1:])
         return np.vstack([q, q + np.cumsum(moves, axis=0)]), times
+
+    def _past(self, time: float) -> tuple[int, float]:
+        """Return how many intervals are over `time` [s] from now, and how much of the next one [s]."""
+        passed = self.elapsed + max(time, 0.0)
+        whole = min(int(passed / self.dt), len(self.velocities) - 2)
+        return whole, passed - whole * self.dt
 
     def _held(self, times: FloatArray) -> FloatArray:
         """Return the velocities at times from now, (K,), the last one held after the end, (K, n)."""
@@ -78,4 +88,17 @@ def _held(velocities, knots):
         weight = knot - index
         for j in range(n):
             result[k, j] = (1.0 - weight) * velocities[index, j] + weight * velocities[index + 1, j]
+    return result
+
+
+@exact_jit
+def _accelerations(velocities, dt, elapsed, count):
+    knots = np.empty(count + 1)
+    for k in range(count + 1):
+        knots[k] = (dt * k + elapsed) / dt
+    held = _held(velocities, knots)
+    result = np.empty((count, velocities.shape[1]))
+    for k in range(count):
+        for j in range(velocities.shape[1]):
+            result[k, j] = (held[k + 1, j] - held[k, j]) / dt
     return result

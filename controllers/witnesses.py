@@ -5,7 +5,7 @@ A witness is `(n, p₁, p₂)`, (9,): the unit normal from the first shape to th
 
 import numpy as np
 
-from handrail.controllers.jit import jit
+from handrail.controllers.jit import copy, jit
 
 
 @jit
@@ -47,6 +47,35 @@ def lower_bounds(now, start, path, times, levers, speeds, reach):
             if bounds[k, p] < reach[p]:
                 close[p] = True
     return bounds, close
+
+
+@jit
+def raise_bounds(bounds, path, known, there, levers, reach):
+    """Raise lower bounds by those of another path among the same obstacles; return which are close.
+
+    `d_p(q_k) ≥ d_p(q'_k) - Σ_j L_jp |q_k - q'_k|_j`.
+
+    Args:
+        bounds: along a path, (K, P) [m].
+        path: configurations q, (K, n).
+        known: distances along another path, or lower bounds of them, (K, P) [m].
+        there: its configurations q', (K, n).
+        levers: L, (n, P).
+        reach: below which a pair is close, (P,) [m].
+    """
+    pairs = bounds.shape[1]
+    close, other = np.zeros(pairs, dtype=np.bool_), np.empty(pairs)
+    for k in range(len(path)):
+        copy(known[k], pairs, other)
+        for j in range(path.shape[1]):
+            moved = abs(path[k, j] - there[k, j])
+            for p in range(pairs):
+                other[p] -= levers[j, p] * moved
+        for p in range(pairs):
+            bounds[k, p] = max(bounds[k, p], other[p])
+            if bounds[k, p] < reach[p]:
+                close[p] = True
+    return close
 
 
 @jit

@@ -62,6 +62,40 @@ def test_what_is_skipped_is_far():
         cheap = collision.values(path, None, (path[0], exact[0]))
         assert np.all(cheap <= exact + 1e-5)
         np.testing.assert_allclose(cheap[exact < 0.15], exact[exact < 0.15], atol=1e-5)
+        reach = rng.uniform(0.0, 0.4, collision.size)
+        cheap, near = collision.values(path, None, (path[0], exact[0]), reach), exact < reach
+        assert np.all(cheap <= exact + 1e-5)
+        np.testing.assert_allclose(cheap[near], exact[near], atol=1e-5)
+
+
+def test_what_is_skipped_is_far_after_a_similar_trajectory():
+    """The memory of the last trajectory spares measurements, and changes nothing of what is near."""
+    rng = np.random.default_rng(5)
+    obstacles = scene(rng)
+    collision = CollisionModel(MODEL, obstacles)
+    skipped = 0
+    path = MODEL.description.home + np.cumsum(rng.uniform(-0.2, 0.2, (12, MODEL.size)), axis=0)
+    for _ in range(30):
+        path = path + rng.uniform(-0.01, 0.02, (12, MODEL.size))
+        exact, fresh = collision.values(path), CollisionModel(MODEL, obstacles).distances(path, reach=0.3)
+        distances = collision.distances(path, reach=0.3)
+        assert np.all(distances.values <= exact + 1e-5)
+        np.testing.assert_array_equal(distances.near, fresh.near)
+        np.testing.assert_allclose(distances.gradients, fresh.gradients, atol=1e-6)
+        skipped += np.sum(distances.values < exact - 1e-3) - np.sum(fresh.values < exact - 1e-3)
+    assert skipped > 0
+
+
+def test_what_was_far_of_an_obstacle_is_forgotten_when_it_has_moved():
+    far, near = (Obstacle("ball", Shape("sphere", [0.1]), [x, 0.0, 0.14]) for x in (9.0, -0.8))
+    collision, path = CollisionModel(MODEL, (far,)), np.tile(MODEL.description.home, (3, 1))
+    assert not np.any(collision.distances(path, reach=0.3).values[:, -1] < 0.3)
+    collision.observe((near,))
+    exact = collision.values(path)
+    distances = collision.distances(path, reach=0.3)
+    np.testing.assert_allclose(distances.values[exact < 0.3], exact[exact < 0.3], atol=1e-5)
+    row = collision.pairs.index(("chassis", "ball"))
+    assert np.all(distances.values[:, row] < 0.3)
 
 
 def test_moving_obstacles_are_where_they_will_be():

@@ -38,6 +38,8 @@ def test_a_path_is_the_integral_of_the_velocity(velocities, elapsed, samples):
 @given(KNOTS, st.floats(0.0, 0.25))
 def test_accelerations_lead_from_knot_to_knot(velocities, elapsed):
     trajectory = stopping(velocities, elapsed)
+    later = trajectory.after(0.7 * elapsed)
+    np.testing.assert_allclose(trajectory.accelerations(8, 0.7 * elapsed), later.accelerations(8), atol=1e-9)
     accelerations = trajectory.accelerations(8)
     reached = trajectory.velocity(0.0) + 0.1 * np.cumsum(accelerations, axis=0)
     expected = [trajectory.velocity(0.1 * k) for k in range(1, 9)]
