@@ -24,6 +24,8 @@ def training_record(
         final: evaluation of the actor on goals that nobody looked at before.
     """
     settings = {name: value for name, value in asdict(config).items() if name not in _PLACES}
+    if config.start_from:
+        settings["start_from"] = Path(config.start_from).name
     return {
         "algorithm": "soft actor-critic",
         "settings": settings,
