@@ -50,14 +50,13 @@ def _collected(results: TaskResults) -> Table:
     )  # fmt: skip
     rows = []
     for mode, each in results.collected.items():
-        share = None if each.successes is None else each.successes / each.attempts
         seconds = each.operator_time / each.successes if each.successes else None
         reasons = ", ".join(f"{reason} ({count})" for reason, count in each.reasons.items())
         rows.append(
             (
                 mode,
                 str(each.episodes),
-                percent(share),
+                percent(each.success),
                 percent_span(each.success_interval),
                 duration(each.operator_time),
                 number(seconds),
