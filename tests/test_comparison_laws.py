@@ -14,7 +14,12 @@ from handrail.datasets.comparison.evaluations import Arm, Policy
 from handrail.datasets.comparison.findings import findings
 from handrail.datasets.comparison.groups import Group
 from handrail.datasets.comparison.outcomes import judge, judge_pairs, one_family, welch_error, welch_p
-from handrail.datasets.comparison.proportions import holm, independent_trials
+from handrail.datasets.comparison.proportions import (
+    holm,
+    independent_trials,
+    paired_shares,
+    unpaired_shares,
+)
 from handrail.datasets.comparison.resampling import Run
 from handrail.datasets.paired import wilson
 from handrail.datasets.quality.catalogue import METRICS
@@ -190,6 +195,20 @@ def test_an_interval_over_scenes_covers(quick, hard):
     assert hard == 0.0 or naive < 170
 
 
+@pytest.mark.parametrize("paired", [True, False])
+def test_the_same_rollouts_three_times_say_no_more(paired):
+    one, other = (rng(14, k).random(100) < share for k, share in enumerate((0.7, 0.4)))
+    twice = list(np.tile(one, 3)), list(np.tile(other, 3))
+    scenes = [*range(100)] * 3
+    if paired:
+        once, again = paired_shares(one, other), paired_shares(*twice, scenes)
+    else:
+        once, again = unpaired_shares(one, other), unpaired_shares(*twice, (scenes, scenes))
+    assert again.estimate == pytest.approx(once.estimate)
+    assert again.interval == pytest.approx(once.interval, abs=2e-3)
+    assert again.error == pytest.approx(once.error, rel=0.03)
+
+
 def test_how_many_trials_scenes_are_worth():
     values = rng(12).integers(0, 2, size=300).astype(float)
     assert independent_trials(values, range(300)) == pytest.approx(300)
@@ -200,11 +219,14 @@ def test_how_many_trials_scenes_are_worth():
 
 
 def test_shares_that_differ_by_rounding_are_the_same():
-    """Warnings are errors here: a t test of numbers that differ by 1e-16 used to give one."""
-    members = [Run(0, seed, tuple(range(100)), np.array([1.0] * 57 + [0.0] * 43)) for seed in range(3)]
-    other = [Run(0, run.training_seed, run.seeds, np.roll(run.values, run.training_seed)) for run in members]
-    assert welch_p(members, other) == 1.0
-    assert welch_error(members, other) == (0.0, float("inf"))
+    """The standard deviation of three times 0.1 is 1e-17; a t test of that warns, and warnings are errors."""
+    few, more = (
+        [Run(0, seed, tuple(range(10)), np.roll([1.0] * k + [0.0] * (10 - k), seed)) for seed in range(3)]
+        for k in (1, 2)
+    )
+    assert welch_p(few, few) == 1.0
+    assert welch_p(few, more) == 0.0
+    assert welch_error(few, more) == (0.0, float("inf"))
 
 
 def test_an_arm_is_compared_with_the_baseline_of_its_own_kind():

@@ -108,7 +108,7 @@ def paired_shares(
         p=found.p_mcnemar,
         paired=True,
         trials=(found.pairs,),
-        error=float(np.sqrt(discordant / found.pairs / worth)),
+        error=float(np.sqrt(discordant / found.pairs)),
     )
 
 
