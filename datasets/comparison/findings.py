@@ -78,7 +78,7 @@ def _short(difference: OutcomeDifference, one: ArmOutcome, other: ArmOutcome) ->
     if not difference.detected:
         return f"Policies: no difference in success detected ({shares})"
     whose = "Policies trained on" if difference.nested else "The policy trained on"
-    word = "more often" if difference.nested else "more often, in one training run,"
+    word = "more often" if difference.nested else "more often in one training run"
     return f"{whose} {better.label} succeeded {word} ({shares})"
 
 
