@@ -9,6 +9,7 @@ from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import HandrailError
 
 _RESAMPLES = 5000
+_Z = float(stats.norm.ppf(0.975))
 
 
 @dataclass(frozen=True)
@@ -82,16 +83,24 @@ def paired_success(first: FloatArray, second: FloatArray) -> PairedSuccess:
     return PairedSuccess(len(one), only_first, only_second, p)
 
 
-def wilson(successes: int, trials: int) -> tuple[float, float]:
-    """Return Wilson's 95 % interval of a share.
+def wilson(successes: float, trials: float) -> tuple[float, float]:
+    """Return Wilson's 95 % interval of a share p of n trials.
+
+    (p + z²/2n ± z √(p (1 − p) / n + z²/4n²)) / (1 + z²/n).
+
+    Args:
+        successes: n p.
+        trials: n; not whole where trials depend on each other and so count for less than one.
 
     Raises:
         HandrailError: no trials, or more successes than trials.
     """
-    if not 0 <= successes <= trials or trials < 1:
+    if not 0.0 <= successes <= trials or trials <= 0.0:
         raise HandrailError(f"share: expected 0 <= successes <= trials, got {successes} of {trials}")
-    interval = stats.binomtest(successes, trials).proportion_ci(0.95, method="wilson")
-    return float(interval.low), float(interval.high)
+    share, square = successes / trials, _Z**2 / trials
+    half = float(np.sqrt(square * share * (1.0 - share) + 0.25 * square**2))
+    low, high = ((share + 0.5 * square + side * half) / (1.0 + square) for side in (-1.0, 1.0))
+    return (0.0 if successes == 0 else low), (1.0 if successes == trials else high)
 
 
 def _differences(first: FloatArray, second: FloatArray) -> FloatArray:

@@ -14,8 +14,8 @@ from handrail.datasets.comparison.proportions import (
     holm,
     newcombe_paired,
     newcombe_unpaired,
-    paired_difference,
-    unpaired_difference,
+    paired_shares,
+    unpaired_shares,
 )
 from handrail.datasets.comparison.resampling import Run, mean_interval, p_of_difference, resample_runs
 
@@ -57,8 +57,8 @@ def test_holm():
 
 def test_boschloo_is_symmetric_and_sees_more_than_fisher():
     """7 of 12 against 1 of 12: uniformly more powerful than Fisher's test."""
-    found = unpaired_difference([True] * 7 + [False] * 5, [True] + [False] * 11)
-    swapped = unpaired_difference([True] + [False] * 11, [True] * 7 + [False] * 5)
+    found = unpaired_shares([True] * 7 + [False] * 5, [True] + [False] * 11)
+    swapped = unpaired_shares([True] + [False] * 11, [True] * 7 + [False] * 5)
     assert (found.paired, found.trials) == (False, (12, 12))
     assert found.estimate == pytest.approx(0.5)
     assert swapped.p == pytest.approx(found.p)
@@ -67,15 +67,16 @@ def test_boschloo_is_symmetric_and_sees_more_than_fisher():
 
 def test_mcnemar():
     """Golden: 8 discordant pairs against 1, p = 2 · 10 / 512."""
-    pairs = paired_difference([1] * 8 + [0] + [1] * 11, [0] * 8 + [1] + [1] * 11)
+    pairs = paired_shares([1] * 8 + [0] + [1] * 11, [0] * 8 + [1] + [1] * 11)
     assert pairs.p == pytest.approx(20 / 512)
     assert pairs.estimate == pytest.approx(7 / 20)
 
 
 def test_what_is_detectable_shrinks_with_the_root_of_the_trials():
-    few, many = (unpaired_difference([True, False] * n, [True, False] * n) for n in (10, 40))
-    assert few.detectable == pytest.approx(2.8016 * np.sqrt(0.5 / 20), rel=1e-3)
-    assert many.detectable == pytest.approx(0.5 * few.detectable, rel=1e-3)
+    few, many = (unpaired_shares([True, False] * n, [True, False] * n) for n in (10, 40))
+    assert few.detectable() == pytest.approx(2.8016 * np.sqrt(0.5 / 20), rel=1e-3)
+    assert many.detectable() == pytest.approx(0.5 * few.detectable(), rel=1e-3)
+    assert many.detectable(9) == pytest.approx((2.7730 + 0.8416) / 2.8016 * many.detectable(), rel=1e-3)
 
 
 def test_a_mean_of_few_has_no_interval():

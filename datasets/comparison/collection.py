@@ -4,15 +4,10 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from handrail.datasets.comparison.groups import Group
-from handrail.datasets.comparison.proportions import ShareDifference, paired_difference, unpaired_difference
+from handrail.datasets.comparison.proportions import ShareDifference, paired_shares, unpaired_shares
 from handrail.datasets.comparison.resampling import Interval
 from handrail.datasets.paired import wilson
-from handrail.datasets.quality.demonstration import Demonstration
-
-_SHARED = 0.8  # of the smaller group's seeds: from here on episodes are compared as pairs
 
 
 @dataclass(frozen=True)
@@ -22,7 +17,6 @@ class Collected:
     Attributes:
         label: Its name.
         episodes: Number recorded.
-        attempts: With those that were thrown away, where the metadata says (`attempts`); else `episodes`.
         successes: How many succeeded; None where success was not recorded for all.
         success_interval: Wilson, 95 %.
         operator_time: Of all episodes, failures included: frames over frames a second [s]. Resets between
@@ -33,7 +27,6 @@ class Collected:
 
     label: str
     episodes: int
-    attempts: int
     successes: int | None
     success_interval: Interval | None
     operator_time: float
@@ -41,9 +34,14 @@ class Collected:
     reasons: Mapping[str, int]
 
     @property
+    def success(self) -> float | None:
+        """Share of the episodes that succeeded."""
+        return None if self.successes is None else self.successes / self.episodes
+
+    @property
     def failure_share(self) -> float | None:
-        """Share of the attempts that did not become a successful episode."""
-        return None if self.successes is None else 1.0 - self.successes / self.attempts
+        """Share of the episodes that failed."""
+        return None if self.success is None else 1.0 - self.success
 
     @property
     def successes_an_hour(self) -> float | None:
@@ -56,7 +54,6 @@ def collected(group: Group) -> Collected:
     results = [episode.success for episode in group.episodes]
     known = all(result is not None for result in results)
     successes = sum(map(bool, results)) if known else None
-    attempts = sum(_attempts(episode) for episode in group.episodes)
     reasons = Counter(
         str(episode.meta.get("failure_reason") or "not recorded")
         for episode in group.episodes
@@ -65,37 +62,32 @@ def collected(group: Group) -> Collected:
     return Collected(
         label=group.label,
         episodes=len(group.episodes),
-        attempts=attempts,
         successes=successes,
-        success_interval=None if successes is None else wilson(successes, attempts),
+        success_interval=None if successes is None else wilson(successes, len(results)),
         operator_time=sum(episode.seconds for episode in group.episodes),
         frames=sum(episode.count for episode in group.episodes),
         reasons=dict(reasons.most_common()),
     )
 
 
-def _attempts(episode: Demonstration) -> int:
-    value = episode.meta.get("attempts")
-    return max(1, int(value)) if isinstance(value, int | float) and np.isfinite(value) else 1
-
-
 def shared_seeds(one: Group, other: Group) -> list[tuple[int, int]]:
-    """Return places of episodes with the same start, as pairs; none where too few have one.
+    """Return places of episodes with the same start, as pairs; none unless every episode has its pair.
 
-    Two episodes begin alike if task sentences and seed are the same. Seeds must be unique in each group.
+    Two episodes begin alike if task sentences and seed are the same. Seeds must be unique in each group. With
+    only some of them paired, what is compared would not be what is shown.
     """
     places = [_starts(group) for group in (one, other)]
-    common = [key for key in places[0] if key in places[1]]
-    if len(common) < max(2.0, _SHARED * min(len(one.episodes), len(other.episodes))):
+    if len(one.episodes) < 2 or places[0].keys() != places[1].keys():
         return []
-    return [(places[0][key], places[1][key]) for key in common]
+    return [(place, places[1][key]) for key, place in places[0].items()]
 
 
 def _starts(group: Group) -> dict[tuple[str, int], int]:
-    keys = [(str(e.meta.get("tasks")), e.meta.get("seed")) for e in group.episodes]
-    if len(set(keys)) < len(keys):
+    known = [(str(e.meta.get("tasks")), e.meta.get("seed")) for e in group.episodes]
+    keys = [(task, seed) for task, seed in known if isinstance(seed, int)]
+    if len(set(keys)) < len(known):
         return {}
-    return {(task, seed): place for place, (task, seed) in enumerate(keys) if isinstance(seed, int)}
+    return {key: place for place, key in enumerate(keys)}
 
 
 def success_difference(group: Group, baseline: Group) -> ShareDifference | None:
@@ -105,9 +97,9 @@ def success_difference(group: Group, baseline: Group) -> ShareDifference | None:
         return None
     one, other = [list(map(bool, each)) for each in results]
     pairs = shared_seeds(group, baseline)
-    if len(pairs) == len(one) == len(other):
-        return paired_difference([one[i] for i, _ in pairs], [other[j] for _, j in pairs])
-    return unpaired_difference(one, other)
+    if pairs:
+        return paired_shares([one[i] for i, _ in pairs], [other[j] for _, j in pairs])
+    return unpaired_shares(one, other)
 
 
 def matched_number(groups: Sequence[Group]) -> list[Group]:

@@ -16,13 +16,15 @@ from handrail.datasets.comparison.collection import (
 from handrail.datasets.comparison.config import CompareConfig
 from handrail.datasets.comparison.differences import Difference, differences
 from handrail.datasets.comparison.evaluations import Arm, read_evaluations
-from handrail.datasets.comparison.groups import Group, baseline_of, load_groups
+from handrail.datasets.comparison.groups import Group, baseline_of, group_of, load_groups
 from handrail.datasets.comparison.means import Means, means
-from handrail.datasets.comparison.outcomes import Outcomes, judge
+from handrail.datasets.comparison.outcomes import Outcomes, judge_pairs
 from handrail.datasets.comparison.productivity import RateRatio, rate_interval, rate_ratio
 from handrail.datasets.comparison.proportions import ShareDifference
 from handrail.datasets.comparison.resampling import Interval
 from handrail.datasets.quality.measure import Measurements, measure
+
+_SAME_NUMBER = "the same number of episodes"
 
 
 @dataclass(frozen=True)
@@ -74,6 +76,11 @@ class Comparison:
         return self.views[0]
 
     @property
+    def same_number(self) -> View:
+        """The view of as many episodes of each group."""
+        return self.views[1]
+
+    @property
     def labels(self) -> list[str]:
         """Labels of the groups."""
         return [group.label for group in self.everything.groups]
@@ -89,10 +96,11 @@ def compare(config: CompareConfig) -> Comparison:
     groups = load_groups(config.datasets, config.by, config.labels, config.columns)
     baseline = baseline_of(groups, config.baseline)
     arms = _arms(config, groups)
+    pairs = _pairs(list(arms), baseline, [group.label for group in groups])
     rng = np.random.default_rng(config.seed)
     chosen = {
         "all episodes": groups,
-        "the same number of episodes": matched_number(groups),
+        _SAME_NUMBER: matched_number(groups),
         "the same operator time": matched_time(groups),
     }
     views = [_view(title, each, baseline, config, rng) for title, each in chosen.items()]
@@ -101,7 +109,7 @@ def compare(config: CompareConfig) -> Comparison:
     success = {group.label: success_difference(group, base) for group in others}
     rates = {group.label: rate_interval(group, rng) for group in groups}
     ratios = {group.label: rate_ratio(group, base, rng) for group in others}
-    outcomes = judge(arms, baseline if baseline in arms else next(iter(arms)), rng) if arms else None
+    outcomes = judge_pairs(arms, pairs, rng) if arms else None
     return Comparison(config, baseline, views, success, rates, ratios, outcomes)
 
 
@@ -112,6 +120,8 @@ def _view(
     for group in measured:
         if not group.episodes:
             raise HandrailError(f"--success_only: {group.label!r} has no successful episode among {title}")
+    if title == _SAME_NUMBER:  # of those that count; as many were collected
+        measured = matched_number(measured)
     measurements = measure({group.label: group.episodes for group in measured}, rng, config.margin)
     found = differences(measured, measurements, baseline, rng)
     counted = [collected(group) for group in groups]
@@ -123,9 +133,32 @@ def _arms(config: CompareConfig, groups: Sequence[Group]) -> dict[str, Arm]:
     arms = read_evaluations(config.evaluations)
     labels = [group.label for group in groups]
     for label in arms:
-        if not any(label == known or label.startswith((f"{known} ", f"{known}/")) for known in labels):
+        if not group_of(label, labels):
             raise HandrailError(
                 f"evaluations: unknown arm {label!r}, expected one of {', '.join(labels)},"
                 " or one of these with more after a space"
             )
     return arms
+
+
+def _pairs(arms: Sequence[str], baseline: str, labels: Sequence[str]) -> list[tuple[str, str]]:
+    """Return each arm of another group with the arm of the baseline's group that it is compared with.
+
+    That is the one that shares most of the words after the label and has none of its own: `ee intent same
+    number` is set against `direct same number`, not `direct`.
+
+    Raises:
+        HandrailError: There is none.
+    """
+    words = {arm: arm.removeprefix(group_of(arm, labels)).strip(" /").split() for arm in arms}
+    candidates = [arm for arm in arms if group_of(arm, labels) == baseline]
+    found = []
+    for arm in arms:
+        fitting = [each for each in candidates if set(words[each]) <= set(words[arm])]
+        if arm not in candidates and not fitting:
+            raise HandrailError(
+                f"evaluations: expected an arm {baseline!r} to compare {arm!r} with, got {', '.join(arms)};"
+                " name another --baseline"
+            )
+        found += [(arm, max(fitting, key=lambda each: len(words[each])))] if arm not in candidates else []
+    return found

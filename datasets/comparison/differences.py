@@ -9,7 +9,7 @@ from scipy import stats
 from handrail.controllers.arrays import FloatArray
 from handrail.datasets.comparison.collection import shared_seeds
 from handrail.datasets.comparison.groups import Group
-from handrail.datasets.comparison.proportions import holm
+from handrail.datasets.comparison.proportions import LEVEL, holm
 from handrail.datasets.comparison.resampling import (
     FEWEST,
     RESAMPLES,
@@ -18,9 +18,11 @@ from handrail.datasets.comparison.resampling import (
     percentiles,
 )
 from handrail.datasets.quality.catalogue import METRICS, Metric
-from handrail.datasets.quality.measure import Measurements
+from handrail.datasets.quality.measure import Measured, Measurements
 
 FOLLOWS = 0.5  # |Spearman's ρ| with length from which a metric counts as following it
+
+_TOO_FEW = f"fewer than {FEWEST} episodes of a group have a value"
 
 
 @dataclass(frozen=True)
@@ -34,11 +36,13 @@ class Difference:
         reason: Why there is no difference to speak of; "" if there is one.
         paired: Whether episodes with the same start were compared.
         counts: Episodes of both that count.
+        tested: Whether there are interval and p. Not for a metric of a group: the values of its episodes
+            share neighbours, and resampling would take them for independent.
         estimate: In the metric's unit.
         interval: 95 %, bootstrap.
         spread: Standard deviation within groups, pooled.
         p: Permutation test, two-sided.
-        p_adjusted: By Holm, over all metrics and groups.
+        p_adjusted: By Holm, over all metrics and groups that are tested.
         at_length: The estimate with the metric's linear dependence on length, within groups, taken off.
         at_length_interval: 95 %, bootstrap.
         follows_length: Spearman's ρ with episode length within groups.
@@ -50,6 +54,7 @@ class Difference:
     reason: str = ""
     paired: bool = False
     counts: tuple[int, int] = (0, 0)
+    tested: bool = True
     estimate: float = float("nan")
     interval: Interval = (float("nan"), float("nan"))
     spread: float = float("nan")
@@ -62,7 +67,9 @@ class Difference:
     @property
     def detected(self) -> bool:
         """Whether the interval leaves zero out and the adjusted p is below 0.05."""
-        return not self.reason and self.p_adjusted < 0.05 and not self.interval[0] <= 0.0 <= self.interval[1]
+        if self.reason or not self.tested:
+            return False
+        return self.p_adjusted < LEVEL and not self.interval[0] <= 0.0 <= self.interval[1]
 
     @property
     def effect(self) -> tuple[float, float, float]:
@@ -91,9 +98,8 @@ def differences(
     (base,) = [group for group in groups if group.label == baseline]
     others = [group for group in groups if group.label != baseline]
     found = [_difference(metric, group, base, measurements, rng) for group in others for metric in METRICS]
-    known = [difference for difference in found if not difference.reason]
-    adjusted = iter(holm([difference.p for difference in known]))
-    return [d if d.reason else replace(d, p_adjusted=next(adjusted)) for d in found]
+    adjusted = iter(holm([d.p for d in found if d.tested and not d.reason]))
+    return [replace(d, p_adjusted=next(adjusted)) if d.tested and not d.reason else d for d in found]
 
 
 def _difference(
@@ -106,16 +112,29 @@ def _difference(
             return Difference(**names, reason=f"{each.label}: {values.reason}")
     if not measurements.comparable(metric, group.label, base.label):
         return Difference(**names, reason="the datasets have different columns, so there is no common scale")
+    if metric.of_group:
+        return _described(Difference(**names, tested=False), measured[0], measured[1])
     pairs = _finite_pairs(shared_seeds(group, base), measured[0].values, measured[1].values)
     chosen = _chosen(pairs, measured[0].values, measured[1].values)
     if min(map(len, chosen)) < FEWEST:
-        return Difference(**names, reason=f"fewer than {FEWEST} episodes of a group have a value")
+        return Difference(**names, reason=_TOO_FEW)
     values = [each.values[places] for each, places in zip(measured, chosen, strict=True)]
     lengths = [
         np.array([episode.seconds for episode in each.episodes])[places]
         for each, places in zip((group, base), chosen, strict=True)
     ]
     return replace(Difference(**names), **_compared(values, lengths, bool(pairs), rng))
+
+
+def _described(difference: Difference, one: Measured, other: Measured) -> Difference:
+    """Return how a metric of a group differs, without a test, where the groups have as many episodes."""
+    counts = int(np.isfinite(one.values).sum()), int(np.isfinite(other.values).sum())
+    if min(counts) < FEWEST:
+        return replace(difference, reason=_TOO_FEW)
+    if len(one.values) != len(other.values):
+        return replace(difference, reason="it depends on the number of episodes: see the same number")
+    estimate = float(np.nanmean(one.values) - np.nanmean(other.values))
+    return replace(difference, counts=counts, estimate=estimate)
 
 
 def _finite_pairs(

@@ -20,8 +20,8 @@ where every rollout of an arm has them. Several files add up; the same rollout t
 """
 
 import json
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Set
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -50,6 +50,11 @@ class Policy:
     trained_on: Mapping[str, float]
     rollouts: Mapping[int, Mapping[str, float]]
 
+    @property
+    def key(self) -> tuple[int, int]:
+        """Draw of the dataset and training seed."""
+        return self.draw, self.training_seed
+
     def run(self, outcome: str) -> Run:
         """Return one outcome of all rollouts."""
         seeds = tuple(sorted(self.rollouts))
@@ -76,6 +81,24 @@ class Arm:
         common = set.intersection(*(set(rollout) for rollout in rollouts))
         return (SUCCESS, *sorted(common - {SUCCESS}))
 
+    @property
+    def rollouts(self) -> frozenset[tuple[int, int, int]]:
+        """Draw, training seed and evaluation seed of every rollout."""
+        return frozenset((*each.key, seed) for each in self.policies for seed in each.rollouts)
+
+    def only(self, rollouts: Set[tuple[int, int, int]]) -> "Arm | None":
+        """Return the arm with some of its rollouts; None if it has none of these.
+
+        Args:
+            rollouts: Draw, training seed and evaluation seed of each.
+        """
+        fewer = [
+            replace(each, rollouts={k: v for k, v in each.rollouts.items() if (*each.key, k) in rollouts})
+            for each in self.policies
+        ]
+        kept = tuple(each for each in fewer if each.rollouts)
+        return Arm(self.label, kept) if kept else None
+
     def runs(self, outcome: str = SUCCESS) -> list[Run]:
         """Return one outcome of all policies."""
         return [policy.run(outcome) for policy in self.policies]
@@ -97,7 +120,7 @@ def read_evaluations(paths: Iterable[str | Path]) -> dict[str, Arm]:
 
 
 def _add(known: dict[tuple[int, int], Policy], policy: Policy, where: str) -> None:
-    key = (policy.draw, policy.training_seed)
+    key = policy.key
     before = known.get(key)
     if before is None:
         known[key] = policy

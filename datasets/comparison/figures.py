@@ -10,7 +10,7 @@ from handrail.datasets.comparison.collection import Collected
 from handrail.datasets.comparison.compare import Comparison
 from handrail.datasets.comparison.differences import Difference
 from handrail.datasets.comparison.drawing import COLOURS, GREY, INK, new_figure, svg, tidy
-from handrail.datasets.comparison.groups import Group
+from handrail.datasets.comparison.groups import Group, group_of
 from handrail.datasets.comparison.means import Mean
 from handrail.datasets.comparison.outcomes import ArmOutcome
 
@@ -21,8 +21,7 @@ def colours(comparison: Comparison) -> dict[str, str]:
     """Return a colour for each group, and each arm of policies that belongs to it."""
     found: dict[str, str] = dict(zip(comparison.labels, COLOURS, strict=False))
     for arm in comparison.outcomes.arms if comparison.outcomes else ():
-        mine = [label for label in comparison.labels if arm.label.startswith(label)]
-        found.setdefault(arm.label, found[max(mine, key=len)])
+        found.setdefault(arm.label, found[group_of(arm.label, comparison.labels)])
     return found
 
 
@@ -52,17 +51,19 @@ def _arms(axes: Any, arms: Sequence[ArmOutcome], known: dict[str, str]) -> None:
             axes.plot(np.multiply(100, arm.nested), [row, row], color=colour, lw=1.6)
         axes.plot(np.multiply(100, arm.seeds), np.full(len(arm.seeds), row + 0.24), "|", color=colour, ms=6)
         axes.plot(100 * arm.share, row, "o", color=colour, ms=8, mec="white")
-    axes.set(title="policy success, 95 %: thick rollouts, thin training too; ticks: each seed", xlabel="%")
+    axes.set(
+        title="policy success, 95 %: thick these policies, thin training too; ticks: each seed", xlabel="%"
+    )
     _labelled(axes, [arm.label for arm in arms])
 
 
 def _shares(axes: Any, collected: Sequence[Collected], known: dict[str, str]) -> None:
     for row, each in enumerate(collected):
-        if each.successes is None or each.success_interval is None:
+        if each.success is None or each.success_interval is None:
             axes.text(50, row, "not recorded", ha="center", va="center", color=GREY, size=8.5)
             continue
         axes.plot(np.multiply(100, each.success_interval), [row, row], color=known[each.label], lw=2.2)
-        axes.plot(100 * each.successes / each.attempts, row, "o", color=known[each.label], ms=8, mec="white")
+        axes.plot(100 * each.success, row, "o", color=known[each.label], ms=8, mec="white")
     axes.set(title="success while collecting, 95 % (Wilson)", xlabel="%")
     _labelled(axes, [each.label for each in collected])
 
@@ -89,7 +90,7 @@ def _over_time(axes: Any, groups: Sequence[Group], known: dict[str, str]) -> Non
 def effects_figure(comparison: Comparison) -> str:
     """Return every metric's difference in standard deviations, with its interval."""
     known = colours(comparison)
-    found = [each for each in comparison.everything.differences if not each.reason]
+    found = [each for each in comparison.everything.differences if each.tested and not each.reason]
     titles = list(dict.fromkeys(each.metric.title for each in found))
     figure = new_figure(10.4, max(1.6, 1.0 + 0.27 * len(titles)))
     axes = figure.subplots()

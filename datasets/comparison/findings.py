@@ -78,7 +78,7 @@ def _short(difference: OutcomeDifference, one: ArmOutcome, other: ArmOutcome) ->
     if not difference.detected:
         return f"Policies: no difference in success detected ({shares})"
     whose = "Policies trained on" if difference.nested else "The policy trained on"
-    word = "more often" if difference.nested else "more often, in one training run,"
+    word = "more often" if difference.nested else "more often in one training run"
     return f"{whose} {better.label} succeeded {word} ({shares})"
 
 
@@ -110,7 +110,7 @@ def _collection(comparison: Comparison) -> Iterator[Finding]:
             text = f"Whether episodes succeeded was not recorded for all of {label} and {other.label}."
             yield Finding("collection", text)
             continue
-        yield _success(difference, adjusted[label], one, other)
+        yield _success(difference, adjusted[label], len(adjusted), one, other)
         ratio = comparison.ratios[label]
         if ratio:
             yield _rate(ratio, ratios[label], one, other)
@@ -121,17 +121,17 @@ def _adjusted(found: Mapping[str, ShareDifference | RateRatio | None]) -> dict[s
     return dict(zip(known, holm(list(known.values())), strict=True))
 
 
-def _success(difference: ShareDifference, p: float, one: Collected, other: Collected) -> Finding:
+def _success(difference: ShareDifference, p: float, tests: int, one: Collected, other: Collected) -> Finding:
     low, high = difference.interval
     told = f"{_told(one)}; {_told(other)}. Difference {points_span(difference.interval)} points (95 %)"
-    shares = f"{one.label} {_share(one)}, {other.label} {_share(other)}"
+    shares = f"{one.label} {percent(one.success)}, {other.label} {percent(other.success)}"
     if p < 0.05 and not low <= 0.0 <= high:
         word = "more" if difference.estimate > 0 else "fewer"
         text = f"With {one.label}, {word} episodes succeeded while collecting: {told}, {p_value(p)}."
         return Finding("collection", text, True, f"With {one.label}, {word} episodes succeeded ({shares})")
     text = (
         f"Success while collecting: {told}, no difference detected; one below about"
-        f" {100 * difference.detectable:.0f} points would often go unseen."
+        f" {100 * difference.detectable(tests):.0f} points would often go unseen."
     )
     return Finding("collection", text, False, f"Collecting: no difference in success detected ({shares})")
 
@@ -151,17 +151,15 @@ def _rate(ratio: RateRatio, p: float, one: Collected, other: Collected) -> Findi
     return Finding("collection", f"{text}.", True, short)
 
 
-def _share(each: Collected) -> str:
-    return percent(None if each.successes is None else each.successes / each.attempts)
-
-
 def _told(one: Collected) -> str:
-    return f"{one.label} {one.successes} of {one.attempts} in {duration(one.operator_time)}"
+    return f"{one.label} {one.successes} of {one.episodes} in {duration(one.operator_time)}"
 
 
 def _quality(comparison: Comparison) -> Iterator[Finding]:
     for label in comparison.success:
-        mine = [d for d in comparison.everything.differences if d.label == label and not d.reason]
+        mine = [
+            d for d in comparison.everything.differences if d.label == label and d.tested and not d.reason
+        ]
         detected = sorted((d for d in mine if d.detected), key=lambda d: -abs(d.effect[0]))
         for difference in detected[:_SHOWN]:
             yield Finding("quality", _metric(difference), detected=True)
@@ -172,6 +170,24 @@ def _quality(comparison: Comparison) -> Iterator[Finding]:
         if rest:
             text = f"{label} and {comparison.baseline}: no difference detected in {', '.join(rest)}."
             yield Finding("quality", f"{text} That is not evidence of equality.")
+        yield from _described(comparison, label)
+
+
+def _described(comparison: Comparison, label: str) -> Iterator[Finding]:
+    """Return what metrics of a whole group say, at the same number of episodes: in words, without a test."""
+    view, told, count = comparison.same_number, [], 0
+    for each in view.differences:
+        if each.label == label and not each.tested and not each.reason:
+            values = view.means[each.metric.name]
+            count = max(each.counts)
+            both = f"{number(values[label].mean)} against {number(values[each.baseline].mean)}"
+            told.append(f"{each.metric.title} {both}{unit(each.metric)}")
+    if told:
+        yield Finding(
+            "quality",
+            f"{label} and {comparison.baseline}, {count} episodes of each: {', '.join(told)}. These depend on"
+            " the number of episodes and are described, not tested: no difference is claimed.",
+        )
 
 
 def _metric(difference: Difference) -> str:
@@ -196,7 +212,7 @@ def _cautions(comparison: Comparison) -> Iterator[str]:
             " describe data and have often misjudged it."
         )
     else:
-        yield from _training(comparison.outcomes)
+        yield from training_cautions(comparison.outcomes)
     if len({group.info.fps for group in groups}) > 1:
         rates = ", ".join(f"{group.label} {group.info.fps} Hz" for group in groups)
         yield f"Frame rates differ ({rates}): smoothness and idle time are only roughly comparable."
@@ -210,7 +226,8 @@ def _cautions(comparison: Comparison) -> Iterator[str]:
         yield f"Few episodes ({', '.join(few)}): intervals of means are rough below about 20."
 
 
-def _training(outcomes: Outcomes) -> Iterator[str]:
+def training_cautions(outcomes: Outcomes) -> Iterator[str]:
+    """Return what the policies' intervals and tests leave out."""
     few = [arm.label for arm in outcomes.arms if len(arm.seeds) < SEEDS]
     if few:
         yield (

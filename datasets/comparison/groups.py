@@ -92,6 +92,12 @@ def baseline_of(groups: Sequence[Group], name: str) -> str:
     return name or labels[0]
 
 
+def group_of(arm: str, labels: Sequence[str]) -> str:
+    """Return the group whose data an arm's policies saw: the longest label that it begins with, or ""."""
+    known = (label for label in labels if f"{arm} ".startswith((f"{label} ", f"{label}/")))
+    return max(known, key=len, default="")
+
+
 def _names(roots: Sequence[str | Path], labels: Sequence[str]) -> list[str]:
     if labels and len(labels) != len(roots):
         raise HandrailError(f"--labels: expected {len(roots)} names, got {len(labels)}")

@@ -27,10 +27,13 @@ from handrail.datasets.quality.catalogue import METRICS
 
 _HOW = (
     "Every interval is 95 %. Shares: Wilson; their differences: Newcombe's method 10, exact McNemar test"
-    " where the same seeds were tried under both, Boschloo's where not. Several trained policies: bootstrap"
-    " over dataset draw, training seed and evaluation seed, nested, and Welch's t test over the policies."
-    " Means of metrics: bootstrap over episodes and permutation tests, paired by seed where episodes began"
-    " alike. A difference counts as detected if its intervals leave zero out and p stays below 0.05 after"
+    " where the same seeds were tried under both, Boschloo's where not. Several trained policies that met the"
+    " same scenes: “these policies” takes the scene for the unit; “with training” is a bootstrap over dataset"
+    " draw, training seed and evaluation seed, nested, and Welch's t test over the policies has to agree."
+    " Means of metrics: bootstrap over episodes and permutation tests, paired by seed where every episode has"
+    " one that began alike. What needs all episodes of a group at once (action variance, state coverage,"
+    " mutual information) depends on their number: it is described at the same number and not tested."
+    " A difference counts as detected if its intervals leave zero out and p stays below 0.05 after"
     " Holm's correction over all comparisons of its kind. “Detectable” is the difference that would be"
     " detected in 80 % of such experiments. ↔ marks metrics that follow the length of the episodes"
     " (Spearman's |ρ| ≥ 0.5); “same length” is the difference with that taken off by analysis of covariance."
@@ -94,9 +97,7 @@ def _card(each: Collected, arm: ArmOutcome | None, rates: Interval | None, colou
         f"{rate} successes per operator hour" if each.successes is not None else "success was not recorded",
     ]
     if arm:
-        collecting = (
-            f"collecting: {percent(each.successes / each.attempts)}" if each.successes is not None else ""
-        )
+        collecting = f"collecting: {percent(each.success)}" if each.success is not None else ""
         first = f"policy success, {percent_span(arm.nested or arm.wilson)} (95 %)"
         return card(
             each.label, colour, percent(arm.share), [first, *([collecting] if collecting else []), *lines]
@@ -104,7 +105,7 @@ def _card(each: Collected, arm: ArmOutcome | None, rates: Interval | None, colou
     if each.successes is None:
         return card(each.label, colour, f"{each.episodes} episodes", lines)
     first = f"succeeded while collecting, {percent_span(each.success_interval)} (95 %)"
-    return card(each.label, colour, percent(each.successes / each.attempts), [first, *lines])
+    return card(each.label, colour, percent(each.success), [first, *lines])
 
 
 def _findings(found: list[Finding]) -> str:
@@ -125,7 +126,8 @@ def _quality(comparison: Comparison) -> list[str]:
 
 def _matched_note() -> str:
     text = (
-        "The first episodes of each, as many as the smallest has, or as fit into the shortest operator time."
+        "The first episodes of each, as many as the smallest has, or as fit into the shortest operator time:"
+        " where persons took turns, the last of them may be missing."
     )
     return paragraph(f"{text} The columns “same number” and “same time” above are of these.", "quiet")
 

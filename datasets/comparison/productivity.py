@@ -49,11 +49,9 @@ def rate_ratio(group: Group, baseline: Group, rng: np.random.Generator) -> RateR
     """
     pairs = shared_seeds(group, baseline)
     numbers = [_numbers(group), _numbers(baseline)]
-    if len(pairs) == len(numbers[0][0]) == len(numbers[1][0]):
+    if pairs:
         order, (successes, seconds) = [j for _, j in sorted(pairs)], numbers[1]
         numbers[1] = successes[order], seconds[order]
-    else:
-        pairs = []
     counts = [len(successes) for successes, _ in numbers]
     if min(counts) < FEWEST or not all(np.isfinite(s).all() and s.any() for s, _ in numbers):
         return None

@@ -11,11 +11,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import stats
 
+from handrail.controllers.arrays import FloatArray
+from handrail.datasets.comparison.resampling import Interval
 from handrail.datasets.paired import paired_success, wilson
 
-Interval = tuple[float, float]
+LEVEL = 0.05  # below which a p that is adjusted for their number counts
 POWER = 0.8
-_REACH = float(stats.norm.ppf(0.975) + stats.norm.ppf(POWER))
 
 
 @dataclass(frozen=True)
@@ -24,11 +25,11 @@ class ShareDifference:
 
     Attributes:
         estimate: Of the difference, −1 to 1.
-        interval: 95 %, Newcombe's method 10.
+        interval: 95 %, Newcombe's method 10; trials of one scene count for as many as they are worth.
         p: Two-sided, exact: McNemar's where paired, else Boschloo's.
         paired: Whether the same trials were made under both.
         trials: Pairs, or trials of the first and of the second.
-        detectable: The difference that would be seen as one in 80 % of such experiments.
+        error: Standard error of the difference if there were none, of shares that are never quite 0 or 1.
     """
 
     estimate: float
@@ -36,19 +37,70 @@ class ShareDifference:
     p: float
     paired: bool
     trials: tuple[int, ...]
-    detectable: float
+    error: float
+
+    def detectable(self, tests: int = 1) -> float:
+        """Return the difference that would be seen as one in 80 % of such experiments.
+
+        Args:
+            tests: Number of comparisons that the p is adjusted for.
+        """
+        return min(1.0, reach(tests) * self.error)
 
 
-def paired_difference(first: Sequence[bool], second: Sequence[bool]) -> ShareDifference:
-    """Compare successes of the same trials under two conditions, `(N,)` each.
+def reach(tests: int = 1, freedom: float = np.inf) -> float:
+    """Return how many standard errors a difference has to have, to be detected in 80 % of experiments.
+
+    t_{1 − α/2m} + t_{0.8}, of the t distribution; m tests, of which Holm gives the smallest p the level α/m.
+
+    Args:
+        tests: m.
+        freedom: Degrees of freedom with which the standard error is known; ∞ is the normal distribution.
+    """
+    return float(stats.t.ppf(1.0 - 0.5 * LEVEL / max(1, tests), freedom) + stats.t.ppf(POWER, freedom))
+
+
+def independent_trials(values: FloatArray, scenes: Sequence[int]) -> float:
+    """Return how many independent trials those are worth of which several met the same scene.
+
+    n = M Var / Var_scenes, within the number of scenes J and that of trials M, with the variance of a mean of
+    trials that have nothing in common, and that of one whose scenes are drawn with all their trials:
+    J / (J − 1) Σ_j (Σ_{i in j} (y_i − ȳ))² / M².
+
+    Args:
+        values: y, `(M,)`.
+        scenes: Which scene each met, `(M,)`.
+    """
+    _, owner = np.unique(np.asarray(scenes), return_inverse=True)
+    away, most, least = values - values.mean(), len(values), int(owner.max()) + 1
+    alone = float(away @ away) * most / max(1, most - 1)
+    together = float((np.bincount(owner, weights=away) ** 2).sum()) * least / max(1, least - 1)
+    if not alone or least < 2:
+        return float(least)
+    return float(np.clip(most * alone / max(together, 1e-12), least, most))
+
+
+def paired_shares(
+    first: Sequence[bool], second: Sequence[bool], scenes: Sequence[int] | None = None
+) -> ShareDifference:
+    """Compare successes of the same trials under two conditions.
+
+    Args:
+        first: `(N,)`.
+        second: `(N,)`.
+        scenes: What pairs may have in common, `(N,)`: for the interval and the error those of a scene count
+            for as many as they are worth; None where each is for itself.
 
     Raises:
         HandrailError: The sizes differ, or there are none.
     """
     found = paired_success(np.asarray(first), np.asarray(second))
-    both = int(np.sum(np.asarray(first, bool) & np.asarray(second, bool)))
-    neither = found.pairs - both - found.only_first - found.only_second
-    cells = (both, found.only_first, found.only_second, neither)
+    one, other = np.asarray(first, bool), np.asarray(second, bool)
+    both, neither = int(np.sum(one & other)), int(np.sum(~one & ~other))
+    worth = 1.0
+    if scenes is not None:
+        worth = independent_trials(one.astype(float) - other, scenes) / found.pairs
+    cells = [worth * count for count in (both, found.only_first, found.only_second, neither)]
     discordant = (found.only_first + found.only_second + 2) / (found.pairs + 4)
     return ShareDifference(
         estimate=(found.only_first - found.only_second) / found.pairs,
@@ -56,39 +108,52 @@ def paired_difference(first: Sequence[bool], second: Sequence[bool]) -> ShareDif
         p=found.p_mcnemar,
         paired=True,
         trials=(found.pairs,),
-        detectable=min(1.0, _REACH * float(np.sqrt(discordant / found.pairs))),
+        error=float(np.sqrt(discordant / found.pairs)),
     )
 
 
-def unpaired_difference(first: Sequence[bool], second: Sequence[bool]) -> ShareDifference:
-    """Compare successes of different trials under two conditions, `(N,)` and `(M,)`.
+def unpaired_shares(
+    first: Sequence[bool],
+    second: Sequence[bool],
+    scenes: tuple[Sequence[int], Sequence[int]] | None = None,
+) -> ShareDifference:
+    """Compare successes of different trials under two conditions.
+
+    Args:
+        first: `(N,)`.
+        second: `(M,)`.
+        scenes: What the trials of each may have in common, `(N,)` and `(M,)`, as for `paired_shares`.
 
     Raises:
         HandrailError: There are none.
     """
     one, other = (int(np.sum(first)), len(first)), (int(np.sum(second)), len(second))
-    interval = newcombe_unpaired(*one, *other)
+    sides = (first, second) if scenes else ()
+    worth = [float(one[1]), float(other[1])]
+    for place, (values, each) in enumerate(zip(sides, scenes or (), strict=True)):
+        worth[place] = independent_trials(np.asarray(values, float), each)
+    shares = one[0] / one[1], other[0] / other[1]
     table = [[one[0], other[0]], [one[1] - one[0], other[1] - other[0]]]
     share = (one[0] + other[0] + 2) / (one[1] + other[1] + 4)
-    spread = np.sqrt(share * (1 - share) * (1 / one[1] + 1 / other[1]))
+    spread = np.sqrt(share * (1 - share) * (1 / worth[0] + 1 / worth[1]))
     return ShareDifference(
-        estimate=one[0] / one[1] - other[0] / other[1],
-        interval=interval,
+        estimate=shares[0] - shares[1],
+        interval=newcombe_unpaired(shares[0] * worth[0], worth[0], shares[1] * worth[1], worth[1]),
         p=float(stats.boschloo_exact(table).pvalue),
         paired=False,
         trials=(one[1], other[1]),
-        detectable=min(1.0, _REACH * float(spread)),
+        error=float(spread),
     )
 
 
-def newcombe_paired(both: int, only_first: int, only_second: int, neither: int) -> Interval:
+def newcombe_paired(both: float, only_first: float, only_second: float, neither: float) -> Interval:
     """Return the 95 % interval of the difference of two paired shares (method 10).
 
     The Wilson intervals of the two shares, combined as squares with their correlation φ̂ taken off; the
     numerator of φ̂ is brought nearer to zero by n/2 where it is positive.
 
     Args:
-        both: Pairs that succeeded twice.
+        both: Pairs that succeeded twice; these numbers need not be whole where pairs count for less than one.
         only_first: That succeeded under the first condition only.
         only_second: Under the second only.
         neither: Under none.
@@ -106,7 +171,7 @@ def newcombe_paired(both: int, only_first: int, only_second: int, neither: int) 
     return difference - _combined(*below, phi), difference + _combined(*above, phi)
 
 
-def newcombe_unpaired(successes_1: int, trials_1: int, successes_2: int, trials_2: int) -> Interval:
+def newcombe_unpaired(successes_1: float, trials_1: float, successes_2: float, trials_2: float) -> Interval:
     """Return the 95 % interval of the difference of two independent shares (method 10).
 
     Raises:
@@ -138,7 +203,7 @@ def holm(p: Sequence[float]) -> list[float]:
     return adjusted.tolist()
 
 
-def _correlation(both: int, only_first: int, only_second: int, neither: int) -> float:
+def _correlation(both: float, only_first: float, only_second: float, neither: float) -> float:
     rows = (both + only_first) * (only_second + neither) * (both + only_second) * (only_first + neither)
     if not rows:
         return 0.0

@@ -62,7 +62,10 @@ def as_json(comparison: Comparison, found: list[Finding]) -> dict[str, Any]:
             "config": asdict(comparison.config),
             "findings": [asdict(finding) for finding in found],
             "collection_differences": {
-                label: asdict(each) if each else None for label, each in comparison.success.items()
+                label: asdict(each) | {"detectable": each.detectable(len(comparison.success))}
+                if each
+                else None
+                for label, each in comparison.success.items()
             },
             "successes_an_hour": {
                 "intervals": comparison.rates,
@@ -95,7 +98,9 @@ def _difference(each: Difference) -> dict[str, Any]:
     known = {"metric": each.metric.name, "group": each.label, "baseline": each.baseline}
     if each.reason:
         return known | {"does_not_apply": each.reason}
-    return known | {name: getattr(each, name) for name in ("paired", "counts", *_FIELDS, "detected")}
+    return known | {
+        name: getattr(each, name) for name in ("paired", "counts", "tested", *_FIELDS, "detected")
+    }
 
 
 def _episode_rows(comparison: Comparison) -> list[dict[str, Any]]:

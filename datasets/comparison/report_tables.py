@@ -10,6 +10,8 @@ from handrail.datasets.comparison.means import Mean
 from handrail.datasets.comparison.outcomes import ArmOutcome, Outcomes
 from handrail.datasets.comparison.wording import (
     DASH,
+    THESE_POLICIES,
+    WITH_TRAINING,
     duration,
     number,
     p_value,
@@ -22,13 +24,14 @@ from handrail.datasets.comparison.wording import (
 )
 from handrail.datasets.quality.catalogue import METRICS, Metric
 
+_UNTESTED = "described, not tested: episodes share neighbours"
+
 
 def collection_table(collected: Sequence[Collected]) -> str:
     """Return what each group consists of."""
     headings = (
         "",
         "episodes",
-        "attempts",
         "success",
         "95 %",
         "failures",
@@ -41,14 +44,12 @@ def collection_table(collected: Sequence[Collected]) -> str:
 
 def _collected(each: Collected) -> list[str]:
     reasons = ", ".join(f"{reason} ({count})" for reason, count in each.reasons.items())
-    failed = each.failure_share
     return [
         each.label,
         str(each.episodes),
-        str(each.attempts),
-        percent(None if failed is None else 1.0 - failed),
+        percent(each.success),
         percent_span(each.success_interval),
-        percent(failed),
+        percent(each.failure_share),
         duration(each.operator_time),
         number(each.successes_an_hour),
         reasons or DASH,
@@ -79,8 +80,8 @@ def arms_table(outcomes: Outcomes) -> str:
     headings = (
         "trained on",
         "success",
-        "rollouts 95 %",
-        "nested 95 %",
+        THESE_POLICIES,
+        WITH_TRAINING,
         "each training seed",
         "data",
         *map(_heading, names),
@@ -114,7 +115,7 @@ def _outcome(arm: ArmOutcome, name: str) -> Cell | str:
 
 def outcome_differences_table(outcomes: Outcomes) -> str:
     """Return how arms differ in success."""
-    headings = ("", "difference", "these policies 95 %", "nested 95 %", "test", "p after Holm", "detectable")
+    headings = ("", "difference", THESE_POLICIES, WITH_TRAINING, "test", "p after Holm", "detectable")
     rows = [
         [
             f"{each.label} − {each.baseline}",
@@ -145,7 +146,8 @@ def _metric(comparison: Comparison, metric: Metric, label: str) -> list[Cell | s
     if one.mean is None and other.mean is None:
         return []
     every, number_, time = (_of(view, metric, label) for view in comparison.views)
-    reason = Cell(DASH, "quiet", every.reason)
+    reason = Cell(DASH, "quiet", every.reason or _UNTESTED)
+    untested = bool(every.reason) or not every.tested
     follows = abs(every.follows_length) >= FOLLOWS and metric.name != "length"
     name = metric.title + (" ↔" if follows else "")
     return [
@@ -153,8 +155,8 @@ def _metric(comparison: Comparison, metric: Metric, label: str) -> list[Cell | s
         _mean(other),
         _mean(one),
         *([_estimate(each) for each in (every, number_, time)]),
-        reason if every.reason or metric.name == "length" else _at_length(every),
-        reason if every.reason else p_value(every.p_adjusted).removeprefix("p = ").removeprefix("p "),
+        reason if untested or metric.name == "length" else _at_length(every),
+        reason if untested else p_value(every.p_adjusted).removeprefix("p = ").removeprefix("p "),
     ]
 
 
@@ -183,6 +185,8 @@ def _mean(mean: Mean) -> Cell:
 def _estimate(each: Difference) -> Cell:
     if each.reason:
         return Cell(DASH, "quiet", each.reason)
+    if not each.tested:
+        return Cell(signed(each.estimate), "", _UNTESTED)
     look = "detected" if each.detected else ""
     return Cell(signed(each.estimate), look, below=span(each.interval))
 

@@ -5,6 +5,8 @@ import math
 from handrail.datasets.quality.catalogue import Metric
 
 DASH = "–"
+THESE_POLICIES = "these policies 95 %"  # in other scenes
+WITH_TRAINING = "with training 95 %"  # trained again, from other seeds, too
 
 
 def number(value: float | None) -> str:

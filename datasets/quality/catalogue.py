@@ -21,7 +21,6 @@ from handrail.datasets.quality.pool import Pool
 Group = Sequence[Demonstration]
 OfEpisode = Callable[[Demonstration, Pool], float]
 OfGroup = Callable[[Group, Pool, np.random.Generator], FloatArray]
-_FRAMES = 2048  # of a group, for what compares every frame with every other
 
 
 @dataclass(frozen=True)
@@ -35,7 +34,8 @@ class Metric:
         good: "higher" or "lower" where everything else being equal that is better; "" where it is not so.
         meaning: One sentence.
         measure: Its value for one episode, or None.
-        measure_group: Its values for all episodes of a group, for what needs the others; or None.
+        measure_group: Its values for all episodes of a group, for what needs the others; or None. Such values
+            depend on how many episodes there are and, through the neighbours they share, on each other.
         pooled: Whether its values depend on what it is compared with, and so only compare within one pool.
     """
 
@@ -47,6 +47,11 @@ class Metric:
     measure: OfEpisode | None = None
     measure_group: OfGroup | None = None
     pooled: bool = False
+
+    @property
+    def of_group(self) -> bool:
+        """Whether an episode's value depends on the other episodes of its group."""
+        return self.measure_group is not None
 
 
 def _speed(episode: Demonstration) -> FloatArray:
@@ -69,7 +74,7 @@ def _switches(episode: Demonstration, pool: Pool) -> float:
 
 
 def _action_variance(group: Group, pool: Pool, rng: np.random.Generator) -> FloatArray:
-    frames = frames_of(group, _FRAMES)
+    frames = frames_of(group, pool.frames)
     states = cloud(group, frames, lambda episode: pool.observations(episode.observation))
     actions = cloud(group, frames, lambda episode: pool.actions(episode.relative_action))
     values = consistency.action_variance(states.points, actions.points, states.owner)
@@ -78,13 +83,13 @@ def _action_variance(group: Group, pool: Pool, rng: np.random.Generator) -> Floa
 
 def _state_coverage(group: Group, pool: Pool, rng: np.random.Generator) -> FloatArray:
     states = cloud(
-        group, frames_of(group, _FRAMES), lambda episode: pool.configurations(episode.configuration)
+        group, frames_of(group, pool.frames), lambda episode: pool.configurations(episode.configuration)
     )
     return mean_of_each(consistency.state_coverage(states.points), states.owner, len(group))
 
 
 def _information(group: Group, pool: Pool, rng: np.random.Generator) -> FloatArray:
-    frames = frames_of(group, _FRAMES)
+    frames = frames_of(group, pool.frames)
     states = cloud(group, frames, lambda episode: pool.observations(episode.observation))
     actions = cloud(group, frames, lambda episode: pool.action_components(episode.relative_action))
     return mean_of_each(information(states.points, actions.points, rng), states.owner, len(group))

@@ -1,5 +1,6 @@
 """One recorded episode, read by what its columns mean rather than by what they are called."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -55,7 +56,7 @@ class Demonstration:
     def success(self) -> bool | None:
         """How it ended, if that was recorded."""
         value = self.meta.get("success")
-        return bool(value) if isinstance(value, bool | int | float) else None
+        return bool(value) if isinstance(value, bool | int | float) and math.isfinite(value) else None
 
     @cached_property
     def motion(self) -> FloatArray:

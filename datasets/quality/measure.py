@@ -12,6 +12,8 @@ from handrail.datasets.quality.demonstration import Demonstration
 from handrail.datasets.quality.missing import DoesNotApply
 from handrail.datasets.quality.pool import Pool, signature
 
+_FRAMES = 2048  # of a group at most, for what compares every frame with every other
+
 
 @dataclass(frozen=True)
 class Measured:
@@ -64,7 +66,7 @@ def measure(
     """
     numbers = _pools(groups)
     pools = {
-        number: Pool([e for label in groups if numbers[label] == number for e in groups[label]], margin)
+        number: _pool([groups[label] for label in groups if numbers[label] == number], margin)
         for number in set(numbers.values())
     }
     values = {
@@ -75,6 +77,12 @@ def measure(
         for metric in metrics
     }
     return Measurements(values, numbers)
+
+
+def _pool(groups: Sequence[Sequence[Demonstration]], margin: float) -> Pool:
+    """Return what groups have in common; the smallest says how many frames are taken of each."""
+    fewest = min(sum(episode.count for episode in episodes) for episodes in groups)
+    return Pool([e for episodes in groups for e in episodes], margin, min(_FRAMES, fewest))
 
 
 def _pools(groups: Groups) -> dict[str, int]:

@@ -13,7 +13,7 @@ _CHUNK = 256  # rows of the distance matrix at a time
 
 @dataclass(frozen=True)
 class Cloud:
-    """Some frames of every episode, as many of each as there are, so that long episodes do not weigh more.
+    """Some frames of every episode, about as many of each, so that long episodes do not weigh more.
 
     Attributes:
         points: `(N, d)`.
@@ -25,17 +25,27 @@ class Cloud:
 
 
 def frames_of(episodes: Sequence[Demonstration], most: int) -> list[IntArray]:
-    """Return which frames stand for each episode: evenly spaced, the same number of all that are long enough.
+    """Return which frames stand for each episode: evenly spaced, as many of all that are long enough.
 
     Args:
         episodes: Of one group.
-        most: Frames of all episodes together, about.
+        most: Frames of all episodes together; all of them where there are fewer.
     """
-    share = max(2, most // len(episodes))
+    lengths = np.array([episode.count for episode in episodes])
     return [
-        np.unique(np.linspace(0, episode.count - 1, min(share, episode.count)).round().astype(int))
-        for episode in episodes
+        np.linspace(0, episode.count - 1, share).round().astype(int)
+        for episode, share in zip(episodes, _shares(lengths, most), strict=True)
     ]
+
+
+def _shares(lengths: IntArray, most: int) -> IntArray:
+    """Return how many frames of each episode there are to be: the shorter ones whole, the rest alike, ±1."""
+    shares, left = np.zeros_like(lengths), min(most, int(lengths.sum()))
+    order = np.argsort(lengths, kind="stable")
+    for done, place in enumerate(order):
+        shares[place] = min(int(lengths[place]), left // (len(order) - done))
+        left -= int(shares[place])
+    return shares
 
 
 def cloud(

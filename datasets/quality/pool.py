@@ -64,10 +64,12 @@ class Pool:
     Attributes:
         episodes: Of all of them.
         margin: Distance to keep [m].
+        frames: Of each group, for what compares every frame with every other: as many of one as of another.
     """
 
     episodes: Sequence[Demonstration]
     margin: float = 0.1
+    frames: int = 2048
 
     @cached_property
     def action_range(self) -> tuple[FloatArray, FloatArray]:

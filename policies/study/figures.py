@@ -1,13 +1,16 @@
 """The figures of a study: the answer by task, what disturbs, and how it depends on the operator's noise."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from handrail.datasets.comparison.drawing import COLOURS, new_figure, tidy
+from handrail.datasets.comparison.outcomes import ArmOutcome
+from handrail.policies.study.arms import StudyArm
 from handrail.policies.study.design import StudyDesign
-from handrail.policies.study.results import Condition, TaskResults
+from handrail.policies.study.results import TaskResults
 
 _WIDTH = 10.4  # [inch]
 
@@ -26,31 +29,36 @@ def figures(design: StudyDesign, results: Sequence[TaskResults]) -> dict[str, An
     return made
 
 
-def _colour(design: StudyDesign, label: str) -> str:
-    mode = max((mode for mode in design.modes if f"{label} ".startswith(f"{mode} ")), key=len)
-    return COLOURS[design.modes.index(mode) % len(COLOURS)]
+def _colour(design: StudyDesign, arm: StudyArm) -> str:
+    return COLOURS[design.modes.index(arm.mode) % len(COLOURS)]
 
 
-def _mark(label: str) -> str:
-    return "D" if " intent" in label else "o"
+def _mark(arm: StudyArm) -> str:
+    return "D" if arm.actions == "intent" else "o"
+
+
+def _name(arm: StudyArm) -> str:
+    """Return what an arm is called: an intent is no policy alone."""
+    data = f"{arm.mode}, same number" if arm.budget == "number" else arm.mode
+    return f"{data}:\nintent through MPC" if arm.actions == "intent" else data
 
 
 def _answer(design: StudyDesign, results: Sequence[TaskResults]) -> Any:
-    """One panel a task: success of every arm; thick: over rollouts, thin: over training too; ticks: seeds."""
+    """One panel a task: success of every arm; thick: these policies, thin: training too; ticks: seeds."""
     rows = max(len(each.conditions) for each in results)
     figure = new_figure(_WIDTH, 1.2 + 0.4 * rows)
     grid = figure.subplots(1, len(results), squeeze=False)[0]
     for axes, each in zip(grid, results, strict=True):
-        for row, (label, condition) in enumerate(each.conditions.items()):
-            arm, colour = condition.outcome, _colour(design, label)
+        for row, condition in enumerate(each.conditions.values()):
+            arm, colour = condition.outcome, _colour(design, condition.arm)
             axes.plot(np.multiply(100, arm.wilson), [row, row], color=colour, lw=5.0, alpha=0.35)
             if arm.nested:
                 axes.plot(np.multiply(100, arm.nested), [row, row], color=colour, lw=1.4)
             axes.plot(
                 np.multiply(100, arm.seeds), np.full(len(arm.seeds), row + 0.26), "|", color=colour, ms=6
             )
-            axes.plot(100 * arm.share, row, _mark(label), color=colour, ms=8, mec="white")
-        labels = list(each.conditions)
+            axes.plot(100 * arm.share, row, _mark(condition.arm), color=colour, ms=8, mec="white")
+        labels = [_name(condition.arm) for condition in each.conditions.values()]
         axes.set(title=each.task.replace("_", " "), xlabel="policy success [%]", xlim=(-3, 103))
         axes.set(ylim=(len(labels) - 0.4, -0.6), yticks=range(len(labels)), yticklabels=labels)
         tidy(axes, "x")
@@ -62,36 +70,39 @@ def _robustness(design: StudyDesign, results: Sequence[TaskResults]) -> Any:
     figure = new_figure(_WIDTH, 3.2)
     grid = figure.subplots(1, len(results), squeeze=False, sharey=True)[0]
     for axes, each in zip(grid, results, strict=True):
-        names = ["undisturbed", *dict.fromkeys(_condition(each, label) for label in each.disturbed)]
-        for place, arm in enumerate(each.conditions):
+        names = ["undisturbed", *dict.fromkeys(found.arm.condition for found in each.disturbed.values())]
+        arms = list(dict.fromkeys(replace(found.arm, condition="") for found in each.disturbed.values()))
+        for place, arm in enumerate(arms):
             shown = _by_condition(each, arm)
             xs = [names.index(name) for name in shown]
-            shift = 0.5 * ((place + 0.5) / len(each.conditions) - 0.5)
-            values = np.array([condition.outcome.share for condition in shown.values()])
-            spans = np.array([condition.outcome.wilson for condition in shown.values()])
+            shift = 0.5 * ((place + 0.5) / len(arms) - 0.5)
+            values = np.array([outcome.share for outcome in shown.values()])
+            spans = np.array([outcome.wilson for outcome in shown.values()])
             errors = np.abs(spans.T - values) * 100
-            style = {"color": _colour(design, arm), "fmt": _mark(arm), "ms": 5, "lw": 1.2, "label": arm}
+            style = {
+                "color": _colour(design, arm),
+                "fmt": _mark(arm),
+                "ms": 5,
+                "lw": 1.2,
+                "label": _name(arm),
+            }
             axes.errorbar(np.array(xs) + shift, 100 * values, yerr=errors, **style)
         axes.set(title=each.task.replace("_", " "), xticks=range(len(names)), ylim=(-3, 103))
         axes.set_xticklabels(names, rotation=20)
         tidy(axes, "y")
     grid[0].set_ylabel("policy success [%], 95 %")
-    grid[-1].legend(fontsize=8, frameon=False, loc="center left", bbox_to_anchor=(1.0, 0.5))
+    known = dict(pair[::-1] for axes in grid for pair in zip(*axes.get_legend_handles_labels(), strict=True))
+    place = {"loc": "center left", "bbox_to_anchor": (1.0, 0.5)}
+    grid[-1].legend(known.values(), known.keys(), fontsize=8, frameon=False, **place)
     return figure
 
 
-def _condition(results: TaskResults, label: str) -> str:
-    """Return what disturbs, of a label such as `ee intent push`."""
-    arms = [arm for arm in results.conditions if label.startswith(f"{arm} ")]
-    return label.removeprefix(max(arms, key=len, default="")).strip()
-
-
-def _by_condition(results: TaskResults, arm: str) -> Mapping[str, Condition]:
-    found = {"undisturbed": results.conditions[arm]}
-    for label, condition in results.disturbed.items():
-        if label == f"{arm} {_condition(results, label)}":
-            found[_condition(results, label)] = condition
-    return found
+def _by_condition(results: TaskResults, arm: StudyArm) -> dict[str, ArmOutcome]:
+    """Return an arm disturbed, and undisturbed: the same policies in the same scenes."""
+    mine = [found for found in results.disturbed.values() if replace(found.arm, condition="") == arm]
+    without = next((found.without for found in mine if found.without), None)
+    shown = {"undisturbed": without} if without else {}
+    return shown | {found.arm.condition: found.outcome for found in mine}
 
 
 def _sweep(design: StudyDesign, results: Sequence[TaskResults]) -> Any:
@@ -99,19 +110,20 @@ def _sweep(design: StudyDesign, results: Sequence[TaskResults]) -> Any:
     figure = new_figure(_WIDTH, 3.0 * len(results))
     grid = figure.subplots(len(results), 2, squeeze=False)
     for (left, right), each in zip(grid, results, strict=True):
-        for label, found in each.sweep.items():
+        for found in each.sweep.values():
+            arm = found[0].arm
             noises = [point.noise for point in found]
             shares = np.array([point.outcome.share for point in found])
             spans = np.array([point.outcome.wilson for point in found])
             style = {
-                "color": _colour(design, label),
-                "marker": _mark(label),
+                "color": _colour(design, arm),
+                "marker": _mark(arm),
                 "ms": 5,
                 "lw": 1.4,
-                "label": label,
+                "label": _name(arm),
             }
             left.errorbar(noises, 100 * shares, yerr=100 * np.abs(spans.T - shares), **style)
-            if " intent" not in label:
+            if arm.actions == "realised":
                 right.plot(noises, [point.seconds for point in found], **style)
         left.set(title=each.task.replace("_", " "), ylabel="policy success [%], 95 %", ylim=(-3, 103))
         right.set(title="operator's time", ylabel="s a successful demonstration", ylim=(0, None))

@@ -14,28 +14,22 @@ from handrail.collect.build import software_versions
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.comparison import markup
 from handrail.datasets.comparison.drawing import svg
-from handrail.datasets.comparison.findings import headline
+from handrail.datasets.comparison.findings import Finding
 from handrail.datasets.comparison.report import plain
 from handrail.policies.study.config import StudyConfig
 from handrail.policies.study.design import StudyDesign
 from handrail.policies.study.figures import figures
+from handrail.policies.study.how import how
 from handrail.policies.study.jobs import Layout
 from handrail.policies.study.results import TaskResults, gather
 from handrail.policies.study.tables import Table, tables
 
 _CAPTIONS = {
-    "answer": "Success of the policies; thick: 95 % over rollouts, thin: over training too, ticks: seeds.",
-    "robustness": "Success when pushed, started elsewhere, or seeing late.",
+    "answer": "Success of the policies; thick: 95 % for these policies, thin: with training, ticks: training"
+    " seeds. Round: joint velocities, unprotected; diamonds: intent through the MPC, policy and controller.",
+    "robustness": "Success disturbed and undisturbed, of the same policies in the same scenes.",
     "sweep": "How human the operator is, and what that does to policies and to his time.",
 }
-_HOW = (
-    "Policies of every mode were trained with the same settings for the same number of updates on what could"
-    " be demonstrated in the same operator time, failed attempts included, and driven from the same"
-    " beginnings. A policy named after a mode alone writes joint velocities, which go to the robot"
-    " unprotected; with “intent” it writes the operator's command, which the masked MPC completes. Intervals"
-    " are 95 %: Wilson over rollouts; bootstrap over training seeds and rollouts; differences: Newcombe's"
-    " method 10, exact McNemar and Welch's test, Holm. ● marks a detected difference."
-)
 _FORMAT = "handrail.study/1"
 _DPI = 110
 
@@ -68,7 +62,7 @@ def _html(
 ) -> str:
     title = f"Study {design.name}: {', '.join(design.modes)}"
     parts = [f"<header><h1>{title}</h1></header>"]
-    answers = [f"{_title(each)}: {headline(each.findings)}" for each in results if each.findings]
+    answers = [f"{_title(each)}. {each.answer}" for each in results if each.answer]
     parts += [markup.paragraph(answer, "headline") for answer in answers]
     for name, figure in drawn.items():
         parts.append(markup.section(_CAPTIONS[name], markup.picture(svg(figure), name)))
@@ -76,14 +70,22 @@ def _html(
         shown = [
             f"<h3>{table.title}</h3>{markup.table(table.headings, table.rows)}" for table in tables(each)
         ]
-        words = [("detected" if found.detected else "quiet", found.text) for found in each.findings]
+        words = [(_look(found), found.text) for found in each.findings]
         link = ""
         if (layout.comparison(each.task) / "report.html").is_file():
             address = f"comparisons/{each.task}/report.html"
             link = f'<p><a href="{address}">The demonstrations compared: quality, trajectories</a></p>'
         parts.append(markup.section(_title(each), markup.items(words), link, *shown))
-    parts.append(markup.section("How to read this", markup.paragraph(_HOW)))
+    parts.append(markup.section("How to read this", markup.paragraph(how(design, results))))
     return markup.page(title, "".join(parts))
+
+
+def _look(found: Finding) -> str:
+    return "caution" if found.kind == "caution" else "detected" if found.detected else "quiet"
+
+
+def _bullet(found: Finding) -> str:
+    return f"- {'Caution: ' if found.kind == 'caution' else ''}{found.text}"
 
 
 def _title(results: TaskResults) -> str:
@@ -106,7 +108,7 @@ def _write_page(
 ) -> list[Path]:
     """Put tables and figures between the study's marks; figures and JSON go beside the page."""
     stem = f"{page.stem}_{design.name}"
-    parts = [f"`handrail-study --preset {design.name}` wrote this. {_HOW}"]
+    parts = [f"`handrail-study --preset {design.name}` wrote this. {how(design, results)}"]
     written = [page]
     for name, figure in drawn.items():
         picture = page.parent / f"{stem}_{name}.png"
@@ -116,7 +118,7 @@ def _write_page(
         parts.append(f"![{_CAPTIONS[name]}]({picture.name})")
         written.append(picture)
     for each in results:
-        parts += [f"### {_title(each)}", "\n".join(f"- {found.text}" for found in each.findings)]
+        parts += [f"### {_title(each)}", "\n".join(map(_bullet, each.findings))]
         parts += [f"**{table.title}**\n\n{_markdown(table)}" for table in tables(each)]
     data = page.parent / f"{stem}.json"
     data.write_text(_json(design, results), encoding="utf-8")

@@ -1,36 +1,22 @@
 """What a study found so far: what was collected, how the policies fared, under which conditions."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from handrail.datasets.comparison.collection import Collected, collected
 from handrail.datasets.comparison.evaluations import Arm, read_evaluations
-from handrail.datasets.comparison.findings import Finding, outcome_findings
+from handrail.datasets.comparison.findings import Finding
 from handrail.datasets.comparison.groups import Group
-from handrail.datasets.comparison.outcomes import ArmOutcome, Outcomes, judge
+from handrail.datasets.comparison.outcomes import ArmOutcome, Outcomes, judge_pairs, one_family
 from handrail.datasets.quality.load import read_demonstrations
 from handrail.datasets.reader import read_info
-from handrail.policies.study.design import StudyDesign
+from handrail.policies.study.arms import StudyArm, identify, pairs
+from handrail.policies.study.conditions import Condition, conditions, outcome
+from handrail.policies.study.design import StudyDesign, Sweep
 from handrail.policies.study.jobs import Cell, Layout
-
-CONTACTS = "contacts"
-
-
-@dataclass(frozen=True)
-class Condition:
-    """All policies of an arm under one condition.
-
-    Attributes:
-        outcome: success with its intervals.
-        touched: share of rollouts with a contact.
-        contacts: mean a rollout.
-    """
-
-    outcome: ArmOutcome
-    touched: float
-    contacts: float
+from handrail.policies.study.words import Judged, answer, findings
 
 
 @dataclass(frozen=True)
@@ -38,11 +24,13 @@ class SweepPoint:
     """An arm at one level of the operator's noise.
 
     Attributes:
+        arm: what it is.
         noise: 0 perfect, 1 as people are.
-        outcome: of its policies.
+        outcome: of its policies of the training seeds that the sweep has.
         seconds: operator time of a successful demonstration, failed attempts included [s].
     """
 
+    arm: StudyArm
     noise: float
     outcome: ArmOutcome
     seconds: float
@@ -55,22 +43,26 @@ class TaskResults:
     Attributes:
         task: its name.
         collected: by mode.
-        policies: undisturbed; None before any was evaluated.
+        policies: undisturbed, each against the baseline of its budget; None before any was evaluated.
+        shielded: joint velocities through a protection, each against the baseline's through the same one.
         conditions: undisturbed, by arm.
-        disturbed: by arm and what disturbs, `ee push`.
+        disturbed: by arm and what disturbs, `ee pushed`.
         protected: by arm and protection, `direct filter`.
         sweep: by arm, in the order of the noise.
+        answer: in a few sentences, what is like for like first.
         findings: in words.
     """
 
     task: str
     collected: Mapping[str, Collected]
     policies: Outcomes | None
+    shielded: Outcomes | None
     conditions: Mapping[str, Condition]
     disturbed: Mapping[str, Condition]
     protected: Mapping[str, Condition]
     sweep: Mapping[str, tuple[SweepPoint, ...]]
-    findings: tuple[Finding, ...]
+    answer: str = ""
+    findings: tuple[Finding, ...] = ()
 
 
 def gather(design: StudyDesign, layout: Layout, rng: np.random.Generator) -> list[TaskResults]:
@@ -81,26 +73,66 @@ def gather(design: StudyDesign, layout: Layout, rng: np.random.Generator) -> lis
         layout: of its folder.
         rng: of the resampling.
     """
-    return [_task(task, design, layout, rng) for task in design.tasks]
+    return _in_words([_task(task, design, layout, rng) for task in design.tasks], design)
+
+
+def _in_words(results: Sequence[TaskResults], design: StudyDesign) -> list[TaskResults]:
+    """Return results with p adjusted over all tasks, undisturbed and protected apart, and what that says."""
+    policies = _one_family([each.policies for each in results])
+    shielded = _one_family([each.shielded for each in results])
+    return [
+        _told(replace(each, policies=open_, shielded=closed), design)
+        for each, open_, closed in zip(results, policies, shielded, strict=True)
+    ]
+
+
+def _one_family(found: Sequence[Outcomes | None]) -> list[Outcomes | None]:
+    """Return outcomes of all tasks with the p of their differences adjusted for all of these."""
+    adjusted = iter(one_family([each for outcomes in found if outcomes for each in outcomes.differences]))
+    return [
+        each and replace(each, differences=tuple(next(adjusted) for _ in each.differences)) for each in found
+    ]
+
+
+def _told(results: TaskResults, design: StudyDesign) -> TaskResults:
+    undisturbed, shielded = (
+        Judged({label: each.arm for label, each in found.items()}, outcomes)
+        for found, outcomes in (
+            (results.conditions, results.policies),
+            (results.protected, results.shielded),
+        )
+    )
+    return replace(
+        results,
+        answer=answer(undisturbed, shielded),
+        findings=findings(undisturbed, shielded, design.baseline),
+    )
 
 
 def _task(task: str, design: StudyDesign, layout: Layout, rng: np.random.Generator) -> TaskResults:
     cells = {mode: Cell(task, mode) for mode in design.modes}
     data = {mode: _collected(layout, cell) for mode, cell in cells.items()}
     nominal = _arms(design, layout, task, "nominal")
-    base = design.baseline if design.baseline in nominal else next(iter(nominal), "")
-    judged = judge(nominal, base, rng) if nominal else None
-    found = tuple(outcome_findings(judged)) if judged else ()
+    disturbed = _arms(design, layout, task, "disturbed")
+    protected = _arms(design, layout, task, "protected")
+    kinds = [identify(design, list(arms)) for arms in (nominal, disturbed, protected)]
     return TaskResults(
         task=task,
         collected={mode: each for mode, each in data.items() if each},
-        policies=judged,
-        conditions=_conditions(nominal, rng),
-        disturbed=_conditions(_arms(design, layout, task, "disturbed"), rng),
-        protected=_conditions(_arms(design, layout, task, "protected"), rng),
+        policies=_judged(nominal, kinds[0], design.baseline, rng),
+        shielded=_judged(protected, kinds[2], design.baseline, rng),
+        conditions=conditions(kinds[0], nominal, nominal, rng),
+        disturbed=conditions(kinds[1], disturbed, nominal, rng),
+        protected=conditions(kinds[2], protected, nominal, rng),
         sweep=_sweep(design, layout, task, rng),
-        findings=found,
     )
+
+
+def _judged(
+    arms: Mapping[str, Arm], kinds: Mapping[str, StudyArm], baseline: str, rng: np.random.Generator
+) -> Outcomes | None:
+    ordered = {label: arms[label] for label in kinds}
+    return judge_pairs(ordered, pairs(kinds, baseline), rng) if arms else None
 
 
 def _collected(layout: Layout, cell: Cell) -> Collected | None:
@@ -118,16 +150,6 @@ def _arms(design: StudyDesign, layout: Layout, task: str, what: str, noise: floa
     return arms
 
 
-def _conditions(arms: Mapping[str, Arm], rng: np.random.Generator) -> dict[str, Condition]:
-    return {label: _condition(arm, rng) for label, arm in arms.items()}
-
-
-def _condition(arm: Arm, rng: np.random.Generator) -> Condition:
-    (outcome,) = judge({arm.label: arm}, arm.label, rng).arms
-    contacts = np.concatenate([run.values for run in arm.runs(CONTACTS)])
-    return Condition(outcome, float(np.mean(contacts > 0)), float(np.mean(contacts)))
-
-
 def _sweep(
     design: StudyDesign, layout: Layout, task: str, rng: np.random.Generator
 ) -> dict[str, tuple[SweepPoint, ...]]:
@@ -136,13 +158,15 @@ def _sweep(
     points: dict[str, list[SweepPoint]] = {}
     for noise in sorted({1.0, *design.sweep.noises}):
         arms = _arms(design, layout, task, "nominal", noise)
-        for mode in design.modes:
-            data = _collected(layout, Cell(task, mode, noise))
-            mine = [arm for label, arm in arms.items() if label in (mode, f"{mode} intent")]
-            if data is None or not data.successes:
-                continue
-            seconds = data.operator_time / data.successes
-            for arm in mine:
-                outcome = _condition(arm, rng).outcome
-                points.setdefault(arm.label, []).append(SweepPoint(noise, outcome, seconds))
+        data = {mode: _collected(layout, Cell(task, mode, noise)) for mode in design.modes}
+        for label, kind in identify(design, list(arms)).items():
+            found, arm = data[kind.mode], _of_sweep(arms[label], design.sweep)
+            if kind.budget == design.budgets[0] and found and found.successes and arm:
+                seconds = found.operator_time / found.successes
+                points.setdefault(label, []).append(SweepPoint(kind, noise, outcome(arm, rng), seconds))
     return {label: tuple(each) for label, each in points.items()}
+
+
+def _of_sweep(arm: Arm, sweep: Sweep) -> Arm | None:
+    """Return the policies of the training seeds that every level of the noise has."""
+    return arm.only({key for key in arm.rollouts if key[1] in sweep.seeds})

@@ -1,11 +1,13 @@
 """The tables of a study, for a page in HTML and one in Markdown alike."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from handrail.datasets.comparison.outcomes import ArmOutcome, OutcomeDifference
 from handrail.datasets.comparison.wording import (
     DASH,
+    THESE_POLICIES,
+    WITH_TRAINING,
     duration,
     number,
     p_value,
@@ -14,7 +16,9 @@ from handrail.datasets.comparison.wording import (
     points,
     points_span,
 )
-from handrail.policies.study.results import Condition, TaskResults
+from handrail.policies.study.arms import StudyArm
+from handrail.policies.study.conditions import Condition
+from handrail.policies.study.results import TaskResults
 
 
 @dataclass(frozen=True)
@@ -50,14 +54,13 @@ def _collected(results: TaskResults) -> Table:
     )  # fmt: skip
     rows = []
     for mode, each in results.collected.items():
-        share = None if each.successes is None else each.successes / each.attempts
         seconds = each.operator_time / each.successes if each.successes else None
         reasons = ", ".join(f"{reason} ({count})" for reason, count in each.reasons.items())
         rows.append(
             (
                 mode,
                 str(each.episodes),
-                percent(share),
+                percent(each.success),
                 percent_span(each.success_interval),
                 duration(each.operator_time),
                 number(seconds),
@@ -70,7 +73,7 @@ def _collected(results: TaskResults) -> Table:
 
 def _policies(results: TaskResults) -> Table:
     headings = (
-        "policy", "success", "rollouts 95 %", "with training 95 %", "each training seed", "length s",
+        "policy", "what drives", "success", THESE_POLICIES, WITH_TRAINING, "each training seed", "length s",
         "rollouts with contact", "trained on",
     )  # fmt: skip
     rows = []
@@ -80,6 +83,7 @@ def _policies(results: TaskResults) -> Table:
         rows.append(
             (
                 label,
+                condition.arm.driven,
                 _share(arm),
                 percent_span(arm.wilson),
                 percent_span(arm.nested),
@@ -96,20 +100,31 @@ def _differences(results: TaskResults) -> Table:
     headings = (
         "policy",
         "against",
+        "what is compared",
         "points",
-        "rollouts 95 %",
-        "with training 95 %",
+        THESE_POLICIES,
+        WITH_TRAINING,
         "p (Holm)",
         "detectable",
     )
-    differences = results.policies.differences if results.policies else ()
-    return Table("Differences", headings, tuple(_difference(each) for each in differences))
+    found = [
+        (conditions_[each.label], each)
+        for outcomes, conditions_ in (
+            (results.policies, results.conditions),
+            (results.shielded, results.protected),
+        )
+        for each in (outcomes.differences if outcomes else ())
+    ]
+    found.sort(key=lambda pair: pair[0].arm.actions == "intent")  # like for like first
+    return Table("Differences", headings, tuple(_difference(each, what.arm) for what, each in found))
 
 
-def _difference(each: OutcomeDifference) -> tuple[str, ...]:
+def _difference(each: OutcomeDifference, arm: StudyArm) -> tuple[str, ...]:
+    alike = f"joint velocities, both through the {arm.condition}" if arm.condition else arm.driven
     return (
         each.label,
         each.baseline,
+        "policy plus controller" if arm.actions == "intent" else alike,
         points(each.rollouts.estimate) + (" ●" if each.detected else ""),
         points_span(each.rollouts.interval),
         DASH if each.nested is None else points_span(each.nested),
@@ -123,35 +138,28 @@ def _conditions(results: TaskResults) -> Table:
         "policy",
         "condition",
         "success",
-        "rollouts 95 %",
+        THESE_POLICIES,
+        "without",
+        "points",
+        "points 95 %",
         "rollouts with contact",
         "contacts / 100 rollouts",
     )
-    rows = [*_undisturbed(results), *_rows(results, results.disturbed), *_rows(results, results.protected)]
-    if not results.disturbed and not results.protected:
-        rows = []
-    return Table("Disturbed, protected", headings, tuple(rows))
+    rows = [_condition(each) for each in (*results.disturbed.values(), *results.protected.values())]
+    return Table("Disturbed, protected; beside the same rollouts without", headings, tuple(rows))
 
 
-def _undisturbed(results: TaskResults) -> Iterator[tuple[str, ...]]:
-    for label, condition in results.conditions.items():
-        yield (label, "undisturbed", *_numbers(condition))
-
-
-def _rows(results: TaskResults, conditions: Mapping[str, Condition]) -> Iterator[tuple[str, ...]]:
-    for label, condition in conditions.items():
-        policy = max(
-            (known for known in results.conditions if label.startswith(f"{known} ")), key=len, default=""
-        )
-        yield (policy or label, label.removeprefix(policy).strip() if policy else DASH, *_numbers(condition))
-
-
-def _numbers(condition: Condition) -> tuple[str, ...]:
+def _condition(each: Condition) -> tuple[str, ...]:
     return (
-        _share(condition.outcome),
-        percent_span(condition.outcome.wilson),
-        percent(condition.touched),
-        number(100 * condition.contacts),
+        each.arm.label,
+        each.arm.condition,
+        _share(each.outcome),
+        percent_span(each.outcome.wilson),
+        _share(each.without) if each.without else DASH,
+        points(each.change.estimate) if each.change else DASH,
+        points_span(each.change.interval) if each.change else DASH,
+        percent(each.touched),
+        number(100 * each.contacts),
     )
 
 
@@ -160,7 +168,7 @@ def _sweep(results: TaskResults) -> Table:
         "policy",
         "operator's noise",
         "success",
-        "rollouts 95 %",
+        THESE_POLICIES,
         "each training seed",
         "s a demonstration",
     )
