@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from handrail.controllers.errors import HandrailError
+from handrail.datasets.atomic import write_whole
 from handrail.policies.imitation.checkpoint import (
     MODEL,
     PolicyMeta,
@@ -82,7 +83,7 @@ def _run(config: TrainConfig, source: Source, steps: int, checkpoint: Path | Non
         record = {"seconds": seconds, "steps_a_second": done / seconds, "steps": steps}
         record |= {"frames": len(dataset), "loss": curve.rows[-1]["loss"] if curve.rows else None}
         content = record | asdict(_meta(source, steps))
-        (config.folder / RECORD).write_text(json.dumps(content, indent=1) + "\n")
+        write_whole(config.folder / RECORD, (json.dumps(content, indent=1) + "\n").encode())
 
 
 def _pipeline(config: TrainConfig, steps: int, checkpoint: Path | None) -> "Pipeline":

@@ -13,7 +13,8 @@ from handrail.datasets.comparison.outcomes import ArmOutcome, Outcomes, judge
 from handrail.datasets.quality.load import read_demonstrations
 from handrail.datasets.reader import read_info
 from handrail.policies.study.design import StudyDesign
-from handrail.policies.study.jobs import Cell, Layout
+from handrail.policies.study.jobs import Cell
+from handrail.policies.study.standing import Standing
 
 CONTACTS = "contacts"
 
@@ -73,21 +74,20 @@ class TaskResults:
     findings: tuple[Finding, ...]
 
 
-def gather(design: StudyDesign, layout: Layout, rng: np.random.Generator) -> list[TaskResults]:
-    """Return what there is of every task.
+def gather(standing: Standing, rng: np.random.Generator) -> list[TaskResults]:
+    """Return what is done of every task.
 
     Args:
-        design: of the study.
-        layout: of its folder.
+        standing: of the study.
         rng: of the resampling.
     """
-    return [_task(task, design, layout, rng) for task in design.tasks]
+    return [_task(task, standing.design, standing, rng) for task in standing.design.tasks]
 
 
-def _task(task: str, design: StudyDesign, layout: Layout, rng: np.random.Generator) -> TaskResults:
+def _task(task: str, design: StudyDesign, standing: Standing, rng: np.random.Generator) -> TaskResults:
     cells = {mode: Cell(task, mode) for mode in design.modes}
-    data = {mode: _collected(layout, cell) for mode, cell in cells.items()}
-    nominal = _arms(design, layout, task, "nominal")
+    data = {mode: _collected(standing, cell) for mode, cell in cells.items()}
+    nominal = _arms(design, standing, task, "nominal")
     base = design.baseline if design.baseline in nominal else next(iter(nominal), "")
     judged = judge(nominal, base, rng) if nominal else None
     found = tuple(outcome_findings(judged)) if judged else ()
@@ -96,25 +96,27 @@ def _task(task: str, design: StudyDesign, layout: Layout, rng: np.random.Generat
         collected={mode: each for mode, each in data.items() if each},
         policies=judged,
         conditions=_conditions(nominal, rng),
-        disturbed=_conditions(_arms(design, layout, task, "disturbed"), rng),
-        protected=_conditions(_arms(design, layout, task, "protected"), rng),
-        sweep=_sweep(design, layout, task, rng),
+        disturbed=_conditions(_arms(design, standing, task, "disturbed"), rng),
+        protected=_conditions(_arms(design, standing, task, "protected"), rng),
+        sweep=_sweep(design, standing, task, rng),
         findings=found,
     )
 
 
-def _collected(layout: Layout, cell: Cell) -> Collected | None:
-    root = layout.dataset(cell)
-    if not (root / "meta" / "info.json").is_file():
+def _collected(standing: Standing, cell: Cell) -> Collected | None:
+    root = standing.dataset(cell)
+    if root is None:
         return None
     return collected(Group(cell.mode, read_info(root), tuple(read_demonstrations(root))))
 
 
-def _arms(design: StudyDesign, layout: Layout, task: str, what: str, noise: float = 1.0) -> dict[str, Arm]:
+def _arms(
+    design: StudyDesign, standing: Standing, task: str, what: str, noise: float = 1.0
+) -> dict[str, Arm]:
     """Return the arms of a task under some conditions, in the order of the design's modes."""
     arms: dict[str, Arm] = {}
     for mode in design.modes:
-        arms |= read_evaluations(layout.evaluations(Cell(task, mode, noise), what))
+        arms |= read_evaluations(standing.evaluations(Cell(task, mode, noise), what))
     return arms
 
 
@@ -129,15 +131,15 @@ def _condition(arm: Arm, rng: np.random.Generator) -> Condition:
 
 
 def _sweep(
-    design: StudyDesign, layout: Layout, task: str, rng: np.random.Generator
+    design: StudyDesign, standing: Standing, task: str, rng: np.random.Generator
 ) -> dict[str, tuple[SweepPoint, ...]]:
     if not design.sweep or task not in design.sweep.tasks:
         return {}
     points: dict[str, list[SweepPoint]] = {}
     for noise in sorted({1.0, *design.sweep.noises}):
-        arms = _arms(design, layout, task, "nominal", noise)
+        arms = _arms(design, standing, task, "nominal", noise)
         for mode in design.modes:
-            data = _collected(layout, Cell(task, mode, noise))
+            data = _collected(standing, Cell(task, mode, noise))
             mine = [arm for label, arm in arms.items() if label in (mode, f"{mode} intent")]
             if data is None or not data.successes:
                 continue
