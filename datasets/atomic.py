@@ -70,6 +70,23 @@ def replace(path: Path, data: bytes, staging: Path) -> None:
     sync_folder(path.parent)
 
 
+def write_whole(path: Path, data: bytes) -> None:
+    """Write or replace a file that has no staging folder; nothing else is left behind if that fails.
+
+    Raises:
+        OSError: The disk is full, or the folder cannot be made or written.
+    """
+    make_folder(path.parent)
+    partial = path.with_name(f".{path.name}.partial")
+    try:
+        write_synced(partial, data)
+        os.replace(partial, path)
+    except BaseException:
+        partial.unlink(missing_ok=True)
+        raise
+    sync_folder(path.parent)
+
+
 def move(source: Path, target: Path) -> None:
     """Rename a file into another folder of the same file system, durably."""
     make_folder(target.parent)

@@ -1,4 +1,4 @@
-"""One writer a dataset: an advisory lock that dies with its process."""
+"""One writer a folder, such as a dataset: an advisory lock that dies with its process."""
 
 import contextlib
 import fcntl
@@ -16,17 +16,20 @@ LOCK_NAME = "lock"
 class DatasetLock:
     """The right to change one dataset, held from construction to `release`."""
 
-    def __init__(self, staging: Path):
+    def __init__(self, staging: Path, thing: str = "dataset", holder: str = "recorder"):
         """Take the lock.
 
         Args:
             staging: The dataset's staging folder; created if missing.
+            thing: What is locked, in words.
+            holder: Who else may hold it, in words.
 
         Raises:
             HandrailError: Another process, or another writer in this one, holds it.
             OSError: The folder cannot be written.
         """
         self._path = staging / LOCK_NAME
+        self._thing, self._holder = thing, holder
         self._file: BinaryIO | None = self._acquire()
 
     def release(self) -> None:
@@ -59,8 +62,8 @@ class DatasetLock:
             except OSError as error:
                 file.close()
                 raise HandrailError(
-                    f"dataset {str(self._path.parent.parent)!r} is being written by another recorder:"
-                    " expected to be the only one; close the other, or choose another root"
+                    f"{self._thing} {str(self._path.parent.parent)!r} is being written by another"
+                    f" {self._holder}: expected to be the only one; close the other, or choose another folder"
                 ) from error
             if self._is_current(file):
                 return file

@@ -1,9 +1,7 @@
 """`handrail-evaluate`: run trained policies on declared seeds, protected or not, disturbed or not."""
 
-from importlib.util import find_spec
-
-from handrail.controllers.errors import HandrailError
 from handrail.policies.imitation.evaluate_config import EvaluateConfig
+from handrail.policies.imitation.installed import check_installed
 from handrail.scripts import cli
 
 
@@ -14,8 +12,7 @@ def main() -> None:
 
 def _evaluate(config: EvaluateConfig) -> int:
     config.check()
-    if find_spec("torch") is None:
-        raise HandrailError("handrail-evaluate: expected torch, found none; pip install '.[train]'")
+    check_installed("handrail-evaluate", ("torch",))
     from rich.console import Console
 
     from handrail.policies.imitation.evaluation import evaluate

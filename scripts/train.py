@@ -1,12 +1,8 @@
 """`handrail-train`: train an imitation policy with LeRobot's own training."""
 
-from importlib.util import find_spec
-
-from handrail.controllers.errors import HandrailError
 from handrail.policies.imitation.config import TrainConfig
+from handrail.policies.imitation.installed import check_installed
 from handrail.scripts import cli
-
-_NEEDED = {"accelerate": "", "diffusers": "diffusion"}  # by policy; "" for all
 
 
 def main() -> None:
@@ -16,9 +12,7 @@ def main() -> None:
 
 def _train(config: TrainConfig) -> int:
     config.check()
-    for module, policy in _NEEDED.items():
-        if policy in ("", config.policy) and find_spec(module) is None:
-            raise HandrailError(f"handrail-train: expected {module}, found none; pip install '.[train]'")
+    check_installed("handrail-train", ("torch", "accelerate"), config.policy)
     from handrail.policies.imitation.training import train
 
     print(f"written: {train(config)}")

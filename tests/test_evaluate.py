@@ -1,6 +1,8 @@
 """Evaluation's laws: paired, the same in parallel, never twice, protected where it says so."""
 
 import json
+import os
+import signal
 from dataclasses import replace
 
 import numpy as np
@@ -129,6 +131,20 @@ def test_what_was_done_is_kept_when_a_rollout_fails(folder, tmp_path):
     with pytest.raises(RuntimeError):
         evaluate(config(folder, "short", json=str(file), episodes=5, time_limit=0.5), load=breaking)
     assert len(rollouts(json.loads(file.read_text()), "ee intent")) == 2
+
+
+def killed(path):
+    """Load a policy in a process that is then killed, as one that wants too much memory is."""
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def test_a_killed_worker_is_one_line_and_the_same_command_goes_on(folder, tmp_path):
+    some = config(folder, "short", json=str(tmp_path / "e.json"), time_limit=0.5)
+    evaluate(replace(some, episodes=1), load=load)
+    with pytest.raises(HandrailError, match="a worker was killed") as error:
+        evaluate(replace(some, episodes=3, workers=2), load=killed)
+    assert "\n" not in str(error.value)
+    assert len(rollouts(evaluate(replace(some, episodes=3), load=load), "ee intent")) == 3
 
 
 def test_an_intent_meets_the_controller_of_its_mode(folder):

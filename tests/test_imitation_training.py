@@ -19,7 +19,9 @@ from training_helpers import FPS, TINY, features, tiny, write_dataset
 from handrail.collect.config import StoredConfig
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.reader import read_episodes, read_frames
-from handrail.policies.imitation.checkpoint import last_checkpoint, load_policy, read_meta
+from handrail.policies.imitation import presets
+from handrail.policies.imitation.checkpoint import last_checkpoint, load_policy, read_meta, write_meta
+from handrail.policies.imitation.config import TrainConfig
 from handrail.policies.imitation.curve import read_curve
 from handrail.policies.imitation.interface import PolicyInterface
 from handrail.policies.imitation.presets import policy_config
@@ -156,6 +158,105 @@ def test_a_resumed_training_is_the_same_to_the_bit(trained, tmp_path):
     assert weights(train(again, quiet=True)) == weights(folder)
     longer = train(dataclasses.replace(again, steps=8), quiet=True)
     assert read_meta(longer)[1].steps == 8
+
+
+def cut(config, folder):
+    """Copy a training without its last checkpoint; return the settings that go on with it."""
+    shutil.copytree(config.folder, folder, symlinks=True)
+    shutil.rmtree(folder / "checkpoints" / "000006")
+    return dataclasses.replace(config, output=str(folder), resume=True)
+
+
+def test_a_training_goes_on_with_its_own_episodes_however_the_dataset_grew(recorded, tmp_path):
+    part = tiny(recorded, tmp_path / "whole", episodes=2, draw=3)
+    whole = train(part, quiet=True)
+    grown = StoredConfig(root=str(write_dataset(tmp_path / "grown", lengths=(9, 7, 8, 5, 6))))
+    assert weights(train(cut(part, tmp_path / "cut"), quiet=True)) == weights(whole)
+    later = dataclasses.replace(cut(part, tmp_path / "later"), dataset=grown)
+    chosen = read_source(dataclasses.replace(later, resume=False)).selection
+    before, meta = read_source(part).selection, read_meta(whole)[1]
+    assert [row["episode_index"] for row in before.rows] == meta.episodes
+    assert [row["episode_index"] for row in chosen.rows] != meta.episodes, "a draw that shows nothing"
+    resumed = train(later, quiet=True)
+    assert weights(resumed) == weights(whole)
+    assert read_meta(resumed)[1].trained_on == meta.trained_on
+
+
+def test_a_training_does_not_go_on_with_other_data_fewer_steps_or_other_sizes(
+    trained, recorded, tmp_path, monkeypatch
+):
+    config = cut(trained[1], tmp_path / "cut")
+    longer = write_dataset(tmp_path / "longer", lengths=(9, 8, 7))
+    fewer = write_dataset(tmp_path / "fewer", lengths=(9, 7))
+    for root, said in ((longer, "got others"), (fewer, "has no episode 2")):
+        with pytest.raises(HandrailError, match=said):
+            train(dataclasses.replace(config, dataset=StoredConfig(root=str(root))), quiet=True)
+    with pytest.raises(HandrailError, match="--steps 5: expected 6 or more"):
+        train(dataclasses.replace(config, steps=5), quiet=True)
+    monkeypatch.setitem(presets._ACT_CPU, "dropout", 0.1)
+    with pytest.raises(HandrailError, match=r"dropout 0\.1: expected 0\.0"):
+        train(config, quiet=True)
+
+
+def test_a_checkpoint_of_an_earlier_version_goes_on_with_as_much_data(recorded, tmp_path):
+    config = tiny(recorded, tmp_path / "whole")
+    whole = train(config, quiet=True)
+    for number, root in enumerate((recorded, write_dataset(tmp_path / "more", lengths=(9, 7, 8, 5)))):
+        again = dataclasses.replace(
+            cut(config, tmp_path / f"cut{number}"), dataset=StoredConfig(root=str(root))
+        )
+        interface, meta = read_meta(folder := again.folder / "checkpoints" / "000003" / "pretrained_model")
+        write_meta(folder, interface, dataclasses.replace(meta, episodes=(), data="", sizes={}))
+        if number:
+            with pytest.raises(HandrailError, match="expected the 3 episodes"):
+                train(again, quiet=True)
+        else:
+            assert weights(train(again, quiet=True)) == weights(whole)
+
+
+def test_sizes_are_what_the_policy_and_the_training_get(recorded, tmp_path):
+    config = tiny(
+        recorded, tmp_path, policy_options=("chunk_size=7", "n_action_steps=3"), batch_size=0, lr=0.25
+    )
+    sizes, described = presets.resolved(config), vars(policy_config(config))
+    for name, value in sizes.options.items():
+        assert described[name] == value
+    assert described["optimizer_lr"] == described["optimizer_lr_backbone"] == sizes.lr == 0.25
+    assert sizes.batch_size == presets.preset_of(config).batch_size > 0
+    assert sizes.steps == 6
+    assert described["temporal_ensemble_coeff"] is None
+
+
+@pytest.mark.parametrize("option", ["dim_model=130", "dropout=2.0", "feedforward_activation=loud"])
+def test_what_a_policy_cannot_be_built_with_is_one_line_before_there_is_data(option, recorded, tmp_path):
+    config = TrainConfig(policy_options=(option,))
+    with pytest.raises(HandrailError, match="policy act: ") as before:
+        presets.check_policy(config)
+    with pytest.raises(HandrailError) as after:
+        train(
+            dataclasses.replace(config, dataset=StoredConfig(root=str(recorded)), output=str(tmp_path)),
+            quiet=True,
+        )
+    assert str(before.value) == str(after.value)
+    presets.check_policy(TrainConfig())
+
+
+def test_only_what_lerobot_refuses_is_put_into_its_mouth(recorded, tmp_path, monkeypatch):
+    monkeypatch.setattr("handrail.policies.imitation.memory.MemoryDataset.__getitems__", _ours)
+    with pytest.raises(ValueError, match=r"^an error of ours$"):
+        train(tiny(recorded, tmp_path), quiet=True)
+
+
+def _ours(self, indices):
+    raise ValueError("an error of ours")
+
+
+@pytest.mark.parametrize("resume", [False, True])
+def test_a_file_in_the_place_of_the_training_is_one_line(resume, recorded, tmp_path):
+    (tmp_path / "file").touch()
+    for place, said in (("file", "found a file"), ("file/below", "file/below: ")):
+        with pytest.raises(HandrailError, match=said):
+            train(tiny(recorded, tmp_path / place, resume=resume), quiet=True)
 
 
 def test_a_killed_training_goes_on(recorded, tmp_path):

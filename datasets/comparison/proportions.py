@@ -101,14 +101,15 @@ def paired_shares(
     if scenes is not None:
         worth = independent_trials(one.astype(float) - other, scenes) / found.pairs
     cells = [worth * count for count in (both, found.only_first, found.only_second, neither)]
-    discordant = (found.only_first + found.only_second + 2) / (found.pairs + 4)
+    pairs = sum(cells)
+    discordant = (cells[1] + cells[2] + 2.0) / (pairs + 4.0)
     return ShareDifference(
         estimate=(found.only_first - found.only_second) / found.pairs,
         interval=newcombe_paired(*cells),
         p=found.p_mcnemar,
         paired=True,
         trials=(found.pairs,),
-        error=float(np.sqrt(discordant / found.pairs)),
+        error=float(np.sqrt(discordant / pairs)),
     )
 
 

@@ -13,7 +13,7 @@ from handrail.collect.config import TASKS
 from handrail.collect.operators.modes import find_mode
 from handrail.collect.perturbations import Perturbation
 from handrail.controllers.errors import HandrailError
-from handrail.policies.imitation.checkpoint import MODEL, NAME, PolicyMeta, last_checkpoint, read_meta
+from handrail.policies.imitation.checkpoint import PolicyMeta, model_folder, read_meta
 from handrail.policies.imitation.evaluate_config import EvaluateConfig
 from handrail.policies.imitation.interface import PolicyInterface
 
@@ -92,11 +92,7 @@ def read_checkpoint(folder: Path) -> Checkpoint:
     Raises:
         HandrailError: there is none, or none of Handrail's.
     """
-    last = last_checkpoint(folder)
-    places = (folder, folder / MODEL, *((last / MODEL,) if last else ()))
-    place = next((place for place in places if (place / NAME).is_file()), None)
-    if place is None:
-        raise HandrailError(f"--policy {folder}: expected a checkpoint with a {NAME}, found none")
+    place = model_folder(folder)
     interface, meta = read_meta(place)
     if meta.environment not in TASKS:
         raise HandrailError(

@@ -9,7 +9,7 @@ A checkpoint appears under its name only when it is whole.
 import json
 import os
 import shutil
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from importlib import metadata
 from pathlib import Path
@@ -45,6 +45,9 @@ class PolicyMeta:
         steps: updates.
         training: the settings of the training.
         versions: of the software.
+        sizes: what the training really used where its settings say 0, a preset's (`Preset`).
+        episodes: numbers of the episodes that it learnt from, in order.
+        data: digest of what it learnt from.
     """
 
     environment: str
@@ -59,6 +62,9 @@ class PolicyMeta:
     steps: int
     training: Mapping[str, Any] = field(default_factory=dict)
     versions: Mapping[str, str] = field(default_factory=dict)
+    sizes: Mapping[str, Any] = field(default_factory=dict)
+    episodes: Sequence[int] = ()
+    data: str = ""
 
 
 @dataclass(frozen=True)
@@ -114,7 +120,7 @@ def load_policy(folder: str | Path, device: str = "cpu") -> TrainedPolicy:
     Raises:
         HandrailError: there is none, or it is broken.
     """
-    place = _model_folder(Path(folder).expanduser())
+    place = model_folder(Path(folder).expanduser())
     interface, meta = read_meta(place)
     import lerobot.policies  # noqa: F401  (registers them)
     from lerobot.configs.policies import PreTrainedConfig
@@ -163,6 +169,19 @@ def last_checkpoint(training: Path) -> Path | None:
     return max(found, key=lambda path: int(path.name), default=None)
 
 
+def model_folder(folder: Path) -> Path:
+    """Return the `pretrained_model` folder there, in a checkpoint, or in a training's last one.
+
+    Raises:
+        HandrailError: there is none with a `handrail.json`.
+    """
+    last = last_checkpoint(folder)
+    for place in (folder, folder / MODEL, *([last / MODEL] if last else [])):
+        if (place / NAME).is_file():
+            return place
+    raise HandrailError(f"policy {str(folder)!r}: expected a checkpoint with a {NAME}, found none")
+
+
 def publish(draft: Path, final: Path) -> None:
     """Give a finished draft of a checkpoint its name, durably; one of that name is replaced.
 
@@ -188,11 +207,3 @@ def point_to(checkpoint: Path) -> None:
 def software_versions() -> dict[str, str]:
     """Return the versions of what trains."""
     return {name: metadata.version(name) for name in _VERSIONED}
-
-
-def _model_folder(folder: Path) -> Path:
-    last = last_checkpoint(folder)
-    for place in (folder, folder / MODEL, *([last / MODEL] if last else [])):
-        if (place / NAME).is_file():
-            return place
-    raise HandrailError(f"{str(folder)!r}: expected a policy of handrail-train, found no {NAME}")

@@ -3,6 +3,7 @@
 import multiprocessing
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 from time import monotonic
 from typing import Any
@@ -10,6 +11,7 @@ from typing import Any
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
+from handrail.controllers.errors import HandrailError
 from handrail.policies.imitation.arms import arms
 from handrail.policies.imitation.evaluate_config import EvaluateConfig
 from handrail.policies.imitation.evaluation_file import EvaluationFile
@@ -81,6 +83,11 @@ def _results(rollouts: Sequence[Rollout], workers: int, load: Load) -> Iterator[
             running = {pool.submit(run_rollout, rollout, load): rollout for rollout in rollouts}
             for done in as_completed(running):
                 yield running[done], done.result()
+        except BrokenProcessPool as error:
+            raise HandrailError(
+                "evaluation: a worker was killed, perhaps for want of memory; what was done is kept, and the "
+                "same command goes on; fewer --workers need less"
+            ) from error
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
             raise

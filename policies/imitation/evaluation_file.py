@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from handrail.controllers.errors import HandrailError
-from handrail.datasets.atomic import explained, move, write_synced
+from handrail.datasets.atomic import explained, write_whole
 from handrail.datasets.comparison.evaluations import FORMAT, read_evaluations
 from handrail.policies.imitation.arms import Arm, Checkpoint
 
@@ -77,10 +77,8 @@ class EvaluationFile:
         """
         if self._path is None or not self.content["arms"]:
             return
-        partial = self._path.with_name(f".{self._path.name}.partial")
         with explained(f"--json {self._path}"):
-            write_synced(partial, (json.dumps(self.content, indent=1, allow_nan=False) + "\n").encode())
-            move(partial, self._path)
+            write_whole(self._path, (json.dumps(self.content, indent=1, allow_nan=False) + "\n").encode())
 
     def _entry(self, arm: Arm) -> dict[str, Any] | None:
         for entry in self.content["arms"].get(arm.label, ()):

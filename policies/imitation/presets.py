@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from handrail.controllers.errors import HandrailError, unknown_name
 from handrail.policies.imitation.config import TrainConfig
+from handrail.policies.imitation.refusal import in_one_line
 
 if TYPE_CHECKING:
     from lerobot.configs.policies import PreTrainedConfig
@@ -60,6 +61,21 @@ def preset_of(config: TrainConfig) -> Preset:
     return _PRESETS.get((config.policy, config.preset), Preset(lr=0.0))
 
 
+def resolved(config: TrainConfig) -> Preset:
+    """Return what a training really uses: the preset, and over it what the config says."""
+    preset, options = preset_of(config), dict(preset_of(config).options)
+    given = {key: _value(text) for key, text in config.options().items()}
+    if "n_action_steps" in given:
+        options.pop(_ENSEMBLE, None)  # averaging is for a look at every step
+    return Preset(
+        options=options | given,
+        lr=config.lr or preset.lr,
+        cosine=preset.cosine,
+        steps=config.steps or preset.steps,
+        batch_size=config.batch_size or preset.batch_size,
+    )
+
+
 def device_of(config: TrainConfig) -> str:
     """Return where to train.
 
@@ -103,22 +119,38 @@ def policy_config(config: TrainConfig) -> "PreTrainedConfig":
     return policy
 
 
+def check_policy(config: TrainConfig) -> None:
+    """Build a policy once, for made-up inputs, so that what it refuses is known before there is data.
+
+    Only its settings are checked where Handrail has no sizes for it: such a policy may load something.
+
+    Raises:
+        HandrailError: there is no such policy or setting, or the policy cannot be built with it.
+    """
+    described = policy_config(config)
+    if (config.policy, config.preset) not in _PRESETS:
+        return
+    from lerobot.configs.types import FeatureType, PolicyFeature
+    from lerobot.policies.factory import get_policy_class
+
+    described.input_features = {
+        "observation.state": PolicyFeature(FeatureType.STATE, (2,)),
+        "observation.environment_state": PolicyFeature(FeatureType.ENV, (2,)),
+    }
+    described.output_features = {"action": PolicyFeature(FeatureType.ACTION, (2,))}
+    with in_one_line(config):
+        get_policy_class(config.policy)(described)
+
+
 def _given(config: TrainConfig, known: set[str]) -> dict[str, Any]:
-    preset = preset_of(config)
-    settings = dict(preset.options)
-    lr = config.lr or preset.lr
     if config.lr and "optimizer_lr" not in known:
         raise HandrailError(f"--lr: the policy {config.policy} has none; give its own with --policy_options")
-    if lr:
-        settings |= {key: lr for key in ("optimizer_lr", "optimizer_lr_backbone") if key in known}
-    options = config.options()
-    if "n_action_steps" in options:
-        settings.pop(_ENSEMBLE, None)  # averaging is for a look at every step
-    for key, text in options.items():
+    sizes = resolved(config)
+    for key in sizes.options:
         if key not in known:
             raise unknown_name(f"setting of the policy {config.policy}", key, known)
-        settings[key] = _value(text)
-    return settings
+    rates = ("optimizer_lr", "optimizer_lr_backbone") if sizes.lr else ()
+    return {key: sizes.lr for key in rates if key in known} | dict(sizes.options)
 
 
 def _registered(name: str) -> type:

@@ -60,6 +60,28 @@ def select(rows: Sequence[Row], fps: float, config: TrainConfig) -> Selection:
     return Selection(tuple(sorted(kept, key=lambda row: row["episode_index"])), taken, frames / fps)
 
 
+def select_again(rows: Sequence[Row], numbers: Sequence[int], trained_on: Mapping[str, float]) -> Selection:
+    """Return the episodes that a training began with, whatever the dataset has gained since.
+
+    Args:
+        rows: lines of metadata of the dataset as it is now.
+        numbers: of the episodes.
+        trained_on: `attempts` and `operator_time` [s], as they were when they were chosen.
+
+    Raises:
+        HandrailError: one of them is not there.
+    """
+    there = {row["episode_index"]: row for row in rows}
+    missing = [number for number in numbers if number not in there]
+    if missing:
+        raise HandrailError(
+            f"--resume: expected the {len(numbers)} episodes that the training began with, "
+            f"but the dataset has no episode {missing[0]}"
+        )
+    kept = tuple(there[number] for number in numbers)
+    return Selection(kept, int(trained_on["attempts"]), trained_on["operator_time"])
+
+
 def _attempts(rows: Sequence[Row], config: TrainConfig) -> list[Row]:
     for column, wanted in (("mode", config.mode), ("success", config.success_only)):
         if wanted and not all(column in row for row in rows):

@@ -1,5 +1,6 @@
 """From a recorded dataset to what a policy is trained on: chosen episodes, seen through its interface."""
 
+import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -10,10 +11,11 @@ import torch
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.reader import DatasetInfo, read_episodes, read_info, read_rows_of
 from handrail.datasets.stats import column_stats
+from handrail.policies.imitation.checkpoint import PolicyMeta
 from handrail.policies.imitation.config import TrainConfig
 from handrail.policies.imitation.interface import COLUMNS, PolicyInterface
 from handrail.policies.imitation.memory import MemoryDataset, MemoryMeta
-from handrail.policies.imitation.selection import Selection, select
+from handrail.policies.imitation.selection import Selection, select, select_again
 
 if TYPE_CHECKING:
     from lerobot.configs.policies import PreTrainedConfig
@@ -46,6 +48,25 @@ class Source:
     interface: PolicyInterface | None
     features: dict[str, dict[str, Any]]
     columns: Columns
+
+    @property
+    def digest(self) -> str:
+        """What tells the data apart: of the numbers in all columns."""
+        digest = hashlib.sha256()
+        for key, values in sorted(self.columns.items()):
+            digest.update(f"{key} {values.dtype} {values.shape}".encode())
+            digest.update(np.ascontiguousarray(values).tobytes())
+        return digest.hexdigest()[:16]
+
+    @property
+    def trained_on(self) -> dict[str, float]:
+        """How many episodes, how many attempts they took, and how long those were [s]."""
+        chosen = self.selection
+        return {
+            "episodes": len(chosen.rows),
+            "attempts": chosen.attempts,
+            "operator_time": chosen.operator_time,
+        }
 
     def dataset(self, policy: "PreTrainedConfig") -> MemoryDataset:
         """Return what LeRobot trains a policy on."""
@@ -86,15 +107,23 @@ class Source:
         )
 
 
-def read_source(config: TrainConfig) -> Source:
-    """Read what a config asks for.
+def read_source(config: TrainConfig, began: PolicyMeta | None = None) -> Source:
+    """Read what a config asks for, or what a training began with.
+
+    Args:
+        config: what to train on.
+        began: what the checkpoint says that the training goes on from.
 
     Raises:
         HandrailError: there is no such dataset, it cannot be read, or it lacks what the policy needs.
     """
     root = config.dataset.folder
     info = read_info(root)
-    selection = select(read_episodes(root), info.fps, config)
+    rows = read_episodes(root)
+    if began is not None and began.episodes:
+        selection = select_again(rows, began.episodes, began.trained_on)
+    else:
+        selection = select(rows, info.fps, config)
     if config.actions == "recorded":
         interface, features, columns = None, *_recorded(info, selection)
     else:

@@ -7,11 +7,12 @@ import shutil
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import asdict, fields
+from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from handrail.controllers.errors import HandrailError
+from handrail.datasets.atomic import write_whole
 from handrail.policies.imitation.checkpoint import (
     MODEL,
     PolicyMeta,
@@ -20,8 +21,10 @@ from handrail.policies.imitation.checkpoint import (
     software_versions,
     write_meta,
 )
-from handrail.policies.imitation.config import FREE_ON_RESUME, TrainConfig
-from handrail.policies.imitation.presets import policy_config, preset_of
+from handrail.policies.imitation.config import TrainConfig
+from handrail.policies.imitation.presets import policy_config, resolved
+from handrail.policies.imitation.refusal import in_one_line
+from handrail.policies.imitation.resume import as_json, check_data, check_settings
 from handrail.policies.imitation.source import Source, read_source
 
 if TYPE_CHECKING:
@@ -44,11 +47,15 @@ def train(config: TrainConfig, quiet: bool = False) -> Path:
     """
     config.check()
     checkpoint = _begin(config)
-    steps = config.steps or preset_of(config).steps
+    began = None if checkpoint is None else read_meta(checkpoint / MODEL)[1]
+    if began is not None:
+        check_settings(config, began)
+    source, steps = read_source(config, began), resolved(config).steps
+    if began is not None:
+        check_data(source, began)
     if checkpoint is not None and int(checkpoint.name) >= steps:
         return checkpoint / MODEL
-    source = read_source(config)
-    with _threads(config.threads), _no_pages_of_logs(), _in_one_line(config):
+    with _threads(config.threads), _no_pages_of_logs(), in_one_line(config):
         _run(config, source, steps, checkpoint, quiet)
     last = last_checkpoint(config.folder)
     assert last is not None
@@ -76,7 +83,7 @@ def _run(config: TrainConfig, source: Source, steps: int, checkpoint: Path | Non
         record = {"seconds": seconds, "steps_a_second": done / seconds, "steps": steps}
         record |= {"frames": len(dataset), "loss": curve.rows[-1]["loss"] if curve.rows else None}
         content = record | asdict(_meta(source, steps))
-        (config.folder / RECORD).write_text(json.dumps(content, indent=1) + "\n")
+        write_whole(config.folder / RECORD, (json.dumps(content, indent=1) + "\n").encode())
 
 
 def _pipeline(config: TrainConfig, steps: int, checkpoint: Path | None) -> "Pipeline":
@@ -85,7 +92,7 @@ def _pipeline(config: TrainConfig, steps: int, checkpoint: Path | None) -> "Pipe
 
     from handrail.policies.imitation.run import Pipeline
 
-    preset = preset_of(config)
+    sizes = resolved(config)
     return Pipeline(
         dataset=DatasetConfig(config.dataset.repo_id, root=str(config.dataset.folder), video_backend="pyav"),
         policy=policy_config(config),
@@ -93,26 +100,22 @@ def _pipeline(config: TrainConfig, steps: int, checkpoint: Path | None) -> "Pipe
         resume=checkpoint is not None,
         seed=config.seed,
         num_workers=0,
-        batch_size=config.batch_size or preset.batch_size,
+        batch_size=sizes.batch_size,
         steps=steps,
         log_freq=_LOG_EVERY,
         save_freq=config.save_freq,
         env_eval_freq=0,
-        scheduler=Cosine(min(_WARMUP, steps // 10)) if preset.cosine else None,
+        scheduler=Cosine(min(_WARMUP, steps // 10)) if sizes.cosine else None,
     )
 
 
 def _begin(config: TrainConfig) -> Path | None:
     """Make room for a training; return the checkpoint that it goes on from, if any."""
     folder = config.folder
-    last = last_checkpoint(folder)
-    if config.resume and last is not None:
-        _check_continues(config, read_meta(last / MODEL)[1].training)
-        return last
-    if config.resume or not folder.exists() or not _is_main_process():
-        return None
-    if not folder.is_dir():
+    if folder.exists() and not folder.is_dir():
         raise HandrailError(f"--output {config.output}: expected a folder, found a file")
+    if config.resume or not folder.exists() or not _is_main_process():
+        return last_checkpoint(folder) if config.resume else None
     ours = {"checkpoints", RECORD, "curve.csv"}
     if any(path.name not in ours for path in folder.iterdir()):
         raise HandrailError(f"--output {config.output}: expected a missing or empty folder; choose another")
@@ -122,15 +125,6 @@ def _begin(config: TrainConfig) -> Path | None:
         )
     shutil.rmtree(folder)
     return None
-
-
-def _check_continues(config: TrainConfig, earlier: Any) -> None:
-    for entry in fields(config):
-        if entry.name in FREE_ON_RESUME or entry.name not in earlier:
-            continue
-        now, then = getattr(config, entry.name), earlier[entry.name]
-        if (list(now) if isinstance(now, tuple) else now) != then:
-            raise HandrailError(f"--resume with --{entry.name} {now}: expected {then} as the training began")
 
 
 def _meta(source: Source, steps: int) -> PolicyMeta:
@@ -143,15 +137,14 @@ def _meta(source: Source, steps: int) -> PolicyMeta:
         actions=config.actions,
         training_seed=config.seed,
         dataset_draw=config.draw,
-        trained_on={
-            "episodes": len(rows),
-            "attempts": source.selection.attempts,
-            "operator_time": source.selection.operator_time,
-        },
+        trained_on=source.trained_on,
         policy=config.policy,
         steps=steps,
         training=asdict(config),
         versions=software_versions(),
+        sizes=as_json(resolved(config)),
+        episodes=[int(row["episode_index"]) for row in rows],
+        data=source.digest,
     )
 
 
@@ -184,12 +177,3 @@ def _no_pages_of_logs() -> Iterator[None]:
         yield
     finally:
         logging.disable(before)
-
-
-@contextmanager
-def _in_one_line(config: TrainConfig) -> Iterator[None]:
-    """Raise what LeRobot refuses as an error of ours."""
-    try:
-        yield
-    except (ValueError, ImportError, NotImplementedError) as error:
-        raise HandrailError(f"policy {config.policy}: {' '.join(str(error).split())}") from error

@@ -16,7 +16,8 @@ from handrail.controllers.errors import HandrailError
 from handrail.policies.study.design import StudyDesign
 from handrail.policies.study.jobs import Job, Layout
 from handrail.policies.study.notes import write_json
-from handrail.policies.study.work import begin, fingerprint, work
+from handrail.policies.study.settings import fingerprint
+from handrail.policies.study.work import begin, work
 
 FAILED = 1
 
@@ -30,11 +31,11 @@ def do(job: Job, design: StudyDesign, root: Path) -> None:
     try:
         begin(job, design, layout)
         result = work(job, design, layout)
-    except HandrailError as error:
+        settings, seconds = fingerprint(job, design), round(time.time() - start, 1)
+        write_json(layout.done(job), {"settings": settings, "result": result, "seconds": seconds})
+    except (HandrailError, OSError) as error:
         print(f"error: {error}", file=sys.stderr)
         sys.exit(FAILED)
-    settings, seconds = fingerprint(job, design), round(time.time() - start, 1)
-    write_json(layout.done(job), {"settings": settings, "result": result, "seconds": seconds})
 
 
 def _say_into(log: Path) -> None:

@@ -36,6 +36,8 @@ class StudyConfig:
             raise HandrailError(f"--workers {self.workers}: expected a whole number from 1 to 256")
         if self.folder.exists() and not self.folder.is_dir():
             raise HandrailError(f"--output {self.output}: expected a folder, found a file")
+        if self.report_only and not any((self.folder / name).is_dir() for name in ("begun", "done")):
+            raise HandrailError(f"--report_only: expected a study in --output {self.output}, found none")
         page = Path(self.page).expanduser()
         if self.page and not (page.suffix == ".md" and page.absolute().parent.is_dir()):
             raise HandrailError(f"--page {self.page}: expected a .md file in an existing folder")

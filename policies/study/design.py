@@ -1,23 +1,28 @@
-"""What a study consists of: modes, tasks and seeds, read from a TOML file; light to import.
+"""What a study consists of: modes, tasks and seeds, as a TOML file says; light to import.
 
-modes = ["ee", "direct"]        the first that a baseline is compared with, and so on
-baseline = "direct"
-policy = "act"
+modes = ["ee", "direct"]        teleop modes
+baseline = "direct"             the mode that the others are compared with
+policy = "act"                  that LeRobot has registered
 seeds = [0, 1, 2]               of the trainings
 rollouts = 100                  of each policy, on the same seeds for all
+budgets = ["time", "number"]    what fits into the task's minutes; as many successes as its episodes
 persons = 5                     scripted operators, who take turns
+seed = 0                        of the scenes in which is recorded, and in which is evaluated
 
 [tasks.reach]
-episodes = 50                   successful demonstrations of each mode, at least
-minutes = 10.0                  of the operator's time with each mode, failed attempts included
+episodes = 50                   successful demonstrations of each mode, at least; the budget "number"
+minutes = 10.0                  of the operator's time with each mode, with failures; the budget "time"
 steps = 4000                    updates of each policy
-time_limit = {direct_single = 60.0}     [s]
+batch_size = 0                  samples an update; 0 for the preset's
+policy_options = ["dropout=0.1"]        more of LeRobot's settings of the policy
+time_limit = {direct_single = 60.0}     of an episode by mode [s]
 rollout_limit = 20.0            after which a policy's rollout has failed [s]; the task's own without it
 
 [robustness]                    optional
 perturbations = ["push", "shift", "delay"]
-protections = ["mpc", "filter"]
-rollouts = 50
+protections = ["mpc", "filter"] of policies that command joint velocities
+rollouts = 50                   under each condition
+seeds = [0]                     of the trainings whose policies go through it
 
 [sweep]                         optional: how human the operator is
 tasks = ["reach"]
@@ -25,20 +30,15 @@ noises = [0.0, 2.0]
 seeds = [0]
 """
 
-import tomllib
-from collections.abc import Mapping
+import math
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
-import draccus
-
-from handrail.collect.config import MODE_NAMES, MOST_TIME, TASKS
+from handrail.collect.config import MODE_NAMES, TASKS
 from handrail.controllers.errors import HandrailError, unknown_name
 
-PRESETS = Path(__file__).parent / "presets"
 BUDGETS = ("time", "number")
-MPC_MODES = ("ee", "base", "base+ee", "joints", "switching")
 
 
 @dataclass(frozen=True)
@@ -129,7 +129,7 @@ class StudyDesign:
     sweep: Sweep | None = None
 
     def check(self) -> None:
-        """Check every name and number.
+        """Check every name, and what only a study asks; `check_jobs` checks the settings of its jobs.
 
         Raises:
             HandrailError: one is wrong; the message says what may be chosen.
@@ -145,58 +145,39 @@ class StudyDesign:
         _known("budget", self.budgets, BUDGETS)
         if self.sweep:
             _known("task of the sweep", self.sweep.tasks, tuple(self.tasks))
-        for name, value in (("rollouts", self.rollouts), ("persons", self.persons)):
-            if value < 1:
-                raise HandrailError(f"study {self.name}: {name} expected 1 or more, got {value}")
-        for name, numbers in (("seeds", self.seeds), ("modes", self.modes), ("budgets", self.budgets)):
-            if not numbers or len(set(numbers)) < len(numbers):
-                raise HandrailError(f"study {self.name}: {name} expected some, each once, got {numbers}")
+        if self.persons < 1:
+            raise HandrailError(f"study {self.name}: persons expected 1 or more, got {self.persons}")
+        for name, chosen in self._chosen():
+            if not chosen or len(set(chosen)) < len(chosen):
+                raise HandrailError(f"study {self.name}: {name} expected some, each once, got {chosen}")
+        if self.robustness and not set(self.robustness.seeds) <= set(self.seeds):
+            raise HandrailError(
+                f"study {self.name}: robustness.seeds expected some of {self.seeds}, "
+                f"got {self.robustness.seeds}"
+            )
         for task, design in self.tasks.items():
-            _known(f"mode in time_limit of {task}", tuple(design.time_limit), self.modes)
-            if design.episodes < 2 or design.steps < 1 or design.minutes < 0:
-                raise HandrailError(
-                    f"study {self.name}, task {task}: expected episodes ≥ 2, steps ≥ 1, minutes ≥ 0, "
-                    f"got {design.episodes}, {design.steps}, {design.minutes}"
-                )
-            if not 0.0 <= design.rollout_limit <= MOST_TIME:
-                raise HandrailError(
-                    f"study {self.name}, task {task}: rollout_limit expected 0 (the task's own) to "
-                    f"{MOST_TIME} s, got {design.rollout_limit}"
-                )
-            if "time" in self.budgets and not design.minutes:
-                raise HandrailError(f"study {self.name}, task {task}: the budget 'time' needs minutes")
+            self._check_task(task, design)
 
+    def _chosen(self) -> Iterator[tuple[str, tuple[Any, ...]]]:
+        """Yield what there has to be one of, by name."""
+        yield from (("seeds", self.seeds), ("modes", self.modes), ("budgets", self.budgets))
+        if self.robustness:
+            yield "robustness.seeds", self.robustness.seeds
+            yield "robustness.perturbations", self.robustness.perturbations
+        if self.sweep:
+            yield from (("sweep.tasks", self.sweep.tasks), ("sweep.seeds", self.sweep.seeds))
+            yield "sweep.noises", self.sweep.noises
 
-def design_names() -> list[str]:
-    """Return the studies that come with Handrail."""
-    return sorted(path.stem for path in PRESETS.glob("*.toml"))
-
-
-def load_design(name: str) -> StudyDesign:
-    """Return a study by the name of a preset or the path of a TOML file.
-
-    Raises:
-        HandrailError: there is none, or something in it is wrong.
-    """
-    path = Path(name).expanduser() if name.endswith(".toml") else PRESETS / f"{name}.toml"
-    if not path.is_file():
-        raise unknown_name("study", name, [*design_names(), "a file that ends in .toml"])
-    try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise HandrailError(f"study {name}: expected TOML, got {error}") from error
-    design = _design(path.stem, content)
-    design.check()
-    return design
-
-
-def _design(name: str, content: dict[str, Any]) -> StudyDesign:
-    from draccus.utils import DecodingError, ParsingError
-
-    try:
-        return draccus.decode(StudyDesign, {"name": name, **content})
-    except (DecodingError, ParsingError, TypeError, ValueError) as error:
-        raise HandrailError(f"study {name}: {' '.join(str(error).split())}") from error
+    def _check_task(self, name: str, task: TaskDesign) -> None:
+        """Check what only a study asks of a task; its jobs check the rest."""
+        _known(f"mode in time_limit of {name}", tuple(task.time_limit), self.modes)
+        if task.episodes < 2 or task.steps < 1 or not 0.0 <= task.minutes < math.inf:
+            raise HandrailError(
+                f"study {self.name}, task {name}: expected episodes ≥ 2, steps ≥ 1, minutes ≥ 0, "
+                f"got {task.episodes}, {task.steps}, {task.minutes}"
+            )
+        if "time" in self.budgets and not task.minutes:
+            raise HandrailError(f"study {self.name}, task {name}: the budget 'time' needs minutes")
 
 
 def _known(what: str, names: Any, choices: Any) -> None:

@@ -6,7 +6,8 @@ from itertools import product
 from pathlib import Path
 from typing import Literal
 
-from handrail.policies.study.design import MPC_MODES, StudyDesign
+from handrail.collect.operators.modes import find_mode
+from handrail.policies.study.design import StudyDesign
 
 Kind = Literal["collect", "policy", "compare"]
 Actions = Literal["realised", "intent"]
@@ -106,7 +107,8 @@ def _sweep(design: StudyDesign) -> Iterator[Job]:
 
 
 def _arms(cell: Cell, budget: str, seed: int) -> list[PolicyArm]:
-    spaces: tuple[Actions, ...] = ("realised", "intent") if cell.mode in MPC_MODES else ("realised",)
+    completed = find_mode(cell.mode).controller == "mpc"  # the others leave nothing for an intent to complete
+    spaces: tuple[Actions, ...] = ("realised", "intent") if completed else ("realised",)
     return [PolicyArm(cell, actions, budget, seed) for actions in spaces]
 
 
@@ -146,10 +148,6 @@ class Layout:
         return (
             self.root / "evaluations" / arm.cell.name / what / f"{arm.actions}-{arm.budget}-{arm.seed}.json"
         )
-
-    def evaluations(self, cell: Cell, what: str) -> list[Path]:
-        """Return the files of rollouts of a cell's policies that are there, by name."""
-        return sorted((self.root / "evaluations" / cell.name / what).glob("*.json"))
 
     def comparison(self, task: str) -> Path:
         """Return the folder of a task's report."""

@@ -1,10 +1,11 @@
 """Small JSON files that say how far a study is: there whole, or not at all."""
 
 import json
-import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
+
+from handrail.datasets.atomic import write_whole
 
 
 def read_json(path: Path) -> dict[str, Any]:
@@ -17,8 +18,9 @@ def read_json(path: Path) -> dict[str, Any]:
 
 
 def write_json(path: Path, content: Mapping[str, Any]) -> None:
-    """Write a JSON object under its name at once."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    staged = path.with_suffix(".part")
-    staged.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
-    os.replace(staged, path)
+    """Write a JSON object under its name at once.
+
+    Raises:
+        OSError: the disk does not take it.
+    """
+    write_whole(path, (json.dumps(content, indent=1) + "\n").encode())

@@ -12,16 +12,17 @@ import numpy as np
 
 from handrail.collect.build import software_versions
 from handrail.controllers.errors import HandrailError
+from handrail.datasets.atomic import write_whole
 from handrail.datasets.comparison import markup
 from handrail.datasets.comparison.drawing import svg
 from handrail.datasets.comparison.findings import Finding
 from handrail.datasets.comparison.report import plain
 from handrail.policies.study.config import StudyConfig
-from handrail.policies.study.design import StudyDesign
 from handrail.policies.study.figures import figures
 from handrail.policies.study.how import how
-from handrail.policies.study.jobs import Layout
+from handrail.policies.study.marks import between_marks, read_page
 from handrail.policies.study.results import TaskResults, gather
+from handrail.policies.study.standing import Standing
 from handrail.policies.study.tables import Table, tables
 
 _CAPTIONS = {
@@ -34,36 +35,41 @@ _FORMAT = "handrail.study/1"
 _DPI = 110
 
 
-def write_study(config: StudyConfig, design: StudyDesign, layout: Layout) -> list[Path]:
+def write_study(config: StudyConfig, standing: Standing) -> list[Path]:
     """Write report.html and study.json, and the part of a Markdown page if asked; return the files.
+
+    Args:
+        config: says whether there is a page.
+        standing: of the study: only what is done is reported, and it says how much is not.
 
     Raises:
         HandrailError: a file cannot be written.
     """
-    results = gather(design, layout, np.random.default_rng(design.seed))
+    design, root = standing.design, standing.layout.root
+    results = gather(standing, np.random.default_rng(design.seed))
     drawn = figures(design, results)
     files = {
-        layout.root / "report.html": _html(design, results, drawn, layout),
-        layout.root / "study.json": _json(design, results),
+        root / "report.html": _html(standing, results, drawn),
+        root / "study.json": _json(standing, results),
     }
     try:
         for path, text in files.items():
-            path.write_text(text, encoding="utf-8")
+            write_whole(path, text.encode())
         written = list(files)
         if config.page:
-            written += _write_page(Path(config.page).expanduser(), design, results, drawn)
+            written += _write_page(Path(config.page).expanduser(), standing, results, drawn)
     except OSError as error:
         raise HandrailError(f"study: expected a folder that can be written, got {error}") from error
     return written
 
 
-def _html(
-    design: StudyDesign, results: Sequence[TaskResults], drawn: Mapping[str, Any], layout: Layout
-) -> str:
+def _html(standing: Standing, results: Sequence[TaskResults], drawn: Mapping[str, Any]) -> str:
+    design, layout = standing.design, standing.layout
     title = f"Study {design.name}: {', '.join(design.modes)}"
     parts = [f"<header><h1>{title}</h1></header>"]
     answers = [f"{_title(each)}. {each.answer}" for each in results if each.answer]
     parts += [markup.paragraph(answer, "headline") for answer in answers]
+    parts += [markup.paragraph(f"{standing.words}.")] if standing.words else []
     for name, figure in drawn.items():
         parts.append(markup.section(_CAPTIONS[name], markup.picture(svg(figure), name)))
     for each in results:
@@ -92,11 +98,12 @@ def _title(results: TaskResults) -> str:
     return results.task.replace("_", " ").capitalize()
 
 
-def _json(design: StudyDesign, results: Sequence[TaskResults]) -> str:
+def _json(standing: Standing, results: Sequence[TaskResults]) -> str:
     versions = software_versions() | {"torch": importlib.metadata.version("torch")}
     content = {
         "format": _FORMAT,
-        "design": asdict(design),
+        "design": asdict(standing.design),
+        "missing": standing.missing,
         "versions": versions,
         "tasks": {each.task: asdict(each) for each in results},
     }
@@ -104,35 +111,29 @@ def _json(design: StudyDesign, results: Sequence[TaskResults]) -> str:
 
 
 def _write_page(
-    page: Path, design: StudyDesign, results: Sequence[TaskResults], drawn: Mapping[str, Any]
+    page: Path, standing: Standing, results: Sequence[TaskResults], drawn: Mapping[str, Any]
 ) -> list[Path]:
     """Put tables and figures between the study's marks; figures and JSON go beside the page."""
+    design = standing.design
     stem = f"{page.stem}_{design.name}"
     parts = [f"`handrail-study --preset {design.name}` wrote this. {how(design, results)}"]
+    parts += [f"{standing.words}."] if standing.words else []
     written = [page]
     for name, figure in drawn.items():
         picture = page.parent / f"{stem}_{name}.png"
         stream = io.BytesIO()
         figure.savefig(stream, format="png", dpi=_DPI, metadata={"Software": None})
-        picture.write_bytes(stream.getvalue())
+        write_whole(picture, stream.getvalue())
         parts.append(f"![{_CAPTIONS[name]}]({picture.name})")
         written.append(picture)
     for each in results:
         parts += [f"### {_title(each)}", "\n".join(map(_bullet, each.findings))]
         parts += [f"**{table.title}**\n\n{_markdown(table)}" for table in tables(each)]
     data = page.parent / f"{stem}.json"
-    data.write_text(_json(design, results), encoding="utf-8")
-    text = page.read_text(encoding="utf-8") if page.exists() else "# Teleoperation modes\n"
-    page.write_text(_between_marks(text, design.name, "\n\n".join(filter(None, parts))), encoding="utf-8")
+    write_whole(data, _json(standing, results).encode())
+    body = "\n\n".join(filter(None, parts))
+    write_whole(page, between_marks(read_page(page), design.name, body).encode())
     return [*written, data]
-
-
-def _between_marks(text: str, name: str, body: str) -> str:
-    begin, end = f"<!-- study {name} -->", f"<!-- end of study {name} -->"
-    before, found, rest = text.partition(begin)
-    if not found:
-        return f"{text.rstrip()}\n\n{begin}\n\n{body}\n\n{end}\n"
-    return f"{before}{begin}\n\n{body}\n\n{end}" + rest.partition(end)[2]
 
 
 def _markdown(table: Table) -> str:

@@ -15,7 +15,8 @@ from handrail.datasets.reader import read_info
 from handrail.policies.study.arms import StudyArm, identify, pairs
 from handrail.policies.study.conditions import Condition, conditions, outcome
 from handrail.policies.study.design import StudyDesign, Sweep
-from handrail.policies.study.jobs import Cell, Layout
+from handrail.policies.study.jobs import Cell
+from handrail.policies.study.standing import Standing
 from handrail.policies.study.words import Judged, answer, findings
 
 
@@ -65,15 +66,15 @@ class TaskResults:
     findings: tuple[Finding, ...] = ()
 
 
-def gather(design: StudyDesign, layout: Layout, rng: np.random.Generator) -> list[TaskResults]:
-    """Return what there is of every task.
+def gather(standing: Standing, rng: np.random.Generator) -> list[TaskResults]:
+    """Return what is done of every task.
 
     Args:
-        design: of the study.
-        layout: of its folder.
+        standing: of the study.
         rng: of the resampling.
     """
-    return _in_words([_task(task, design, layout, rng) for task in design.tasks], design)
+    design = standing.design
+    return _in_words([_task(task, design, standing, rng) for task in design.tasks], design)
 
 
 def _in_words(results: Sequence[TaskResults], design: StudyDesign) -> list[TaskResults]:
@@ -109,12 +110,12 @@ def _told(results: TaskResults, design: StudyDesign) -> TaskResults:
     )
 
 
-def _task(task: str, design: StudyDesign, layout: Layout, rng: np.random.Generator) -> TaskResults:
+def _task(task: str, design: StudyDesign, standing: Standing, rng: np.random.Generator) -> TaskResults:
     cells = {mode: Cell(task, mode) for mode in design.modes}
-    data = {mode: _collected(layout, cell) for mode, cell in cells.items()}
-    nominal = _arms(design, layout, task, "nominal")
-    disturbed = _arms(design, layout, task, "disturbed")
-    protected = _arms(design, layout, task, "protected")
+    data = {mode: _collected(standing, cell) for mode, cell in cells.items()}
+    nominal = _arms(design, standing, task, "nominal")
+    disturbed = _arms(design, standing, task, "disturbed")
+    protected = _arms(design, standing, task, "protected")
     kinds = [identify(design, list(arms)) for arms in (nominal, disturbed, protected)]
     return TaskResults(
         task=task,
@@ -124,7 +125,7 @@ def _task(task: str, design: StudyDesign, layout: Layout, rng: np.random.Generat
         conditions=conditions(kinds[0], nominal, nominal, rng),
         disturbed=conditions(kinds[1], disturbed, nominal, rng),
         protected=conditions(kinds[2], protected, nominal, rng),
-        sweep=_sweep(design, layout, task, rng),
+        sweep=_sweep(design, standing, task, rng),
     )
 
 
@@ -135,30 +136,32 @@ def _judged(
     return judge_pairs(ordered, pairs(kinds, baseline), rng) if arms else None
 
 
-def _collected(layout: Layout, cell: Cell) -> Collected | None:
-    root = layout.dataset(cell)
-    if not (root / "meta" / "info.json").is_file():
+def _collected(standing: Standing, cell: Cell) -> Collected | None:
+    root = standing.dataset(cell)
+    if root is None:
         return None
     return collected(Group(cell.mode, read_info(root), tuple(read_demonstrations(root))))
 
 
-def _arms(design: StudyDesign, layout: Layout, task: str, what: str, noise: float = 1.0) -> dict[str, Arm]:
+def _arms(
+    design: StudyDesign, standing: Standing, task: str, what: str, noise: float = 1.0
+) -> dict[str, Arm]:
     """Return the arms of a task under some conditions, in the order of the design's modes."""
     arms: dict[str, Arm] = {}
     for mode in design.modes:
-        arms |= read_evaluations(layout.evaluations(Cell(task, mode, noise), what))
+        arms |= read_evaluations(standing.evaluations(Cell(task, mode, noise), what))
     return arms
 
 
 def _sweep(
-    design: StudyDesign, layout: Layout, task: str, rng: np.random.Generator
+    design: StudyDesign, standing: Standing, task: str, rng: np.random.Generator
 ) -> dict[str, tuple[SweepPoint, ...]]:
     if not design.sweep or task not in design.sweep.tasks:
         return {}
     points: dict[str, list[SweepPoint]] = {}
     for noise in sorted({1.0, *design.sweep.noises}):
-        arms = _arms(design, layout, task, "nominal", noise)
-        data = {mode: _collected(layout, Cell(task, mode, noise)) for mode in design.modes}
+        arms = _arms(design, standing, task, "nominal", noise)
+        data = {mode: _collected(standing, Cell(task, mode, noise)) for mode in design.modes}
         for label, kind in identify(design, list(arms)).items():
             found, arm = data[kind.mode], _of_sweep(arms[label], design.sweep)
             if kind.budget == design.budgets[0] and found and found.successes and arm:

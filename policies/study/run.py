@@ -3,27 +3,32 @@
 import contextlib
 import multiprocessing
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from datetime import datetime
 from multiprocessing.process import BaseProcess
 from pathlib import Path
-from typing import Any
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from handrail.controllers.errors import HandrailError
+from handrail.datasets.atomic import explained, make_folder
 from handrail.datasets.lock import DatasetLock
+from handrail.policies.imitation.installed import check_installed
 from handrail.policies.study.child import do
 from handrail.policies.study.config import StudyConfig
-from handrail.policies.study.design import StudyDesign, load_design
+from handrail.policies.study.design import StudyDesign
 from handrail.policies.study.jobs import Job, Layout, jobs
-from handrail.policies.study.notes import read_json
-from handrail.policies.study.work import fingerprint
+from handrail.policies.study.load import load_design
+from handrail.policies.study.marks import between_marks, read_page
+from handrail.policies.study.settings import check_policies
+from handrail.policies.study.standing import Standing
 
 FAILED = 1
 _PRELOAD = "handrail.policies.study.preload"
 _ASLEEP = 0.2  # between two looks at the running jobs [s]
+_BEGINS = "=== handrail-study begins"
 _TAIL = 300  # characters of a failed job's last words
 
 
@@ -67,37 +72,45 @@ def run_study(config: StudyConfig, start: Start = start_job) -> int:
     """
     config.check()
     design = load_design(config.preset)
-    layout, console = Layout(config.folder), Console(stderr=True)
-    lock = DatasetLock(config.folder / ".study")
-    try:
-        state = _State(done={job.name for job in jobs(design) if is_done(job, design, layout)})
+    standing, console = Standing(design, Layout(config.folder)), Console(stderr=True)
+    _check_before(config, standing)
+    with _alone_in(config):
+        state = _State(done=set(standing.done))
         if not config.report_only:
             with _terminating(state):
-                _run_all(start, config.workers, design, layout, state, console)
+                _run_all(start, config.workers, standing, state, console)
         from handrail.policies.study.report import write_study
 
-        files = write_study(config, design, layout)
-    finally:
-        lock.release()
+        files = write_study(config, Standing(design, standing.layout))
     for name, words in state.failed.items():
         console.print(f"failed: {name}: {words}", style="bold red", highlight=False, markup=False)
     console.print("Written: " + ", ".join(map(str, files)), highlight=False, soft_wrap=True)
     return FAILED if state.failed else 0
 
 
-def is_done(job: Job, design: StudyDesign, layout: Layout) -> bool:
-    """Return whether a job was done with just these settings."""
-    return finished(job, layout).get("settings") == fingerprint(job, design)
+def _check_before(config: StudyConfig, standing: Standing) -> None:
+    """Check what would otherwise show only after hours."""
+    design = standing.design
+    if config.page:
+        between_marks(read_page(Path(config.page).expanduser()), design.name, "")
+    check_installed("handrail-study", ("torch", "accelerate"), design.policy)
+    if not config.report_only and any(name.startswith("policy/") for name in standing.missing):
+        check_policies(design)
 
 
-def finished(job: Job, layout: Layout) -> Mapping[str, Any]:
-    """Return what a job wrote when it was done; nothing if it is not."""
-    return read_json(layout.done(job))
+@contextlib.contextmanager
+def _alone_in(config: StudyConfig) -> Iterator[None]:
+    """Hold the study's folder, made if it is not there."""
+    with explained(f"--output {config.output}: expected a folder that can be written"):
+        lock = DatasetLock(config.folder / ".study", "study", "handrail-study")
+    try:
+        yield
+    finally:
+        lock.release()
 
 
-def _run_all(
-    start: Start, workers: int, design: StudyDesign, layout: Layout, state: _State, console: Console
-) -> None:
+def _run_all(start: Start, workers: int, standing: Standing, state: _State, console: Console) -> None:
+    design, layout = standing.design, standing.layout
     todo = jobs(design)
     columns = (
         TextColumn("{task.description}"),
@@ -112,6 +125,7 @@ def _run_all(
             for job in state.ready(todo):
                 if len(state.running) >= workers:
                     break
+                _mark(layout.log(job), job.name)
                 state.running[job.name] = (job, start(job, design, layout))
             if not state.running:
                 break
@@ -134,10 +148,20 @@ def _collect_finished(state: _State, layout: Layout) -> None:
             state.failed[name] = _last_words(layout.log(job), process.exitcode)
 
 
+def _mark(log: Path, name: str) -> None:
+    """Write into a log that a job begins: what stands before is of an earlier time."""
+    with explained(str(log)):
+        make_folder(log.parent)
+        with open(log, "a", encoding="utf-8") as file:
+            file.write(f"\n{_BEGINS} {name}, {datetime.now():%Y-%m-%d %H:%M:%S}\n")
+
+
 def _last_words(log: Path, code: int | None) -> str:
-    text = log.read_text(encoding="utf-8", errors="replace").strip() if log.is_file() else ""
-    errors = [line for line in text.splitlines() if line.startswith("error: ")]
-    words = errors[-1].removeprefix("error: ") if errors else text[-_TAIL:]
+    """Return what a job said last since it began: its error in a line, or the end of what it wrote."""
+    text = log.read_text(encoding="utf-8", errors="replace") if log.is_file() else ""
+    lines = text.rpartition(_BEGINS)[2].strip().splitlines()[1:]
+    errors = [line for line in lines if line.startswith("error: ")]
+    words = errors[-1].removeprefix("error: ") if errors else "\n".join(lines)[-_TAIL:] or "without a word"
     return f"{words} (exit code {code}; {log})"
 
 

@@ -1,51 +1,59 @@
 """Does one job of a study, in a process of its own; whatever is killed goes on where it was."""
 
-import json
 from collections.abc import Mapping
-from dataclasses import asdict, replace
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
-from handrail.collect.config import DatasetConfig, RecordConfig, StoredConfig
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.atomic import remove
 from handrail.datasets.comparison.config import CompareConfig
 from handrail.datasets.reader import read_episodes, read_info
-from handrail.policies.imitation.config import TrainConfig
+from handrail.policies.imitation.checkpoint import last_checkpoint
 from handrail.policies.imitation.evaluate_config import EvaluateConfig
 from handrail.policies.study.design import StudyDesign, TaskDesign
 from handrail.policies.study.jobs import CONDITIONS, Cell, Job, Layout, PolicyArm
 from handrail.policies.study.notes import read_json, write_json
+from handrail.policies.study.settings import evaluations, fingerprint, recording, training
+from handrail.policies.study.standing import Standing
 
-_BATCH = 10  # episodes, until the next person has a turn
 _MOST_ATTEMPTS = 6  # for each success that is wanted
-_FPS = 20  # [Hz]
-
-
-def fingerprint(job: Job, design: StudyDesign) -> dict[str, Any]:
-    """Return all settings that a job's result depends on, as JSON has them."""
-    settings: dict[str, Any] = {"job": asdict(job)}
-    if job.cell:
-        task = design.tasks[job.cell.task]
-        settings |= {"episodes": task.episodes, "minutes": task.minutes, "persons": design.persons}
-        settings |= {"time_limit": task.time_limit.get(job.cell.mode, 0.0), "seed": design.seed}
-    elif job.arm:
-        settings |= {"task": asdict(design.tasks[job.arm.cell.task]), "policy": design.policy}
-        settings |= {"rollouts": design.rollouts, "seed": design.seed}
-        if job.robust and design.robustness:
-            settings["robustness"] = asdict(design.robustness)
-    else:
-        settings["design"] = asdict(design)
-    return json.loads(json.dumps(settings))
 
 
 def begin(job: Job, design: StudyDesign, layout: Layout) -> None:
-    """Note with which settings a job begins; remove what it made with others before."""
-    settings, path = fingerprint(job, design), layout.begun(job)
-    if read_json(path) not in ({}, settings) and job.arm:
-        remove(layout.policy(job.arm))
-        for what in CONDITIONS:
-            remove(layout.evaluation(job.arm, what))
-    write_json(path, settings)
+    """Remove what a job made with other settings before, then note with which it begins.
+
+    A dataset may grow, but never mix two ways to record; rollouts of other conditions go, and those of a
+    policy that is gone; a policy that learnt otherwise goes with all its rollouts.
+
+    Raises:
+        HandrailError: nobody knows with which settings something was made that is there.
+    """
+    settings, before = fingerprint(job, design), read_json(layout.begun(job))
+    stale = [path for path in _stale(job, settings, before, layout) if path.exists()]
+    if stale and "recording" not in before:
+        raise HandrailError(
+            f"{job.name}: expected a note of this version on how {stale[0]} was made in "
+            f"{layout.begun(job)}, found none; remove what is there, or choose another --output"
+        )
+    for path in stale:
+        print(f"removed, made with other settings: {path}")
+        remove(path)
+    write_json(layout.begun(job), settings)
+
+
+def _stale(job: Job, now: Mapping[str, Any], before: Mapping[str, Any], layout: Layout) -> list[Path]:
+    """Return where something would be that does not go with the settings of now."""
+    if job.cell:
+        return [layout.dataset(job.cell)] if now["recording"] != before.get("recording") else []
+    if job.arm is None:
+        return []
+    arm, driven = job.arm, before.get("evaluations", {})
+    if any(now[part] != before.get(part) for part in ("recording", "wanted", "training")):
+        return [layout.policy(arm), *(layout.evaluation(arm, what) for what in CONDITIONS)]
+    gone = last_checkpoint(layout.policy(arm)) is None
+    others = [what for what in CONDITIONS if gone or now["evaluations"].get(what) != driven.get(what)]
+    return [layout.evaluation(arm, what) for what in others]
 
 
 def work(job: Job, design: StudyDesign, layout: Layout) -> dict[str, Any]:
@@ -57,7 +65,7 @@ def work(job: Job, design: StudyDesign, layout: Layout) -> dict[str, Any]:
     if job.cell:
         return _collect(job.cell, design, layout)
     if job.arm:
-        return _policy(job.arm, job.robust, design, layout)
+        return _policy(job, job.arm, design, layout)
     return _compare(job.task, design, layout)
 
 
@@ -68,24 +76,7 @@ def _collect(cell: Cell, design: StudyDesign, layout: Layout) -> dict[str, Any]:
     wanted, root = design.tasks[cell.task], layout.dataset(cell)
     found = _collected(root) if root.exists() else {"episodes": 0, "successes": 0, "minutes": 0.0}
     while not _enough(found, wanted):
-        turn = found["episodes"] // _BATCH
-        code = record(
-            RecordConfig(
-                task=cell.task,
-                mode=cell.mode,
-                noise=cell.noise,
-                person=1 + turn % design.persons,
-                time_limit=wanted.time_limit.get(cell.mode, 0.0),
-                seed=design.seed,
-                dataset=DatasetConfig(
-                    repo_id=f"study/{cell.task}-{cell.mode}",
-                    root=str(root),
-                    num_episodes=_BATCH - found["episodes"] % _BATCH,
-                    fps=_FPS,
-                ),
-                resume=root.exists(),
-            )
-        )
+        code = record(recording(cell, design, root, found["episodes"]))
         if code:
             raise HandrailError(f"collecting {cell.name}: recording ended with exit code {code}")
         found = _collected(root)
@@ -110,52 +101,21 @@ def _enough(found: Mapping[str, Any], wanted: TaskDesign) -> bool:
     return found["successes"] >= wanted.episodes and found["minutes"] >= wanted.minutes
 
 
-def _policy(arm: PolicyArm, robust: bool, design: StudyDesign, layout: Layout) -> dict[str, Any]:
+def _policy(job: Job, arm: PolicyArm, design: StudyDesign, layout: Layout) -> dict[str, Any]:
     """Train a policy and let it drive."""
     from handrail.policies.imitation.training import train
 
-    task = design.tasks[arm.cell.task]
-    timed = arm.budget == "time"
-    folder = train(
-        TrainConfig(
-            dataset=StoredConfig(root=str(layout.dataset(arm.cell))),
-            output=str(layout.policy(arm)),
-            policy=design.policy,
-            actions=arm.actions,
-            success_only=True,
-            steps=task.steps,
-            batch_size=task.batch_size,
-            seed=arm.seed,
-            policy_options=task.policy_options,
-            minutes=task.minutes if timed else 0.0,
-            episodes=0 if timed else task.episodes,
-            resume=True,
-        )
-    )
-    config = EvaluateConfig(
-        policy=(str(folder),),
-        episodes=design.rollouts,
-        seed=design.seed,
-        label=arm.label,
-        time_limit=task.rollout_limit,
-    )
-    shares = {"nominal": _evaluate(config, layout, arm, "nominal")}
-    if robust and design.robustness:
-        fewer = replace(config, episodes=min(design.rollouts, design.robustness.rollouts))
-        disturbed = ",".join(design.robustness.perturbations)
-        shares["disturbed"] = _evaluate(replace(fewer, perturbation=disturbed), layout, arm, "disturbed")
-        if arm.actions == "realised" and design.robustness.protections:
-            protected = replace(fewer, protection=",".join(design.robustness.protections))
-            shares["protected"] = _evaluate(protected, layout, arm, "protected")
+    folder = train(training(arm, design, layout.dataset(arm.cell), layout.policy(arm)))
+    driven = evaluations(job, design, str(folder))
+    shares = {what: _evaluate(config, layout.evaluation(arm, what)) for what, config in driven.items()}
     return {"checkpoint": str(folder.relative_to(layout.root)), "success": shares}
 
 
-def _evaluate(config: EvaluateConfig, layout: Layout, arm: PolicyArm, what: str) -> dict[str, float]:
+def _evaluate(config: EvaluateConfig, file: Path) -> dict[str, float]:
     """Run rollouts into a file of their own and return the success of each arm in it."""
     from handrail.datasets.comparison.evaluations import read_evaluations
     from handrail.policies.imitation.evaluation import evaluate
 
-    file = layout.evaluation(arm, what)
     file.parent.mkdir(parents=True, exist_ok=True)
     evaluate(replace(config, json=str(file)))
     arms = read_evaluations([file])
@@ -169,7 +129,8 @@ def _compare(task: str, design: StudyDesign, layout: Layout) -> dict[str, Any]:
     from handrail.datasets.comparison.report import write_report
 
     cells = [Cell(task, mode) for mode in design.modes]
-    files = [path for cell in cells for path in layout.evaluations(cell, "nominal")]
+    standing = Standing(design, layout)
+    files = [path for cell in cells for path in standing.evaluations(cell, "nominal")]
     comparison = compare(
         CompareConfig(
             datasets=tuple(str(layout.dataset(cell)) for cell in cells),

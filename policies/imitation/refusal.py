@@ -1,0 +1,38 @@
+"""What LeRobot refuses, and what the disk does, as errors of ours; an error in Handrail itself stays one."""
+
+import traceback
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from handrail.controllers.errors import HandrailError
+from handrail.policies.imitation.config import TrainConfig
+
+_REFUSALS = (ValueError, TypeError, AssertionError, ImportError, RuntimeError)
+
+
+@contextmanager
+def in_one_line(config: TrainConfig) -> Iterator[None]:
+    """Turn what is raised while a policy is built or trained into one line.
+
+    Raises:
+        HandrailError: for what arose in LeRobot or below it, and for every OSError.
+    """
+    try:
+        yield
+    except OSError as error:
+        raise HandrailError(f"training in {config.output}: {_words(error)}") from error
+    except _REFUSALS as error:
+        if not _of_lerobot(error):
+            raise
+        raise HandrailError(f"policy {config.policy}: {_words(error)}") from error
+
+
+def _of_lerobot(error: BaseException) -> bool:
+    """Return whether LeRobot, or what it called, raised it; not Handrail, or what that called."""
+    modules = [str(frame.f_globals.get("__name__")) for frame, _ in traceback.walk_tb(error.__traceback__)]
+    packages = [name.partition(".")[0] for name in modules if name.startswith(("handrail.", "lerobot."))]
+    return packages[-1:] == ["lerobot"]
+
+
+def _words(error: BaseException) -> str:
+    return " ".join(str(error).split()) or type(error).__name__

@@ -1,0 +1,46 @@
+"""Reading a study's design from a TOML file, and checking it whole."""
+
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import draccus
+
+from handrail.controllers.errors import HandrailError, unknown_name
+from handrail.policies.study.design import StudyDesign
+from handrail.policies.study.settings import check_jobs
+
+PRESETS = Path(__file__).parent / "presets"
+
+
+def design_names() -> list[str]:
+    """Return the studies that come with Handrail."""
+    return sorted(path.stem for path in PRESETS.glob("*.toml"))
+
+
+def load_design(name: str) -> StudyDesign:
+    """Return a study by the name of a preset or the path of a TOML file.
+
+    Raises:
+        HandrailError: there is none, or something in it is wrong.
+    """
+    path = Path(name).expanduser() if name.endswith(".toml") else PRESETS / f"{name}.toml"
+    if not path.is_file():
+        raise unknown_name("study", name, [*design_names(), "a file that ends in .toml"])
+    try:
+        content = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise HandrailError(f"study {name}: expected TOML, got {error}") from error
+    design = _design(path.stem, content)
+    design.check()
+    check_jobs(design)
+    return design
+
+
+def _design(name: str, content: dict[str, Any]) -> StudyDesign:
+    from draccus.utils import DecodingError, ParsingError
+
+    try:
+        return draccus.decode(StudyDesign, {"name": name, **content})
+    except (DecodingError, ParsingError, TypeError, ValueError) as error:
+        raise HandrailError(f"study {name}: {' '.join(str(error).split())}") from error
