@@ -73,10 +73,14 @@ def run_study(config: StudyConfig, start: Start = start_job) -> int:
     config.check()
     design = load_design(config.preset)
     standing, console = Standing(design, Layout(config.folder)), Console(stderr=True)
-    _check_before(config, standing)
+    check_installed("handrail-study", ("torch", "accelerate"), design.policy)
+    if config.page:
+        between_marks(read_page(Path(config.page).expanduser()), design.name, "")
     with _alone_in(config):
         state = _State(done=set(standing.done))
         if not config.report_only:
+            if any(name.startswith("policy/") for name in standing.missing):
+                check_policies(design)
             with _terminating(state):
                 _run_all(start, config.workers, standing, state, console)
         from handrail.policies.study.report import write_study
@@ -86,16 +90,6 @@ def run_study(config: StudyConfig, start: Start = start_job) -> int:
         console.print(f"failed: {name}: {words}", style="bold red", highlight=False, markup=False)
     console.print("Written: " + ", ".join(map(str, files)), highlight=False, soft_wrap=True)
     return FAILED if state.failed else 0
-
-
-def _check_before(config: StudyConfig, standing: Standing) -> None:
-    """Check what would otherwise show only after hours."""
-    design = standing.design
-    if config.page:
-        between_marks(read_page(Path(config.page).expanduser()), design.name, "")
-    check_installed("handrail-study", ("torch", "accelerate"), design.policy)
-    if not config.report_only and any(name.startswith("policy/") for name in standing.missing):
-        check_policies(design)
 
 
 @contextlib.contextmanager
