@@ -3,7 +3,8 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from handrail.controllers.errors import HandrailError, unknown_name
+from handrail.collect.flags import check_names, check_page, names
+from handrail.controllers.errors import HandrailError
 
 CONTROLLERS = (
     *("mpc", "rl", "mink", "dls", "dls_arm", "decoupled", "blended"),
@@ -49,12 +50,12 @@ class BenchmarkConfig:
     @property
     def controller_names(self) -> tuple[str, ...]:
         """The controllers asked for."""
-        return _names(self.controllers, CONTROLLERS)
+        return names(self.controllers, CONTROLLERS)
 
     @property
     def profile_names(self) -> tuple[str, ...]:
         """The profiles asked for."""
-        return _names(self.profile, PROFILES)
+        return names(self.profile, PROFILES)
 
     @property
     def label(self) -> str:
@@ -71,8 +72,8 @@ class BenchmarkConfig:
         Raises:
             HandrailError: one setting is wrong; the message says what may be chosen.
         """
-        _check_names("controller", "--controllers", self.controller_names, CONTROLLERS)
-        _check_names("profile", "--profile", self.profile_names, PROFILES)
+        check_names("controller", "--controllers", self.controller_names, CONTROLLERS)
+        check_names("profile", "--profile", self.profile_names, PROFILES)
         for name, least, most in (("goals", 1, 100_000), ("seed", 0, None), ("workers", 1, MOST_WORKERS)):
             value = getattr(self, name)
             if value < least or (most is not None and value > most):
@@ -80,23 +81,6 @@ class BenchmarkConfig:
                 raise HandrailError(f"--{name} {value}: expected a whole number {limits}")
         if self.json and not Path(self.json).expanduser().absolute().parent.is_dir():
             raise HandrailError(f"--json {self.json}: expected a file in an existing folder")
-        if self.page and not (self.page.endswith(".md") and Path(self.page).expanduser().parent.is_dir()):
-            raise HandrailError(f"--page {self.page}: expected a .md file in an existing folder")
+        check_page(self.page)
         if self.report and Path(self.report).expanduser().is_file():
             raise HandrailError(f"--report {self.report}: expected a folder, found a file")
-
-
-def _names(given: str, everything: tuple[str, ...]) -> tuple[str, ...]:
-    if given.strip() == "all":
-        return everything
-    return tuple(name.strip() for name in given.split(",") if name.strip())
-
-
-def _check_names(thing: str, flag: str, names: tuple[str, ...], choices: tuple[str, ...]) -> None:
-    if not names:
-        raise HandrailError(f"{flag}: expected all, or some of {', '.join(choices)}; got none")
-    for name in names:
-        if name not in choices:
-            raise unknown_name(thing, name, ("all", *choices))
-    if len(set(names)) != len(names):
-        raise HandrailError(f"{flag} {','.join(names)}: expected each {thing} once")

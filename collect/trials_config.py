@@ -1,10 +1,10 @@
 """What `handrail-trials` runs, as typed settings; light to import."""
 
 from dataclasses import dataclass
-from pathlib import Path
 
 from handrail.collect.config import MODE_NAMES, TASKS
-from handrail.controllers.errors import HandrailError, unknown_name
+from handrail.collect.flags import check_names, check_page, names
+from handrail.controllers.errors import HandrailError
 
 SLOW_MODE = "direct_single"  # needs more time than the tasks give
 SLOW_LIMITS = {"drawer": 180.0, "pick_place": 180.0, "reach": 60.0, "tray": 180.0}  # [s]
@@ -34,12 +34,12 @@ class TrialsConfig:
     @property
     def task_names(self) -> tuple[str, ...]:
         """The tasks asked for."""
-        return _names(self.tasks, TASKS)
+        return names(self.tasks, TASKS)
 
     @property
     def mode_names(self) -> tuple[str, ...]:
         """The modes asked for."""
-        return _names(self.modes, MODE_NAMES)
+        return names(self.modes, MODE_NAMES)
 
     def check(self) -> None:
         """Check what can be checked without loading anything heavy.
@@ -47,8 +47,8 @@ class TrialsConfig:
         Raises:
             HandrailError: one setting is wrong; the message says what may be chosen.
         """
-        _check("task", "--tasks", self.task_names, TASKS)
-        _check("mode", "--modes", self.mode_names, MODE_NAMES)
+        check_names("task", "--tasks", self.task_names, TASKS)
+        check_names("mode", "--modes", self.mode_names, MODE_NAMES)
         for name, least in (("episodes", 1), ("persons", 1), ("seed", 0)):
             value = getattr(self, name)
             if value < least:
@@ -57,19 +57,4 @@ class TrialsConfig:
             raise HandrailError(f"--noise {self.noise}: expected a number from 0 (perfect) to 5")
         if not self.json.endswith(".json"):
             raise HandrailError(f"--json {self.json}: expected a file that ends in .json")
-        if self.page and not (self.page.endswith(".md") and Path(self.page).expanduser().parent.is_dir()):
-            raise HandrailError(f"--page {self.page}: expected a .md file in an existing folder")
-
-
-def _names(given: str, everything: tuple[str, ...]) -> tuple[str, ...]:
-    if given.strip() == "all":
-        return everything
-    return tuple(name.strip() for name in given.split(",") if name.strip())
-
-
-def _check(thing: str, flag: str, names: tuple[str, ...], choices: tuple[str, ...]) -> None:
-    if not names or len(set(names)) < len(names):
-        raise HandrailError(f"{flag} {','.join(names)}: expected all, or some of {', '.join(choices)}, once")
-    for name in names:
-        if name not in choices:
-            raise unknown_name(thing, name, ("all", *choices))
+        check_page(self.page)

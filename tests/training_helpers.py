@@ -77,3 +77,8 @@ def tiny(root: Path, output: Path, *options: str, **settings) -> TrainConfig:
     source = StoredConfig("handrail/test", str(root))
     size = {"steps": 6, "batch_size": 8, "save_freq": 3, "policy_options": (*TINY, *options)} | settings
     return TrainConfig(source, str(output), **size)
+
+
+def weights(folder):
+    """Return the weights of a policy, as they lie on the disk."""
+    return (folder / "model.safetensors").read_bytes()

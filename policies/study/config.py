@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from pathlib import Path
 
+from handrail.collect.flags import check_page
 from handrail.controllers.errors import HandrailError
 
 
@@ -38,6 +39,4 @@ class StudyConfig:
             raise HandrailError(f"--output {self.output}: expected a folder, found a file")
         if self.report_only and not any((self.folder / name).is_dir() for name in ("begun", "done")):
             raise HandrailError(f"--report_only: expected a study in --output {self.output}, found none")
-        page = Path(self.page).expanduser()
-        if self.page and not (page.suffix == ".md" and page.absolute().parent.is_dir()):
-            raise HandrailError(f"--page {self.page}: expected a .md file in an existing folder")
+        check_page(self.page)
