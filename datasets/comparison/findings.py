@@ -88,16 +88,23 @@ def _outcome(difference: OutcomeDifference, one: ArmOutcome, other: ArmOutcome) 
     if not difference.detected:
         return (
             f"No difference in policy success was detected between {one.label} and {other.label}: {shares},"
-            f" difference {interval} points (95 %). This does not show that they are equal: a difference"
-            f" below about {100 * difference.detectable:.0f} points would often go unseen here."
+            f" difference {interval} points (95 %; {_chance(difference)}). This does not show that they are"
+            f" equal: a difference below about {100 * difference.detectable:.0f} points would often go unseen"
+            " here."
         )
     word = "more" if one.share > other.share else "less"
     whose = "Policies trained on" if difference.nested else "This policy trained on"
     return (
         f"{whose} {one.label} succeed{'' if difference.nested else 's'} {word} often than"
         f" {'those' if difference.nested else 'this one'} trained on {other.label}: {shares}, difference"
-        f" {interval} points (95 %; {p_value(difference.p_adjusted)} after Holm)."
+        f" {interval} points (95 %; {_chance(difference)})."
     )
+
+
+def _chance(difference: OutcomeDifference) -> str:
+    """Say how probable such a difference is by chance; an interval alone knows nothing of the others."""
+    among = f", among {difference.tests} differences" if difference.tests > 1 else ""
+    return f"{p_value(difference.p_adjusted)} after Holm{among}"
 
 
 def _collection(comparison: Comparison) -> Iterator[Finding]:
