@@ -60,7 +60,7 @@ class TrainRlConfig:
     goals: int = 50
     """Goals of these evaluations, always the same."""
     final_goals: int = 300
-    """Goals of the last evaluation; nobody looked at them before."""
+    """Goals of the last evaluation, on which nothing is chosen."""
     average: int = 1
     """The actor at the end is the mean of so many last evaluated ones: steadier than any of them."""
     threads: int = 1
