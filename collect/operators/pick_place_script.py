@@ -14,6 +14,7 @@ from handrail.controllers.model import Pose, RobotModel
 
 _HELD = 0.05  # a cube this near to the tool point is held [m]
 _GRASP = 0.010  # of the hand above the middle of the cube [m]
+_CLOSE = 0.020  # from there at which he closes the gripper: on either side of the cube there is as much room [m]
 _RETREAT = 0.40  # hand behind the table's edge while carrying [m]
 _AHEAD = 0.80  # hand before the base's centre while carrying [m]
 
@@ -101,7 +102,7 @@ class PickPlaceScript:
         return [
             phase("stage", stage, distance=0.10, angle=0.30),
             phase("above", _above(cube, 0.14), distance=0.02, angle=0.10),
-            phase("descend", _above(cube, _GRASP), distance=0.010, angle=0.10, pace=0.4, patience=8.0),
+            phase("descend", _above(cube, _GRASP), distance=_CLOSE, angle=0.10, pace=0.4, patience=8.0),
             phase("grasp", _above(cube, _GRASP), distance=1.0, angle=3.2, gripper=1.0, dwell=1.2),
             phase("lift", _above(cube, 0.22), distance=0.04, angle=0.3, gripper=1.0, pace=0.6),
         ]

@@ -21,7 +21,7 @@ from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import HandrailError
 from handrail.policies.imitation.interface import PolicyInterface
 
-FORMAT = "handrail.policy/1"
+FORMAT = "handrail.policy/2"
 NAME = "handrail.json"
 MODEL, STATE = "pretrained_model", "training_state"
 _KEYS = ("observation.state", "observation.environment_state")

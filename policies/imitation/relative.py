@@ -10,6 +10,9 @@ With `R_wb` the base's heading and `(p_t, R_t)` the tool's pose, the pose `(p_o,
 and the tool itself is seen from the base: `R_wbᵀ (p_t − p_b)`, `R_wbᵀ R_t`. So a motion learnt in one place
 is the same motion everywhere, and what an operator steers to zero is an input. `E` is smooth, unlike a
 rotation vector; `p` and `E − Eᵀ` vanish at the goal.
+
+The robot's own velocities are left out: the next joint velocity is nearly the present one, so a policy that sees
+them learns to go on as it goes, and stays at rest where it once comes to rest.
 """
 
 from collections.abc import Sequence
@@ -123,11 +126,10 @@ class RelativeView:
     @property
     def names(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
         """What the numbers are called: of the state, of the environment."""
-        velocities = tuple(f"{joint}.vel" for joint in self.joints)
         arm = tuple(f"{joint}.pos" for joint in self._arm)
         tool = (*_TOOL[:3], *(f"tool.{entry}" for entry in _MATRIX))
         environment = tuple(f"{group.name}.{part}" for group in self._groups for part in _parts(group))
-        return (*arm, *velocities, *self._other, *tool), environment
+        return (*arm, *self._other, *tool), environment
 
     def __call__(self, state: FloatArray, environment: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return both as the policy reads them, (T, s') and (T, e') float32.
@@ -141,7 +143,6 @@ class RelativeView:
         place = np.column_stack([frame.tool[:, :2] - frame.base, frame.tool[:, 2]])
         own = (
             state[:, self._positions],
-            self.to_base(frame, self.velocities(state)),
             state[:, self._others],
             frame.turned(place),
             (frame.matrices().transpose(0, 2, 1) @ frame.rotation).reshape(-1, 9),
