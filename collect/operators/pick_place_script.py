@@ -9,12 +9,13 @@ from handrail.collect.operators.phases import Phase, PhaseRunner
 from handrail.collect.operators.route import Route, front_edge
 from handrail.collect.operators.steering import Gains, pose_errors
 from handrail.collect.operators.wish import Wish
+from handrail.collect.scene import SceneObject
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.model import Pose, RobotModel
 
 _HELD = 0.05  # a cube this near to the tool point is held [m]
 _GRASP = 0.010  # of the hand above the middle of the cube [m]
-_CLOSE = 0.020  # from there at which he closes the gripper: on either side of the cube there is as much room [m]
+_NEAR = 0.010  # to that is as exactly as he tries to place the hand [m]
 _RETREAT = 0.40  # hand behind the table's edge while carrying [m]
 _AHEAD = 0.80  # hand before the base's centre while carrying [m]
 
@@ -68,7 +69,7 @@ class PickPlaceScript:
         place = _Place(front_edge(task, "bin_table"), task.pose("bin").position)
         down = grasp_rotation(view.tool.rotation, cube.rotation)
         rim = task.object("bin").top - place.thing[2]
-        phases = self._pick(pick, down)
+        phases = self._pick(pick, down, self._room(task.object("cube")))
         phases += self._carry(pick, place, down)
         phases += self._place(place, down, rim)
         lane = self._route.lane
@@ -92,7 +93,13 @@ class PickPlaceScript:
         hand = np.array([base[0] + _AHEAD, base[1], pick.thing[2] + 0.30])
         return Phase("ready", Pose(hand, down), base, distance=0.15, angle=0.5)
 
-    def _pick(self, pick: _Place, down: FloatArray) -> list[Phase]:
+    def _room(self, cube: SceneObject) -> float:
+        """Return how far off the hand may be for the open fingers to close around the cube [m]."""
+        gripper = self._model.description.gripper
+        return _NEAR if gripper is None else max(_NEAR, (gripper.stroke - float(cube.shape.size[0])) / 2)
+
+    def _pick(self, pick: _Place, down: FloatArray, room: float) -> list[Phase]:
+        """Go above the cube, down until it is between the fingers, close them, lift."""
         cube, base = pick.thing, self._stand(pick)
         stage = np.array([pick.edge - 0.15, cube[1], cube[2] + 0.30])
 
@@ -102,7 +109,7 @@ class PickPlaceScript:
         return [
             phase("stage", stage, distance=0.10, angle=0.30),
             phase("above", _above(cube, 0.14), distance=0.02, angle=0.10),
-            phase("descend", _above(cube, _GRASP), distance=_CLOSE, angle=0.10, pace=0.4, patience=8.0),
+            phase("descend", _above(cube, _GRASP), distance=room, angle=0.10, pace=0.4, patience=8.0),
             phase("grasp", _above(cube, _GRASP), distance=1.0, angle=3.2, gripper=1.0, dwell=1.2),
             phase("lift", _above(cube, 0.22), distance=0.04, angle=0.3, gripper=1.0, pace=0.6),
         ]

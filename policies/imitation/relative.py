@@ -11,8 +11,8 @@ and the tool itself is seen from the base: `R_wbᵀ (p_t − p_b)`, `R_wbᵀ R_t
 is the same motion everywhere, and what an operator steers to zero is an input. `E` is smooth, unlike a
 rotation vector; `p` and `E − Eᵀ` vanish at the goal.
 
-The robot's own velocities are left out: the next joint velocity is nearly the present one, so a policy that sees
-them learns to go on as it goes, and stays at rest where it once comes to rest.
+The robot's own velocities are left out: the next joint velocity is nearly the present one, so a policy that
+sees them learns to go on as it goes, and stays at rest where it once comes to rest.
 """
 
 from collections.abc import Sequence
