@@ -1,4 +1,4 @@
-"""Counts the contacts that a robot should not have."""
+"""Looks at contacts: those that a robot should not have, and those by which it holds a thing."""
 
 from collections.abc import Iterable
 
@@ -48,6 +48,33 @@ class ContactMonitor:
             (self._model.geom(first).name, self._model.geom(second).name) for first, second in self._pairs
         )
         return tuple(sorted(" – ".join(sorted(pair)) for pair in pairs))
+
+
+class GraspMonitor:
+    """Sees which movable things the fingers hold: those that every finger touches.
+
+    Args:
+        model: the compiled model.
+        fingers: names of their geoms.
+        movable: names of the bodies that can be grasped and carried.
+    """
+
+    def __init__(self, model: MjModel, fingers: Iterable[str], movable: Iterable[str]) -> None:
+        self._bodies = model.geom_bodyid
+        self._fingers = [model.geom(name).id for name in fingers]
+        self._movable = {int(model.body(name).id): name for name in movable}
+
+    def held(self, data: MjData) -> tuple[str, ...]:
+        """Return the names of what is held at this instant."""
+        if not (self._fingers and self._movable and data.ncon):
+            return ()
+        pairs = data.contact.geom
+        touched = [
+            set(self._bodies[pairs[(pairs == finger).any(axis=1)]].ravel().tolist())
+            for finger in self._fingers
+        ]
+        both = set.intersection(*touched)
+        return tuple(name for body, name in self._movable.items() if body in both)
 
 
 def _forbidden_pairs() -> BoolArray:

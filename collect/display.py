@@ -58,7 +58,7 @@ class Display:
         rr.log("world", rr.Clear(recursive=True))
         rr.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP)
         self._movers = env.episode.scene.movers
-        for obstacle in env.obstacles():
+        for obstacle in env.episode.scene.obstacles():
             self._log_shape(f"world/scene/{obstacle.name}", obstacle)
 
     def see(self, moment: Moment) -> None:

@@ -140,8 +140,11 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         return self.simulation.state()
 
     def obstacles(self) -> tuple[Obstacle, ...]:
-        """Return what a controller has to avoid besides the floor, where it is now and how fast it moves."""
-        return self.episode.scene.obstacles(float(self.simulation.data.time))
+        """Return what a controller has to avoid besides the floor, where it is now and how fast it moves.
+
+        What the fingers hold is among it, fixed to the tool.
+        """
+        return (*self.episode.scene.obstacles(float(self.simulation.data.time)), *self.simulation.held())
 
     def task_state(self) -> TaskState:
         """Return the truth of this moment."""

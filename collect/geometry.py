@@ -1,5 +1,6 @@
 """Shapes, poses and inertias of the controllers' vocabulary, in MuJoCo's."""
 
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -55,6 +56,19 @@ def volume(shape: Shape) -> float:
     radius = shape.size[0]
     ball = 0.0 if shape.kind == "cylinder" else 4.0 / 3.0 * np.pi * radius**3
     return float(ball + (np.pi * radius**2 * shape.size[1] if len(shape.size) > 1 else 0.0))
+
+
+def box_around(solids: Iterable[tuple[Shape, FloatArray, FloatArray]]) -> tuple[FloatArray, FloatArray]:
+    """Return full lengths and centre of the smallest box along the axes around shapes, (3,) each [m].
+
+    Args:
+        solids: shape, position of its centre, (3,), and rotation, (3, 3), of each.
+    """
+    lower, upper = np.full(3, np.inf), np.full(3, -np.inf)
+    for shape, position, rotation in solids:
+        half = np.abs(rotation) @ bounding_box(shape) / 2
+        lower, upper = np.minimum(lower, position - half), np.maximum(upper, position + half)
+    return upper - lower, (lower + upper) / 2
 
 
 def bounding_box(shape: Shape) -> FloatArray:

@@ -74,7 +74,8 @@ class MinkController:
     def reset(self, obstacles: tuple[Obstacle, ...] = ()) -> None:
         """Forget the last command; build mink's tasks and limits for the scene of a new episode."""
         mink, settings = self._mink, self._settings
-        self._shapes = shape_model(self._model, obstacles)
+        around = tuple(obstacle for obstacle in obstacles if not obstacle.held)
+        self._shapes = shape_model(self._model, around)
         self._configuration = mink.Configuration(self._shapes)
         self._task = mink.FrameTask("tool", "site", position_cost=1.0, orientation_cost=1.0)
         base = len(self._model.description.base_joints)
@@ -82,14 +83,15 @@ class MinkController:
         self._tasks = [self._task, mink.DampingTask(self._shapes, costs)]
         speeds = dict(zip(self._model.joints, self._model.description.limits.velocity.tolist(), strict=True))
         limits = [mink.ConfigurationLimit(self._shapes), mink.VelocityLimit(self._shapes, speeds)]
-        self._limits = [*limits, *self._avoidance(obstacles)]
+        self._limits = [*limits, *self._avoidance(around)]
         self._reactive.reset(obstacles)
 
     def observe(self, obstacles: tuple[Obstacle, ...]) -> None:
-        """Take where the obstacles are now."""
+        """Take where the obstacles are now; of what the hand holds, mink is told nothing."""
         self._reactive.observe(obstacles)
         for obstacle in obstacles:
-            self._shapes.geom(obstacle.name).pos[:] = obstacle.position
+            if not obstacle.held:
+                self._shapes.geom(obstacle.name).pos[:] = obstacle.position
 
     def update(self, state: State, intent: Intent) -> Command:
         """Return the command from now on."""

@@ -12,6 +12,7 @@ from handrail.collect.patrol import Patrol
 from handrail.collect.slide import Slide
 from handrail.controllers.arrays import FloatArray, frozen
 from handrail.controllers.errors import HandrailError, unknown_name
+from handrail.controllers.model import Pose
 from handrail.controllers.shape import Obstacle, Shape
 
 Colour = tuple[float, float, float, float]
@@ -79,6 +80,28 @@ class SceneObject:
     def top(self) -> float:
         """Height of its upper face above the floor [m], for an upright object."""
         return float(self.position[2] + geometry.bounding_box(self.shape)[2] / 2)
+
+    @property
+    def portable(self) -> bool:
+        """Whether the hand can carry it away."""
+        return self.movable and self.slide is None
+
+    def carried(self, tool: Pose, now: Pose) -> Obstacle:
+        """Return it as the controller sees it while the hand holds it: the box around it, fixed to the tool.
+
+        Args:
+            tool: pose of the tool point.
+            now: its own pose.
+        """
+        size, centre = geometry.box_around((part.shape, part.position, part.rotation) for part in self.solids)
+        inverse = tool.rotation.T
+        position = inverse @ (now.position + now.rotation @ centre - tool.position)
+        return Obstacle(self.name, box(size), position, inverse @ now.rotation, frame="tool")
+
+    @property
+    def solids(self) -> tuple[Part, ...]:
+        """What is drawn and touched."""
+        return self.parts or (Part(self.shape, np.zeros(3)),)
 
     def obstacle(self, time: float = 0.0) -> Obstacle:
         """Return it as the controller sees it at a time of the episode [s]."""
@@ -157,7 +180,7 @@ def _add_object(spec: MjSpec, item: SceneObject) -> None:
     if item.movable:
         _add_freedom(body, item)
     volume = sum(geometry.volume(part.shape) for part in item.parts)
-    for index, part in enumerate(item.parts or (Part(item.shape, np.zeros(3)),)):
+    for index, part in enumerate(item.solids):
         mass = item.mass * geometry.volume(part.shape) / volume if item.parts else 0.0
         body.add_geom(
             mass=mass,

@@ -115,19 +115,18 @@ class Session:
 
     def _run(self, seed: int) -> Outcome:
         observation, info = self.env.reset(seed=seed)
-        self._controller.reset(self.env.obstacles())
+        around = _Surroundings(self.env, self._controller)
         self._operator.reset(self._view(observation), np.random.default_rng([seed, 1]))
         for other in (*self._observers, *self._disturbances):
             other.begin(self.env, seed)
         tally = _Tally(seed, 1.0 / self.env.fps)
-        moving, done = bool(self.env.episode.scene.movers), False
+        done = False
         while not done:
             wall_clock = tally.elapsed
             with tally.timed("operator"):
                 intent = self._operator.act(self._view(observation))
             with tally.timed("controller"):
-                if moving:
-                    self._controller.observe(self.env.obstacles())
+                around.observe()
                 command = self._controller.update(self.env.state(), intent)
             action = action_of(command, 1.0 / self.env.fps)
             with tally.timed("environment"):
@@ -161,6 +160,21 @@ class Session:
 def action_of(command: Command, period: float) -> np.ndarray:
     """Return the env's action: velocity at the end of the period and gripper, (n + 1,) float32."""
     return np.append(command.velocity(period), command.gripper).astype(np.float32)
+
+
+class _Surroundings:
+    """Tells a controller what there is to avoid: at the beginning, and while that changes or is held."""
+
+    def __init__(self, env: HandrailEnv, controller: Controller) -> None:
+        self._env, self._controller = env, controller
+        self._moving, self._holding = bool(env.episode.scene.movers), bool(env.simulation.held())
+        controller.reset(env.obstacles())
+
+    def observe(self) -> None:
+        """Say where things are now, if that can have changed."""
+        before, self._holding = self._holding, bool(self._env.simulation.held())
+        if self._moving or self._holding or before:
+            self._controller.observe(self._env.obstacles())
 
 
 class _Tally:

@@ -183,7 +183,7 @@ class _Tracer:
         states, solve_times = zip(*self._rows, strict=True)
         model, case = self._env.model, self._case
         q = np.array([state.q for state in states])
-        collision = CollisionModel(model, self._env.obstacles())
+        collision = CollisionModel(model, self._env.episode.scene.obstacles())
         return Trace(
             case=case,
             times=np.array([state.time for state in states]),

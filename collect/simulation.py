@@ -6,7 +6,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from handrail.collect.contacts import ContactMonitor
+from handrail.collect.contacts import ContactMonitor, GraspMonitor
 from handrail.collect.gl import mujoco
 from handrail.collect.robot import BASE_BODY, FINGERS, RobotSpec, build_robot
 from handrail.collect.scene import Scene, add_scene
@@ -15,6 +15,7 @@ from handrail.controllers.arrays import FloatArray, IntArray
 from handrail.controllers.controller import State
 from handrail.controllers.jit import exact_jit
 from handrail.controllers.model import Pose, RobotModel
+from handrail.controllers.shape import Obstacle
 
 _LARGEST_TIMESTEP = 0.002
 
@@ -64,6 +65,9 @@ class Simulation:
         self._contacts = ContactMonitor(
             self.mujoco_model, robot.contact_geoms, robot.grasp_geoms, [m.name for m in scene.movables]
         )
+        fingers = FINGERS if model.description.gripper else ()
+        portable = [item.name for item in scene.movables if item.portable]
+        self._grasp = GraspMonitor(self.mujoco_model, fingers, portable)
         self._index()
         self.commanded = np.zeros(model.size)
         self._place(q, grip)
@@ -185,6 +189,12 @@ class Simulation:
     def twists(self) -> dict[str, Twist]:
         """Return how every movable object moves now, by name."""
         return {item.name: self._twist(item.name) for item in self._scene.movables}
+
+    def held(self) -> tuple[Obstacle, ...]:
+        """Return what the fingers hold, fixed to the tool as it is now."""
+        tool = self.tool
+        names = self._grasp.held(self.data)
+        return tuple(self._scene.find(name).carried(tool, self._pose(name)) for name in names)
 
     def _pose(self, name: str) -> Pose:
         body = self.data.body(name)

@@ -91,15 +91,19 @@ class CbfFilter:
 
     def reset(self, obstacles: tuple[Obstacle, ...] = ()) -> None:
         """Forget the last command; take the obstacles of a new episode."""
-        self._collision = CollisionModel(self._model, obstacles)
-        wanted = np.where(self._collision.work, self._settings.work_margin, self._settings.margin)
-        self._margins = np.minimum(wanted, self._collision.largest_margin)
+        self._avoid(CollisionModel(self._model, obstacles))
         self._previous: FloatArray | None = None
         self._gripper = 0.0
 
     def observe(self, obstacles: tuple[Obstacle, ...]) -> None:
-        """Take where the obstacles are now and how fast they move."""
-        self._collision.observe(obstacles)
+        """Take where the obstacles are now, how fast they move, and what the hand holds."""
+        self._avoid(self._collision.among(obstacles))
+
+    def _avoid(self, collision: CollisionModel) -> None:
+        """Keep these pairs apart from now on."""
+        self._collision = collision
+        wanted = np.where(collision.work, self._settings.work_margin, self._settings.margin)
+        self._margins = np.minimum(wanted, collision.largest_margin)
 
     def update(self, state: State, intent: Intent) -> Command:
         """Return the command from now on; brakes on a bad input or a failed solve."""

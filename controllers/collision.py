@@ -2,19 +2,17 @@
 
 from dataclasses import dataclass
 
-import coal
 import numpy as np
 import pinocchio as pin
 
-from handrail.controllers.arrays import BoolArray, FloatArray, IntArray, frozen
+from handrail.controllers.arrays import FloatArray, IntArray
 from handrail.controllers.errors import HandrailError
-from handrail.controllers.levers import all_lever_arms
 from handrail.controllers.model import RobotModel
 from handrail.controllers.pair_data import PairData
-from handrail.controllers.shape import Obstacle, Shape
+from handrail.controllers.shape import Obstacle
+from handrail.controllers.shape_pairs import ShapePairs
 from handrail.controllers.witnesses import gradients, lower_bounds, measured, raise_bounds
 
-FLOOR = "floor"
 _STRETCH = 13  # configurations after which all pairs are measured again
 _FAR = 0.15  # a pair that stays farther apart than this need not be measured exactly [m]
 
@@ -35,9 +33,9 @@ class Distances:
 
 
 class CollisionModel:
-    """The pairs that must keep apart: robot shapes with each other, the floor and the obstacles.
+    """Measures the pairs that must keep apart.
 
-    See witnesses.py for the distance of a pair and its gradient.
+    See shape_pairs.py for which these are, and witnesses.py for the distance of a pair and its gradient.
 
     Attributes:
         pairs: names of the two shapes of each pair, (P,) of (str, str).
@@ -46,32 +44,18 @@ class CollisionModel:
     """
 
     def __init__(self, model: RobotModel, obstacles: tuple[Obstacle, ...] = ()) -> None:
+        self._robot = model
         self._model = model.pinocchio
-        self._geometry = pin.GeometryModel()
-        description = model.description
-        robot = {
-            placed.name: self._add(placed.name, model.frame_id(placed.frame), placed.shape, placed.placement)
-            for placed in description.collision
-        }
-        tools = {placed.name for placed in description.collision if placed.tool}
-        scene = self._add_scene(obstacles)
-        self._obstacles = {obstacle.name: scene[obstacle.name] for obstacle in obstacles}
-        self._moving: list[tuple[pin.GeometryObject, Obstacle]] = []
-        work_surfaces = {obstacle.name for obstacle in obstacles if obstacle.work_surface}
-        self.pairs = (
-            *description.self_pairs,
-            *((name, FLOOR) for name in description.floor_shapes),
-            *((name, obstacle.name) for name in description.scene_shapes for obstacle in obstacles),
-        )
-        everything = robot | scene
-        for first, second in self.pairs:
-            self._geometry.addCollisionPair(pin.CollisionPair(everything[first], everything[second]))
-        self.work: BoolArray = frozen([a in tools and b in work_surfaces for a, b in self.pairs], dtype=bool)
-        other = np.full(len(self.pairs) - len(description.self_pairs), np.inf)
-        self.largest_margin: FloatArray = frozen(np.concatenate([description.self_margins, other]))
+        self._shapes = ShapePairs(model, obstacles)
+        self._geometry = self._shapes.geometry
+        self._obstacles = self._frames(obstacles)
+        self._moving: list[Obstacle] = []
+        self.pairs = self._shapes.names
+        self.work = self._shapes.work
+        self.largest_margin = self._shapes.largest_margin
+        self._moves = self._shapes.moves  # (P, 2, n)
+        self._levers = self._shapes.levers  # (n, P)
         self._data = self._model.createData()
-        self._moves = self._pair_moves()  # (P, 2, n)
-        self._levers = np.ascontiguousarray(self._pair_levers(model))  # (n, P)
         self._every = np.arange(len(self.pairs))
         self._far = np.full(len(self.pairs), _FAR)
         neutral = pin.neutral(self._model)
@@ -195,10 +179,8 @@ class CollisionModel:
 
     def _move_obstacles(self, time: float) -> None:
         """Put moving obstacles where they are after a time."""
-        for geometry, obstacle in self._moving:
-            geometry.placement = pin.SE3(
-                np.array(obstacle.rotation), obstacle.position + time * obstacle.velocity
-            )
+        for obstacle in self._moving:
+            self._shapes.place(obstacle, time)
 
     def observe(self, obstacles: tuple[Obstacle, ...]) -> None:
         """Take where the obstacles are now and how fast they move.
@@ -206,70 +188,35 @@ class CollisionModel:
         Raises:
             HandrailError: they are not the obstacles that the model was built with.
         """
-        names = tuple(obstacle.name for obstacle in obstacles)
-        if names != tuple(self._obstacles):
-            raise HandrailError(f"obstacles: expected {', '.join(self._obstacles)}, got {', '.join(names)}")
-        self._moving = []
+        if self._frames(obstacles) != self._obstacles:
+            expected, got = ", ".join(self._obstacles), ", ".join(obstacle.name for obstacle in obstacles)
+            raise HandrailError(f"obstacles: expected {expected}, got {got}")
         self._last: tuple[FloatArray, FloatArray] | None = None
         for obstacle in obstacles:
-            geometry = self._geometry.geometryObjects[self._obstacles[obstacle.name]]
-            geometry.placement = pin.SE3(np.array(obstacle.rotation), np.array(obstacle.position))
-            if obstacle.velocity.any():
-                self._moving.append((geometry, obstacle))
+            self._shapes.place(obstacle)
+        self._moving = [obstacle for obstacle in obstacles if obstacle.velocity.any()]
         speeds = {obstacle.name: float(np.linalg.norm(obstacle.velocity)) for obstacle in obstacles}
         self._speeds = np.array([speeds.get(second, 0.0) for _, second in self.pairs])
 
-    def _add_scene(self, obstacles: tuple[Obstacle, ...]) -> dict[str, int]:
-        names = [obstacle.name for obstacle in obstacles]
-        if len(set(names)) != len(names) or FLOOR in names:
-            raise HandrailError(f"obstacle names: expected distinct names other than {FLOOR!r}, got {names}")
-        floor = pin.GeometryObject(
-            FLOOR, 0, pin.SE3.Identity(), coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0)
-        )
-        scene = {FLOOR: self._geometry.addGeometryObject(floor)}
-        for obstacle in obstacles:
-            scene[obstacle.name] = self._add(obstacle.name, 0, obstacle.shape, obstacle)
-        return scene
+    def among(self, obstacles: tuple[Obstacle, ...]) -> "CollisionModel":
+        """Return the model as the obstacles are now: this one; another one when what is held has changed.
 
-    def _add(self, name: str, frame: int, shape: Shape, placement: object) -> int:
-        translation = getattr(placement, "translation", None)
-        if translation is None:
-            translation = placement.position  # type: ignore[attr-defined]
-        local = pin.SE3(np.array(placement.rotation), np.array(translation))  # type: ignore[attr-defined]
-        parent = self._model.frames[frame]
-        thing = pin.GeometryObject(name, parent.parentJoint, parent.placement * local, _coal_shape(shape))
-        return self._geometry.addGeometryObject(thing)
-
-    def _pair_moves(self) -> FloatArray:
-        """Return which coordinates move the two shapes of every pair: 1 or 0, (P, 2, n)."""
-        moved = np.zeros((self._model.njoints, self._model.nv))
-        for joint in range(1, self._model.njoints):
-            moved[joint] = moved[self._model.parents[joint]]
-            moved[joint, self._model.joints[joint].idx_v] = 1.0
-        joints = [thing.parentJoint for thing in self._geometry.geometryObjects]
-        pairs = [(joints[pair.first], joints[pair.second]) for pair in self._geometry.collisionPairs]
-        return moved[np.array(pairs, dtype=int).reshape(-1, 2)]
-
-    def _pair_levers(self, model: RobotModel) -> FloatArray:
-        """Return how far a unit of each coordinate can bring a pair together at most, (n, P) [m].
-
-        A coordinate that moves both shapes alike does not; of one that moves a single shape it is the
-        shape's lever arm.
+        Raises:
+            HandrailError: what stands around is not what the model was built with.
         """
-        arms = all_lever_arms(model)
-        none = np.zeros(model.size)
-        either = (
-            self._moves[:, 0] != self._moves[:, 1] if self.size else np.zeros((0, model.size), dtype=bool)
-        )
-        longer = [np.maximum(arms.get(a, none), arms.get(b, none)) for a, b in self.pairs]
-        return (either * np.array(longer).reshape(-1, model.size)).T
+        before = [name for name, frame in self._obstacles.items() if not frame]
+        standing = [obstacle.name for obstacle in obstacles if not obstacle.held]
+        if standing == before and self._frames(obstacles) != self._obstacles:
+            return CollisionModel(self._robot, obstacles)
+        self.observe(obstacles)
+        return self
+
+    @staticmethod
+    def _frames(obstacles: tuple[Obstacle, ...]) -> dict[str, str]:
+        """Return what every obstacle is fixed to, by its name."""
+        return {obstacle.name: obstacle.frame for obstacle in obstacles}
 
 
 def _nothing(count: int, size: int) -> Distances:
     """Return the distances of no pairs at all at `count` configurations."""
     return Distances(np.zeros((count, 0)), np.zeros((0, 2), dtype=int), np.zeros((0, size)))
-
-
-def _coal_shape(shape: Shape) -> coal.ShapeBase:
-    make = {"box": coal.Box, "capsule": coal.Capsule, "sphere": coal.Sphere, "cylinder": coal.Cylinder}
-    return make[shape.kind](*(float(length) for length in shape.size))

@@ -39,10 +39,12 @@ class Controller(Protocol):
         ...
 
     def observe(self, obstacles: tuple[Obstacle, ...]) -> None:
-        """Take where the obstacles are now and how fast they move; called before an update if any moves.
+        """Take where the obstacles are now, how fast they move, and what the hand holds.
+
+        Called before an update if any moves, while something is held, and when it was let go.
 
         Raises:
-            HandrailError: they are not the obstacles of this episode.
+            HandrailError: what stands around is not what did at the beginning of this episode.
         """
         ...
 

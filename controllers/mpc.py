@@ -88,28 +88,27 @@ class MaskedMpc:
 
     def reset(self, obstacles: tuple[Obstacle, ...] = ()) -> None:
         """Forget warm start and last command; take the obstacles of a new episode."""
-        settings = self.settings
-        self._collision = CollisionModel(self.model, obstacles)
-        wanted = np.where(self._collision.work, settings.work_margin, settings.margin)
-        self._margins = np.minimum(wanted, self._collision.largest_margin)
-        floors = settings.floor * self._margins
-        certificate = StopCertificate(
-            self._limiter,
-            self._collision,
-            floors,
-            self.model.description.limits,
-            settings.horizon * settings.dt,
-        )
-        self._backup = Backup(certificate, self._limiter, settings.dt)
+        certificate = self._avoid(CollisionModel(self.model, obstacles))
+        self._backup = Backup(certificate, self._limiter, self.settings.dt)
         self._parameters = self.residuals.parameters
         self._plan: Plan | None = None
         self._followed: Followed | None = None
-        self.solver.reset()
         getattr(self._predict, "reset", lambda: None)()
 
     def observe(self, obstacles: tuple[Obstacle, ...]) -> None:
-        """Take where the obstacles are now and how fast they move."""
-        self._collision.observe(obstacles)
+        """Take where the obstacles are now, how fast they move, and what the hand holds."""
+        now = self._collision.among(obstacles)
+        if now is not self._collision:
+            self._backup.certificate = self._avoid(now)
+
+    def _avoid(self, collision: CollisionModel) -> StopCertificate:
+        """Keep these pairs apart from now on; return what measures motions by them."""
+        settings, self._collision = self.settings, collision
+        wanted = np.where(collision.work, settings.work_margin, settings.margin)
+        self._margins = np.minimum(wanted, collision.largest_margin)
+        self.solver.reset()  # the rows that were active are numbered by pairs
+        floors, span = settings.floor * self._margins, settings.horizon * settings.dt
+        return StopCertificate(self._limiter, collision, floors, self.model.description.limits, span)
 
     def set_parameters(self, objective: str, values: FloatArray) -> None:
         """Change an objective's parameters from the next update on.

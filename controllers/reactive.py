@@ -58,8 +58,8 @@ class ReactiveController:
         self._gripper = 0.0
 
     def observe(self, obstacles: tuple[Obstacle, ...]) -> None:
-        """Take where the obstacles are now."""
-        self._collision.observe(obstacles)
+        """Take where the obstacles are now, and what the hand holds."""
+        self._collision = self._collision.among(obstacles)
 
     def update(self, state: State, intent: Intent) -> Command:
         """Return the command from now on."""

@@ -44,15 +44,16 @@ class Shape:
 
 @dataclass(frozen=True)
 class Obstacle:
-    """A shape in the scene.
+    """A shape in the scene, or one that the robot holds.
 
     Attributes:
         name: unique in the scene.
         shape: its geometry.
-        position: of its centre in the world [m], (3,).
-        rotation: world from shape, (3, 3).
-        velocity: of its centre in the world [m/s], (3,); predicted constant.
+        position: of its centre in the world, or in `frame` [m], (3,).
+        rotation: world, or `frame`, from shape, (3, 3).
+        velocity: of its centre in the world [m/s], (3,); predicted constant; none of what is held.
         work_surface: whether tool shapes may come close to it (a table that is worked on).
+        frame: the robot's frame that it is fixed to because the hand holds it; empty for the world.
     """
 
     name: str
@@ -61,8 +62,14 @@ class Obstacle:
     rotation: FloatArray = field(default_factory=lambda: np.eye(3))
     velocity: FloatArray = field(default_factory=lambda: np.zeros(3))
     work_surface: bool = False
+    frame: str = ""
 
     def __post_init__(self) -> None:
         """Copy the arrays and make them read-only."""
         for name in ("position", "rotation", "velocity"):
             object.__setattr__(self, name, frozen(getattr(self, name)))
+
+    @property
+    def held(self) -> bool:
+        """Whether it moves with the robot."""
+        return bool(self.frame)
