@@ -192,8 +192,7 @@ class CollisionModel:
             expected, got = ", ".join(self._obstacles), ", ".join(obstacle.name for obstacle in obstacles)
             raise HandrailError(f"obstacles: expected {expected}, got {got}")
         self._last: tuple[FloatArray, FloatArray] | None = None
-        for obstacle in obstacles:
-            self._shapes.place(obstacle)
+        self._shapes.observe(obstacles)
         self._moving = [obstacle for obstacle in obstacles if obstacle.velocity.any()]
         speeds = {obstacle.name: float(np.linalg.norm(obstacle.velocity)) for obstacle in obstacles}
         self._speeds = np.array([speeds.get(second, 0.0) for _, second in self.pairs])

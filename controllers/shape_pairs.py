@@ -1,5 +1,7 @@
 """Which shapes must keep apart: those of the robot, of the scene, and of what the hand holds."""
 
+from collections.abc import Iterable
+
 import coal
 import numpy as np
 import pinocchio as pin
@@ -54,7 +56,20 @@ class ShapePairs:
         margins = [description.self_margins, np.full(len(others), np.inf)]
         self.largest_margin: FloatArray = frozen(np.concatenate(margins))
         self.moves = self._pair_moves()
-        self.levers = np.ascontiguousarray(self._pair_levers(obstacles))
+        self.levers = np.zeros((model.size, len(self.names)))
+        self._arms = dict(all_lever_arms(model))
+        held = {obstacle.name for obstacle in obstacles if obstacle.held}
+        self._held = {name: [row for row, pair in enumerate(self.names) if name in pair] for name in held}
+        self._measure_levers(range(len(self.names)))
+        self.observe(obstacles)
+
+    def observe(self, obstacles: tuple[Obstacle, ...]) -> None:
+        """Put every obstacle where it is now; a thing may have slipped in the hand, and reach farther."""
+        for obstacle in obstacles:
+            self.place(obstacle)
+            if obstacle.held:
+                self._arms[obstacle.name] = lever_arms(self._model, _placed(obstacle))
+                self._measure_levers(self._held[obstacle.name])
 
     def place(self, obstacle: Obstacle, time: float = 0.0) -> None:
         """Put an obstacle where it is after a time [s]."""
@@ -104,18 +119,16 @@ class ShapePairs:
         pairs = [(joints[pair.first], joints[pair.second]) for pair in self.geometry.collisionPairs]
         return moved[np.array(pairs, dtype=int).reshape(-1, 2)]
 
-    def _pair_levers(self, obstacles: tuple[Obstacle, ...]) -> FloatArray:
-        """Return the levers.
+    def _measure_levers(self, rows: Iterable[int]) -> None:
+        """Write the levers of some pairs.
 
         A coordinate that moves both shapes alike does not bring them together; of one that moves a single
         shape it is the shape's lever arm.
         """
-        model = self._model
-        held = {each.name: lever_arms(model, _placed(each)) for each in obstacles if each.held}
-        arms, none = all_lever_arms(model) | held, np.zeros(model.size)
-        either = self.moves[:, 0] != self.moves[:, 1]
-        longer = [np.maximum(arms.get(a, none), arms.get(b, none)) for a, b in self.names]
-        return (either * np.array(longer).reshape(-1, model.size)).T
+        none = np.zeros(self._model.size)
+        for row in rows:
+            first, second = (self._arms.get(name, none) for name in self.names[row])
+            self.levers[:, row] = (self.moves[row, 0] != self.moves[row, 1]) * np.maximum(first, second)
 
 
 def _check_names(obstacles: tuple[Obstacle, ...]) -> None:

@@ -205,3 +205,16 @@ def test_the_box_around_shapes():
     )
     np.testing.assert_allclose(size, [0.45, 0.2, 0.5], atol=1e-12)  # x from -0.05 to 0.4
     np.testing.assert_allclose(centre, [0.175, 0.0, 0.15], atol=1e-12)
+
+
+def test_bounds_hold_for_a_thing_that_has_slipped():
+    """A thing that sits otherwise in the hand than when it was grasped may reach farther from some joints."""
+    rng, cube = np.random.default_rng(3), Shape("box", [0.05, 0.05, 0.05])
+    collision = CollisionModel(MODEL, (POST, Obstacle("box", cube, [0.0, 0.0, 0.0], frame="tool")))
+    collision.observe((POST, Obstacle("box", cube, [0.0, 0.0, 0.6], frame="tool")))
+    for _ in range(60):
+        q = rng.uniform(-1.5, 1.5, MODEL.size)
+        path = q + np.outer(np.linspace(0.0, 0.4, 30), np.eye(MODEL.size)[rng.integers(6, 8)])  # a wrist
+        exact = collision.values(path)
+        cheap = collision.values(path, None, (path[0], exact[0]), np.full(collision.size, -1.0))
+        assert np.all(cheap <= exact + 1e-5)
