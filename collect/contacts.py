@@ -5,7 +5,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from handrail.collect.gl import MjData, MjModel
-from handrail.controllers.arrays import BoolArray
+from handrail.controllers.arrays import BoolArray, FloatArray
 
 _SCENE, _ROBOT, _GRASP, _MOVABLE = range(4)
 
@@ -51,30 +51,39 @@ class ContactMonitor:
 
 
 class GraspMonitor:
-    """Sees which movable things the fingers hold: those that every finger touches.
+    """Sees which things the fingers hold: those that they press from opposite sides.
 
     Args:
         model: the compiled model.
-        fingers: names of their geoms.
-        movable: names of the bodies that can be grasped and carried.
+        fingers: names of the geoms of the two; none of a robot without a gripper.
+        portable: names of the bodies that can be carried.
     """
 
-    def __init__(self, model: MjModel, fingers: Iterable[str], movable: Iterable[str]) -> None:
+    def __init__(self, model: MjModel, fingers: Iterable[str], portable: Iterable[str]) -> None:
         self._bodies = model.geom_bodyid
         self._fingers = [model.geom(name).id for name in fingers]
-        self._movable = {int(model.body(name).id): name for name in movable}
+        self._portable = {int(model.body(name).id): name for name in portable}
 
     def held(self, data: MjData) -> tuple[str, ...]:
         """Return the names of what is held at this instant."""
-        if not (self._fingers and self._movable and data.ncon):
+        if not (self._fingers and self._portable and data.ncon):
             return ()
-        pairs = data.contact.geom
-        touched = [
-            set(self._bodies[pairs[(pairs == finger).any(axis=1)]].ravel().tolist())
-            for finger in self._fingers
-        ]
-        both = set.intersection(*touched)
-        return tuple(name for body, name in self._movable.items() if body in both)
+        left, right = (self._pushes(data, finger) for finger in self._fingers)
+        return tuple(
+            name
+            for body, name in self._portable.items()
+            if body in left and body in right and left[body] @ right[body] < 0.0
+        )
+
+    def _pushes(self, data: MjData, finger: int) -> dict[int, FloatArray]:
+        """Return which way a finger pushes what it touches: sums of unit normals, (3,), by body."""
+        pushes: dict[int, FloatArray] = {}
+        for pair, frame in zip(data.contact.geom, data.contact.frame, strict=True):
+            if finger in pair:
+                other, sign = (pair[1], 1.0) if pair[0] == finger else (pair[0], -1.0)
+                body = int(self._bodies[other])
+                pushes[body] = pushes.get(body, 0.0) + sign * frame[:3]
+        return pushes
 
 
 def _forbidden_pairs() -> BoolArray:

@@ -142,7 +142,7 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     def obstacles(self) -> tuple[Obstacle, ...]:
         """Return what a controller has to avoid besides the floor, where it is now and how fast it moves.
 
-        What the fingers hold is among it, fixed to the tool.
+        What the fingers hold is among it; its position and rotation are in the frame that it names.
         """
         return (*self.episode.scene.obstacles(float(self.simulation.data.time)), *self.simulation.held())
 

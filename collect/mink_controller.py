@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from handrail.collect.mink_scene import avoidance, import_mink, qp_solvers, shape_model, shape_pairs
+from handrail.collect.mink_scene import avoidance, import_mink, qp_solvers, shape_model, standing_pairs
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.channels import Channels
 from handrail.controllers.command import Command
@@ -87,7 +87,7 @@ class MinkController:
         self._reactive.reset(obstacles)
 
     def observe(self, obstacles: tuple[Obstacle, ...]) -> None:
-        """Take where the obstacles are now; of what the hand holds, mink is told nothing."""
+        """Take where the obstacles are now; mink does not avoid what the hand holds."""
         self._reactive.observe(obstacles)
         for obstacle in obstacles:
             if not obstacle.held:
@@ -100,7 +100,7 @@ class MinkController:
     def _avoidance(self, obstacles: tuple[Obstacle, ...]) -> list[Any]:
         """Return a limit for every margin that pairs keep: a few of the robot's own keep less."""
         description, settings = self._model.description, self._settings
-        pairs = shape_pairs(self._model, obstacles)
+        pairs = standing_pairs(self._model, obstacles)
         others = np.full(len(pairs) - len(description.self_margins), np.inf)
         margins = np.minimum(settings.margin, np.concatenate([description.self_margins, others]))
         gain = min(settings.approach * self._period, 1.0)

@@ -48,8 +48,8 @@ def shape_model(model: RobotModel, obstacles: tuple[Obstacle, ...]) -> Any:
     return spec.compile()
 
 
-def shape_pairs(model: RobotModel, obstacles: tuple[Obstacle, ...]) -> tuple[tuple[str, str], ...]:
-    """Return the pairs that keep apart, the same as the controllers'."""
+def standing_pairs(model: RobotModel, obstacles: tuple[Obstacle, ...]) -> tuple[tuple[str, str], ...]:
+    """Return the pairs that keep apart, the same as the controllers' while nothing is held."""
     description = model.description
     return (
         *description.self_pairs,

@@ -4,7 +4,7 @@ from time import perf_counter
 
 import numpy as np
 
-from handrail.collect.mink_scene import avoidance, import_mink, qp_solvers, shape_model, shape_pairs
+from handrail.collect.mink_scene import avoidance, import_mink, qp_solvers, shape_model, standing_pairs
 from handrail.collect.profile_lane import PERIOD, Lane, Update
 from handrail.controllers.converged import ConvergedSolver
 from handrail.controllers.settings import MpcSettings
@@ -96,7 +96,7 @@ class Mink:
         limits = lane.model.description.limits
         speeds = dict(zip(lane.model.joints, limits.velocity.tolist(), strict=True))
         margin = MpcSettings().margin
-        avoid = avoidance(model, shape_pairs(lane.model, lane.obstacles), margin, self._reach)
+        avoid = avoidance(model, standing_pairs(lane.model, lane.obstacles), margin, self._reach)
         self.pairs = avoid.max_num_contacts
         self._tasks = [self._task, posture]
         self._limits = [mink.ConfigurationLimit(model), mink.VelocityLimit(model, speeds), avoid]

@@ -163,7 +163,7 @@ def action_of(command: Command, period: float) -> np.ndarray:
 
 
 class _Surroundings:
-    """Tells a controller what there is to avoid: at the beginning, and while that changes or is held."""
+    """Tells a controller what there is to avoid: at the beginning, and while it moves or is held."""
 
     def __init__(self, env: HandrailEnv, controller: Controller) -> None:
         self._env, self._controller = env, controller

@@ -152,7 +152,7 @@ class Parametrised:
             self._mpc.set_parameters(objective, values)
 
     def observe(self, obstacles: tuple[Obstacle, ...]) -> None:
-        """Tell the controller where the obstacles are."""
+        """Tell the controller where the obstacles are, and what the hand holds."""
         self._mpc.observe(obstacles)
 
     def update(self, state: State, intent: Intent) -> Command:

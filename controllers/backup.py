@@ -64,16 +64,17 @@ class Backup:
         certificate: measures the ways.
         limiter: knows the full stop.
         dt: time between knots [s].
-
-    Attributes:
-        certificate: measures the ways; another one from when something was grasped or let go.
     """
 
     def __init__(self, certificate: StopCertificate, limiter: Limiter, dt: float) -> None:
-        self.certificate = certificate
+        self._certificate = certificate
         self._limiter = limiter
         self._dt = dt
         self._stored: Trajectory | None = None
+
+    def measure_by(self, certificate: StopCertificate) -> None:
+        """Measure by other pairs from now on: something was grasped or let go."""
+        self._certificate = certificate
 
     def choose(self, situation: Situation, plan: Plan | None, halt: bool = False) -> Way:
         """Return the way to take, and store it.
@@ -101,7 +102,7 @@ class Backup:
     def _ways(self, situation: Situation, plan: Plan | None, halt: bool) -> Iterator[Way]:
         now = situation.q, situation.distances
         if plan is not None:
-            shortfall = self.certificate.shortfall(plan.q[1], plan.v[1], now, self._dt)
+            shortfall = self._certificate.shortfall(plan.q[1], plan.v[1], now, self._dt)
             yield Way(Trajectory(plan.v[:2], self._dt), shortfall, planned=True)
             yield from self._farther(plan, now)
         if halt:
@@ -109,24 +110,24 @@ class Backup:
         if self._stored is not None:
             rest = self._stopping(self._stored).after(situation.elapsed)
             if np.allclose(situation.v, rest.velocity(0.0), rtol=0.0, atol=_SAME):
-                yield Way(rest, self.certificate.until_rest(*rest.path(situation.q), now))
+                yield Way(rest, self._certificate.until_rest(*rest.path(situation.q), now))
         if not halt:
             yield self._stop(situation)
 
     def _farther(self, plan: Plan, now: tuple[FloatArray, FloatArray]) -> Iterator[Way]:
         """Yield the plan as far as its own path is safe, then a full stop; half as far; and so on."""
         path = Trajectory(plan.v, self._dt).path(plan.q[0], _SAMPLES)
-        shortfalls = self.certificate.along(*path, now)
+        shortfalls = self._certificate.along(*path, now)
         unsafe = np.flatnonzero(shortfalls > 0.0)
         stages = len(plan.u) if not len(unsafe) else (int(unsafe[0]) - 1) // _SAMPLES
         while stages > 1:
-            shortfall = self.certificate.shortfall(plan.q[stages], plan.v[stages], now, self._dt * stages)
+            shortfall = self._certificate.shortfall(plan.q[stages], plan.v[stages], now, self._dt * stages)
             yield Way(Trajectory(plan.v[: stages + 1], self._dt), shortfall, planned=True)
             stages //= 2
 
     def _stop(self, situation: Situation) -> Way:
         now = situation.q, situation.distances
-        shortfall = self.certificate.shortfall(situation.q, situation.v, now)
+        shortfall = self._certificate.shortfall(situation.q, situation.v, now)
         return Way(self._braking(situation.v), shortfall)
 
     def _braking(self, velocity: FloatArray) -> Trajectory:

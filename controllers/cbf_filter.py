@@ -15,6 +15,7 @@ from handrail.controllers.errors import HandrailError
 from handrail.controllers.guard import check_inputs
 from handrail.controllers.intent import Intent
 from handrail.controllers.limiter import Limiter
+from handrail.controllers.margins import Margins
 from handrail.controllers.model import RobotModel
 from handrail.controllers.shape import Obstacle
 
@@ -97,13 +98,14 @@ class CbfFilter:
 
     def observe(self, obstacles: tuple[Obstacle, ...]) -> None:
         """Take where the obstacles are now, how fast they move, and what the hand holds."""
-        self._avoid(self._collision.among(obstacles))
+        now = self._collision.among(obstacles)
+        if now is not self._collision:
+            self._avoid(now)
 
     def _avoid(self, collision: CollisionModel) -> None:
         """Keep these pairs apart from now on."""
         self._collision = collision
-        wanted = np.where(collision.work, self._settings.work_margin, self._settings.margin)
-        self._margins = np.minimum(wanted, collision.largest_margin)
+        self._margins = Margins(collision, self._settings.margin, self._settings.work_margin)
 
     def update(self, state: State, intent: Intent) -> Command:
         """Return the command from now on; brakes on a bad input or a failed solve."""
@@ -144,13 +146,16 @@ class CbfFilter:
 
     def _barriers(self, q: FloatArray) -> _Barriers:
         """Return the barrier rows at q; how the obstacles' own motion changes d is seen over a period."""
-        times = np.array([0.0, self._period])
-        distances = self._collision.distances(np.stack([q, q]), self._margins + self._settings.reach, times)
+        if self._margins.unknown:
+            self._margins.see(self._collision.values(q[None, :])[0])
+        times, margins = np.array([0.0, self._period]), self._margins.values
+        distances = self._collision.distances(np.stack([q, q]), margins + self._settings.reach, times)
+        self._margins.see(distances.values[0])
         keep = distances.near[:, 0] == 1
         pair = distances.near[keep, 1]
         now, then = distances.values[:, pair]
         drift = (then - now) / self._period
-        lower = -self._settings.alpha * (now - self._margins[pair]) - drift
+        lower = -self._settings.alpha * (now - margins[pair]) - drift
         return _Barriers(distances.gradients[keep], lower, distances.values[0])
 
     def _bounds(self, previous: FloatArray, q: FloatArray) -> tuple[FloatArray, FloatArray]:

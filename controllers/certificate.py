@@ -7,6 +7,7 @@ from handrail.controllers.collision import CollisionModel
 from handrail.controllers.description import Limits
 from handrail.controllers.jit import jit
 from handrail.controllers.limiter import Limiter
+from handrail.controllers.margins import Margins
 
 _SAMPLES = np.array([0.25, 0.5, 0.75, 1.0])  # of the time that a stop takes, or that the robot waits after it
 _ERROR = 1e-3  # of signed distances, that is no loss [m]
@@ -22,7 +23,8 @@ class StopCertificate:
     Args:
         limiter: knows the full stop.
         collision: the pairs.
-        floors: of each pair [m], (P,).
+        margins: of the pairs.
+        floor: of each pair, as a share of its margin.
         limits: of the joints.
         span: time for which the robot has to be safe, where obstacles move [s].
     """
@@ -31,13 +33,15 @@ class StopCertificate:
         self,
         limiter: Limiter,
         collision: CollisionModel,
-        floors: FloatArray,
+        margins: Margins,
+        floor: float,
         limits: Limits,
         span: float,
     ) -> None:
         self._limiter = limiter
         self._collision = collision
-        self._floors = floors
+        self._margins = margins
+        self._floor = floor
         self._limits = limits
         self._span = span
 
@@ -70,9 +74,10 @@ class StopCertificate:
 
     def along(self, path: FloatArray, times: FloatArray, now: tuple[FloatArray, FloatArray]) -> FloatArray:
         """Return the same at every point of a motion, (K,)."""
-        distances = self._collision.values(path, times, now, self._floors)
+        floors = self._floor * self._margins.values
+        distances = self._collision.values(path, times, now, floors)
         bounds = self._limits.position_lower, self._limits.position_upper
-        return _shortfalls(path, distances, *now, self._floors, *bounds)
+        return _shortfalls(path, distances, *now, floors, *bounds)
 
 
 @jit

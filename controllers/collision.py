@@ -41,6 +41,7 @@ class CollisionModel:
         pairs: names of the two shapes of each pair, (P,) of (str, str).
         work: which pairs are a tool shape against a work surface, (P,).
         largest_margin: the largest margin that a pair can keep [m], (P,).
+        held: rows of the pairs with something that the hand holds, (H,).
     """
 
     def __init__(self, model: RobotModel, obstacles: tuple[Obstacle, ...] = ()) -> None:
@@ -53,8 +54,9 @@ class CollisionModel:
         self.pairs = self._shapes.names
         self.work = self._shapes.work
         self.largest_margin = self._shapes.largest_margin
+        self.held = self._shapes.held
         self._moves = self._shapes.moves  # (P, 2, n)
-        self._levers = self._shapes.levers  # (n, P)
+        self._levers = self._shapes.levers  # (n, P), which `observe` brings up to date
         self._data = self._model.createData()
         self._every = np.arange(len(self.pairs))
         self._far = np.full(len(self.pairs), _FAR)

@@ -38,7 +38,7 @@ class DirectController:
         self._reactive.reset(obstacles)
 
     def observe(self, obstacles: tuple[Obstacle, ...]) -> None:
-        """Take where the obstacles are now."""
+        """Take where the obstacles are now, and what the hand holds."""
         self._reactive.observe(obstacles)
 
     def update(self, state: State, intent: Intent) -> Command:

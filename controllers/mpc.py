@@ -18,6 +18,7 @@ from handrail.controllers.followed import Followed
 from handrail.controllers.guard import check_inputs
 from handrail.controllers.intent import Intent
 from handrail.controllers.limiter import Limiter
+from handrail.controllers.margins import Margins
 from handrail.controllers.model import RobotModel
 from handrail.controllers.motion import cut, near
 from handrail.controllers.objective import Objective
@@ -88,8 +89,8 @@ class MaskedMpc:
 
     def reset(self, obstacles: tuple[Obstacle, ...] = ()) -> None:
         """Forget warm start and last command; take the obstacles of a new episode."""
-        certificate = self._avoid(CollisionModel(self.model, obstacles))
-        self._backup = Backup(certificate, self._limiter, self.settings.dt)
+        self._avoid(CollisionModel(self.model, obstacles))
+        self._backup = Backup(self._certificate, self._limiter, self.settings.dt)
         self._parameters = self.residuals.parameters
         self._plan: Plan | None = None
         self._followed: Followed | None = None
@@ -99,16 +100,19 @@ class MaskedMpc:
         """Take where the obstacles are now, how fast they move, and what the hand holds."""
         now = self._collision.among(obstacles)
         if now is not self._collision:
-            self._backup.certificate = self._avoid(now)
+            self._avoid(now)
+            self._backup.measure_by(self._certificate)
 
-    def _avoid(self, collision: CollisionModel) -> StopCertificate:
-        """Keep these pairs apart from now on; return what measures motions by them."""
-        settings, self._collision = self.settings, collision
-        wanted = np.where(collision.work, settings.work_margin, settings.margin)
-        self._margins = np.minimum(wanted, collision.largest_margin)
+    def _avoid(self, collision: CollisionModel) -> None:
+        """Keep these pairs apart from now on."""
+        settings, limits = self.settings, self.model.description.limits
+        self._collision = collision
+        self._margins = Margins(collision, settings.margin, settings.work_margin)
         self.solver.reset()  # the rows that were active are numbered by pairs
-        floors, span = settings.floor * self._margins, settings.horizon * settings.dt
-        return StopCertificate(self._limiter, collision, floors, self.model.description.limits, span)
+        span = settings.horizon * settings.dt
+        self._certificate = StopCertificate(
+            self._limiter, collision, self._margins, settings.floor, limits, span
+        )
 
     def set_parameters(self, objective: str, values: FloatArray) -> None:
         """Change an objective's parameters from the next update on.
@@ -129,6 +133,8 @@ class MaskedMpc:
         if status is Status.OK and plan is None:
             status = Status.SOLVER_FAILED
         distances = self._distances(state, plan, status)
+        if distances is not None:
+            self._margins.see(distances)
         motion, planned = self._motion(state, plan, distances, status)
         if plan is not None and not planned:
             status = Status.BACKUP
@@ -141,6 +147,8 @@ class MaskedMpc:
     def problem(self, state: State, intent: Intent) -> Problem:
         """Return the optimal control problem of a state and an intent."""
         settings, size = self.settings, self.channels.size
+        if self._margins.unknown:
+            self._margins.see(self._collision.values(state.q[None, :])[0])
         masked = self._of_mask(np.asarray(intent.mask), state.q)
         reference = self._reference.copy()
         predicted = np.asarray(self._predict(intent, self._times), dtype=np.float64)
@@ -156,7 +164,7 @@ class MaskedMpc:
             channels=size,
             limits=self.model.description.limits,
             collision=self._collision,
-            margins=self._margins,
+            margins=self._margins.values,
             reach=settings.reach,
             slack_linear=settings.slack_linear,
             slack_quadratic=settings.slack_quadratic,

@@ -32,6 +32,7 @@ class ShapePairs:
         names: of the two shapes of each pair, (P,) of (str, str).
         work: which pairs are a tool shape against a work surface, (P,).
         largest_margin: the largest margin that a pair can keep [m], (P,).
+        held: rows of the pairs with something that is held, (H,).
         moves: which coordinates move the two shapes of a pair: 1 or 0, (P, 2, n).
         levers: how far a unit of each coordinate can bring a pair together at most, (n, P) [m].
 
@@ -58,8 +59,9 @@ class ShapePairs:
         self.moves = self._pair_moves()
         self.levers = np.zeros((model.size, len(self.names)))
         self._arms = dict(all_lever_arms(model))
-        held = {obstacle.name for obstacle in obstacles if obstacle.held}
-        self._held = {name: [row for row, pair in enumerate(self.names) if name in pair] for name in held}
+        held = [obstacle.name for obstacle in obstacles if obstacle.held]
+        self._rows = {name: [row for row, pair in enumerate(self.names) if name in pair] for name in held}
+        self.held = np.array([row for rows in self._rows.values() for row in rows], dtype=int)
         self._measure_levers(range(len(self.names)))
         self.observe(obstacles)
 
@@ -69,7 +71,7 @@ class ShapePairs:
             self.place(obstacle)
             if obstacle.held:
                 self._arms[obstacle.name] = lever_arms(self._model, _placed(obstacle))
-                self._measure_levers(self._held[obstacle.name])
+                self._measure_levers(self._rows[obstacle.name])
 
     def place(self, obstacle: Obstacle, time: float = 0.0) -> None:
         """Put an obstacle where it is after a time [s]."""

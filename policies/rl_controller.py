@@ -118,7 +118,7 @@ class RlController:
         self._inner.reset(obstacles)
 
     def observe(self, obstacles: tuple[Obstacle, ...]) -> None:
-        """Take where the obstacles are now."""
+        """Take where the obstacles are now, and what the hand holds."""
         self._inner.observe(obstacles)
 
     def aim(self, goal: Goal) -> None:

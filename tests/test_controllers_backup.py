@@ -16,6 +16,7 @@ from handrail.controllers.controller import State
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.intent import Intent
 from handrail.controllers.limiter import Limiter
+from handrail.controllers.margins import Margins
 from handrail.controllers.mpc import MaskedMpc
 from handrail.controllers.shape import Obstacle, Shape
 
@@ -235,7 +236,7 @@ def test_where_obstacles_move_rest_is_not_safe_for_ever():
             "pillar", Shape("cylinder", [0.2, 0.25]), [x, 0.0, 0.125], velocity=[-0.5, 0.0, 0.0]
         )
         collision = CollisionModel(MODEL, (pillar,))
-        certificate = StopCertificate(LIMITER, collision, np.full(collision.size, 0.03), LIMITS, span=1.0)
+        certificate = StopCertificate(LIMITER, collision, Margins(collision, 0.1, 0.1), 0.3, LIMITS, span=1.0)
         now = collision.values(HOME[None])[0]
         shortfall = certificate.shortfall(HOME, np.zeros(9), (HOME, now))
         assert shortfall == pytest.approx(0.0 if safe else 0.5 - away + 0.03, abs=1e-6)

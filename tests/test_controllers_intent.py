@@ -11,6 +11,7 @@ from handrail.controllers.errors import HandrailError
 from handrail.controllers.frames import Frames
 from handrail.controllers.intent import Intent
 from handrail.controllers.limiter import Limiter
+from handrail.controllers.margins import Margins
 from handrail.controllers.model import load_model
 from handrail.controllers.mpc import MaskedMpc
 from handrail.controllers.prediction import Bounded, Decaying, Extrapolated, Preview, Smoothed, constant
@@ -253,9 +254,8 @@ def test_the_certificate_measures_the_stop():
     for gap, safe in ((0.2, False), (0.5, True)):
         wall = Obstacle("wall", Shape("box", [0.2, 4.0, 0.2]), [HOME[0] + 0.48 + gap + 0.1, 0.0, 0.1])
         collision = CollisionModel(MODEL, (wall,))
-        certificate = StopCertificate(
-            limiter, collision, np.full(collision.size, 0.03), MODEL.description.limits, span=1.0
-        )
+        margins = Margins(collision, 0.1, 0.1)
+        certificate = StopCertificate(limiter, collision, margins, 0.3, MODEL.description.limits, span=1.0)
         now = collision.values(HOME[None])[0]
         shortfall = certificate.shortfall(HOME, v, (HOME, now))
         assert (shortfall == 0.0) is safe

@@ -96,6 +96,21 @@ def test_same_everywhere(actions):
     np.testing.assert_allclose(interface.encode(columns), interface.encode(other), atol=1e-5)
 
 
+def test_a_policy_does_not_see_how_fast_the_robot_moves():
+    columns = episode(np.random.default_rng(1), [("ee",)])
+    faster, farther = (np.array(columns["observation.state"]) for _ in range(2))
+    n = len(JOINTS)
+    faster[:, n : 2 * n] *= 3.0
+    farther[:, 5] += 0.1
+    interface = PolicyInterface.of_dataset(FEATURES, [columns], "realised")
+    seen, same, other = (
+        np.column_stack(interface.observe(state, columns["observation.environment_state"]))
+        for state in (columns["observation.state"], faster, farther)
+    )
+    np.testing.assert_array_equal(seen, same)
+    assert not np.array_equal(seen, other)
+
+
 @pytest.mark.parametrize("masks", [[("ee",)], [("base",), ("ee",)], [("joint",)], [("ee.vx", "ee.wz")]])
 def test_intent_comes_back(masks):
     """The intent that an action stands for is the one that was recorded."""

@@ -23,6 +23,7 @@ class Phase:
         focus: which of the two ends the phase, and is steered in switching mode.
         gripper: 0 open, 1 closed.
         distance: from the goal at which the phase ends [m].
+        beside: the same across the tool's axis, where more is good enough there [m].
         angle: the same for orientation [rad].
         pace: share of the full stick.
         tilt: how far the hand may lean on the way [rad].
@@ -36,6 +37,7 @@ class Phase:
     focus: Focus = "hand"
     gripper: float = 0.0
     distance: float = 0.05
+    beside: float = 0.0
     angle: float = 0.2
     pace: float = 1.0
     tilt: float = np.inf
@@ -98,4 +100,7 @@ class PhaseRunner:
             turn = np.arctan2(np.sin(phase.base[2] - q[2]), np.cos(phase.base[2] - q[2]))
             return bool(np.hypot(*(phase.base[:2] - q[:2])) < phase.distance and abs(turn) < phase.angle)
         distance, angle = pose_errors(view.tool, phase.hand)
-        return distance < phase.distance and angle < phase.angle
+        if phase.beside:
+            *across, along = view.tool.rotation.T @ (view.tool.position - phase.hand.position)
+            distance = max(abs(along), np.hypot(*across) * phase.distance / phase.beside)
+        return bool(distance < phase.distance and angle < phase.angle)

@@ -15,7 +15,7 @@ from handrail.controllers.model import Pose, RobotModel
 
 _HELD = 0.05  # a cube this near to the tool point is held [m]
 _GRASP = 0.010  # of the hand above the middle of the cube [m]
-_NEAR = 0.010  # to that is as exactly as he tries to place the hand [m]
+_NEAR, _ALIGNED = 0.010, 0.10  # how exactly the hand has to be there to grasp [m, rad]
 _RETREAT = 0.40  # hand behind the table's edge while carrying [m]
 _AHEAD = 0.80  # hand before the base's centre while carrying [m]
 
@@ -94,14 +94,19 @@ class PickPlaceScript:
         return Phase("ready", Pose(hand, down), base, distance=0.15, angle=0.5)
 
     def _room(self, cube: SceneObject) -> float:
-        """Return how far off the hand may be for the open fingers to close around the cube [m]."""
+        """Return how far beside the cube the hand may be for the open fingers to close around it [m].
+
+        `(stroke − w (cos a + sin a)) / 2` for a cube of width w that is turned by a; as much either way.
+        """
         gripper = self._model.description.gripper
-        return _NEAR if gripper is None else max(_NEAR, (gripper.stroke - float(cube.shape.size[0])) / 2)
+        width = float(cube.shape.size[0]) * (np.cos(_ALIGNED) + np.sin(_ALIGNED))
+        return _NEAR if gripper is None else max(_NEAR, (gripper.stroke - width) / 2)
 
     def _pick(self, pick: _Place, down: FloatArray, room: float) -> list[Phase]:
         """Go above the cube, down until it is between the fingers, close them, lift."""
         cube, base = pick.thing, self._stand(pick)
         stage = np.array([pick.edge - 0.15, cube[1], cube[2] + 0.30])
+        grasp = _above(cube, _GRASP)
 
         def phase(name: str, position: FloatArray, **options: float) -> Phase:
             return Phase(name, Pose(position, down), base, **options)  # type: ignore[arg-type]
@@ -109,8 +114,8 @@ class PickPlaceScript:
         return [
             phase("stage", stage, distance=0.10, angle=0.30),
             phase("above", _above(cube, 0.14), distance=0.02, angle=0.10),
-            phase("descend", _above(cube, _GRASP), distance=room, angle=0.10, pace=0.4, patience=8.0),
-            phase("grasp", _above(cube, _GRASP), distance=1.0, angle=3.2, gripper=1.0, dwell=1.2),
+            phase("descend", grasp, distance=_NEAR, beside=room, angle=_ALIGNED, pace=0.4, patience=8.0),
+            phase("grasp", grasp, distance=1.0, angle=3.2, gripper=1.0, dwell=1.2),
             phase("lift", _above(cube, 0.22), distance=0.04, angle=0.3, gripper=1.0, pace=0.6),
         ]
 
