@@ -53,7 +53,7 @@ class Backup:
     1. The new plan, if a full stop after its first stage is safe; that stage and stop are stored.
     2. The new plan, if its own path and a full stop from its end are safe, or from half way, or half of that;
        these are stored.
-    3. What is stored, from where it is now; only if the robot is on it: not when it was pushed away, nor when
+    3. What is stored, from where it is now; only if its velocity is that: not when it was held back, nor when
        an update comes so late that more than was stored has been driven.
     4. A full stop at once.
 

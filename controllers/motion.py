@@ -61,12 +61,24 @@ def changed(q, v, dt, u, change, limit):
 
 
 @exact_jit
-def near(commanded, measured, tolerance, limit):
-    """Return commanded velocities, within a tolerance of the measured ones and within ± limit, (n,)."""
+def resumed(commanded, measured, tolerance, limit):
+    """Return the velocity from which a command goes on, (n,).
+
+    `min(max(c, v - tolerance), v + tolerance)` between rest and c: of a robot that cannot follow it is what is
+    measured, so that the command does not run away from it; one that is pushed keeps what was commanded, so
+    that its servos hold against the push.
+
+    Args:
+        commanded: c, (n,) [m/s, rad/s].
+        measured: v, (n,).
+        tolerance: how far they may differ, (n,).
+        limit: of the velocity, (n,).
+    """
     velocity = np.empty(len(measured))
     for j in range(len(measured)):
         close = min(max(commanded[j], measured[j] - tolerance[j]), measured[j] + tolerance[j])
-        velocity[j] = min(max(close, -limit[j]), limit[j])
+        between = min(max(close, min(commanded[j], 0.0)), max(commanded[j], 0.0))
+        velocity[j] = min(max(between, -limit[j]), limit[j])
     return velocity
 
 

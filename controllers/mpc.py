@@ -20,7 +20,7 @@ from handrail.controllers.intent import Intent
 from handrail.controllers.limiter import Limiter
 from handrail.controllers.margins import Margins
 from handrail.controllers.model import RobotModel
-from handrail.controllers.motion import cut, near
+from handrail.controllers.motion import cut, resumed
 from handrail.controllers.objective import Objective
 from handrail.controllers.objectives.regularisation import (
     acceleration_regularisation,
@@ -218,9 +218,9 @@ class MaskedMpc:
         return way.motion, False
 
     def _start_velocity(self, state: State) -> FloatArray:
-        """Return the velocity that a command starts from: the commanded one, if the robot follows it."""
+        """Return the velocity that a command starts from: the commanded one, unless the robot falls behind."""
         commanded = state.v if self._followed is None else self._followed.velocity(state.time)
-        return near(commanded, state.v, self._tolerance, self.model.description.limits.velocity)
+        return resumed(commanded, state.v, self._tolerance, self.model.description.limits.velocity)
 
     def _guess(self, time: float) -> FloatArray:
         """Return the accelerations that are being followed from a time on, (N, n)."""

@@ -32,8 +32,8 @@ class MpcSettings:
         largest_speed: speed above which a commanded translation of the tool is taken as this [m/s].
         largest_rate: the same for its rotation [rad/s].
         intent_timeout: age from which an intent is stale [s].
-        velocity_tolerance: how far the measured velocity may be from the commanded one before the plan
-            starts from the measured one, relative to the velocity limit.
+        velocity_tolerance: how far a robot that cannot follow may fall behind the commanded velocity before
+            the plan starts from the measured one, relative to the velocity limit.
     """
 
     horizon: int = 10

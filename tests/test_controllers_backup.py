@@ -17,6 +17,7 @@ from handrail.controllers.errors import HandrailError
 from handrail.controllers.intent import Intent
 from handrail.controllers.limiter import Limiter
 from handrail.controllers.margins import Margins
+from handrail.controllers.motion import resumed
 from handrail.controllers.mpc import MaskedMpc
 from handrail.controllers.shape import Obstacle, Shape
 
@@ -159,17 +160,38 @@ def test_no_change_of_mind_exceeds_a_limit(monkeypatch, period):
     assert_within_limits(robot)
 
 
-def test_a_robot_that_was_pushed_brakes_from_where_it_is(monkeypatch):
+def test_a_robot_that_is_pushed_is_not_told_to_go_along(monkeypatch):
+    """Its servos hold against the push as long as the command stays what it was."""
     robot = Robot(MPC)
     for _ in range(10):
         robot.update(AHEAD(robot.time))
-    robot.v = robot.v + np.eye(9)[1] * 0.5
+    before = robot.v.copy()
+    robot.v = before + np.eye(9)[1] * 0.5
     monkeypatch.setattr(MPC.solver, "solve", unsolved)
     command = robot.update(AHEAD(robot.time))
-    start = command.velocity(0.0)
-    assert start[1] == pytest.approx(0.5 - 0.1 * LIMITS.velocity[1], abs=1e-6)  # as near as is trusted
-    expected = np.sign(start) * np.maximum(np.abs(start) - LIMITS.acceleration * PERIOD, 0.0)
-    np.testing.assert_allclose(robot.v[:2], expected[:2], atol=1e-9)
+    np.testing.assert_allclose(command.velocity(0.0), before, atol=1e-9)
+    assert np.abs(command.velocities[:, 1]).max() < 1e-9
+
+
+def test_a_robot_that_cannot_follow_is_waited_for():
+    """A command that ran away from a robot held fast would throw it when it comes free."""
+    robot = Robot(MPC)
+    for _ in range(10):
+        robot.update(AHEAD(robot.time))
+    assert robot.v[0] > 0.2
+    robot.v = np.zeros(9)
+    ahead = robot.update(AHEAD(robot.time)).velocity(0.0)[0]
+    assert ahead == pytest.approx(0.1 * LIMITS.velocity[0], abs=1e-9)  # as far as is trusted
+
+
+def test_a_command_goes_on_between_rest_and_what_was_commanded():
+    """Cases a coordinate: followed, faster, pushed back, held fast, pushed from rest, too fast."""
+    commanded = np.array([0.5, 0.5, 0.5, 0.5, 0.0, 2.0])
+    measured = np.array([0.45, 0.9, -0.3, 0.0, 0.7, 2.0])
+    expected = np.array([0.5, 0.5, 0.0, 0.1, 0.0, 1.0])
+    tolerance, limit = np.full(6, 0.1), np.ones(6)
+    np.testing.assert_allclose(resumed(commanded, measured, tolerance, limit), expected)
+    np.testing.assert_allclose(resumed(-commanded, -measured, tolerance, limit), -expected)
 
 
 @settings(max_examples=30, deadline=None)

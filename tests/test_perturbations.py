@@ -17,6 +17,7 @@ from handrail.controllers.collision import CollisionModel
 from handrail.controllers.direct import DirectController
 from handrail.controllers.intent import Intent
 from handrail.controllers.model import load_model
+from handrail.controllers.mpc import MaskedMpc
 
 MODEL = load_model()
 
@@ -53,10 +54,10 @@ class Watcher:
         self.states.append(moment.state)
 
 
-def path(env, seed, disturbances=()):
-    """Return where a robot that nobody steers goes, (T, s)."""
+def path(env, seed, disturbances=(), controller=None):
+    """Return where a robot that nobody steers goes, (T, s); by default one whose servos just hold."""
     watcher = Watcher()
-    controller = DirectController(MODEL, 1.0 / env.fps)
+    controller = controller or DirectController(MODEL, 1.0 / env.fps)
     Session(env, controller, Motionless(), (watcher,), disturbances=disturbances).run(seed)
     return np.array(watcher.states)
 
@@ -93,6 +94,18 @@ def test_a_push_moves_the_robot_and_more_strength_moves_it_more():
     assert moved[0.0] < 0.035  # the servos nearly hold
     assert 0.02 < moved[1.0] < 0.3
     assert moved[2.0] > 1.5 * moved[1.0]
+
+
+def test_the_mpc_holds_against_a_push_as_the_servos_alone_do():
+    """A plan that went on from what is measured would give way, and then coast to rest."""
+    controller, moved = MaskedMpc(MODEL), []
+    with environment("Reach", task=Reach(horizon=4.0)) as env:
+        for seed in range(4):
+            held, planned = (path(env, seed, (Pusher(1.0),), who)[:, :9] for who in (None, controller))
+            moved.append([np.abs(way - way[0]).max() for way in (held, planned)])
+    held, planned = np.array(moved).T
+    assert held.max() > 0.02
+    assert np.all(planned < 1.2 * held + 0.005)
 
 
 def test_forces_end_with_the_push():
