@@ -9,6 +9,7 @@ import numpy as np
 from handrail.controllers.arrays import FloatArray, frozen
 from handrail.controllers.command import Command
 from handrail.controllers.intent import Intent
+from handrail.controllers.jit import exact_jit
 from handrail.controllers.shape import Obstacle
 
 
@@ -28,7 +29,16 @@ class State:
     @property
     def is_finite(self) -> bool:
         """Whether every entry is a number."""
-        return math.isfinite(self.time) and bool(np.isfinite(self.q).all() and np.isfinite(self.v).all())
+        return math.isfinite(self.time) and _finite(self.q) and _finite(self.v)
+
+
+@exact_jit
+def _finite(values):
+    """Whether all values are numbers, whatever their shape."""
+    for value in values.flat:
+        if not np.isfinite(value):
+            return False
+    return True
 
 
 class Controller(Protocol):

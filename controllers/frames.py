@@ -1,6 +1,7 @@
 """In which frames an operator means the twists, and for which point of the tool."""
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -43,7 +44,20 @@ class Frames:
                 f"tool point: expected 3 numbers within {_REACH} m, got {self.point.tolist()}"
             )
 
-    @property
+    @cached_property
+    def are_known(self) -> bool:
+        """Whether `check` finds nothing wrong."""
+        try:
+            self.check()
+        except HandrailError:
+            return False
+        return True
+
+    @cached_property
     def parameters(self) -> FloatArray:
         """The parameters of the tracking objective, (5,): base in world, tool in tool, point."""
-        return np.array([self.base == "world", self.tool == "tool", *self.point], dtype=float)
+        return frozen([self.base == "world", self.tool == "tool", *self.point])
+
+
+USUAL = Frames()
+"""Those of an operator who says nothing about it."""

@@ -3,7 +3,6 @@
 from handrail.controllers.channels import Channels
 from handrail.controllers.command import Status
 from handrail.controllers.controller import State
-from handrail.controllers.errors import HandrailError
 from handrail.controllers.intent import Intent
 
 
@@ -21,11 +20,7 @@ def check_inputs(state: State, intent: Intent, channels: Channels, timeout: floa
         return Status.INVALID_STATE
     if intent.values.shape != (channels.size,) or intent.mask.shape != (channels.size,):
         return Status.INVALID_INTENT
-    if not intent.is_finite:
-        return Status.INVALID_INTENT
-    try:
-        intent.frames.check()
-    except HandrailError:
+    if not (intent.is_finite and intent.frames.are_known):
         return Status.INVALID_INTENT
     if state.time - intent.time > timeout:
         return Status.STALE_INTENT

@@ -8,7 +8,8 @@ import numpy as np
 from handrail.controllers.arrays import BoolArray, FloatArray, frozen
 from handrail.controllers.channels import Channels
 from handrail.controllers.errors import HandrailError
-from handrail.controllers.frames import Frames
+from handrail.controllers.frames import USUAL, Frames
+from handrail.controllers.jit import exact_jit
 
 
 @dataclass(frozen=True)
@@ -31,6 +32,9 @@ class RawInput:
         object.__setattr__(self, "values", frozen(self.values))
 
 
+_UNKNOWN = RawInput()
+
+
 @dataclass(frozen=True)
 class Intent:
     """A partial command.
@@ -51,8 +55,8 @@ class Intent:
     gripper: float = 0.0
     mode: str = ""
     time: float = 0.0
-    frames: Frames = field(default_factory=Frames)
-    raw: RawInput = field(default_factory=RawInput)
+    frames: Frames = USUAL
+    raw: RawInput = _UNKNOWN
 
     def __post_init__(self) -> None:
         """Copy the arrays and make them read-only."""
@@ -82,4 +86,13 @@ class Intent:
     def is_finite(self) -> bool:
         """Whether every commanded value, the gripper and the time are numbers."""
         scalars = math.isfinite(self.gripper) and math.isfinite(self.time)
-        return scalars and bool(np.isfinite(self.values[self.mask]).all())
+        return scalars and _finite(self.values, self.mask)
+
+
+@exact_jit
+def _finite(values, mask):
+    """Whether all values that a mask picks are numbers, (m,)."""
+    for channel in range(len(values)):
+        if mask[channel] and not np.isfinite(values[channel]):
+            return False
+    return True
