@@ -8,6 +8,7 @@ import pinocchio as pin
 
 from handrail.controllers.arrays import FloatArray, frozen
 from handrail.controllers.errors import HandrailError
+from handrail.controllers.jit import exact_jit
 from handrail.controllers.rotation import rotation_vector
 
 STEP = 0.03  # of the simulation [s]
@@ -49,10 +50,17 @@ def pose_error(position: FloatArray, rotation: FloatArray, goal: Goal) -> tuple[
         rotation: world from tool, (3, 3).
         goal: to compare with.
     """
-    way = position - goal.position
-    d_p = sqrt(float(way @ way))
-    d_r = (3.0 - float(np.vdot(rotation, goal.rotation))) / 4.0
-    return d_p, min(max(d_r, 0.0), 1.0)
+    return _pose_error(position, rotation, goal.position, goal.rotation)
+
+
+@exact_jit
+def _pose_error(position, rotation, goal, orientation):
+    way, trace = 0.0, 0.0
+    for i in range(3):
+        way += (position[i] - goal[i]) ** 2
+        for j in range(3):
+            trace += rotation[i, j] * orientation[i, j]
+    return sqrt(way), min(max((3.0 - trace) / 4.0, 0.0), 1.0)
 
 
 def reached(d_p: float, d_r: float) -> bool:

@@ -12,40 +12,36 @@ _STEEL, _RUBBER = (0.30, 0.31, 0.33, 1.0), (0.10, 0.10, 0.11, 1.0)
 _REFLECTED = 1.0  # inertia of the motor behind each finger, seen through its gear [kg]
 
 
-def add_gripper(spec: MjSpec, gripper: Gripper, mount: MjsBody, frame: pin.SE3) -> None:
-    """Add palm mass, fingers, their servo and the wrist camera to the body that carries the frame."""
+def add_gripper(spec: MjSpec, gripper: Gripper, mount: MjsBody, frame: pin.SE3, grips: bool) -> None:
+    """Add palm mass, fingers, their servo and the wrist camera to the body that carries the frame.
+
+    Where it does not grip, the fingers are fixed, open: moving ones take a third of a physics step.
+    """
     palm = mount.add_body(name="gripper", gravcomp=1.0, **geometry.pose(frame.translation, frame.rotation))
     length = gripper.tip - gripper.finger_size[2]
     size = np.array([gripper.stroke, gripper.stroke, length])
     palm.explicitinertial = True
     palm.mass, palm.ipos, palm.iquat = gripper.mass, [0.0, 0.0, length / 2], [1.0, 0.0, 0.0, 0.0]
     palm.inertia = geometry.box_inertia(gripper.mass, size)
-    _add_finger(palm, gripper, "finger_left", -1.0)
-    _add_finger(palm, gripper, "finger_right", 1.0)
+    for name, side in (("finger_left", -1.0), ("finger_right", 1.0)):
+        finger = _add_finger(palm, gripper, name, side, 0.0 if grips else gripper.stroke / 2)
+        if grips:
+            _add_slide(finger, gripper, name, side)
     _add_rail(palm, gripper)
-    _couple(spec)
-    _add_servo(spec, gripper)
+    if grips:
+        _couple(spec)
+        _add_servo(spec, gripper)
     palm.add_camera(name="wrist", fovy=70.0, **_camera_pose(gripper))
 
 
-def _add_finger(palm: MjsBody, gripper: Gripper, name: str, side: float) -> None:
-    """Add a finger; its joint coordinate is its distance from the closed position [m]."""
+def _add_finger(palm: MjsBody, gripper: Gripper, name: str, side: float, away: float) -> MjsBody:
+    """Add a finger at a distance from its closed position [m]."""
     width, _, length = gripper.finger_size
-    finger = palm.add_body(
-        name=f"{name}_body", pos=[side * width / 2, 0.0, gripper.tip - length / 2], gravcomp=1.0
-    )
+    position = [side * (width / 2 + away), 0.0, gripper.tip - length / 2]
+    finger = palm.add_body(name=f"{name}_body", pos=position, gravcomp=1.0)
     finger.explicitinertial = True
     finger.mass, finger.ipos, finger.iquat = gripper.finger_mass, [0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0]
     finger.inertia = geometry.box_inertia(gripper.finger_mass, np.array(gripper.finger_size))
-    finger.add_joint(
-        name=name,
-        type=mujoco.mjtJoint.mjJNT_SLIDE,
-        axis=[side, 0.0, 0.0],
-        limited=True,
-        range=[0.0, gripper.stroke / 2],
-        armature=_REFLECTED,
-        damping=[20.0, 0.0, 0.0],
-    )
     finger.add_geom(
         name=name,
         type=mujoco.mjtGeom.mjGEOM_BOX,
@@ -59,6 +55,20 @@ def _add_finger(palm: MjsBody, gripper: Gripper, name: str, side: float) -> None
         solimp=[0.95, 0.99, 0.001, 0.5, 2.0],
         group=geometry.VISIBLE_GROUP,
         rgba=_RUBBER,
+    )
+    return finger
+
+
+def _add_slide(finger: MjsBody, gripper: Gripper, name: str, side: float) -> None:
+    """Let a finger move; its joint coordinate is its distance from the closed position [m]."""
+    finger.add_joint(
+        name=name,
+        type=mujoco.mjtJoint.mjJNT_SLIDE,
+        axis=[side, 0.0, 0.0],
+        limited=True,
+        range=[0.0, gripper.stroke / 2],
+        armature=_REFLECTED,
+        damping=[20.0, 0.0, 0.0],
     )
 
 

@@ -55,8 +55,13 @@ class Mounts:
         return self._bodies[frame.parentJoint], frame.placement
 
 
-def build_robot(model: RobotModel, meshes: bool = True) -> RobotSpec:
+def build_robot(model: RobotModel, meshes: bool = True, grips: bool = True) -> RobotSpec:
     """Build the robot; without `meshes` it moves and collides alike, but is not for looking at.
+
+    Args:
+        model: of the robot.
+        meshes: whether to draw it as it looks.
+        grips: whether its fingers move; else they stay open.
 
     Raises:
         HandrailError: a joint is neither a hinge nor a slide.
@@ -69,7 +74,7 @@ def build_robot(model: RobotModel, meshes: bool = True) -> RobotSpec:
     site_body.add_site(name="tool", group=4, **geometry.pose(placement.translation, placement.rotation))
     contact = _add_contact_shapes(model, mounts)
     if model.description.gripper is not None:
-        add_gripper(spec, model.description.gripper, *mounts.frame(model.description.gripper.frame))
+        add_gripper(spec, model.description.gripper, *mounts.frame(model.description.gripper.frame), grips)
         contact += FINGERS
     _add_pairs(spec, model)
     _add_servos(spec, model)

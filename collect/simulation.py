@@ -17,7 +17,7 @@ from handrail.controllers.jit import exact_jit
 from handrail.controllers.model import Pose, RobotModel
 from handrail.controllers.shape import Obstacle
 
-_LARGEST_TIMESTEP = 0.002
+_TIMESTEP = 0.002  # [s]
 
 
 @dataclass(frozen=True)
@@ -36,6 +36,16 @@ class Twist:
 class Simulation:
     """A fresh MuJoCo model and data; nothing of an earlier episode can remain in it.
 
+    Args:
+        model: of the robot.
+        scene: what stands around it.
+        q: where it begins, (n,).
+        step: of the control [s].
+        meshes: whether to draw the robot as it looks.
+        grip: width of what the gripper is closed around at the beginning [m]; None where it is open.
+        grips: whether the gripper can move; else it stays open.
+        timestep: longest step of the integrator [s].
+
     Attributes:
         mujoco_model: the compiled model.
         data: its state.
@@ -51,13 +61,16 @@ class Simulation:
         step: float,
         meshes: bool = False,
         grip: float | None = None,
+        grips: bool = True,
+        timestep: float = _TIMESTEP,
     ) -> None:
         self._model = model
+        self._gripper = model.description.gripper if grips else None
         self._scene = scene
         self._step = step
-        self.substeps = math.ceil(step / _LARGEST_TIMESTEP - 1e-9)
+        self.substeps = math.ceil(step / timestep - 1e-9)
         self._shares = np.arange(1, self.substeps + 1) / self.substeps
-        robot = _robot(model, meshes, step / self.substeps)
+        robot = _robot(model, meshes, grips, step / self.substeps)
         spec = robot.spec.copy()
         add_scene(spec, scene)
         self.mujoco_model = spec.compile()
@@ -65,7 +78,7 @@ class Simulation:
         self._contacts = ContactMonitor(
             self.mujoco_model, robot.contact_geoms, robot.grasp_geoms, [m.name for m in scene.movables]
         )
-        fingers = FINGERS if model.description.gripper else ()
+        fingers = FINGERS if self._gripper else ()
         portable = [item.name for item in scene.movables if item.portable]
         self._grasp = GraspMonitor(self.mujoco_model, fingers, portable)
         self._index()
@@ -79,7 +92,7 @@ class Simulation:
         self._v_index = _span([compiled.joint(name).dofadr[0] for name in names])
         self._servo_index = np.array([compiled.actuator(name).id for name in names])
         self._tool = compiled.site("tool").id
-        gripper = self._model.description.gripper
+        gripper = self._gripper
         self._stroke = gripper.stroke if gripper else 0.0
         self._speed = gripper.speed if gripper else 0.0
         self._gripper_servo = -1
@@ -166,7 +179,7 @@ class Simulation:
 
     @property
     def opening(self) -> float:
-        """How far the gripper is open, from 0 to 1; 0 for a robot without one."""
+        """How far the gripper is open, from 0 to 1; 0 where none can move."""
         if not self._stroke:
             return 0.0
         return float(np.clip(self.data.qpos[self._finger_index].sum() / self._stroke, 0.0, 1.0))
@@ -230,8 +243,8 @@ def _span(places: list[int]) -> slice | IntArray:
 
 
 @lru_cache(maxsize=8)
-def _robot(model: RobotModel, meshes: bool, timestep: float) -> RobotSpec:
-    robot = build_robot(model, meshes)
+def _robot(model: RobotModel, meshes: bool, grips: bool, timestep: float) -> RobotSpec:
+    robot = build_robot(model, meshes, grips)
     robot.spec.compiler.usethread = meshes  # without any, waking a second thread takes longer than its work
     set_stage(robot.spec, timestep)
     return robot

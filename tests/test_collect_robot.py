@@ -143,6 +143,24 @@ def test_fingers_stay_in_the_box_that_the_controller_avoids():
             assert signed_distance(placed.shape, local @ placed.placement.rotation).max() < 0.002
 
 
+def test_a_gripper_that_does_not_grip_is_the_open_one():
+    """Same fingers at the same place, nothing to move them, and the robot moves alike, in larger steps too."""
+    model = load_model()
+    home, ends = np.array(model.description.home), []
+    speed = 0.2 * model.description.limits.velocity * np.resize([1.0, -1.0], model.size)
+    for options in ({}, {"grips": False}, {"grips": False, "timestep": 0.005}):
+        simulation = Simulation(model, Scene(), home, 0.03, **options)
+        fingers = [simulation.data.geom(name).xpos.copy() for name in FINGERS]
+        for k in range(60):
+            simulation.advance(speed * min(k, 20, 59 - k) / 20, 1.0 if "grips" in options else 0.0)
+        fingers += [simulation.data.geom(name).xpos.copy() for name in FINGERS]
+        ends.append(np.array([*fingers, simulation.tool.position]))
+    assert len(simulation.data.qpos) == model.size
+    assert np.linalg.norm(ends[0][-1] - model.pose(home).position) > 0.1
+    np.testing.assert_allclose(ends[1], ends[0], atol=5e-4)
+    np.testing.assert_allclose(ends[2], ends[0], atol=2e-3)
+
+
 def test_velocity_commands_are_tracked():
     """Steady error below 1 %, lag below 10 ms, in every joint, with the arm stretched out."""
     with environment("Reach") as env:
