@@ -35,10 +35,10 @@ class State:
 @exact_jit
 def _finite(values):
     """Whether all values are numbers, whatever their shape."""
+    finite = True
     for value in values.flat:
-        if not np.isfinite(value):
-            return False
-    return True
+        finite &= np.isfinite(value)
+    return finite
 
 
 class Controller(Protocol):

@@ -92,7 +92,7 @@ class Intent:
 @exact_jit
 def _finite(values, mask):
     """Whether all values that a mask picks are numbers, (m,)."""
+    finite = True
     for channel in range(len(values)):
-        if mask[channel] and not np.isfinite(values[channel]):
-            return False
-    return True
+        finite &= np.isfinite(values[channel]) or not mask[channel]
+    return finite

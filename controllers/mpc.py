@@ -218,7 +218,7 @@ class MaskedMpc:
         return way.motion, False
 
     def _start_velocity(self, state: State) -> FloatArray:
-        """Return the velocity that a command starts from: the commanded one, unless the robot falls behind."""
+        """Return the velocity that a command starts from: the commanded one, if the robot keeps up."""
         commanded = state.v if self._followed is None else self._followed.velocity(state.time)
         return resumed(commanded, state.v, self._tolerance, self.model.description.limits.velocity)
 

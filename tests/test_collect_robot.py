@@ -144,7 +144,7 @@ def test_fingers_stay_in_the_box_that_the_controller_avoids():
 
 
 def test_a_gripper_that_does_not_grip_is_the_open_one():
-    """Same fingers at the same place, nothing to move them, and the robot moves alike, in larger steps too."""
+    """Same fingers at the same place, nothing moves them, and the robot moves alike, in larger steps too."""
     model = load_model()
     home, ends = np.array(model.description.home), []
     speed = 0.2 * model.description.limits.velocity * np.resize([1.0, -1.0], model.size)
