@@ -1,6 +1,7 @@
 """The robot that the benchmark drives: an ideal one, or MuJoCo's."""
 
-from typing import Protocol
+from collections.abc import Mapping
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -12,7 +13,8 @@ from handrail.controllers.collision import CollisionModel
 from handrail.controllers.controller import State
 from handrail.controllers.model import Pose, RobotModel
 
-_TIMESTEP = 0.005  # longest one of the integrator [s]
+PHYSICS: Mapping[str, Any] = {"grips": False, "timestep": 0.005}
+"""MuJoCo's robot: its fingers do not move, and the integrator's longest step [s]."""
 
 
 class Plant(Protocol):
@@ -77,5 +79,5 @@ def build_plant(model: RobotModel, scene: Scene, physics: bool) -> Plant:
     """
     home = model.description.home
     if physics:
-        return Simulation(model, scene, home, STEP, grips=False, timestep=_TIMESTEP)
+        return Simulation(model, scene, home, STEP, **PHYSICS)
     return IdealRobot(model, scene, home)

@@ -101,7 +101,7 @@ def _video(path: Path) -> str:
 
 
 def _conditions(results: Mapping[str, Any]) -> str:
-    groups = ("config", "mpc_settings", "machine", "versions", "skipped")
+    groups = ("config", "mpc_settings", "physics", "machine", "versions", "skipped")
     lines = [
         f"<p><b>{group}</b>: "
         + ", ".join(f"<code>{escape(str(k))} {escape(str(v))}</code>" for k, v in results[group].items())

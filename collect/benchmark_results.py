@@ -13,6 +13,7 @@ import numpy as np
 from handrail.collect.benchmark_config import BenchmarkConfig
 from handrail.collect.benchmark_contenders import TAKE_UP, TAKE_UP_TURN, Contender, goal_reaching_settings
 from handrail.collect.benchmark_metrics import COST_METRICS, METRICS, SAFETY_METRICS, SETTLED_METRICS
+from handrail.collect.benchmark_plants import PHYSICS
 from handrail.datasets.paired import paired_difference, paired_success, wilson
 
 Row = Mapping[str, Any]
@@ -47,6 +48,7 @@ def summarise(
         "skipped": dict(skipped),
         "config": {name: value for name, value in asdict(config).items() if name not in _PLACES},
         "mpc_settings": asdict(goal_reaching_settings()) | {"take_up": TAKE_UP, "take_up_turn": TAKE_UP_TURN},
+        "physics": dict(PHYSICS) if config.physics else {},
         "machine": {"cores": os.cpu_count(), "load": os.getloadavg()[0]},
         "versions": {name: metadata.version(name) for name in _VERSIONED},
         "episodes": [dict(row) for row in rows],

@@ -13,6 +13,7 @@ from handrail.collect.scene import Scene, add_scene
 from handrail.collect.stage import set_stage
 from handrail.controllers.arrays import FloatArray, IntArray
 from handrail.controllers.controller import State
+from handrail.controllers.errors import HandrailError
 from handrail.controllers.jit import exact_jit
 from handrail.controllers.model import Pose, RobotModel
 from handrail.controllers.shape import Obstacle
@@ -46,6 +47,9 @@ class Simulation:
         grips: whether the gripper can move; else it stays open.
         timestep: longest step of the integrator [s].
 
+    Raises:
+        HandrailError: the gripper is closed around something, and cannot move.
+
     Attributes:
         mujoco_model: the compiled model.
         data: its state.
@@ -64,6 +68,8 @@ class Simulation:
         grips: bool = True,
         timestep: float = _TIMESTEP,
     ) -> None:
+        if grip is not None and not grips:
+            raise HandrailError(f"grip of a simulation: expected none without grips, got {grip}")
         self._model = model
         self._gripper = model.description.gripper if grips else None
         self._scene = scene
@@ -179,9 +185,9 @@ class Simulation:
 
     @property
     def opening(self) -> float:
-        """How far the gripper is open, from 0 to 1; 0 where none can move."""
-        if not self._stroke:
-            return 0.0
+        """How far the gripper is open, from 0 to 1; 0 for a robot without one."""
+        if self._gripper is None:
+            return float(self._model.description.gripper is not None)
         return float(np.clip(self.data.qpos[self._finger_index].sum() / self._stroke, 0.0, 1.0))
 
     @property

@@ -21,7 +21,7 @@ class Situation:
 
     Attributes:
         q: measured position, (n,).
-        v: velocity that a command begins with: the commanded one, if the robot follows it, (n,).
+        v: velocity that a command begins with: the commanded one, if the robot keeps up, (n,).
         distances: signed distances of all pairs, (P,) [m].
         elapsed: time since the last update [s].
     """

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.command import Command
+from handrail.controllers.controller import State
 
 
 @dataclass(frozen=True)
@@ -28,6 +29,11 @@ class Followed:
     def velocity(self, time: float) -> FloatArray:
         """Return what is commanded at a time, which may be no number, (n,)."""
         return self.command.velocity(self.elapsed(time))
+
+    def next_start(self, state: State) -> FloatArray:
+        """Return what the next command goes on from, (n,): this one while it lasts, then as measured."""
+        elapsed = self.elapsed(state.time)
+        return state.v if elapsed > self.command.duration else self.command.velocity(elapsed)
 
     def accelerations(self, time: float, count: int) -> FloatArray:
         """Return what is commanded over `count` intervals from a time on, (count, n); zero after the end."""

@@ -84,13 +84,14 @@ class Intent:
 
     @property
     def is_finite(self) -> bool:
-        """Whether every commanded value, the gripper and the time are numbers."""
+        """Whether every commanded value, the gripper and the time are numbers, and each value has a mask."""
         scalars = math.isfinite(self.gripper) and math.isfinite(self.time)
-        return scalars and _finite(self.values, self.mask)
+        scalars = scalars and self.values.ndim == 1 and self.values.shape == self.mask.shape
+        return scalars and _commanded_finite(self.values, self.mask)
 
 
 @exact_jit
-def _finite(values, mask):
+def _commanded_finite(values, mask):
     """Whether all values that a mask picks are numbers, (m,)."""
     finite = True
     for channel in range(len(values)):

@@ -64,9 +64,9 @@ def changed(q, v, dt, u, change, limit):
 def resumed(commanded, measured, tolerance, limit):
     """Return the velocity from which a command goes on, (n,).
 
-    `min(max(c, v - tolerance), v + tolerance)`, but between rest and c: of a robot that cannot follow it is
-    what is measured, so that the command does not run away from it; one that is pushed keeps what was
-    commanded, so that its servos hold against the push.
+    `min(max(c, v - tolerance), v + tolerance)`, but between rest and c. A robot that cannot follow is waited
+    for, the tolerance ahead of it; one that is pushed onward keeps what was commanded, one pushed back is asked
+    to rest, so that its servos hold against the push.
 
     Args:
         commanded: c, (n,) [m/s, rad/s].

@@ -219,7 +219,7 @@ class MaskedMpc:
 
     def _start_velocity(self, state: State) -> FloatArray:
         """Return the velocity that a command starts from: the commanded one, if the robot keeps up."""
-        commanded = state.v if self._followed is None else self._followed.velocity(state.time)
+        commanded = state.v if self._followed is None else self._followed.next_start(state)
         return resumed(commanded, state.v, self._tolerance, self.model.description.limits.velocity)
 
     def _guess(self, time: float) -> FloatArray:

@@ -33,7 +33,7 @@ class MpcSettings:
         largest_rate: the same for its rotation [rad/s].
         intent_timeout: age from which an intent is stale [s].
         velocity_tolerance: how far a robot that cannot follow may fall behind the commanded velocity before
-            the plan starts from the measured one, relative to the velocity limit.
+            the plan waits for it, relative to the velocity limit; more than the measured velocity's noise.
     """
 
     horizon: int = 10

@@ -11,6 +11,7 @@ from handrail.collect.meshes import PlacedMesh, pieces, placed_meshes
 from handrail.collect.robot import FINGERS, build_robot
 from handrail.collect.scene import Scene
 from handrail.collect.simulation import Simulation
+from handrail.controllers.errors import HandrailError
 from handrail.controllers.model import RobotModel, load_model
 from handrail.controllers.shape import Shape
 
@@ -156,6 +157,9 @@ def test_a_gripper_that_does_not_grip_is_the_open_one():
         fingers += [simulation.data.geom(name).xpos.copy() for name in FINGERS]
         ends.append(np.array([*fingers, simulation.tool.position]))
     assert len(simulation.data.qpos) == model.size
+    assert simulation.opening == 1.0
+    with pytest.raises(HandrailError, match="grip of a simulation: expected none without grips"):
+        Simulation(model, Scene(), home, 0.03, grip=0.05, grips=False)
     assert np.linalg.norm(ends[0][-1] - model.pose(home).position) > 0.1
     np.testing.assert_allclose(ends[1], ends[0], atol=5e-4)
     np.testing.assert_allclose(ends[2], ends[0], atol=2e-3)
