@@ -65,8 +65,8 @@ def resumed(commanded, measured, tolerance, limit):
     """Return the velocity from which a command goes on, (n,).
 
     `min(max(c, v - tolerance), v + tolerance)`, but between rest and c. A robot that cannot follow is waited
-    for, the tolerance ahead of it; one that is pushed onward keeps what was commanded, one pushed back is asked
-    to rest, so that its servos hold against the push.
+    for, the tolerance ahead of it; one that is pushed onward keeps what was commanded; one pushed back is
+    asked to rest. So its servos hold against a push.
 
     Args:
         commanded: c, (n,) [m/s, rad/s].
