@@ -44,6 +44,8 @@ class ContactMonitor:
     @property
     def names(self) -> tuple[str, ...]:
         """The pairs of geoms that met since the last `clear`, sorted."""
+        if not self._pairs:
+            return ()
         pairs = (
             (self._model.geom(first).name, self._model.geom(second).name) for first, second in self._pairs
         )

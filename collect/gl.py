@@ -76,6 +76,7 @@ import mujoco as _mujoco  # noqa: E402
 mujoco: Any = _mujoco  # it comes without type stubs, and so do its classes
 type MjSpec = Any
 type MjsBody = Any
+type MjsGeom = Any
 type MjModel = Any
 type MjData = Any
 type MjrContext = Any
@@ -86,6 +87,7 @@ __all__ = [
     "MjSpec",
     "MjrContext",
     "MjsBody",
+    "MjsGeom",
     "choose_backend",
     "graphics_trouble",
     "missing_graphics",

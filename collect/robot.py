@@ -80,8 +80,9 @@ def build_robot(model: RobotModel, meshes: bool = True, grips: bool = True) -> R
     _add_servos(spec, model)
     if meshes:
         _add_meshes(spec, model, mounts)
-    for index, shape in enumerate(model.description.visual):
-        _add_shape(mounts, shape, name=f"visual_{index}", rgba=shape.rgba, **_ghost(geometry.VISIBLE_GROUP))
+        for index, shape in enumerate(model.description.visual):
+            ghost = _ghost(geometry.VISIBLE_GROUP)
+            _add_shape(mounts, shape, name=f"visual_{index}", rgba=shape.rgba, **ghost)
     return RobotSpec(spec, contact, _grasp_geoms(model, contact))
 
 

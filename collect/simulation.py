@@ -252,5 +252,5 @@ def _span(places: list[int]) -> slice | IntArray:
 def _robot(model: RobotModel, meshes: bool, grips: bool, timestep: float) -> RobotSpec:
     robot = build_robot(model, meshes, grips)
     robot.spec.compiler.usethread = meshes  # without any, waking a second thread takes longer than its work
-    set_stage(robot.spec, timestep)
+    set_stage(robot.spec, timestep, meshes)
     return robot

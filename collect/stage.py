@@ -1,15 +1,16 @@
 """What every scene stands on and is lit by: floor, sky, lights, solver options."""
 
 from handrail.collect import geometry
-from handrail.collect.gl import MjSpec, mujoco
+from handrail.collect.gl import MjsGeom, MjSpec, mujoco
 
 
-def set_stage(spec: MjSpec, timestep: float) -> None:
+def set_stage(spec: MjSpec, timestep: float, looks: bool) -> None:
     """Add floor, sky and lights, and set how the simulation integrates.
 
     Args:
         spec: the spec to add to.
         timestep: of the integrator [s].
+        looks: whether it will be looked at; sky, lights and the floor's pattern take time in every step.
     """
     spec.option.timestep = timestep
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
@@ -17,10 +18,12 @@ def set_stage(spec: MjSpec, timestep: float) -> None:
     spec.option.impratio = 20.0
     spec.stat.extent = 3.0
     spec.stat.center = [0.0, 0.0, 0.5]
-    _set_quality(spec)
-    _add_sky(spec)
-    _add_floor(spec)
-    _add_lights(spec)
+    floor = _add_floor(spec)
+    if looks:
+        _set_quality(spec)
+        _add_sky(spec)
+        _add_pattern(spec, floor)
+        _add_lights(spec)
 
 
 def _set_quality(spec: MjSpec) -> None:
@@ -46,7 +49,19 @@ def _add_sky(spec: MjSpec) -> None:
     )
 
 
-def _add_floor(spec: MjSpec) -> None:
+def _add_floor(spec: MjSpec) -> MjsGeom:
+    return spec.worldbody.add_geom(
+        name="floor",
+        type=mujoco.mjtGeom.mjGEOM_PLANE,
+        size=[8.0, 8.0, 0.1],
+        contype=geometry.FLOOR_BIT,
+        conaffinity=0,
+        friction=[0.8, 0.01, 0.0001],
+        group=geometry.VISIBLE_GROUP,
+    )
+
+
+def _add_pattern(spec: MjSpec, floor: MjsGeom) -> None:
     spec.add_texture(
         name="checker",
         type=mujoco.mjtTexture.mjTEXTURE_2D,
@@ -61,16 +76,7 @@ def _add_floor(spec: MjSpec) -> None:
     textures = [""] * int(mujoco.mjtTextureRole.mjNTEXROLE)
     textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = "checker"
     spec.add_material(name="floor", textures=textures, texrepeat=[1.0, 1.0], texuniform=True, reflectance=0.0)
-    spec.worldbody.add_geom(
-        name="floor",
-        type=mujoco.mjtGeom.mjGEOM_PLANE,
-        size=[8.0, 8.0, 0.1],
-        material="floor",
-        contype=geometry.FLOOR_BIT,
-        conaffinity=0,
-        friction=[0.8, 0.01, 0.0001],
-        group=geometry.VISIBLE_GROUP,
-    )
+    floor.material = "floor"
 
 
 def _add_lights(spec: MjSpec) -> None:

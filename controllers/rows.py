@@ -60,7 +60,7 @@ def rows_around(
         matrix: of basis.py.
     """
     limits = problem.limits
-    constraints, names, needed, first = _rows(
+    guess, offsets, scales, distance_rows, names, needed, first = _rows(
         matrix,
         *motion,
         (limits.position_lower, limits.position_upper, limits.velocity, limits.acceleration),
@@ -70,7 +70,8 @@ def rows_around(
         problem.margins,
         nodes.gains,
     )
-    return Rows(Constraints(*constraints), names, needed, first)
+    constraints = Constraints(matrix, guess, limits.acceleration, offsets, scales, *distance_rows)
+    return Rows(constraints, names, needed, first)
 
 
 @jit
@@ -112,7 +113,7 @@ def _rows(matrix, q, v, u, limits, near, gradients, values, margins, gains):
         names[kept] = first + pair * _NODES + node
         kept += 1
     needed[1] = max(over[0], over[1] / VELOCITY_SLACK)
-    return (matrix, guess, acceleration, offsets, scales, stage, coefficients, left), names, needed, first
+    return guess, offsets, scales, (stage, coefficients, left), names, needed, first
 
 
 @jit
