@@ -75,7 +75,8 @@ def build_plant(model: RobotModel, scene: Scene, physics: bool) -> Plant:
 
     MuJoCo's gripper stays open, for nothing is grasped, and without a grasp steps of 5 ms do: on six goals,
     compared with steps of 0.5 ms, no path of the hand under `mpc`, `dls` or `rl` differs by more than 1.1 mm,
-    no effort by more than 0.5 %.
+    no effort by more than 0.5 %; on 300 goals, compared with 2 ms and moving fingers, ten controllers touch
+    something in as many episodes, but for one of `rl`.
     """
     home = model.description.home
     if physics:
