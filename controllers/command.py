@@ -79,11 +79,6 @@ class Command:
         """The velocities as a trajectory."""
         return Trajectory(self.velocities, self.dt, self.elapsed)
 
-    @property
-    def duration(self) -> float:
-        """Time from the update to the last knot [s]; after it the robot is asked to rest."""
-        return (len(self.velocities) - 1) * self.dt - self.elapsed
-
     def velocity(self, time: float) -> FloatArray:
         """Return the commanded velocity `time` [s] from the update on, (n,)."""
         return self.trajectory.velocity(time)

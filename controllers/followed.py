@@ -33,7 +33,7 @@ class Followed:
     def next_start(self, state: State) -> FloatArray:
         """Return what the next command goes on from, (n,): this one while it lasts, then as measured."""
         elapsed = self.elapsed(state.time)
-        return state.v if elapsed > self.command.duration else self.command.velocity(elapsed)
+        return state.v if self.command.trajectory.is_over(elapsed) else self.command.velocity(elapsed)
 
     def accelerations(self, time: float, count: int) -> FloatArray:
         """Return what is commanded over `count` intervals from a time on, (count, n); zero after the end."""

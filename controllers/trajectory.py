@@ -33,10 +33,14 @@ class Trajectory:
         knot = (max(time, 0.0) + self.elapsed) / self.dt
         index, last = int(knot), len(self.velocities) - 1
         if index >= last:
-            over = knot - last > _ROUNDING * last
-            return np.zeros_like(self.velocities[0]) if over else self.velocities[-1]
+            return np.zeros_like(self.velocities[0]) if self.is_over(time) else self.velocities[-1]
         weight = knot - index
         return (1.0 - weight) * self.velocities[index] + weight * self.velocities[index + 1]
+
+    def is_over(self, time: float) -> bool:
+        """Whether the last knot lies in the past `time` [s] from now, by more than rounding."""
+        last = len(self.velocities) - 1
+        return (max(time, 0.0) + self.elapsed) / self.dt - last > _ROUNDING * last
 
     def after(self, time: float) -> "Trajectory":
         """Return what is left of it `time` [s] from now: the same curve, without knots long past."""
