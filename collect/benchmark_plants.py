@@ -52,7 +52,7 @@ class IdealRobot:
 
     def state(self) -> State:
         """Return position, velocity and time."""
-        return State(self._q, self._v, self._steps * STEP)
+        return State(self._q, self._v, self._steps * STEP, self._v)
 
     @property
     def tool(self) -> Pose:

@@ -174,8 +174,9 @@ class Simulation:
             self.data.mocap_pos[body] = patrol.position(self.data.time)
 
     def state(self) -> State:
-        """Return the measured positions and velocities."""
-        return State(self.data.qpos[self._q_index], self.data.qvel[self._v_index], self.data.time)
+        """Return the measured positions and velocities, and what was commanded last."""
+        data = self.data
+        return State(data.qpos[self._q_index], data.qvel[self._v_index], data.time, self.commanded)
 
     @property
     def tool(self) -> Pose:

@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray, IntArray
-from handrail.controllers.constraints import SLACKS
 from handrail.controllers.jit import copy, jit
+from handrail.controllers.slacks import SLACKS
 
 _CANCELLED = 0.25  # share of a row's square below which rounding makes a second projection worth while
 
@@ -18,7 +18,7 @@ class ActiveRows(NamedTuple):
     """Room for as many rows as there are variables; kept from update to update.
 
     Attributes:
-        directions: Q, (A, N n + 2).
+        directions: Q, (A, N n + 4).
         triangle: T, (A, A).
         multipliers: λ, (A,).
         keys: which rows they are, (A,).
@@ -51,10 +51,10 @@ def project(held, count, new, along, shares, normal):
     Args:
         held: the active rows.
         count: of them.
-        new: m, (N n + 2,).
+        new: m, (N n + 4,).
         along: filled with Q m, (A,).
         shares: filled with the combination, `T⁻ᵀ Q m`, (A,).
-        normal: filled with the rest, `m - Qᵀ Q m`, (N n + 2,).
+        normal: filled with the rest, `m - Qᵀ Q m`, (N n + 4,).
     """
     copy(new, len(new), normal)
     for i in range(count):

@@ -2,7 +2,7 @@
 
     min ½ sᵀ H s + gᵀ s + Σ_i (ρ₁ σ_i + ½ ρ₂ σ_i²)   subject to   c_pᵀ s - a_p σ_i(p) ≤ b_p,  σ ≥ 0
 
-with `H = L Lᵀ` banded and two slacks σ. In `y = (Lᵀ s, √ρ₂ σ)` the objective is `½ ‖y + f‖²`, so that the
+with `H = L Lᵀ` banded and slacks σ. In `y = (Lᵀ s, √ρ₂ σ)` the objective is `½ ‖y + f‖²`, so that the
 solution is the nearest point to `-f` within the rows `m_p = (L⁻¹ c_p, -a_p / √ρ₂)`. Rows become active one by
 one, the most violated first, while all multipliers stay ≥ 0 (D. Goldfarb, A. Idnani, Mathematical Programming
 27, 1983). Only rows that are met are ever transformed: one that is far from binding costs a comparison. Begun
@@ -14,15 +14,16 @@ import numpy as np
 from handrail.controllers.active_rows import append, drop, project, settle
 from handrail.controllers.banded import backward, forward
 from handrail.controllers.basis import to_motion
-from handrail.controllers.constraints import SLACKS, most_violated, write_row
+from handrail.controllers.constraints import most_violated, write_row
 from handrail.controllers.jit import copy, jit
+from handrail.controllers.slacks import SLACKS
 
 _DEPENDENT = 1e-12  # squared sine to the active rows, below which a row is a combination of them
 
 
 @jit
 def solve(band, gradient, penalty, rows, warm, limit, held, motion):
-    """Solve the QP; return σ (2,), `gᵀ s + ½ sᵀ H s`, whether that is the solution, changes, active rows.
+    """Solve the QP; return σ (4,), `gᵀ s + ½ sᵀ H s`, whether that is the solution, changes, active rows.
 
     Args:
         band: L, (N n, 3n); see banded.py.

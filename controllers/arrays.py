@@ -1,17 +1,67 @@
-"""Array types and the read-only copy that every value in the house is made of."""
+"""Array types, and the checked, read-only copy that every value in the house is made of."""
 
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from handrail.controllers.errors import HandrailError
+
 FloatArray = NDArray[np.floating]
 BoolArray = NDArray[np.bool_]
 IntArray = NDArray[np.integer]
 
+_KINDS = {"f": "biuf", "i": "biu", "b": "b"}  # of numbers that may become floats, integers, truth values
+_WORDS = {"f": "real numbers", "i": "integers", "b": "True or False"}
 
-def frozen(values: ArrayLike, dtype: Any = np.float64) -> NDArray[Any]:
-    """Return a read-only copy of the values."""
+
+def frozen(values: ArrayLike, dtype: Any = np.float64, what: str = "an array") -> NDArray[Any]:
+    """Return a read-only copy of the values.
+
+    Args:
+        values: numbers; truth values where `dtype` is bool.
+        dtype: of the copy.
+        what: they are, for the message.
+
+    Raises:
+        HandrailError: they are something else: text, complex numbers, rows of unequal length, or integers
+            that are too large.
+    """
+    if not (isinstance(values, np.ndarray) and values.dtype == dtype):
+        values = _checked(values, np.dtype(dtype).kind, what)
     array = np.array(values, dtype=dtype)
     array.setflags(write=False)
     return array
+
+
+def real(value: Any, what: str) -> float:
+    """Return a number as a float.
+
+    Raises:
+        HandrailError: it is none: text, a complex number, or an integer that is too large.
+    """
+    if isinstance(value, float):
+        return float(value)
+    array = _checked(value, "f", what)
+    if array.shape != ():
+        raise HandrailError(f"{what}: expected one number, got shape {array.shape}")
+    return float(array)
+
+
+def _checked(values: ArrayLike, kind: str, what: str) -> NDArray[Any]:
+    try:
+        array = np.asarray(values)
+    except (ValueError, OverflowError) as error:
+        raise HandrailError(f"{what}: expected {_WORDS[kind]} in rows of equal length: {error}") from error
+    if array.size and array.dtype.kind not in _KINDS[kind]:
+        raise HandrailError(f"{what}: expected {_WORDS[kind]}, got {_told(values)}")
+    return array
+
+
+def _told(values: Any) -> str:
+    """Return values in few words; an integer of many digits has no short ones."""
+    try:
+        text = " ".join(repr(values).split())
+    except ValueError:
+        return "an integer that is too large"
+    return text if len(text) <= 60 else f"{text[:57]}..."

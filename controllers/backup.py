@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray
-from handrail.controllers.certificate import StopCertificate
+from handrail.controllers.certificate import Shortfall, StopCertificate
 from handrail.controllers.limiter import Limiter
 from handrail.controllers.problem import Plan
 from handrail.controllers.trajectory import Trajectory
@@ -38,12 +38,12 @@ class Way:
 
     Attributes:
         motion: what is done for sure, unless a later update finds something better; then a full stop.
-        shortfall: of its safety; 0 when it is safe [m, rad].
+        shortfall: of its safety.
         planned: whether it begins with the new plan.
     """
 
     motion: Trajectory
-    shortfall: float
+    shortfall: Shortfall
     planned: bool = False
 
 
@@ -58,7 +58,8 @@ class Backup:
     4. A full stop at once.
 
     An operator who is gone or talks nonsense has no plan, and wants 4 before 3. Where no way is safe,
-    because an obstacle or the robot was moved by somebody else, it is the one that falls least short.
+    because an obstacle or the robot was moved by somebody else, it is the one that falls least short: first
+    of keeping from itself and from what stands still, then of keeping from everything.
 
     Args:
         certificate: measures the ways.
@@ -86,7 +87,7 @@ class Backup:
         """
         refused: list[Way] = []
         for way in self._ways(situation, plan, halt):
-            if way.shortfall <= 0.0:
+            if way.shortfall.all <= 0.0:
                 break
             refused.insert(0, way)
         else:
@@ -117,7 +118,7 @@ class Backup:
     def _farther(self, plan: Plan, now: tuple[FloatArray, FloatArray]) -> Iterator[Way]:
         """Yield the plan as far as its own path is safe, then a full stop; half as far; and so on."""
         path = Trajectory(plan.v, self._dt).path(plan.q[0], _SAMPLES)
-        shortfalls = self._certificate.along(*path, now)
+        shortfalls = self._certificate.along(*path, now)[:, 1]
         unsafe = np.flatnonzero(shortfalls > 0.0)
         stages = len(plan.u) if not len(unsafe) else (int(unsafe[0]) - 1) // _SAMPLES
         while stages > 1:
@@ -132,10 +133,8 @@ class Backup:
 
     def _braking(self, velocity: FloatArray) -> Trajectory:
         """Return a full stop from a velocity, (n,)."""
-        steps = max(1, int(np.ceil(self._limiter.stopping_time(velocity) / self._dt)))
-        return Trajectory(self._limiter.brake(velocity, self._dt, steps), self._dt)
+        return Trajectory(self._limiter.to_rest(velocity[None], self._dt), self._dt)
 
     def _stopping(self, motion: Trajectory) -> Trajectory:
         """Return a motion and a full stop from its end."""
-        stop = self._braking(motion.velocities[-1]).velocities
-        return replace(motion, velocities=np.vstack([motion.velocities, stop[1:]]))
+        return replace(motion, velocities=self._limiter.to_rest(motion.velocities, self._dt))

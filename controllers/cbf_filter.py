@@ -8,16 +8,17 @@ import numpy as np
 
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.channels import Channels
-from handrail.controllers.collision import CollisionModel
 from handrail.controllers.command import Command, Health, Status
 from handrail.controllers.controller import State
 from handrail.controllers.errors import HandrailError
-from handrail.controllers.guard import check_inputs
+from handrail.controllers.followed import Followed, following, sent_velocity
+from handrail.controllers.guard import InputGuard
 from handrail.controllers.intent import Intent
 from handrail.controllers.limiter import Limiter
 from handrail.controllers.margins import Margins
 from handrail.controllers.model import RobotModel
 from handrail.controllers.shape import Obstacle
+from handrail.controllers.surroundings import Surroundings
 
 _INFINITE = 1e30
 
@@ -86,40 +87,44 @@ class CbfFilter:
         self._period = period
         self._settings = settings or CbfSettings()
         self.channels = Channels.of(model.description)
+        self._guard = InputGuard(self.channels, self._settings.intent_timeout)
         self._limiter = Limiter(model.description)
         self._weights = model.description.limits.velocity**-2.0
         self.reset()
 
     def reset(self, obstacles: tuple[Obstacle, ...] = ()) -> None:
         """Forget the last command; take the obstacles of a new episode."""
-        self._avoid(CollisionModel(self._model, obstacles))
-        self._previous: FloatArray | None = None
+        self._surroundings = Surroundings(self._model, obstacles)
+        self._margins = self._wanted_margins()
+        self._guard.reset()
+        self._followed: Followed | None = None
         self._gripper = 0.0
 
     def observe(self, obstacles: tuple[Obstacle, ...]) -> None:
         """Take where the obstacles are now, how fast they move, and what the hand holds."""
-        now = self._collision.among(obstacles)
-        if now is not self._collision:
-            self._avoid(now)
+        if self._surroundings.observe(obstacles):
+            self._margins = self._wanted_margins(self._margins)
 
-    def _avoid(self, collision: CollisionModel) -> None:
-        """Keep these pairs apart from now on."""
-        self._collision = collision
-        self._margins = Margins(collision, self._settings.margin, self._settings.work_margin)
+    def _wanted_margins(self, before: Margins | None = None) -> Margins:
+        """Return the margins of the pairs that there are now."""
+        settings = self._settings
+        return Margins(self._surroundings.collision, settings.margin, settings.work_margin, before)
 
     def update(self, state: State, intent: Intent) -> Command:
         """Return the command from now on; brakes on a bad input or a failed solve."""
         start = perf_counter()
-        status = check_inputs(state, intent, self.channels, self._settings.intent_timeout)
-        previous = self._start_velocity(state)
-        if status is Status.INVALID_STATE:
+        status = self._guard.check(state, intent, self._surroundings)
+        previous = sent_velocity(state, self._followed, self._model.description.limits)
+        if state.is_of(self._model.size):
+            velocity, health = self._filtered(state.q, previous, intent, status)
+        else:
             velocity, _ = self._limiter.limit(previous, np.zeros(self._model.size), self._period)
             health = Health(status)
-        else:
-            velocity, health = self._filtered(state.q, previous, intent, status)
-        self._previous = velocity
+        velocities = self._limiter.to_rest(np.stack([previous, velocity]), self._period)
         health = replace(health, solve_time=perf_counter() - start)
-        return Command(np.stack([previous, velocity]), self._period, self._gripper, health)
+        command = Command(velocities, self._period, self._gripper, health)
+        self._followed = following(self._followed, command, state.time, self._period)
+        return command
 
     def _filtered(
         self, q: FloatArray, previous: FloatArray, intent: Intent, status: Status
@@ -135,7 +140,7 @@ class CbfFilter:
             wanted, slack, solved = self._solve(asked, barriers, *self._bounds(previous, q))
             status = Status.OK if solved else Status.SOLVER_FAILED
         velocity, _ = self._limiter.limit(previous, wanted, self._period, q)
-        work = self._collision.work
+        work = self._surroundings.collision.work
         return velocity, Health(
             status=status,
             slack=slack,
@@ -146,10 +151,11 @@ class CbfFilter:
 
     def _barriers(self, q: FloatArray) -> _Barriers:
         """Return the barrier rows at q; how the obstacles' own motion changes d is seen over a period."""
+        collision = self._surroundings.collision
         if self._margins.unknown:
-            self._margins.see(self._collision.values(q[None, :])[0])
+            self._margins.see(collision.values(q[None, :])[0])
         times, margins = np.array([0.0, self._period]), self._margins.values
-        distances = self._collision.distances(np.stack([q, q]), margins + self._settings.reach, times)
+        distances = collision.distances(np.stack([q, q]), margins + self._settings.reach, times)
         self._margins.see(distances.values[0])
         keep = distances.near[:, 0] == 1
         pair = distances.near[keep, 1]
@@ -177,9 +183,3 @@ class CbfFilter:
         if flag <= 0 or not np.isfinite(solution).all():
             return np.zeros(len(asked)), 0.0, False
         return solution[:-1], max(float(solution[-1]), 0.0), True
-
-    def _start_velocity(self, state: State) -> FloatArray:
-        if self._previous is not None:
-            return self._previous
-        valid = state.is_finite and state.v.shape == (self._model.size,)
-        return state.v if valid else np.zeros(self._model.size)

@@ -1,5 +1,7 @@
 """The certificate that a motion is safe: no pair comes below its floor, no joint beyond its range."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray
@@ -11,7 +13,22 @@ from handrail.controllers.margins import Margins
 
 _SAMPLES = np.array([0.25, 0.5, 0.75, 1.0])  # of the time that a stop takes, or that the robot waits after it
 _ERROR = 1e-3  # of signed distances, that is no loss [m]
+_HARD_ERROR = 1e-4  # the same where a thing that stands still is nearer than its hard floor [m]
+_HARD = 0.5  # hard floor of the robot with itself and with what stands still, as a share of the floor
 _BEYOND = 0.01  # of its range that a joint may come to rest [m, rad]
+
+
+class Shortfall(NamedTuple):
+    """How far a motion falls short of safety; of two the smaller is safer. 0 when it is safe [m, rad].
+
+    Attributes:
+        hard: of the hard floors of the robot with itself and with what stands still, and of the joints'
+            range. Nobody else moves these: what was safe once stays safe, and nothing is worth giving it up.
+        all: of all floors.
+    """
+
+    hard: float
+    all: float
 
 
 class StopCertificate:
@@ -47,8 +64,8 @@ class StopCertificate:
 
     def shortfall(
         self, q: FloatArray, v: FloatArray, now: tuple[FloatArray, FloatArray], delay: float = 0.0
-    ) -> float:
-        """Return how far the full stop from (q, v) falls short of safety; 0 when it is safe [m, rad].
+    ) -> Shortfall:
+        """Return how far the full stop from (q, v) falls short of safety.
 
         At full deceleration of every joint: `q_j(t) = q_j + v_j t - ½ sign(v_j) a_j t²` until `|v_j| / a_j`.
 
@@ -61,7 +78,9 @@ class StopCertificate:
         path, times = self._limiter.stop(q, v, _SAMPLES)
         return self.until_rest(path, delay + times, now)
 
-    def until_rest(self, path: FloatArray, times: FloatArray, now: tuple[FloatArray, FloatArray]) -> float:
+    def until_rest(
+        self, path: FloatArray, times: FloatArray, now: tuple[FloatArray, FloatArray]
+    ) -> Shortfall:
         """Return the same of a motion that ends at rest, through positions (K, n) at times from now, (K,).
 
         Where obstacles move, the robot has to be safe for some time, moving or waiting.
@@ -70,25 +89,30 @@ class StopCertificate:
         if self._collision.moves and left > 0.0:
             path = np.vstack([path, np.broadcast_to(path[-1], (len(_SAMPLES), path.shape[1]))])
             times = np.append(times, times[-1] + left * _SAMPLES)
-        return float(self.along(path, times, now).max())
+        hard, all_floors = self.along(path, times, now).max(axis=0).tolist()
+        return Shortfall(hard, all_floors)
 
     def along(self, path: FloatArray, times: FloatArray, now: tuple[FloatArray, FloatArray]) -> FloatArray:
-        """Return the same at every point of a motion, (K,)."""
+        """Return the same at every point of a motion, hard and of all floors, (K, 2)."""
         floors = self._floor * self._margins.values
         distances = self._collision.values(path, times, now, floors)
         bounds = self._limits.position_lower, self._limits.position_upper
-        return _shortfalls(path, distances, *now, floors, *bounds)
+        return _shortfalls(path, distances, *now, floors, self._collision.speeds, *bounds)
 
 
 @jit
-def _shortfalls(path, distances, start, now, floors, lower, upper):
-    short = np.zeros(len(path))
+def _shortfalls(path, distances, start, now, floors, speeds, lower, upper):
+    short = np.zeros((len(path), 2))
     for k in range(len(path)):
         for p in range(len(floors)):
-            short[k] = max(short[k], min(floors[p], now[p] - _ERROR) - distances[k, p])
+            distance = distances[k, p]
+            short[k, 1] = max(short[k, 1], min(floors[p], now[p] - _ERROR) - distance)
+            if speeds[p] == 0.0:
+                short[k, 0] = max(short[k, 0], min(_HARD * floors[p], now[p] - _HARD_ERROR) - distance)
         for j in range(len(start)):
             room = min(path[k, j] - lower[j], upper[j] - path[k, j]) + _BEYOND
             if room < 0.0:
                 before = min(0.0, start[j] - lower[j], upper[j] - start[j])
-                short[k] = max(short[k], before - room)
+                short[k, 0] = max(short[k, 0], before - room)
+        short[k, 1] = max(short[k, 0], short[k, 1])
     return short

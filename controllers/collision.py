@@ -9,8 +9,9 @@ from handrail.controllers.arrays import FloatArray, IntArray
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.model import RobotModel
 from handrail.controllers.pair_data import PairData
-from handrail.controllers.shape import Obstacle
+from handrail.controllers.shape import Kept, Obstacle
 from handrail.controllers.shape_pairs import ShapePairs
+from handrail.controllers.slacks import MOVING, OWN, STANDING
 from handrail.controllers.witnesses import gradients, lower_bounds, measured, raise_bounds
 
 _STRETCH = 13  # configurations after which all pairs are measured again
@@ -42,6 +43,8 @@ class CollisionModel:
         work: which pairs are a tool shape against a work surface, (P,).
         largest_margin: the largest margin that a pair can keep [m], (P,).
         held: rows of the pairs with something that the hand holds, (H,).
+        speeds: of the obstacle of each pair, 0 of what stands still or is held, (P,) [m/s].
+        kinds: whether a pair is OWN, STANDING or MOVING (slacks.py), (P,).
     """
 
     def __init__(self, model: RobotModel, obstacles: tuple[Obstacle, ...] = ()) -> None:
@@ -49,7 +52,7 @@ class CollisionModel:
         self._model = model.pinocchio
         self._shapes = ShapePairs(model, obstacles)
         self._geometry = self._shapes.geometry
-        self._obstacles = self._frames(obstacles)
+        self._kept = _kept(obstacles)
         self._moving: list[Obstacle] = []
         self.pairs = self._shapes.names
         self.work = self._shapes.work
@@ -104,7 +107,7 @@ class CollisionModel:
             measured(witnesses[first], self._every, values[first])
             ahead = times[stretch] - times[begin]
             bounds, close = lower_bounds(
-                values[begin], q[begin], q[stretch], ahead, self._levers, self._speeds, reaches
+                values[begin], q[begin], q[stretch], ahead, self._levers, self.speeds, reaches
             )
             if self._last is not None and self._last[0].shape == q.shape:
                 there, known = self._last[0][stretch], self._last[1][stretch]
@@ -143,7 +146,7 @@ class CollisionModel:
         else:
             data, (start, there) = self._after, now
             reach = self._far if reach is None else reach
-            values, close = lower_bounds(there, start, q, times, self._levers, self._speeds, reach)
+            values, close = lower_bounds(there, start, q, times, self._levers, self.speeds, reach)
             if not close.any():
                 return values
             chosen = data.select(close)
@@ -190,32 +193,32 @@ class CollisionModel:
         Raises:
             HandrailError: they are not the obstacles that the model was built with.
         """
-        if self._frames(obstacles) != self._obstacles:
-            expected, got = ", ".join(self._obstacles), ", ".join(obstacle.name for obstacle in obstacles)
-            raise HandrailError(f"obstacles: expected {expected}, got {got}")
+        if _kept(obstacles) != self._kept:
+            expected, got = (", ".join(kept.name for kept in kind) for kind in (self._kept, _kept(obstacles)))
+            raise HandrailError(f"obstacles: expected {expected} as they were, got {got}")
         self._last: tuple[FloatArray, FloatArray] | None = None
         self._shapes.observe(obstacles)
         self._moving = [obstacle for obstacle in obstacles if obstacle.velocity.any()]
         speeds = {obstacle.name: float(np.linalg.norm(obstacle.velocity)) for obstacle in obstacles}
-        self._speeds = np.array([speeds.get(second, 0.0) for _, second in self.pairs])
+        self.speeds = np.array([speeds.get(second, 0.0) for _, second in self.pairs])
+        self.kinds = np.where(self.speeds > 0.0, MOVING, STANDING)
+        self.kinds[: len(self._robot.description.self_pairs)] = OWN
 
     def among(self, obstacles: tuple[Obstacle, ...]) -> "CollisionModel":
-        """Return the model as the obstacles are now: this one; another one when what is held has changed.
+        """Return the model as the obstacles are now: this one; another one when some came, went or changed.
 
         Raises:
-            HandrailError: what stands around is not what the model was built with.
+            HandrailError: two obstacles share a name, or one is held by a frame that the robot lacks.
         """
-        before = [name for name, frame in self._obstacles.items() if not frame]
-        standing = [obstacle.name for obstacle in obstacles if not obstacle.held]
-        if standing == before and self._frames(obstacles) != self._obstacles:
+        if _kept(obstacles) != self._kept:
             return CollisionModel(self._robot, obstacles)
         self.observe(obstacles)
         return self
 
-    @staticmethod
-    def _frames(obstacles: tuple[Obstacle, ...]) -> dict[str, str]:
-        """Return what every obstacle is fixed to, by its name."""
-        return {obstacle.name: obstacle.frame for obstacle in obstacles}
+
+def _kept(obstacles: tuple[Obstacle, ...]) -> tuple[Kept, ...]:
+    """Return what of every obstacle stays the same while it moves."""
+    return tuple(obstacle.kept for obstacle in obstacles)
 
 
 def _nothing(count: int, size: int) -> Distances:

@@ -15,8 +15,9 @@ class Status(StrEnum):
 
     OK = "ok"
     CLIPPED = "clipped"  # a direct command that the limits cut
-    INVALID_INTENT = "invalid_intent"  # wrong size, NaN or infinite
-    INVALID_STATE = "invalid_state"
+    INVALID_INTENT = "invalid_intent"  # wrong size, NaN or infinite, in an unknown frame, from the future
+    INVALID_STATE = "invalid_state"  # the same, or its clock does not advance
+    INVALID_SCENE = "invalid_scene"  # two obstacles of one name, or one held by a frame that the robot lacks
     STALE_INTENT = "stale_intent"
     SOLVER_FAILED = "solver_failed"  # the stored backup is followed
     BACKUP = "backup"  # the plan leaves no safe way out: the stored backup is followed
@@ -38,7 +39,6 @@ class Health:
         smallest_distance: smallest signed distance now, tool against work surfaces left out [m].
         work_distance: smallest signed distance of the tool against work surfaces now [m].
         tracking_error: norm of the commanded channels' error at the end of the plan [m/s, rad/s].
-        over_determined: whether more was commanded than the robot has freedom for.
         phases: where the update's time went [s].
     """
 
@@ -48,7 +48,6 @@ class Health:
     smallest_distance: float = np.inf
     work_distance: float = np.inf
     tracking_error: float = 0.0
-    over_determined: bool = False
     phases: tuple[tuple[str, float], ...] = ()
 
 

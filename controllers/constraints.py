@@ -1,17 +1,16 @@
 """The inequality rows of one update's QP, in variables of local support, and which of them a point breaks.
 
-A row `c_pᵀ s - a_p σ ≤ b_p` has a number, its key: first the two slacks (σ ≥ 0), then the accelerations'
-bounds (hard), the limits of velocity and position (slack 1), and the distances (slack 0). Only distances are
-kept as coefficients; the others have one entry each in (q, v, u) of their stage.
+A row `c_pᵀ s - a_p σ ≤ b_p` has a number, its key: first the slacks (σ ≥ 0, slacks.py), then the bounds of
+accelerations (hard), the limits of velocity and position, and the distances of three kinds. Distances alone
+are kept as coefficients; the others have one entry each in (q, v, u) of their stage.
 """
 
 from typing import NamedTuple
 
 from handrail.controllers.arrays import FloatArray, IntArray
 from handrail.controllers.jit import jit
+from handrail.controllers.slacks import LIMITS, SLACKS, VELOCITY_SLACK
 
-SLACKS = 2  # of the distances [m], and of the limits (relative)
-VELOCITY_SLACK = 1e-3  # share of the slack that velocity limits get: they can always be kept
 _HARD_TOLERANCE = 1e-7  # of a bound, relative
 _TOLERANCE = 1e-5  # of a limit, relative
 _DISTANCE_TOLERANCE = 1e-6  # [m]
@@ -28,6 +27,7 @@ class Constraints(NamedTuple):
         offsets: position and velocity after every stage relative to their limits, (N, 2, n).
         scales: what they are relative to, (2, n).
         stage: of every distance row, (R,).
+        kind: of every distance row, which is its slack, (R,).
         coefficients: of its stage's variables, (R, 3n).
         upper: how much of each distance is left [m], (R,).
     """
@@ -38,6 +38,7 @@ class Constraints(NamedTuple):
     offsets: FloatArray
     scales: FloatArray
     stage: IntArray
+    kind: IntArray
     coefficients: FloatArray
     upper: FloatArray
 
@@ -56,7 +57,7 @@ def most_violated(rows, s, motion, slack, active):
         rows: the constraints.
         s: the variables, (N n,).
         motion: changes of (q, v, u) after every stage, (N, 3, n).
-        slack: σ, (2,).
+        slack: σ, (4,).
         active: keys of the active rows, (A,).
     """
     worst, worst_key = 0.0, -1
@@ -74,7 +75,7 @@ def most_violated(rows, s, motion, slack, active):
                 if not _contains(active, key):
                     worst, worst_key = excess, key
         for kind in range(2):
-            allowed = 1.0 + slack[1] * (VELOCITY_SLACK if kind == 1 else 1.0)
+            allowed = 1.0 + slack[LIMITS] * (VELOCITY_SLACK if kind == 1 else 1.0)
             for j in range(n):
                 value = rows.offsets[k, kind, j] + motion[k, kind, j] / rows.scales[kind, j]
                 excess = abs(value) - allowed
@@ -84,7 +85,7 @@ def most_violated(rows, s, motion, slack, active):
                         worst, worst_key = excess, key
     base = first_distance(horizon, n)
     for row in range(len(rows.upper)):
-        excess = _change(rows, row, n, s) - rows.upper[row] - slack[0]
+        excess = _change(rows, row, n, s) - rows.upper[row] - slack[rows.kind[row]]
         scaled = _DISTANCE_SCALE * excess
         if excess > _DISTANCE_TOLERANCE and scaled > worst and not _contains(active, base + row):
             worst, worst_key = scaled, base + row
@@ -93,7 +94,7 @@ def most_violated(rows, s, motion, slack, active):
 
 @jit
 def write_row(rows, key, out):
-    """Write a row's coefficients of s and σ, (N n + 2,); return its right-hand side and first entry.
+    """Write a row's coefficients of s and σ, (N n + 4,); return its right-hand side and first entry.
 
     The slacks' entries are written as they stand in the row: -1 for σ ≥ 0, else -a.
     """
@@ -113,14 +114,14 @@ def write_row(rows, key, out):
     if key < 4 * size:
         k, kind, j, sign = key // 4 // n, key // 2 // n % 2, key // 2 % n, 1.0 - 2.0 * (key % 2)
         first = _write_entry(rows.matrix[kind], k, j, n, sign / rows.scales[kind, j], out)
-        out[size + 1] = -(VELOCITY_SLACK if kind == 1 else 1.0)
+        out[size + LIMITS] = -(VELOCITY_SLACK if kind == 1 else 1.0)
         return 1.0 - sign * rows.offsets[k, kind, j], first
     row = key - 4 * size
     start = (rows.stage[row] - 2) * n
     first = max(0, start)
     for column in range(first - start, 3 * n):
         out[start + column] = rows.coefficients[row, column]
-    out[size] = -1.0
+    out[size + rows.kind[row]] = -1.0
     return rows.upper[row], first
 
 

@@ -1,12 +1,11 @@
 """The one protocol behind which every controller stands."""
 
-import math
 from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
-from handrail.controllers.arrays import FloatArray, frozen
+from handrail.controllers.arrays import FloatArray, frozen, real
 from handrail.controllers.command import Command
 from handrail.controllers.intent import Intent
 from handrail.controllers.jit import exact_jit
@@ -15,21 +14,36 @@ from handrail.controllers.shape import Obstacle
 
 @dataclass(frozen=True)
 class State:
-    """What is measured of the robot: q (n,) and v = dq/dt (n,), at a time [s]."""
+    """What is known of the robot at a time.
+
+    Attributes:
+        q: measured positions, (n,) [m, rad].
+        v: measured velocities, dq/dt, (n,) [m/s, rad/s].
+        time: on the robot's clock [s]; later at every update.
+        commanded: the velocity that the robot was sent last, (n,). It alone knows, for what is asked may be
+            limited on the way. None where it does not say; then it was sent what was asked.
+    """
 
     q: FloatArray
     v: FloatArray
     time: float = 0.0
+    commanded: FloatArray | None = None
 
     def __post_init__(self) -> None:
-        """Copy the arrays and make them read-only."""
-        object.__setattr__(self, "q", frozen(self.q))
-        object.__setattr__(self, "v", frozen(self.v))
+        """Copy the arrays and make them read-only.
 
-    @property
-    def is_finite(self) -> bool:
-        """Whether every entry is a number."""
-        return math.isfinite(self.time) and _finite(self.q) and _finite(self.v)
+        Raises:
+            HandrailError: one of them is not made of real numbers.
+        """
+        for name in ("q", "v", "commanded"):
+            if getattr(self, name) is not None:
+                object.__setattr__(self, name, frozen(getattr(self, name), what=f"{name} of a state"))
+        object.__setattr__(self, "time", real(self.time, "time of a state"))
+
+    def is_of(self, size: int) -> bool:
+        """Whether all of it but the time are finite numbers for a robot with `size` coordinates."""
+        known = self.commanded is None or (self.commanded.shape == (size,) and _finite(self.commanded))
+        return known and self.q.shape == self.v.shape == (size,) and _finite(self.q) and _finite(self.v)
 
 
 @exact_jit
@@ -49,12 +63,10 @@ class Controller(Protocol):
         ...
 
     def observe(self, obstacles: tuple[Obstacle, ...]) -> None:
-        """Take where the obstacles are now, how fast they move, and what the hand holds.
+        """Take what stands around now, where, how fast it moves, and what the hand holds.
 
-        Called before an update if any moves, while something is held, and when it was let go.
-
-        Raises:
-            HandrailError: what stands around is not what did at the beginning of this episode.
+        Things may appear and vanish; what was commanded is not forgotten. Where the scene makes no sense (two
+        things of one name, a frame that the robot lacks) updates brake until one is seen that does.
         """
         ...
 

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray
-from handrail.controllers.constraints import VELOCITY_SLACK
 from handrail.controllers.nodes import Nodes
 from handrail.controllers.problem import Problem
 from handrail.controllers.residuals import StageResiduals
 from handrail.controllers.rows import RECOVERY
+from handrail.controllers.slacks import LIMITS, VELOCITY_SLACK
 
 
 @dataclass(frozen=True)
@@ -20,7 +20,7 @@ class Evaluation:
         tracking: weighted squared errors of all objectives.
         collision_slack: largest shortfall of a distance against its bound [m].
         limit_slack: that the velocity and position limits need, relative.
-        cost: all of it, with the penalties of both slacks.
+        cost: all of it, with the penalties of the slacks.
     """
 
     tracking: float
@@ -30,7 +30,7 @@ class Evaluation:
 
 
 class Evaluator:
-    """Evaluates `Σ ½ ‖r - ref‖²_W + ρ₁ s + ½ ρ₂ s²` at any accelerations, s the smallest that is enough."""
+    """Evaluates `Σ ½ ‖r - ref‖²_W + Σ_i (ρ₁ σ_i + ½ ρ₂ σ_i²)` at accelerations, σ the least that do."""
 
     def __init__(self, residuals: StageResiduals, horizon: int) -> None:
         self._residual = residuals.expression.map(horizon)
@@ -40,9 +40,10 @@ class Evaluator:
         q, v = problem.rollout(u)
         error = self.residuals(problem, u) - problem.reference
         tracking = 0.5 * float(np.sum(problem.weights * error**2))
-        slacks = collision_slack(problem, q, v), limit_slack(problem, q, v)
-        penalty = sum(problem.slack_linear * s + 0.5 * problem.slack_quadratic * s**2 for s in slacks)
-        return Evaluation(tracking, *slacks, tracking + penalty)
+        distances, limits = distance_slacks(problem, q, v), limit_slack(problem, q, v)
+        slacks = np.append(distances, limits)
+        penalty = problem.slack_linear * slacks.sum() + 0.5 * problem.slack_quadratic * slacks @ slacks
+        return Evaluation(tracking, float(distances.max()), limits, tracking + float(penalty))
 
     def residuals(self, problem: Problem, u: FloatArray) -> FloatArray:
         """Return every residual of every stage, (N, r)."""
@@ -70,12 +71,13 @@ def distance_bounds(problem: Problem, now: FloatArray, count: int) -> FloatArray
     return problem.margins - deficit * RECOVERY ** np.arange(count)[:, None]
 
 
-def collision_slack(problem: Problem, q: FloatArray, v: FloatArray) -> float:
-    """Return the largest shortfall of a distance at the nodes after now [m]."""
+def distance_slacks(problem: Problem, q: FloatArray, v: FloatArray) -> FloatArray:
+    """Return the largest shortfall of a distance of each kind at the nodes after now, (3,) [m]."""
     nodes = Nodes(problem, q, v)
     values = problem.collision.values(nodes.q, nodes.times)
-    bounds = distance_bounds(problem, values[0], len(values))
-    return float(np.max(bounds[1:] - values[1:], initial=0.0))
+    short = (distance_bounds(problem, values[0], len(values)) - values)[1:]
+    kinds = problem.collision.kinds
+    return np.array([np.max(short[:, kinds == kind], initial=0.0) for kind in range(LIMITS)])
 
 
 def limit_slack(problem: Problem, q: FloatArray, v: FloatArray) -> float:

@@ -1,27 +1,64 @@
 """The checks that every controller makes before it listens to an intent."""
 
+import math
+
 from handrail.controllers.channels import Channels
 from handrail.controllers.command import Status
 from handrail.controllers.controller import State
 from handrail.controllers.intent import Intent
+from handrail.controllers.surroundings import Surroundings
+
+_LEAD = 0.05  # by which an intent's stamp may be ahead of the state's clock: one control period [s]
+_TICK = 1e-4  # by which the state's clock advances from update to update at least [s]
 
 
-def check_inputs(state: State, intent: Intent, channels: Channels, timeout: float) -> Status:
-    """Return `ok`, or why the robot must brake.
+class InputGuard:
+    """Says whether an update's inputs may move the robot; remembers when they came.
+
+    An intent is new if its stamp is later than all before. With t the state's time, t_s the stamp and t_a the
+    time at which it came first, its age is `max(t - t_s, t - t_a)`: an operator whose clock is ahead grows
+    stale like any other. The state's clock must advance; one that stands still or jumps back is a fault, for
+    then nobody knows how old anything is.
 
     Args:
-        state: as measured.
-        intent: of the operator.
         channels: of the robot.
         timeout: age from which an intent is stale [s].
     """
-    size = len(channels.joints)
-    if state.q.shape != (size,) or state.v.shape != (size,) or not state.is_finite:
-        return Status.INVALID_STATE
-    if intent.values.shape != (channels.size,) or intent.mask.shape != (channels.size,):
-        return Status.INVALID_INTENT
-    if not (intent.is_finite and intent.frames.are_known):
-        return Status.INVALID_INTENT
-    if state.time - intent.time > timeout:
-        return Status.STALE_INTENT
-    return Status.OK
+
+    def __init__(self, channels: Channels, timeout: float) -> None:
+        self._channels = channels
+        self._timeout = timeout
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget what came."""
+        self._time = self._stamp = -math.inf
+        self._age = 0.0
+
+    def check(self, state: State, intent: Intent, surroundings: Surroundings) -> Status:
+        """Return `ok`, or why the robot must brake."""
+        if not (self._advances(state.time) and state.is_of(len(self._channels.joints))):
+            return Status.INVALID_STATE
+        if not surroundings.make_sense:
+            return Status.INVALID_SCENE
+        return self._check_intent(state, intent)
+
+    def _check_intent(self, state: State, intent: Intent) -> Status:
+        size = self._channels.size
+        if intent.values.shape != (size,) or intent.mask.shape != (size,):
+            return Status.INVALID_INTENT
+        if not (intent.is_finite and intent.frames.are_known) or intent.time > state.time + _LEAD:
+            return Status.INVALID_INTENT
+        if intent.time > self._stamp:
+            self._stamp, self._age = intent.time, 0.0
+        return Status.STALE_INTENT if max(state.time - intent.time, self._age) > self._timeout else Status.OK
+
+    def _advances(self, time: float) -> bool:
+        """Take the state's time [s]; return whether it is later than the one before."""
+        if not math.isfinite(time):
+            return False
+        passed, self._time = time - self._time, time
+        if passed < 0.0:
+            self._stamp = -math.inf  # stamps of before are in the future now, and those of now would be old
+        self._age += max(passed, 0.0)
+        return passed > _TICK

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from handrail.controllers.arrays import BoolArray, FloatArray, frozen
+from handrail.controllers.arrays import BoolArray, FloatArray, frozen, real
 from handrail.controllers.channels import Channels
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.frames import USUAL, Frames
@@ -45,7 +45,7 @@ class Intent:
         mask: which channels the operator owns now, (m,).
         gripper: 0 open, 1 closed.
         mode: name of the teleop mode that made it.
-        time: when the operator asked [s], on the clock of the state.
+        time: when the operator asked [s], on the clock of the state; every new intent has a later one.
         frames: in which frames the twists are meant, and for which point of the tool.
         raw: what the input device read.
     """
@@ -59,9 +59,15 @@ class Intent:
     raw: RawInput = _UNKNOWN
 
     def __post_init__(self) -> None:
-        """Copy the arrays and make them read-only."""
-        object.__setattr__(self, "values", frozen(self.values))
-        object.__setattr__(self, "mask", frozen(self.mask, dtype=bool))
+        """Copy the arrays and make them read-only.
+
+        Raises:
+            HandrailError: values, gripper or time are no real numbers, or the mask is not bool.
+        """
+        object.__setattr__(self, "values", frozen(self.values, what="values of an intent"))
+        object.__setattr__(self, "mask", frozen(self.mask, bool, "mask of an intent"))
+        for name in ("gripper", "time"):
+            object.__setattr__(self, name, real(getattr(self, name), f"{name} of an intent"))
 
     @classmethod
     def idle(cls, channels: Channels, time: float = 0.0) -> "Intent":

@@ -55,6 +55,11 @@ class Limiter:
         speed = np.maximum(np.abs(velocity) - self._limits.acceleration * times, 0.0)
         return np.sign(velocity) * speed
 
+    def to_rest(self, velocities: FloatArray, dt: float) -> FloatArray:
+        """Return velocities at knots, (k, n), and the fastest stop from the last one."""
+        steps = max(1, int(np.ceil(self.stopping_time(velocities[-1]) / dt)))
+        return np.vstack([velocities, self.brake(velocities[-1], dt, steps)[1:]])
+
     def stop(self, q: FloatArray, v: FloatArray, shares: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return configurations along the fastest stop, (K, n), and their times, (K,) [s].
 

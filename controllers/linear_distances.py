@@ -16,18 +16,20 @@ _NOBODY = -1
 
 @dataclass(frozen=True)
 class LinearDistances:
-    """Distances of R pairs at a node as rows `by_q q + by_v v + s ≥ lower`; rows of zeros fill up.
+    """Distances of R pairs at a node as rows `by_q q + by_v v + σ_kind ≥ lower`; rows of zeros fill up.
 
     Attributes:
         pairs: which pair a row is of; -1 where it only fills up, (N + 2, R).
         by_q: gradients by the position of the stage, (N + 2, R, n).
         by_v: gradients by the velocity of the stage, (N + 2, R, n); zero before the final stop.
+        kind: of a row, which is its slack, (N + 2, R).
         lower: (N + 2, R).
     """
 
     pairs: IntArray
     by_q: FloatArray
     by_v: FloatArray
+    kind: IntArray
     lower: FloatArray
 
     @property
@@ -55,7 +57,7 @@ class LinearDistances:
 def linear_distances(problem: Problem, u: FloatArray) -> LinearDistances:
     """Return the distances around accelerations (N, n), those that are within reach.
 
-    `d + g (q - q̄) + s ≥ bound`; at the final stop `q = q_N + c v_N |v_N| / a_max`, whose derivative by v_N is
+    `d + g (q - q̄) + σ ≥ bound`; at the final stop `q = q_N + c v_N |v_N| / a_max`, whose derivative by v_N is
     `2 c |v_N| / a_max`.
     """
     q, v = problem.rollout(u)
@@ -70,7 +72,8 @@ def linear_distances(problem: Problem, u: FloatArray) -> LinearDistances:
     pairs[place], by_q[place] = pair, found.gradients[keep]
     by_v = np.zeros_like(by_q)
     by_v[problem.horizon :] = by_q[problem.horizon :] * nodes.gains[:, None, :]
-    empty = LinearDistances(pairs, by_q, by_v, np.zeros(shape))
+    kind = np.append(problem.collision.kinds, 0)[pairs]  # -1 takes the last one, of nobody
+    empty = LinearDistances(pairs, by_q, by_v, kind, np.zeros(shape))
     if not empty.rows:
         return empty
     return empty._exact(problem, found.values, q, v)

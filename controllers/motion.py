@@ -19,6 +19,25 @@ def rollout(q, v, dt, u, positions, velocities):
             positions[k + 1, j] = positions[k, j] + 0.5 * dt * (velocities[k, j] + after)
 
 
+@exact_jit
+def approach(velocities, step):
+    """Keep velocities, (K, n), within ± a step, (n,), of those before; the first stays."""
+    for k in range(1, len(velocities)):
+        for j in range(velocities.shape[1]):
+            before = velocities[k - 1, j]
+            velocities[k, j] = min(max(velocities[k, j], before - step[j]), before + step[j])
+
+
+@jit
+def cumulated(velocities, dt):
+    """Return how far velocities at knots, (K, n), have led at each of them, (K, n)."""
+    way = np.zeros(velocities.shape)
+    for k in range(1, len(velocities)):
+        for j in range(velocities.shape[1]):
+            way[k, j] = way[k - 1, j] + 0.5 * dt * (velocities[k - 1, j] + velocities[k, j])
+    return way
+
+
 @jit
 def is_motion(q, v, dt, u, positions, velocities, limit, tolerance):
     """Whether accelerations u, (N, n), are finite, within ± limit, and lead from (q, v) where it is said."""

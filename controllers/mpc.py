@@ -1,7 +1,6 @@
 """The masked model predictive controller: the operator steers a part, the optimum completes the rest."""
 
 import math
-from dataclasses import dataclass
 from time import perf_counter
 
 import numpy as np
@@ -10,12 +9,11 @@ from handrail.controllers.arrays import BoolArray, FloatArray
 from handrail.controllers.backup import Backup, Situation
 from handrail.controllers.certificate import StopCertificate
 from handrail.controllers.channels import Channels
-from handrail.controllers.collision import CollisionModel
 from handrail.controllers.command import Command, Health, Status
 from handrail.controllers.controller import State
 from handrail.controllers.errors import HandrailError, unknown_name
-from handrail.controllers.followed import Followed
-from handrail.controllers.guard import check_inputs
+from handrail.controllers.followed import Followed, following, sent_velocity
+from handrail.controllers.guard import InputGuard
 from handrail.controllers.intent import Intent
 from handrail.controllers.limiter import Limiter
 from handrail.controllers.margins import Margins
@@ -34,18 +32,11 @@ from handrail.controllers.real_time import RealTimeSolver
 from handrail.controllers.residuals import StageResiduals
 from handrail.controllers.settings import MpcSettings
 from handrail.controllers.shape import Obstacle
+from handrail.controllers.surroundings import Surroundings
 from handrail.controllers.trajectory import Trajectory
 from handrail.controllers.witnesses import smallest_distances
 
 _SOLVER_ERRORS = (HandrailError, ArithmeticError, RuntimeError, ValueError)  # of ours, numpy, CasADi, coal
-
-
-@dataclass(frozen=True)
-class _Masked:
-    """What depends on the mask alone."""
-
-    weights: FloatArray  # (N, r)
-    over_determined: bool
 
 
 class MaskedMpc:
@@ -76,7 +67,8 @@ class MaskedMpc:
         self._tolerance = self.settings.velocity_tolerance * model.description.limits.velocity
         self._predict = predict
         self._times = self.settings.dt * np.arange(1, horizon + 1)
-        self._masked: dict[bytes, _Masked] = {}
+        self._guard = InputGuard(self.channels, self.settings.intent_timeout)
+        self._weights: dict[bytes, FloatArray] = {}
         self._largest = self._largest_intent()
         self._reference = np.tile(self.residuals.reference, (horizon, 1))
         self._frames = self.residuals.parameter_slice("tracking")
@@ -89,27 +81,29 @@ class MaskedMpc:
 
     def reset(self, obstacles: tuple[Obstacle, ...] = ()) -> None:
         """Forget warm start and last command; take the obstacles of a new episode."""
-        self._avoid(CollisionModel(self.model, obstacles))
+        self._surroundings = Surroundings(self.model, obstacles)
+        self._keep_apart()
         self._backup = Backup(self._certificate, self._limiter, self.settings.dt)
         self._parameters = self.residuals.parameters
         self._plan: Plan | None = None
         self._followed: Followed | None = None
+        self._guard.reset()
         getattr(self._predict, "reset", lambda: None)()
 
     def observe(self, obstacles: tuple[Obstacle, ...]) -> None:
-        """Take where the obstacles are now, how fast they move, and what the hand holds."""
-        now = self._collision.among(obstacles)
-        if now is not self._collision:
-            self._avoid(now)
+        """Take what stands around now, where, how fast it moves, and what the hand holds."""
+        if self._surroundings.observe(obstacles):
+            self._keep_apart(self._margins)
             self._backup.measure_by(self._certificate)
 
-    def _avoid(self, collision: CollisionModel) -> None:
-        """Keep these pairs apart from now on."""
-        settings, limits = self.settings, self.model.description.limits
+    def _keep_apart(self, before: Margins | None = None) -> None:
+        """Keep apart the pairs that there are now, which may have had margins before."""
+        settings, collision = self.settings, self._surroundings.collision
         self._collision = collision
-        self._margins = Margins(collision, settings.margin, settings.work_margin)
+        self._margins = Margins(collision, settings.margin, settings.work_margin, before)
         self.solver.reset()  # the rows that were active are numbered by pairs
         span = settings.horizon * settings.dt
+        limits = self.model.description.limits
         self._certificate = StopCertificate(
             self._limiter, collision, self._margins, settings.floor, limits, span
         )
@@ -126,22 +120,22 @@ class MaskedMpc:
         self._parameters[self.residuals.parameter_slice(objective)] = values
 
     def update(self, state: State, intent: Intent) -> Command:
-        """Return the command from now on: the plan, or what `Backup` has instead."""
+        """Return the command from now on: the plan, or what `Backup` has instead; it ends at rest."""
         start = perf_counter()
-        status = check_inputs(state, intent, self.channels, self.settings.intent_timeout)
+        status = self._guard.check(state, intent, self._surroundings)
         plan = self._solve(state, intent) if status is Status.OK else None
         if status is Status.OK and plan is None:
             status = Status.SOLVER_FAILED
-        distances = self._distances(state, plan, status)
+        distances = self._distances(state, plan)
         if distances is not None:
             self._margins.see(distances)
         motion, planned = self._motion(state, plan, distances, status)
         if plan is not None and not planned:
             status = Status.BACKUP
-        health = self._health(state, intent, status, plan, distances, start)
+        health = self._health(status, plan, distances, start)
         command = Command(motion.velocities, motion.dt, self._gripper(intent), health, motion.elapsed)
         self._plan = plan if planned else None
-        self._remember(command, state.time)
+        self._followed = following(self._followed, command, state.time, self.settings.dt)
         return command
 
     def problem(self, state: State, intent: Intent) -> Problem:
@@ -149,7 +143,6 @@ class MaskedMpc:
         settings, size = self.settings, self.channels.size
         if self._margins.unknown:
             self._margins.see(self._collision.values(state.q[None, :])[0])
-        masked = self._of_mask(np.asarray(intent.mask), state.q)
         reference = self._reference.copy()
         predicted = np.asarray(self._predict(intent, self._times), dtype=np.float64)
         cut(predicted, intent.mask, self._largest, reference)
@@ -159,7 +152,7 @@ class MaskedMpc:
             v=self._start_velocity(state),
             dt=settings.dt,
             reference=reference,
-            weights=masked.weights,
+            weights=self._weights_of(intent.mask),
             parameters=self._parameters.copy(),
             channels=size,
             limits=self.model.description.limits,
@@ -176,63 +169,59 @@ class MaskedMpc:
         tool = [self.settings.largest_speed] * 3 + [self.settings.largest_rate] * 3
         return np.concatenate([velocity[: len(self.channels.base)], tool, velocity])
 
-    def _of_mask(self, mask: BoolArray, q: FloatArray) -> _Masked:
-        """Return what depends on the mask alone, remembered for every mask met."""
+    def _weights_of(self, mask: BoolArray) -> FloatArray:
+        """Return the weights of all rows under a mask, (N, r), remembered for every mask met."""
         key = mask.tobytes()
-        if key not in self._masked:
+        if key not in self._weights:
             weights = np.tile(self.residuals.weights(mask), (self.settings.horizon, 1))
             weights[:, : self.channels.size] *= self.settings.discounts[:, None]
             velocity = slice(self.channels.size, self.channels.size + self.model.size)
             idle = weights[-1, velocity] > 0
             weights[-1, velocity] += self.settings.terminal_velocity * idle
-            rows = channel_matrix(self.model, self.channels, q)[mask]
-            freedom = np.linalg.matrix_rank(rows) if len(rows) else 0
-            self._masked[key] = _Masked(weights, len(rows) > freedom)
-        return self._masked[key]
+            self._weights[key] = weights
+        return self._weights[key]
 
     def _solve(self, state: State, intent: Intent) -> Plan | None:
-        """Return the plan, or None where the solver fails in whatever way."""
+        """Return the plan, beginning with what is being sent; None where the solver fails in whatever way."""
         problem = self.problem(state, intent)
         try:
             plan = self.solver.solve(problem, self._guess(state.time)).within(problem)
         except _SOLVER_ERRORS:
             self.solver.reset()
             return None
-        return plan if plan.is_solution(problem) else None
+        return plan.taken_up(problem, self._sent(state)) if plan.is_solution(problem) else None
 
     def _motion(
         self, state: State, plan: Plan | None, distances: FloatArray | None, status: Status
     ) -> tuple[Trajectory, bool]:
-        """Return how the robot moves from now on, and whether that is the plan."""
+        """Return how the robot moves from now on, to rest at last, and whether it begins with the plan."""
+        sent = self._sent(state)
         if distances is None:
-            followed = self._followed
-            velocity = np.zeros(self.model.size) if followed is None else followed.velocity(state.time)
-            return self._backup.brake(velocity), False
+            return self._backup.brake(sent), False
         elapsed = 0.0 if self._followed is None else self._followed.elapsed(state.time)
-        start = self._start_velocity(state) if plan is None else plan.v[0]
-        situation = Situation(state.q, start, distances, elapsed)
-        halt = status in (Status.INVALID_INTENT, Status.STALE_INTENT)
-        way = self._backup.choose(situation, plan, halt)
+        halt = status not in (Status.OK, Status.SOLVER_FAILED)
+        way = self._backup.choose(Situation(state.q, sent, distances, elapsed), plan, halt)
         if plan is not None and way.planned:
-            return Trajectory(plan.v, self.settings.dt), True
+            dt = self.settings.dt
+            return Trajectory(self._limiter.to_rest(plan.v, dt), dt), True
         return way.motion, False
 
+    def _sent(self, state: State) -> FloatArray:
+        """Return the velocity that the robot is being sent, with which every command begins, (n,)."""
+        return sent_velocity(state, self._followed, self.model.description.limits)
+
     def _start_velocity(self, state: State) -> FloatArray:
-        """Return the velocity that a command starts from: the commanded one, if the robot keeps up."""
-        commanded = state.v if self._followed is None else self._followed.next_start(state)
-        return resumed(commanded, state.v, self._tolerance, self.model.description.limits.velocity)
+        """Return the velocity that a plan starts from: the one sent, if the robot keeps up."""
+        return resumed(self._sent(state), state.v, self._tolerance, self.model.description.limits.velocity)
 
     def _guess(self, time: float) -> FloatArray:
         """Return the accelerations that are being followed from a time on, (N, n)."""
+        horizon = self.settings.horizon
         if self._followed is None:
-            return np.zeros((self.settings.horizon, self.model.size))
-        return self._followed.accelerations(time, self.settings.horizon)
-
-    def _remember(self, command: Command, time: float) -> None:
-        if self._followed is not None:
-            self._followed = self._followed.then(command, time)
-        else:
-            self._followed = Followed(command, time if np.isfinite(time) else 0.0, self.settings.dt)
+            return np.zeros((horizon, self.model.size))
+        if self._plan is None:
+            return self._followed.accelerations(time, horizon)
+        return Trajectory(self._plan.v, self.settings.dt).accelerations(horizon, self._followed.elapsed(time))
 
     def _gripper(self, intent: Intent) -> float:
         """Return how far the gripper is closed: as asked, or as before where that is no number."""
@@ -240,20 +229,14 @@ class MaskedMpc:
         asked = float(intent.gripper) if math.isfinite(intent.gripper) else last
         return min(max(asked, 0.0), 1.0)
 
-    def _distances(self, state: State, plan: Plan | None, status: Status) -> FloatArray | None:
+    def _distances(self, state: State, plan: Plan | None) -> FloatArray | None:
         """Return the signed distances now, (P,); None where nobody knows where the robot is."""
-        if status is Status.INVALID_STATE:
+        if not state.is_of(self.model.size):
             return None
         return self._collision.values(state.q[None, :])[0] if plan is None else plan.distances
 
     def _health(
-        self,
-        state: State,
-        intent: Intent,
-        status: Status,
-        plan: Plan | None,
-        distances: FloatArray | None,
-        start: float,
+        self, status: Status, plan: Plan | None, distances: FloatArray | None, start: float
     ) -> Health:
         if distances is None:
             return Health(status, perf_counter() - start)
@@ -267,7 +250,6 @@ class MaskedMpc:
             work_distance=at_work,
             slack=max(plan.collision_slack, plan.limit_slack),
             tracking_error=plan.tracking_error,
-            over_determined=self._of_mask(np.asarray(intent.mask), state.q).over_determined,
             phases=plan.phases,
         )
 

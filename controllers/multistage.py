@@ -7,12 +7,12 @@ import casadi as ca
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray
-from handrail.controllers.constraints import VELOCITY_SLACK
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.evaluation import limit_slack
 from handrail.controllers.linear_distances import LinearDistances
 from handrail.controllers.problem import Problem
 from handrail.controllers.residuals import StageResiduals
+from handrail.controllers.slacks import LIMITS, SLACKS, VELOCITY_SLACK
 
 _INSIDE = 1e-3  # how far within the bounds the slacks begin
 STOPS = 2  # nodes of the final stop, measured after the last stage
@@ -45,12 +45,11 @@ class Solution:
 
 
 class MultistageProgram:
-    """`min Σ l(F(x_k, u_k), u_k) + ρ₁ s + ½ ρ₂ s²` with x = (q, v, s), `x_{k+1} = F(x_k, u_k)`.
+    """`min Σ l(F(x_k, u_k), u_k) + Σ_i (ρ₁ σ_i + ½ ρ₂ σ_i²)` with x = (q, v, σ), `x_{k+1} = F(x_k, u_k)`.
 
-    The dynamics are those of `Problem`. The two slacks that all nodes share, of the distances [m] and of the
-    limits (relative), are states that stay what they are, `s_{k+1} = s_k`: the shared slack without any
-    constraint across stages. Variables and constraints are in the order of the stages: the gap to the next
-    state first, then what holds at the stage.
+    The dynamics are those of `Problem`. The slacks, which all nodes share, are states that stay what they
+    are, `σ_{k+1} = σ_k`: shared without any constraint across stages. Variables and constraints are in the
+    order of the stages: the gap to the next state first, then what holds at the stage.
 
     Args:
         residuals: of one stage.
@@ -92,9 +91,9 @@ class MultistageProgram:
         """
         limit = np.broadcast_to(problem.limits.acceleration, guess.shape)
         lower, upper = np.maximum(-limit, guess - trust), np.minimum(limit, guess + trust)
-        count = 2 * self._shape[1] + 2
+        count = 2 * self._shape[1] + SLACKS
         least = np.full((self._shape[0] + 1, count), -np.inf)
-        least[:, -2:] = 0.0
+        least[:, -SLACKS:] = 0.0
         q, v = problem.rollout(guess)
         states = np.hstack([q, v, np.tile(self._slacks(problem, q, v, distances), (len(q), 1))])
         bounds = self._constraint_bounds(distances)
@@ -117,18 +116,19 @@ class MultistageProgram:
 
     def _slacks(
         self, problem: Problem, q: FloatArray, v: FloatArray, distances: LinearDistances
-    ) -> tuple[float, float]:
-        """Return slacks with which a trajectory obeys everything, and a little more."""
-        short = float(np.max(distances.lower - distances.at(q, v), initial=0.0))
-        return short + _INSIDE, limit_slack(problem, q, v) + _INSIDE
+    ) -> FloatArray:
+        """Return slacks with which a trajectory obeys everything, and a little more, (4,)."""
+        short = distances.lower - distances.at(q, v)
+        kinds = [np.max(short[distances.kind == kind], initial=0.0) for kind in range(LIMITS)]
+        return np.append(kinds, limit_slack(problem, q, v)) + _INSIDE
 
     def _constraint_bounds(self, distances: LinearDistances) -> tuple[FloatArray, FloatArray]:
         horizon, size = self._shape
         upper = np.zeros(len(self._equality))
         lower = np.zeros(len(self._equality))
-        start = 2 * (2 * size + 2) - 2  # gap and initial state of the first stage
+        start = 2 * (2 * size + SLACKS) - SLACKS  # gap and initial state of the first stage
         for stage in range(1, horizon + 1):
-            start += 2 * size + 2 if stage < horizon else 0
+            start += 2 * size + SLACKS if stage < horizon else 0
             lower[start : start + 4 * size] = -np.inf
             upper[start : start + 4 * size] = 1.0
             start += 4 * size
@@ -152,7 +152,7 @@ class _Symbols:
         self.parameters = ca.MX.sym("parameters", len(residuals.parameters))
         self.reference = ca.MX.sym("reference", residuals.size, horizon)
         self.weights = ca.MX.sym("weights", residuals.size, horizon)
-        self.by_state = ca.MX.sym("by_state", 2 * size * rows, horizon + STOPS)  # row by row
+        self.by_state = ca.MX.sym("by_state", (2 * size + SLACKS) * rows, horizon + STOPS)  # row by row
 
     @property
     def vector(self) -> ca.MX:
@@ -161,21 +161,20 @@ class _Symbols:
         return ca.veccat(*parts, self.reference, self.weights, self.by_state)
 
     def distance_rows(self, node: int, x: ca.MX) -> ca.MX:
-        """Return `by_q q + by_v v + s` of a node after now, from 0 on, (R, 1)."""
-        matrix = ca.reshape(self.by_state[:, node], 2 * self.size, self.rows).T
-        return matrix @ x[: 2 * self.size] + x[2 * self.size]
+        """Return `by_q q + by_v v + σ` of a node after now, from 0 on, (R, 1)."""
+        return ca.reshape(self.by_state[:, node], 2 * self.size + SLACKS, self.rows).T @ x
 
     def limit_rows(self, x: ca.MX) -> ca.MX:
         """Return how far positions and velocities are from the middle of their range, ≤ 1, (4n, 1)."""
         values = (x[: 2 * self.size] - self.middle) / self.scale
         share = np.repeat([1.0, VELOCITY_SLACK], self.size)
-        return ca.vertcat(values, -values) - x[2 * self.size + 1] * np.tile(share, 2)
+        return ca.vertcat(values, -values) - x[2 * self.size + LIMITS] * np.tile(share, 2)
 
 
 def _parameters(problem: Problem, distances: LinearDistances) -> FloatArray:
     limits = problem.limits
     zero = np.zeros(len(problem.q))
-    by_state = np.concatenate([distances.by_q, distances.by_v], axis=2)
+    by_state = np.concatenate([distances.by_q, distances.by_v, np.eye(SLACKS)[distances.kind]], axis=2)
     return np.concatenate(
         [
             *(problem.q, problem.v, [problem.slack_linear, problem.slack_quadratic]),
@@ -193,7 +192,7 @@ def _penalty(problem: Problem, slack: FloatArray) -> float:
 def _program(symbols: _Symbols, residual: ca.Function, dt: float) -> tuple[dict[str, ca.MX], np.ndarray]:
     """Return the nonlinear program and which of its constraints are equalities."""
     horizon, size = symbols.horizon, symbols.size
-    states = [ca.MX.sym(f"x{k}", 2 * size + 2) for k in range(horizon + 1)]
+    states = [ca.MX.sym(f"x{k}", 2 * size + SLACKS) for k in range(horizon + 1)]
     inputs = [ca.MX.sym(f"u{k}", size) for k in range(horizon)]
     step, cost = _step(size, dt), _stage_cost(residual, size)
     objective, constraints, equality = ca.MX(0), [], []
@@ -223,7 +222,7 @@ def _program(symbols: _Symbols, residual: ca.Function, dt: float) -> tuple[dict[
 
 
 def _step(size: int, dt: float) -> ca.Function:
-    x, u = ca.SX.sym("x", 2 * size + 2), ca.SX.sym("u", size)
+    x, u = ca.SX.sym("x", 2 * size + SLACKS), ca.SX.sym("u", size)
     v = x[size : 2 * size]
     after = ca.vertcat(x[:size] + dt * v + 0.5 * dt * dt * u, v + dt * u, x[2 * size :])
     return ca.Function("step", [x, u], [after])

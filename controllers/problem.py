@@ -7,16 +7,17 @@ import numpy as np
 from handrail.controllers.arrays import FloatArray, frozen
 from handrail.controllers.collision import CollisionModel
 from handrail.controllers.description import Limits
-from handrail.controllers.motion import is_motion, largest_share, rollout
+from handrail.controllers.motion import approach, cumulated, is_motion, largest_share, rollout
 
 
 @dataclass(frozen=True)
 class Problem:
-    """`min Σ_k ½ ‖r(q_k, v_k, u_k; p) - ref_k‖²_W_k + ρ₁ s + ½ ρ₂ s²` over N stages.
+    """`min Σ_k ½ ‖r(q_k, v_k, u_k; p) - ref_k‖²_W_k + Σ_i (ρ₁ σ_i + ½ ρ₂ σ_i²)` over N stages.
 
     Dynamics: `v_k = v_{k-1} + dt u_k`, `q_k = q_{k-1} + dt v_{k-1} + ½ dt² u_k`. Hard: `|u| ≤ a_max`.
-    Soft, with slack s: velocity and position limits, and `d_p(q_k) ≥ margin_p` for every pair. The terminal
-    set X_f asks the same of the stop from the last node: `q_N + ½ v_N |v_N| / a_max`, half way and at rest.
+    Soft, each kind with a slack of its own (slacks.py): velocity and position limits, and for every pair
+    `d_p(q_k) ≥ margin_p`. The terminal set X_f asks the same of the stop from the last node:
+    `q_N + ½ v_N |v_N| / a_max`, half way and at rest.
 
     Attributes:
         q: position now, (n,).
@@ -109,6 +110,18 @@ class Plan:
         u = np.diff(v, axis=0) / problem.dt
         q, v = problem.rollout(u)
         return replace(self, q=q, v=v, u=u)
+
+    def taken_up(self, problem: Problem, velocity: FloatArray) -> "Plan":
+        """Return the plan as taken up by a robot that is being sent another velocity than its first, (n,).
+
+        `v_0 = velocity`, `v_k ← clip(v_k, v_{k-1} ± dt a_max)`: so consecutive commands keep the limit too.
+        """
+        if np.array_equal(velocity, self.v[0]):
+            return self
+        v = np.vstack([velocity, self.v[1:]])
+        approach(v, problem.dt * problem.limits.acceleration)
+        u = np.diff(v, axis=0) / problem.dt
+        return replace(self, q=problem.q + cumulated(v, problem.dt), v=v, u=u)
 
     def is_solution(self, problem: Problem, tolerance: float = 1e-6) -> bool:
         """Whether the plan is finite, obeys the dynamics from the state and the hard acceleration limits."""

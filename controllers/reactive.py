@@ -7,14 +7,15 @@ import numpy as np
 
 from handrail.controllers.arrays import BoolArray, FloatArray
 from handrail.controllers.channels import Channels
-from handrail.controllers.collision import CollisionModel
 from handrail.controllers.command import Command, Health, Status
 from handrail.controllers.controller import State
-from handrail.controllers.guard import check_inputs
+from handrail.controllers.followed import Followed, following, sent_velocity
+from handrail.controllers.guard import InputGuard
 from handrail.controllers.intent import Intent
 from handrail.controllers.limiter import Limiter
 from handrail.controllers.model import RobotModel
 from handrail.controllers.shape import Obstacle
+from handrail.controllers.surroundings import Surroundings
 
 Ask = Callable[[State, Intent, FloatArray], FloatArray]
 """State, intent, velocity commanded last (n,) → velocity wanted (n,) [m/s, rad/s]."""
@@ -46,52 +47,50 @@ class ReactiveController:
         self._model = model
         self._ask = ask
         self._limiter = Limiter(model.description)
+        self._guard = InputGuard(self.channels, intent_timeout)
         self._period = period
-        self._timeout = intent_timeout
         self._foreign = np.zeros(self.channels.size, dtype=bool) if understood is None else ~understood
         self.reset()
 
     def reset(self, obstacles: tuple[Obstacle, ...] = ()) -> None:
         """Forget the last command; take the obstacles whose distance is reported."""
-        self._collision = CollisionModel(self._model, obstacles)
-        self._previous: FloatArray | None = None
+        self._surroundings = Surroundings(self._model, obstacles)
+        self._guard.reset()
+        self._followed: Followed | None = None
         self._gripper = 0.0
 
     def observe(self, obstacles: tuple[Obstacle, ...]) -> None:
         """Take where the obstacles are now, and what the hand holds."""
-        self._collision = self._collision.among(obstacles)
+        self._surroundings.observe(obstacles)
 
     def update(self, state: State, intent: Intent) -> Command:
         """Return the command from now on."""
         start = perf_counter()
-        status = check_inputs(state, intent, self.channels, self._timeout)
+        status = self._guard.check(state, intent, self._surroundings)
         if status is Status.OK and np.any(intent.mask & self._foreign):
             status = Status.INVALID_INTENT
-        previous = self._start_velocity(state)
+        previous = sent_velocity(state, self._followed, self._model.description.limits)
         target = np.zeros(self._model.size)
         if status is Status.OK:
             target = self._ask(state, intent, previous)
-            self._gripper = float(np.clip(intent.gripper, 0.0, 1.0))
-        q = state.q if status is not Status.INVALID_STATE else None
+            self._gripper = min(max(intent.gripper, 0.0), 1.0)
+        q = state.q if state.is_of(self._model.size) else None
         velocity, clipped = self._limiter.limit(previous, target, self._period, q)
         if status is Status.OK and clipped:
             status = Status.CLIPPED
-        self._previous = velocity
+        velocities = self._limiter.to_rest(np.stack([previous, velocity]), self._period)
         health = self._health(state, status, start)
-        return Command(np.stack([previous, velocity]), self._period, self._gripper, health)
-
-    def _start_velocity(self, state: State) -> FloatArray:
-        if self._previous is not None:
-            return self._previous
-        valid = state.is_finite and state.v.shape == (self._model.size,)
-        return state.v if valid else np.zeros(self._model.size)
+        command = Command(velocities, self._period, self._gripper, health)
+        self._followed = following(self._followed, command, state.time, self._period)
+        return command
 
     def _health(self, state: State, status: Status, start: float) -> Health:
         solve_time = perf_counter() - start
-        if status is Status.INVALID_STATE:
+        if not state.is_of(self._model.size):
             return Health(status, solve_time)
-        distances = self._collision.values(state.q[None, :])[0]
-        work = self._collision.work
+        collision = self._surroundings.collision
+        distances = collision.values(state.q[None, :])[0]
+        work = collision.work
         return Health(
             status=status,
             solve_time=solve_time,

@@ -10,12 +10,12 @@ from handrail.controllers.active_rows import active_rows
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.banded import factor
 from handrail.controllers.collision import Distances
-from handrail.controllers.constraints import SLACKS
 from handrail.controllers.motion import changed, largest_share
 from handrail.controllers.nodes import Nodes
 from handrail.controllers.problem import Plan, Problem
 from handrail.controllers.residuals import StageResiduals
 from handrail.controllers.rows import Rows, rows_around
+from handrail.controllers.slacks import LIMITS, SLACKS
 from handrail.controllers.stage_cost import Quadratic, StageCost
 from handrail.controllers.witnesses import depth
 
@@ -74,8 +74,8 @@ class RealTimeSolver:
             q=step.moved.q,
             v=step.moved.v,
             u=step.moved.u,
-            collision_slack=float(slack[0]),
-            limit_slack=float(slack[1]),
+            collision_slack=float(slack[:LIMITS].max()),
+            limit_slack=float(slack[LIMITS]),
             distances=step.distances,
             solved=step.answer.solved,
             iterations=step.answer.changes,
@@ -157,8 +157,8 @@ class RealTimeSolver:
             problem: of this update.
             guess: accelerations, (N, n).
             allowed: cost of the guess.
-            slack: of the QP's solution, (2,).
-            needed: by the guess, (2,).
+            slack: of the QP's solution, (4,).
+            needed: by the guess, (4,).
         """
         change, share = self._motion[:, 2].copy(), 1.0
         while True:
@@ -213,9 +213,7 @@ def _measured(problem: Problem, q: FloatArray, v: FloatArray, u: FloatArray) -> 
 
 
 def _penalty(problem: Problem, slack: FloatArray) -> float:
-    first, second = slack
-    squares = first * first + second * second
-    return float(problem.slack_linear * (first + second) + 0.5 * problem.slack_quadratic * squares)
+    return float(problem.slack_linear * slack.sum() + 0.5 * problem.slack_quadratic * (slack @ slack))
 
 
 def _stop(problem: Problem) -> FloatArray:

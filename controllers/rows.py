@@ -7,10 +7,11 @@ import numpy as np
 from handrail.controllers.arrays import FloatArray, IntArray
 from handrail.controllers.basis import to_variables
 from handrail.controllers.collision import Distances
-from handrail.controllers.constraints import VELOCITY_SLACK, Constraints, first_distance
+from handrail.controllers.constraints import Constraints, first_distance
 from handrail.controllers.jit import jit
 from handrail.controllers.nodes import Nodes
 from handrail.controllers.problem import Problem
+from handrail.controllers.slacks import LIMITS, SLACKS, VELOCITY_SLACK
 
 RECOVERY = 0.8  # of a distance deficit that is left after each node
 _NODES = 1000  # more than there are in any plan
@@ -23,7 +24,7 @@ class Rows:
     Attributes:
         constraints: with keys that hold for this update only.
         names: of the distance rows, (R,): above all other keys, the same in the next update.
-        needed: slacks that the guess itself needs, (2,).
+        needed: slacks that the guess itself needs, (4,).
         first: key of the first distance row.
     """
 
@@ -68,6 +69,7 @@ def rows_around(
         distances.gradients,
         distances.values,
         problem.margins,
+        problem.collision.kinds,
         nodes.gains,
     )
     constraints = Constraints(matrix, guess, limits.acceleration, offsets, scales, *distance_rows)
@@ -75,7 +77,7 @@ def rows_around(
 
 
 @jit
-def _rows(matrix, q, v, u, limits, near, gradients, values, margins, gains):
+def _rows(matrix, q, v, u, limits, near, gradients, values, margins, kinds, gains):
     lower, upper, velocity, acceleration = limits
     horizon, n = u.shape
     guess, offsets, scales = np.empty((horizon, n)), np.empty((horizon, 2, n)), np.empty((2, n))
@@ -92,11 +94,12 @@ def _rows(matrix, q, v, u, limits, near, gradients, values, margins, gains):
     count = 0
     for row in range(len(near)):
         count += near[row, 0] > 0
-    stage, names = np.empty(count, dtype=np.int64), np.empty(count, dtype=np.int64)
+    stage, kind = np.empty(count, dtype=np.int64), np.empty(count, dtype=np.int64)
+    names = np.empty(count, dtype=np.int64)
     coefficients, left = np.empty((count, 3 * n)), np.empty(count)
     by_velocity, none = np.zeros(n), np.zeros(n)
     first = first_distance(horizon, n)
-    needed = np.zeros(2)
+    needed = np.zeros(SLACKS)
     kept = 0
     for row in range(len(near)):
         node, pair = near[row]
@@ -109,11 +112,12 @@ def _rows(matrix, q, v, u, limits, near, gradients, values, margins, gains):
         to_variables(matrix, -gradients[row], by_velocity, none, coefficients[kept])
         deficit = max(margins[pair] - values[0, pair], 0.0)
         left[kept] = values[node, pair] - margins[pair] + deficit * RECOVERY**node
-        needed[0] = max(needed[0], -left[kept])
+        kind[kept] = kinds[pair]
+        needed[kinds[pair]] = max(needed[kinds[pair]], -left[kept])
         names[kept] = first + pair * _NODES + node
         kept += 1
-    needed[1] = max(over[0], over[1] / VELOCITY_SLACK)
-    return guess, offsets, scales, (stage, coefficients, left), names, needed, first
+    needed[LIMITS] = max(over[0], over[1] / VELOCITY_SLACK)
+    return guess, offsets, scales, (stage, kind, coefficients, left), names, needed, first
 
 
 @jit

@@ -56,7 +56,7 @@ class Robot:
 
     def _look(self):
         still = tuple(replace(o, velocity=np.zeros(3)) for o in self._seen(self.time))
-        self._truth.observe(still)
+        self._truth = self._truth.among(still)
         self.smallest = min(self.smallest, self._truth.values(self.q[None])[0].min())
 
     def _seen(self, time):

@@ -90,7 +90,7 @@ def test_the_welded_base_is_a_controller():
     q, v = HOME.copy(), np.zeros(9)
     for step in range(60):
         intent = Intent(values, channels.mask("ee"), time=step * PERIOD)
-        v = controller.update(State(q, v, step * PERIOD), intent).velocities[-1]
+        v = controller.update(State(q, v, step * PERIOD), intent).velocity(PERIOD)
         achieved = MODEL.jacobian(q) @ v
         q = q + PERIOD * v
     assert np.allclose(achieved, twist, atol=1e-6)

@@ -9,10 +9,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from handrail.controllers.cbf_filter import CbfFilter
 from handrail.controllers.certificate import StopCertificate
 from handrail.controllers.collision import CollisionModel
 from handrail.controllers.command import Status
 from handrail.controllers.controller import State
+from handrail.controllers.direct import DirectController
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.intent import Intent
 from handrail.controllers.limiter import Limiter
@@ -174,28 +176,44 @@ def test_a_robot_that_is_pushed_is_not_told_to_go_along(monkeypatch):
 
 
 def test_a_robot_that_cannot_follow_is_waited_for():
-    """A command that ran away from a robot held fast would throw it when it comes free."""
+    """A command that ran away from a robot held fast would throw it; it comes back within the limits."""
     robot = Robot(MPC)
     for _ in range(10):
         robot.update(AHEAD(robot.time))
-    assert robot.v[0] > 0.2
-    robot.v = np.zeros(9)
-    ahead = robot.update(AHEAD(robot.time)).velocity(0.0)[0]
-    assert ahead == pytest.approx(0.1 * LIMITS.velocity[0], abs=1e-9)  # as far as is trusted
+    place, sent = robot.q.copy(), [robot.v[0]]
+    assert sent[0] > 0.2
+    for _ in range(20):
+        held = State(place, np.zeros(9), robot.time, robot.v)
+        robot.update(AHEAD(robot.time), held)
+        sent.append(robot.v[0])
+    stage = LIMITS.acceleration[0] * MPC.settings.dt
+    assert sent[-1] < 0.1 * LIMITS.velocity[0] + stage + 1e-3  # as far as is trusted, and one stage
+    assert_within_limits(robot)
 
 
-def test_after_the_last_command_has_ended_the_next_begins_as_the_robot_moves():
-    """Nothing is commanded any more; a robot that still moves is not taken to be at rest."""
-    robot = Robot(MPC)
-    last = robot.update(AHEAD(robot.time))
-    velocity, end = 0.4 * np.eye(9)[0], (len(last.velocities) - 1) * last.dt
-    ahead = 0.4 + 0.1 * LIMITS.velocity[0]  # as far as is trusted
-    for late, expected in ((end - 0.01, ahead), (end * (1.0 + 1e-9), ahead), (end + 0.01, 0.4)):
-        assert late > end or last.velocity(late)[0] > ahead
-        MPC.reset()
-        MPC.update(State(HOME, np.zeros(9), 0.0), AHEAD(0.0))
-        command = MPC.update(State(HOME, velocity, late), AHEAD(late))
-        assert command.velocity(0.0)[0] == pytest.approx(expected, abs=1e-6)
+def test_a_robot_knows_better_what_it_was_sent():
+    """What was asked for may have been cut on the way; the next command goes on from what was sent."""
+    for build in (MaskedMpc, CbfFilter, DirectController):
+        controller = build(MODEL)
+        controller.reset()
+        controller.update(State(HOME, np.zeros(9), 0.0), AHEAD(0.0))
+        sent = 0.3 * LIMITS.velocity
+        command = controller.update(State(HOME, np.zeros(9), PERIOD, sent), AHEAD(PERIOD))
+        np.testing.assert_allclose(command.velocity(0.0), sent)
+        steps = np.abs(np.diff(command.velocities, axis=0))
+        assert np.all(steps <= LIMITS.acceleration * command.dt + 1e-9)
+        np.testing.assert_array_equal(command.velocities[-1], 0.0)  # and ends at rest
+
+
+@pytest.mark.parametrize("late", [0.3, 1.05, 1.5, 3.0])
+def test_a_late_update_goes_on_from_what_is_commanded(late):
+    """A command brakes at its end; after that nothing is commanded, whatever the robot does."""
+    MPC.reset()
+    first = MPC.update(State(HOME, np.zeros(9), 0.0), AHEAD(0.0))
+    moving = 0.4 * np.eye(9)[0]
+    command = MPC.update(State(HOME, moving, late), AHEAD(late))
+    np.testing.assert_allclose(command.velocity(0.0), first.velocity(late), atol=1e-12)
+    assert late < 2.0 or not first.velocity(late).any()
 
 
 def test_a_command_goes_on_between_rest_and_what_was_commanded():
@@ -275,4 +293,5 @@ def test_where_obstacles_move_rest_is_not_safe_for_ever():
         certificate = StopCertificate(LIMITER, collision, Margins(collision, 0.1, 0.1), 0.3, LIMITS, span=1.0)
         now = collision.values(HOME[None])[0]
         shortfall = certificate.shortfall(HOME, np.zeros(9), (HOME, now))
-        assert shortfall == pytest.approx(0.0 if safe else 0.5 - away + 0.03, abs=1e-6)
+        assert shortfall.all == pytest.approx(0.0 if safe else 0.5 - away + 0.03, abs=1e-6)
+        assert shortfall.hard == 0.0  # a pillar that comes by itself is nobody's fault

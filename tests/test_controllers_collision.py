@@ -110,8 +110,10 @@ def test_moving_obstacles_are_where_they_will_be():
     nearer = Obstacle("ball", ball.shape, [1.0, 0.0, 0.14])
     collision.observe((nearer,))
     np.testing.assert_allclose(collision.values(q, times)[:, row], expected[0] - 1.0, atol=1e-6)
-    with pytest.raises(HandrailError, match="obstacles: expected ball, got none"):
+    with pytest.raises(HandrailError, match="obstacles: expected ball as they were, got none"):
         collision.observe((Obstacle("none", ball.shape, [1, 0, 0]),))
+    with pytest.raises(HandrailError, match="obstacles: expected ball as they were, got ball"):
+        collision.observe((Obstacle("ball", Shape("sphere", [0.2]), [1, 0, 0]),))
 
 
 def test_the_distance_to_a_wall_is_the_gap():

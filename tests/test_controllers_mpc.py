@@ -16,6 +16,7 @@ from handrail.controllers.model import load_model
 from handrail.controllers.mpc import MaskedMpc
 from handrail.controllers.settings import MpcSettings
 from handrail.controllers.shape import Obstacle, Shape
+from handrail.controllers.slacks import SLACKS
 
 MODEL = load_model()
 HOME = MODEL.description.home
@@ -126,7 +127,7 @@ def test_a_failed_solve_brakes(monkeypatch):
     positions, velocities, _ = roll(MPC, [asked] * 10)
 
     def infeasible(band, gradient, *rest):
-        return np.zeros(2), 0.0, False, 3, 0
+        return np.zeros(SLACKS), 0.0, False, 3, 0
 
     monkeypatch.setattr(active_set, "solve", infeasible)
     beyond = asking(np.full(18, -2.0), "ee")
@@ -240,8 +241,9 @@ def test_a_plan_knows_whether_it_is_a_solution():
     from dataclasses import replace
 
     MPC.reset()
+    problem = MPC.problem(still(), asking(np.full(18, 0.2), "ee")(0.0))
     MPC.update(still(), asking(np.full(18, 0.2), "ee")(0.0))
-    problem, plan = MPC.problem(still(), asking(np.full(18, 0.2), "ee")(0.0)), MPC.plan
+    plan = MPC.plan
     assert plan.is_solution(problem)
     assert not replace(plan, u=plan.u * 50.0).is_solution(problem)
     assert not replace(plan, q=plan.q + 0.1).is_solution(problem)
@@ -251,7 +253,9 @@ def test_a_plan_knows_whether_it_is_a_solution():
 def test_a_longer_horizon_is_a_setting():
     mpc = MaskedMpc(MODEL, MpcSettings(horizon=15, dt=0.08))
     command = mpc.update(still(), asking(np.full(18, 0.2), "ee")(0.0))
-    assert command.velocities.shape == (16, 9)
+    assert mpc.plan.v.shape == (16, 9)
+    np.testing.assert_array_equal(command.velocities[:16], mpc.plan.v)
+    np.testing.assert_array_equal(command.velocities[-1], 0.0)  # a command ends at rest
     assert command.dt == 0.08
 
 

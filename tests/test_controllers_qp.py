@@ -8,7 +8,8 @@ from handrail.controllers import active_set
 from handrail.controllers.active_rows import active_rows
 from handrail.controllers.banded import backward, factor, forward
 from handrail.controllers.basis import REACH, stage_matrix, to_motion
-from handrail.controllers.constraints import SLACKS, Constraints, first_distance, write_row
+from handrail.controllers.constraints import Constraints, first_distance, write_row
+from handrail.controllers.slacks import LIMITS, SLACKS
 
 DT, N = 0.1, 3  # N coordinates
 NONE = np.arange(SLACKS)  # the rows that an update begins with
@@ -52,6 +53,7 @@ def random_rows(rng, horizon, distances, tight):
         offsets=rng.uniform(-0.95, 0.95, (horizon, 2, N)),
         scales=rng.uniform(0.5, 2.0, (2, N)),
         stage=rng.integers(0, horizon, distances),
+        kind=rng.integers(0, LIMITS, distances),
         coefficients=coefficients,
         upper=rng.uniform(-tight, 0.1, distances),
     )
@@ -152,6 +154,7 @@ def test_rows_that_are_the_same_twice_do_no_harm():
     band, rows = random_band(rng, 6), random_rows(rng, 6, 10, 0.05)
     twice = rows._replace(
         stage=np.tile(rows.stage, 3),
+        kind=np.tile(rows.kind, 3),
         coefficients=np.tile(rows.coefficients, (3, 1)),
         upper=np.tile(rows.upper, 3),
     )

@@ -1,5 +1,7 @@
 """What the hand holds moves with the hand, and keeps from the robot and from what stands around."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -71,16 +73,18 @@ def test_gradients_and_bounds_of_held_things():
     assert np.quantile(errors, 0.98) < 2e-2
 
 
-def test_what_is_held_comes_and_goes_but_the_rest_stays():
+def test_things_come_and_go_and_change():
     collision = CollisionModel(MODEL, (POST,))
     assert collision.among((POST,)) is collision
     holding = collision.among((POST, BOX))
     assert len(held_rows(holding)) > 0
     assert holding.among((POST, BOX)) is holding
     assert not held_rows(holding.among((POST,)))
-    for others in ((TABLE,), (TABLE, BOX), (), (BOX,)):
-        with pytest.raises(HandrailError, match="obstacles: expected post"):
-            collision.among(others)
+    larger = replace(POST, shape=Shape(POST.shape.kind, 2.0 * POST.shape.size))
+    for others in ((TABLE,), (TABLE, BOX), (), (BOX,), (larger,), (replace(POST, work_surface=True),)):
+        now, fresh = collision.among(others), CollisionModel(MODEL, others)
+        assert now.pairs == fresh.pairs
+        np.testing.assert_array_equal(now.values(HOME[None]), fresh.values(HOME[None]))
     with pytest.raises(HandrailError, match="frame 'nowhere'"):
         collision.among((POST, Obstacle("box", BOX.shape, BOX.position, frame="nowhere")))
 

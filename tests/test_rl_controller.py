@@ -44,7 +44,7 @@ def test_the_controller_moves_like_the_environment(controller):
         for t in range(80):
             command = controller.update(robot.state(), intent(env.planner.twist(t), t * STEP))
             observation, *_ = env.step(actor(observation))
-            v = command.velocities[-1]
+            v = command.velocity(STEP)
             robot.advance(v, 0.0)
             assert command.health.status is Status.OK
             assert np.allclose(v, env.velocity, atol=1e-5)
@@ -57,34 +57,31 @@ def test_the_controller_moves_like_the_environment(controller):
         (lambda good: replace(good, values=np.full(CHANNELS.size, np.nan)), Status.INVALID_INTENT),
         (lambda good: replace(good, values=np.zeros(4)), Status.INVALID_INTENT),
         (lambda good: replace(good, mask=CHANNELS.mask("joint")), Status.INVALID_INTENT),
-        (lambda good: replace(good, time=-1.0), Status.STALE_INTENT),
+        (lambda good: replace(good, time=good.time - 1.0), Status.STALE_INTENT),
     ],
 )
 def test_bad_input_brakes_within_the_limits(controller, spoil, status):
     q, v = MODEL.description.home, np.zeros(9)
-    for _ in range(30):
-        v = controller.update(State(q, v), intent([0.2, 0.0, 0.0, 0.0, 0.0, 0.0])).velocities[-1]
+    for k in range(30):
+        asked = intent([0.2, 0.0, 0.0, 0.0, 0.0, 0.0], k * STEP)
+        v = controller.update(State(q, v, k * STEP), asked).velocity(STEP)
     speed = np.linalg.norm(v)
-    command = controller.update(State(q, v), spoil(intent(np.zeros(6))))
-    assert command.health.status is status
-    assert np.linalg.norm(command.velocities[-1]) < speed
-    assert np.all(np.abs(command.velocities[-1] - v) <= MODEL.description.limits.acceleration * STEP + 1e-9)
-    for _ in range(100):
-        command = controller.update(State(q, v), spoil(intent(np.zeros(6))))
-    assert not command.velocities[-1].any()
-
-
-def test_a_broken_state_brakes(controller):
-    command = controller.update(State(np.full(9, np.nan), np.zeros(9)), intent(np.ones(6)))
-    assert command.health.status is Status.INVALID_STATE
+    for k in range(30, 130):
+        before, time = v, k * STEP
+        command = controller.update(State(q, v, time), spoil(intent(np.zeros(6), time)))
+        v = command.velocity(STEP)
+        assert command.health.status is status
+        assert np.all(np.abs(v - before) <= MODEL.description.limits.acceleration * STEP + 1e-9)
+        assert np.linalg.norm(v) < speed
     assert not command.velocities.any()
 
 
 def test_a_new_episode_knows_nothing_of_the_one_before(controller):
     def drive():
         q, v = MODEL.description.home, np.zeros(9)
-        for _ in range(20):
-            v = controller.update(State(q, v), intent([0.05, 0.1, 0.0, 0.0, 0.0, 0.2])).velocities[-1]
+        for k in range(20):
+            asked = intent([0.05, 0.1, 0.0, 0.0, 0.0, 0.2], k * STEP)
+            v = controller.update(State(q, v, k * STEP), asked).velocity(STEP)
             q = q + STEP * v
         return q
 

@@ -28,7 +28,7 @@ def reaches(controller, goal, speed=1.0) -> bool:
         values = np.zeros(CHANNELS.size)
         values[CHANNELS.tool_slice] = planner.twist(t)
         command = controller.update(State(q, v, t * STEP), Intent(values, CHANNELS.mask("ee"), time=t * STEP))
-        v = command.velocities[-1]
+        v = command.velocity(STEP)
         q = q + STEP * v
         pose = MODEL.pose(q)
         if reached(*pose_error(pose.position, pose.rotation, goal)):
