@@ -178,33 +178,31 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self._steps = 0
         self._gripper = float(episode.grip is not None)
         state = self.task_state()
-        return self._observe(state), self._info(state, Outcome(), clipped=False, contacts=())
+        rest = np.append(np.zeros(self.model.size), self._gripper).astype(np.float32)
+        return self._observe(state), self._info(state, Outcome(), rest, contacts=())
 
     def step(self, action: ArrayLike) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
-        """Move for 1/fps seconds; the reward is 1 at success."""
-        velocity, clipped = self._limit(np.asarray(action, dtype=np.float64).ravel())
-        contacts = self.simulation.advance(velocity, self._gripper)
+        """Move for 1/fps seconds; the reward is 1 at success. `info["sent"]` is the action that was sent."""
+        sent = self._limit(np.asarray(action, dtype=np.float64).ravel())
+        contacts = self.simulation.advance(sent[:-1].astype(np.float64), float(sent[-1]))
         self._steps += 1
         state = self.task_state()
         outcome = self.task.outcome(state) if state.stable else Outcome(failure="unstable")
         truncated = not outcome.over and self._steps >= self._max_episode_steps
         if truncated:
             outcome = Outcome(failure="timeout")
-        info = self._info(state, outcome, clipped, contacts)
+        info = self._info(state, outcome, sent, contacts)
         return self._observe(state), float(outcome.success), outcome.over and not truncated, truncated, info
 
-    def _limit(self, action: FloatArray) -> tuple[FloatArray, bool]:
-        """Return the velocity to command and whether the action was changed; keep the gripper's."""
-        size = self.model.size
+    def _limit(self, action: FloatArray) -> NDArray[np.float32]:
+        """Return what is sent instead of an action, (n + 1,): within the limits, as it can be recorded."""
+        size, now = self.model.size, self.simulation
         gripper = float(action[size]) if action.size == size + 1 else math.nan
         usable = math.isfinite(gripper)
-        wanted = min(max(gripper, 0.0), 1.0) if usable else self._gripper
-        self._gripper = wanted
+        self._gripper = min(max(gripper, 0.0), 1.0) if usable else self._gripper
         target = action[:size] if usable else np.full(size, np.nan)
-        velocity, clipped = self._limiter.limit(
-            self.simulation.commanded, target, 1.0 / self.fps, self.simulation.state().q
-        )
-        return velocity, clipped or wanted != gripper
+        velocity, _ = self._limiter.limit(now.commanded, target, 1.0 / self.fps, now.state().q)
+        return np.append(velocity, self._gripper).astype(np.float32)
 
     def _observe(self, state: TaskState) -> Observation:
         observation: Observation = {
@@ -216,12 +214,12 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         return observation
 
     def _info(
-        self, state: TaskState, outcome: Outcome, clipped: bool, contacts: tuple[str, ...]
+        self, state: TaskState, outcome: Outcome, sent: NDArray[np.float32], contacts: tuple[str, ...]
     ) -> dict[str, Any]:
         return {
             "is_success": outcome.success,
             "failure_reason": outcome.failure,
-            "clipped": clipped,
+            "sent": sent,
             "contacts": len(contacts),
             "contact_names": contacts,
             "time": state.time,

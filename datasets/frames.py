@@ -21,7 +21,8 @@ class Moment:
         environment: the task as observed, (e,); `observation.environment_state`.
         images: pictures by camera, (height, width, 3) uint8 each.
         intent: what the operator asked for.
-        action: what was commanded: velocities at the end of the period and the gripper, (n + 1,).
+        action: what was sent to the robot: velocities at the end of the period and the gripper, (n + 1,).
+        command: what the controller asked for, (n + 1,); the robot's own limits may have cut it.
         health: of the controller.
         contacts: forbidden contacts in the period.
         wall_clock: wall time since the episode began [s].
@@ -32,6 +33,7 @@ class Moment:
     images: dict[str, np.ndarray]
     intent: Intent
     action: FloatArray
+    command: FloatArray
     health: Health
     contacts: int
     wall_clock: float
@@ -61,17 +63,19 @@ def moment_features(
     scalar = Feature("float32")
     asked = (*channels, "gripper")
     pictures = {f"observation.images.{name}": Feature("video", (*image_size, 3)) for name in cameras}
+    velocities = (*(f"v_{name}" for name in joints), "gripper")
     return {
         "observation.state": Feature("float32", (len(state),), tuple(state)),
         "observation.environment_state": Feature("float32", (len(environment),), tuple(environment)),
         **pictures,
-        "action": Feature("float32", (len(joints) + 1,), (*(f"v_{name}" for name in joints), "gripper")),
+        "action": Feature("float32", (len(velocities),), velocities),
         "teleop.values": Feature("float32", (len(asked),), asked),
         "teleop.mask": Feature("bool", (len(asked),), asked),
         "teleop.mode": Feature("string"),
         "teleop.raw": Feature("float32", (len(channels),), tuple(channels)),
         "teleop.axes": Feature("int64"),
         "teleop.switches": Feature("int64"),
+        "controller.command": Feature("float32", (len(velocities),), velocities),
         "controller.solve_time": scalar,
         "controller.status": Feature("string"),
         "controller.slack": scalar,
@@ -97,6 +101,7 @@ def moment_row(moment: Moment) -> dict[str, Any]:
         "teleop.raw": intent.raw.values if intent.raw.values.size else np.zeros(len(intent.values)),
         "teleop.axes": intent.raw.axes,
         "teleop.switches": intent.raw.switches,
+        "controller.command": moment.command,
         "controller.solve_time": health.solve_time,
         "controller.status": health.status.value,
         "controller.slack": health.slack,

@@ -1,78 +1,71 @@
-"""Random cluttered scenes and random, rude intents, for the safety fuzz."""
+"""Random clutter, movers, and random, rude intents, for the safety fuzz.
 
+The robot is MuJoCo's, driven without the environment's limiter; contacts and distances are MuJoCo's too.
+"""
+
+from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
-import handrail.collect  # noqa: F401  (registers the environments)
-from handrail.collect.env import HandrailEnv
+from handrail.collect.gl import mujoco
 from handrail.collect.scene import Scene, SceneObject, View
-from handrail.collect.tasks.reach import Reach
-from handrail.collect.tasks.task import Episode
-from handrail.controllers.arrays import FloatArray
+from handrail.collect.simulation import Simulation
+from handrail.collect.tasks.moving import sample_movers
 from handrail.controllers.collision import CollisionModel
-from handrail.controllers.command import Status
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.frames import Frames
 from handrail.controllers.intent import Intent
+from handrail.controllers.model import RobotModel
 from handrail.controllers.mpc import MaskedMpc
 from handrail.controllers.problem import Plan, Problem
 from handrail.controllers.shape import Shape
 
-GROUPS = [
-    ("ee",),
-    ("base",),
-    ("joint",),
-    ("base", "ee"),
-    ("ee.vx", "ee.vy", "ee.vz"),
-    ("joint.elbow_joint",),
-    (),
-]
+PERIOD = 0.05  # [s]
 CLEARANCE = 0.15  # of the robot at the start [m]
 
 
-@dataclass(frozen=True)
+@dataclass
 class FuzzResult:
     """What a run showed."""
 
-    contacts: int
-    contact_names: tuple[str, ...]
-    smallest: float
-    statuses: dict[str, int]
-    excess: float  # of velocity or acceleration over the limit, relative
+    own: list[str] = field(default_factory=list)  # contacts with itself
+    standing: list[str] = field(default_factory=list)  # with what stands still
+    moving: list[str] = field(default_factory=list)  # with movers, which end the run: nothing stops them
+    nearest_own: float = np.inf  # smallest distance of the robot to itself, at the ends of periods [m]
+    statuses: Counter[str] = field(default_factory=Counter)
+    velocity_excess: float = 0.0  # over the limit, relative
+    acceleration_excess: float = 0.0  # between consecutive commands, over the limit, relative
+    travelled: float = 0.0  # way of the tool [m]
 
 
-def cluttered_episode(env: HandrailEnv, rng: np.random.Generator) -> Episode:
+def cluttered(model: RobotModel, movers: int, rng: np.random.Generator) -> tuple[Scene, np.ndarray]:
     """Draw a start posture and things around the robot, none nearer than the clearance."""
-    model = env.model
-    sampled = Reach().sample(model, rng)
+    base = len(model.description.base_joints)
     while True:
         q = np.array(model.description.home)
-        q[:3] = rng.uniform([-1.5, -1.5, -3.0], [1.5, 1.5, 3.0])
-        q[3:] += rng.uniform(-0.7, 0.7, 6)
-        own = CollisionModel(model)
-        if np.all(own.values(q[None])[0] > np.minimum(own.largest_margin, 0.10)):
+        q[:base] = rng.uniform([-1.5, -1.5, -3.0], [1.5, 1.5, 3.0])
+        q[base:] += rng.uniform(-0.7, 0.7, model.size - base)
+        limits, own = model.description.limits, CollisionModel(model)
+        inside = np.all((q > limits.position_lower) & (q < limits.position_upper))
+        if inside and np.all(own.values(q[None])[0] > np.minimum(own.largest_margin, 0.10)):
             break
-    objects: list[SceneObject] = []
-    wanted = int(rng.integers(4, 11))
+    objects: list[SceneObject] = sample_movers(movers, model, q, rng)
+    wanted = movers + int(rng.integers(4, 11))
+    view = View((-3, -3, 3), (0, 0, 0.5), 50.0)
     for _ in range(400):
         if len(objects) == wanted:
             break
-        item = _thing(f"thing_{len(objects)}", q, rng)
-        scene = Scene((*objects, item), View((-3, -3, 3), (0, 0, 0.5), 50.0))
-        if np.all(CollisionModel(model, scene.obstacles()).values(q[None])[0] > _least(model, scene)):
-            objects.append(item)
-    return Episode(Scene(tuple(objects), sampled.scene.view), q, sampled.goal)
+        scene = Scene((*objects, _thing(f"thing_{len(objects)}", q, rng)), view)
+        around = CollisionModel(model, scene.obstacles())
+        if np.all(around.values(q[None])[0] > np.minimum(around.largest_margin, CLEARANCE)):
+            objects = list(scene.objects)
+    return Scene(tuple(objects), view), q
 
 
-def _least(model, scene):
-    collision = CollisionModel(model, scene.obstacles())
-    return np.minimum(collision.largest_margin, CLEARANCE)
-
-
-def _thing(name, q, rng):
+def _thing(name: str, q: np.ndarray, rng: np.random.Generator) -> SceneObject:
     angle, distance = rng.uniform(-np.pi, np.pi), rng.uniform(0.5, 2.2)
     x, y = q[0] + distance * np.cos(angle), q[1] + distance * np.sin(angle)
     height = rng.uniform(0.2, 1.6)
@@ -85,10 +78,12 @@ def _thing(name, q, rng):
 
 
 class RudeOperator:
-    """Full-speed, jerky, switching intents; now and then garbage, huge, stale or in no known frame."""
+    """Full-speed, jerky, switching intents; now and then garbage, huge, stale, future, in no known frame."""
 
     def __init__(self, channels, limits, rng):
         self._channels, self._limits, self._rng = channels, limits, rng
+        self._groups = [("ee",), ("base",), ("joint",), ("base", "ee"), ("ee.vx", "ee.vy", "ee.vz"), ()]
+        self._groups.append((channels.joints[-3],))
         self._until = 0.0
 
     def intent(self, time):
@@ -96,7 +91,7 @@ class RudeOperator:
         if time >= self._until:
             self._until = time + rng.uniform(0.05, 2.0)
             self._mask = (
-                self._channels.mask(*GROUPS[rng.integers(len(GROUPS))])
+                self._channels.mask(*self._groups[rng.integers(len(self._groups))])
                 if rng.random() < 0.8
                 else (rng.random(size) < 0.4)
             )
@@ -105,6 +100,10 @@ class RudeOperator:
             self._frames = Frames(
                 rng.choice(["base", "world"]), rng.choice(["world", "tool"]), rng.uniform(-0.3, 0.3, 3)
             )
+        return self._troubled(time)
+
+    def _troubled(self, time):
+        rng, size = self._rng, self._channels.size
         values, mask, frames, stamp = self._values, self._mask, self._frames, time
         trouble = rng.random()
         if trouble < 0.02:
@@ -114,8 +113,10 @@ class RudeOperator:
         elif trouble < 0.05:
             stamp = time - rng.uniform(0.3, 5.0)
         elif trouble < 0.06:
-            frames = Frames("moon", "world")
+            stamp = time + rng.choice([0.5, 10.0, 1e18, np.nan])
         elif trouble < 0.07:
+            frames = Frames("moon", "world")
+        elif trouble < 0.08:
             values, mask = np.zeros(3), np.zeros(3, dtype=bool)
         elif trouble < 0.20:
             values = values + rng.normal(0, 0.5, size)
@@ -127,7 +128,7 @@ def failing(controller: MaskedMpc, seed: int, share: float) -> Iterator[None]:
     """Let the solver fail at random, now and then for a while."""
     rng, honest, until = np.random.default_rng([seed, 2]), controller.solver.solve, 0
 
-    def solve(problem: Problem, guess: FloatArray) -> Plan:
+    def solve(problem: Problem, guess: np.ndarray) -> Plan:
         nonlocal until
         if until > 0 or rng.random() < share:
             until = until - 1 if until else int(rng.integers(0, 20))
@@ -139,31 +140,68 @@ def failing(controller: MaskedMpc, seed: int, share: float) -> Iterator[None]:
     controller.solver.solve = honest
 
 
-def run(env: HandrailEnv, controller: MaskedMpc, seed: int, seconds: float) -> FuzzResult:
-    rng = np.random.default_rng(seed)
-    episode = cluttered_episode(env, rng)
-    env.reset(seed=seed, options={"episode": episode})
-    controller.reset(env.obstacles())
-    limits = env.model.description.limits
+class OwnDistances:
+    """MuJoCo's distances between the robot's own geoms, those pairs that it may touch itself with."""
+
+    def __init__(self, model, compiled):
+        names = {compiled.geom(index).name for index in range(compiled.ngeom)}
+        self._model = compiled
+        self._pairs = [
+            (compiled.geom(first).id, compiled.geom(second).id)
+            for first, second in model.description.self_pairs
+            if first in names and second in names
+        ]
+
+    def smallest(self, data):
+        where = np.zeros(6)
+        near = [mujoco.mj_geomDistance(self._model, data, a, b, 0.5, where) for a, b in self._pairs]
+        return min(near, default=np.inf)
+
+
+class _Around:
+    """Says how near things are, to explain a contact."""
+
+    def __init__(self, model, scene):
+        self._scene, self._collision = scene, CollisionModel(model, scene.obstacles())
+
+    def told(self, state):
+        self._collision.observe(self._scene.obstacles(state.time))
+        distances = self._collision.values(state.q[None])[0]
+        still = distances[self._collision.speeds == 0.0].min()
+        return f"robot at {np.abs(state.v).max():.2f}, nearest that stands {still:.3f} m"
+
+
+def run(model: RobotModel, controller, seed: int, seconds: float, movers: int = 0) -> FuzzResult:
+    """Drive a robot through a scene of a seed with whatever comes; return what happened."""
+    rng = np.random.default_rng([seed, movers])
+    scene, q = cluttered(model, movers, rng)
+    simulation = Simulation(model, scene, q, PERIOD)
+    own = OwnDistances(model, simulation.mujoco_model)
+    around = _Around(model, scene)
+    controller.reset(scene.obstacles(0.0))
+    limits, result = model.description.limits, FuzzResult()
     rude = RudeOperator(controller.channels, limits, rng)
-    contacts, names, smallest, excess = 0, set(), np.inf, 0.0
-    statuses: dict[str, int] = {}
-    exact = CollisionModel(env.model, env.obstacles())
-    previous, period = np.zeros(env.model.size), 1.0 / env.fps
-    for _ in range(int(seconds * env.fps)):
-        state = env.state()
+    moving = {item.name for item in scene.movers}
+    standing = {item.name for item in scene.objects} - moving | {"floor"}
+    previous = np.zeros(model.size)
+    for _ in range(int(seconds / PERIOD)):
+        state, hand = simulation.state(), simulation.tool.position
+        if movers:
+            controller.observe(scene.obstacles(state.time))
         command = controller.update(state, rude.intent(state.time))
-        velocity = command.velocity(period)
-        excess = max(
-            excess,
-            float(np.max(np.abs(velocity) / limits.velocity - 1.0)),
-            float(np.max(np.abs(velocity - previous) / (limits.acceleration * period) - 1.0)),
-        )
+        velocity = command.velocity(PERIOD)
+        result.statuses[command.health.status.value] += 1
+        excess = np.abs(velocity) / limits.velocity - 1.0
+        result.velocity_excess = max(result.velocity_excess, float(np.max(excess)))
+        excess = np.abs(velocity - previous) / (limits.acceleration * PERIOD) - 1.0
+        result.acceleration_excess = max(result.acceleration_excess, float(np.max(excess)))
         previous = velocity
-        statuses[command.health.status.value] = statuses.get(command.health.status.value, 0) + 1
-        _, _, _, _, info = env.step(np.append(velocity, 0.0).astype(np.float32))
-        contacts += info["contacts"]
-        names |= set(info["contact_names"])
-        smallest = min(smallest, float(exact.values(env.state().q[None])[0].min()))
-    assert command.health.status in Status
-    return FuzzResult(contacts, tuple(sorted(names)), smallest, statuses, excess)
+        for pair in simulation.advance(velocity, 0.0):
+            met = set(pair.split(" – "))
+            kind = result.moving if met & moving else result.standing if met & standing else result.own
+            kind.append(f"{pair} at {state.time:.2f} s: {around.told(state)}, {command.health.status}")
+        if result.moving:
+            break
+        result.nearest_own = min(result.nearest_own, own.smallest(simulation.data))
+        result.travelled += float(np.linalg.norm(simulation.tool.position - hand))
+    return result

@@ -92,9 +92,10 @@ def test_limits_hold_for_any_action():
             before = env.commanded_velocity
             *_, info = env.step(drive)
             after = env.commanded_velocity
-            assert info["clipped"]
-            assert np.all(np.abs(after) <= limits.velocity + 1e-9)
-            assert np.all(np.abs(after - before) <= limits.acceleration / env.fps + 1e-9)
+            np.testing.assert_array_equal(info["sent"][:-1], after)
+            assert 0.0 <= info["sent"][-1] <= 1.0
+            assert np.all(np.abs(after) <= limits.velocity * (1.0 + 1e-6))
+            assert np.all(np.abs(after - before) <= limits.acceleration / env.fps * (1.0 + 1e-5))
 
 
 def test_an_action_that_is_no_action_brakes():
@@ -105,18 +106,18 @@ def test_an_action_that_is_no_action_brakes():
                 env.step(action(env, [0.2] + [0.0] * 8))
             for _ in range(10):
                 *_, info = env.step(bad)
-                assert info["clipped"]
+            np.testing.assert_array_equal(info["sent"], 0.0)
             np.testing.assert_array_equal(env.commanded_velocity, 0.0)
 
 
-def test_a_reachable_action_is_not_clipped():
+def test_a_reachable_action_is_sent_as_it_is():
     with environment("Reach") as env:
         env.reset(seed=0)
         limits = env.model.description.limits
         wanted = 0.9 * limits.acceleration / env.fps
         *_, info = env.step(action(env, wanted))
-        assert not info["clipped"]
-        np.testing.assert_allclose(env.commanded_velocity, wanted, rtol=1e-6)
+        np.testing.assert_array_equal(info["sent"], action(env, wanted))
+        np.testing.assert_array_equal(env.state().commanded, info["sent"][:-1])
 
 
 @pytest.mark.parametrize("fps", [10, 30, 100])
