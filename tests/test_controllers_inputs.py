@@ -1,4 +1,4 @@
-"""What comes into a controller from outside: intents, states, obstacles. It fails closed, and brakes in time."""
+"""What comes into a controller: intents, states, obstacles. It fails closed and brakes in time."""
 
 from dataclasses import replace
 

@@ -3,7 +3,14 @@
 import numpy as np
 import pytest
 
-from handrail.collect.build import build_controller, build_env, build_mode, build_session, session_features
+from handrail.collect.build import (
+    build_controller,
+    build_env,
+    build_mode,
+    build_operator,
+    build_session,
+    session_features,
+)
 from handrail.collect.config import SessionConfig
 from handrail.collect.operators.modes import MODES, find_mode
 from handrail.collect.session import Session
@@ -180,3 +187,45 @@ def test_rerun_sees_a_session(tmp_path):
     build_session(config, build_env(config, 20), [display]).run(2)
     display.close()
     assert path.stat().st_size > 100_000
+
+
+class Grip:
+    """Holds the robot fast for two seconds, whatever its servos do; a disturbance."""
+
+    def begin(self, env, seed):
+        self._free = env.simulation.mujoco_model.dof_damping.copy()
+
+    def act(self, simulation):
+        held = 2.0 <= simulation.data.time < 4.0
+        simulation.mujoco_model.dof_damping[:] = 1e9 if held else self._free
+
+
+@pytest.mark.parametrize("mode", ["ee", "direct"])
+def test_what_is_recorded_is_what_was_sent(mode):
+    """Also of a robot that is held fast: consecutive actions keep the limits; the controller knows them."""
+    watcher, config = Watcher(), SessionConfig(task="reach", mode=mode)
+    env = build_env(config, 20)
+    chosen = build_mode(config, env.model)
+    operator = build_operator(config, chosen, env.model)
+    controller = build_controller(chosen, env.model, env.fps, config.task)
+    session = Session(env, controller, operator, [watcher], disturbances=[Grip()])
+    sent = []
+    step = env.step
+
+    def stepped(action):
+        result = step(action)
+        sent.append(np.append(env.commanded_velocity, result[4]["sent"][-1]))
+        return result
+
+    env.step = stepped
+    session.run(3)
+    actions = np.array([moment.action for moment in watcher.moments])
+    commands = np.array([moment.command for moment in watcher.moments])
+    np.testing.assert_array_equal(actions, sent)
+    limits = env.model.description.limits
+    steps = np.abs(np.diff(actions[:, :-1], axis=0, prepend=np.zeros((1, env.model.size))))
+    assert np.all(steps <= limits.acceleration / env.fps * (1.0 + 1e-5))
+    if mode == "ee":
+        speeds = np.abs(actions[:, :-1] / limits.velocity).max(axis=1)
+        assert speeds[60:80].max() < 0.5 * speeds[:40].max()  # held: the command waits
+        np.testing.assert_allclose(actions, commands, atol=1e-6)  # and nothing is cut behind its back
