@@ -7,8 +7,8 @@ from handrail.collect.flags import check_names, check_page, names
 from handrail.controllers.errors import HandrailError
 
 CONTROLLERS = (
-    *("mpc", "rl", "mink", "dls", "dls_arm", "decoupled", "blended"),
-    *("direct", "cbf_filter", "safety_filter"),
+    *("mpc", "rl", "mink", "mpc_paper", "rl_low_pass", "mink_low_pass"),
+    *("dls", "dls_arm", "decoupled", "blended", "direct", "cbf_filter", "safety_filter"),
 )
 PROFILES = ("nominal", "fast15", "fast2", "fast3", "steps", "noise", "delay", "dropouts", "quantised")
 MOST_WORKERS = 64
@@ -19,8 +19,8 @@ class BenchmarkConfig:
     """Run the paper's goal-reaching benchmark: every controller on the same goals, with the same planner."""
 
     controllers: str = "all"
-    """Which controllers, comma-separated, or all: mpc, rl, mink, dls, dls_arm, decoupled, blended, direct,
-    cbf_filter, safety_filter."""
+    """Which controllers, comma-separated, or all: mpc, rl, mink, mpc_paper, rl_low_pass, mink_low_pass, dls,
+    dls_arm, decoupled, blended, direct, cbf_filter, safety_filter."""
     goals: int = 100
     """Goals, the same for every controller."""
     seed: int = 1

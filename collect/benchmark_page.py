@@ -11,6 +11,8 @@ from handrail.collect.benchmark_format import (
     paired_table,
     profile_table,
     safety_table,
+    settles,
+    settling_table,
 )
 from handrail.collect.benchmark_metrics import COST_METRICS, METRICS, SETTLED_METRICS
 from handrail.collect.benchmark_results import save_json
@@ -40,11 +42,14 @@ def write_page(
 
 
 def _parts(results: Mapping[str, Any], pictures: Mapping[str, bytes], stem: str) -> list[str]:
-    parts = [f"`{_command(results)}` wrote this. Mean ± SD (min, max) over the episodes."]
+    parts = [f"`{_command(results)}` wrote this. {_how(results)}"]
     profiles = list(results["profiles"])
     for profile in profiles:
         parts += [f"**Profile {profile}**"] if len(profiles) > 1 else []
-        parts.append(markdown_table(main_table(results, (*METRICS, COST_METRICS[0]), profile)))
+        parts.append(markdown_table(main_table(results, METRICS, profile)))
+        parts.append(markdown_table(main_table(results, COST_METRICS, profile)))
+        if settles(results):
+            parts.append(markdown_table(settling_table(results, profile)))
         if not results["config"]["early_stop"]:
             parts.append(markdown_table(main_table(results, SETTLED_METRICS, profile)))
         parts.append(markdown_table(safety_table(results, profile)))
@@ -54,6 +59,16 @@ def _parts(results: Mapping[str, Any], pictures: Mapping[str, bytes], stem: str)
         parts.append(markdown_table(profile_table(results)))
     parts += [f"![{name}]({stem}_{name}.png)" for name in pictures]
     return parts + [f"Left out: {name} ({reason})." for name, reason in results["skipped"].items()]
+
+
+def _how(results: Mapping[str, Any]) -> str:
+    """Return how the numbers are to be read, those that depend on the machine above all."""
+    machine, workers = results["machine"], results["config"]["workers"]
+    return (
+        "Mean ± SD (min, max) over the episodes. Update ms: the median over an episode's updates, without the"
+        f" distances that rivals only report. {machine['cores']} cores, load at the end {machine['load']:.1f}, of"
+        f" which {workers} by this run: times are longer where others computed too."
+    )
 
 
 def _command(results: Mapping[str, Any]) -> str:
