@@ -66,8 +66,8 @@ def _how(results: Mapping[str, Any]) -> str:
     machine, workers = results["machine"], results["config"]["workers"]
     return (
         "Mean ± SD (min, max) over the episodes. Update ms: the median over an episode's updates, without the"
-        f" distances that rivals only report. {machine['cores']} cores, load at the end {machine['load']:.1f}, of"
-        f" which {workers} by this run: times are longer where others computed too."
+        f" distances that rivals only report. {machine['cores']} cores; load at the end"
+        f" {machine['load']:.1f}, of which {workers} by this run: times are longer where others computed too."
     )
 
 
