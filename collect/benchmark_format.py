@@ -28,7 +28,7 @@ COMPARED = ("success", "final_position_error", "arm_effort", "base_path", "jerki
 """What paired tables show."""
 _ONE = ("length", "arm_effort", "contacts", "brakes", "updates_per_s")
 _TWO = ("base_path", "wall_time_s", "cpu_time_s", "update_ms_median")
-_DIGITS = dict.fromkeys(_ONE, 1) | dict.fromkeys(_TWO, 2)
+_DIGITS: dict[str, int] = {**dict.fromkeys(_ONE, 1), **dict.fromkeys(_TWO, 2)}
 
 Table = tuple[list[str], list[list[str]]]
 """Headings and rows."""
