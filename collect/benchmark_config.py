@@ -61,7 +61,7 @@ class BenchmarkConfig:
     def label(self) -> str:
         """A name of this kind of run: what is special about it, and the seed."""
         profiles = self.profile_names
-        kinds = [profiles[0] if len(profiles) == 1 else "profiles"]
+        kinds = ["profiles"] if set(profiles) == set(PROFILES) else list(profiles)
         kinds += [name for name in ("clutter", "closed_loop") if getattr(self, name)]
         kinds += [word for word, there in (("whole", self.early_stop), ("ideal", self.physics)) if not there]
         return "_".join([*kinds, f"seed_{self.seed}"])

@@ -18,6 +18,11 @@ from handrail.collect.benchmark_metrics import COST_METRICS, METRICS, SETTLED_ME
 from handrail.collect.benchmark_results import save_json
 from handrail.collect.markdown import markdown_table, with_part
 
+_PAIRED = (
+    "Paired differences: mean, 95 % bootstrap interval, p of Wilcoxon's test, for success of McNemar's; every"
+    " p is for itself, not corrected for how many there are."
+)
+
 
 def write_page(
     results: Mapping[str, Any], pictures: Mapping[str, bytes], page: Path, config: BenchmarkConfig
@@ -64,11 +69,12 @@ def _parts(results: Mapping[str, Any], pictures: Mapping[str, bytes], stem: str)
 def _how(results: Mapping[str, Any]) -> str:
     """Return how the numbers are to be read, those that depend on the machine above all."""
     machine, workers = results["machine"], results["config"]["workers"]
-    return (
+    said = (
         "Mean ± SD (min, max) over the episodes. Update ms: the median over an episode's updates, without the"
         f" distances that rivals only report. {machine['cores']} cores; load at the end"
         f" {machine['load']:.1f}, of which {workers} by this run: times are longer where others computed too."
     )
+    return f"{said} {_PAIRED}" if any(results["paired"].values()) else said
 
 
 def _command(results: Mapping[str, Any]) -> str:
