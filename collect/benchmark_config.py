@@ -7,8 +7,8 @@ from handrail.collect.flags import check_names, check_page, names
 from handrail.controllers.errors import HandrailError
 
 CONTROLLERS = (
-    *("mpc", "rl", "mink", "dls", "dls_arm", "decoupled", "blended"),
-    *("direct", "cbf_filter", "safety_filter"),
+    *("mpc", "rl", "mink", "mpc_paper", "rl_low_pass", "mink_low_pass"),
+    *("dls", "dls_arm", "decoupled", "blended", "direct", "cbf_filter", "safety_filter"),
 )
 PROFILES = ("nominal", "fast15", "fast2", "fast3", "steps", "noise", "delay", "dropouts", "quantised")
 MOST_WORKERS = 64
@@ -19,8 +19,8 @@ class BenchmarkConfig:
     """Run the paper's goal-reaching benchmark: every controller on the same goals, with the same planner."""
 
     controllers: str = "all"
-    """Which controllers, comma-separated, or all: mpc, rl, mink, dls, dls_arm, decoupled, blended, direct,
-    cbf_filter, safety_filter."""
+    """Which controllers, comma-separated, or all: mpc, rl, mink, mpc_paper, rl_low_pass, mink_low_pass, dls,
+    dls_arm, decoupled, blended, direct, cbf_filter, safety_filter."""
     goals: int = 100
     """Goals, the same for every controller."""
     seed: int = 1
@@ -61,7 +61,7 @@ class BenchmarkConfig:
     def label(self) -> str:
         """A name of this kind of run: what is special about it, and the seed."""
         profiles = self.profile_names
-        kinds = [profiles[0] if len(profiles) == 1 else "profiles"]
+        kinds = ["profiles"] if set(profiles) == set(PROFILES) else list(profiles)
         kinds += [name for name in ("clutter", "closed_loop") if getattr(self, name)]
         kinds += [word for word, there in (("whole", self.early_stop), ("ideal", self.physics)) if not there]
         return "_".join([*kinds, f"seed_{self.seed}"])

@@ -1,7 +1,7 @@
 """Who takes part in the benchmark: each controller, what its operator sends, and how often it is asked."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -27,6 +27,7 @@ from handrail.controllers.whole_body_completion import WholeBodyCompletion
 MPC_PERIOD = 0.1  # of the protocol [s]
 _FILTER_PERIOD = 0.06  # [s]
 TAKE_UP, TAKE_UP_TURN = 1.0, 0.65  # time constants of the masked MPC's hand [s]
+_NOW = np.zeros(1)  # no time ahead [s]
 
 
 def goal_reaching_settings() -> MpcSettings:
@@ -46,6 +47,26 @@ def goal_reaching_settings() -> MpcSettings:
         turn_tracking=4.0,
         base_velocity=0.022,
         acceleration=0.1,
+        posture=0.0,
+        terminal_velocity=0.0,
+    )
+
+
+def paper_settings() -> MpcSettings:
+    """Return the paper's own horizon and weights: ten stages of 0.1 s, all of them tracked alike.
+
+    N = 10, dt = 0.1 s, γ = 1, no posture to return to, no terminal cost; the weights are those of its code.
+    Margins, the penalty of slack and the check that a stop remains are ours, as in `goal_reaching_settings`.
+    """
+    return MpcSettings(
+        horizon=10,
+        dt=0.1,
+        decay=1.0,
+        tracking=1000.0,
+        turn_tracking=1000.0,
+        base_velocity=0.01,
+        arm_velocity=0.1,
+        acceleration=0.01,
         posture=0.0,
         terminal_velocity=0.0,
     )
@@ -81,6 +102,25 @@ class HandIntent:
         values = np.zeros(self._channels.size)
         values[self._channels.tool_slice] = twist
         return Intent(values, self._mask, mode="hand", time=time)
+
+
+class SmoothedHandIntent:
+    """The operator steers the hand through the masked MPC's own low-pass; for controllers that have none.
+
+    What arrives is what `goal_reaching_prediction` says of this moment. Remembers; one an episode.
+
+    Args:
+        model: of the robot.
+    """
+
+    def __init__(self, model: RobotModel) -> None:
+        self._hand = HandIntent(model)
+        self._predict = goal_reaching_prediction(Channels.of(model.description))
+
+    def __call__(self, twist: FloatArray, state: State, time: float) -> Intent:
+        """Return the smoothed intent of a twist, world-aligned at the tool, that was sent at a time [s]."""
+        intent = self._hand(twist, state, time)
+        return replace(intent, values=self._predict(intent, _NOW)[0])
 
 
 class JointIntent:
@@ -120,7 +160,7 @@ class Contender:
         name: as on the command line.
         title: one line.
         build: the controller for a robot.
-        operator: what the planner's twist becomes.
+        operator: what the planner's twist becomes; made anew for every episode.
         period: between two updates [s].
         aim: tells the controller the goal, if it needs to know it.
     """
@@ -136,6 +176,10 @@ class Contender:
 def _mpc(model: RobotModel) -> Controller:
     predict = goal_reaching_prediction(Channels.of(model.description))
     return MaskedMpc(model, goal_reaching_settings(), predict=predict)
+
+
+def _mpc_paper(model: RobotModel) -> Controller:
+    return MaskedMpc(model, paper_settings())
 
 
 def _mink(model: RobotModel) -> Controller:
@@ -175,7 +219,9 @@ CONTENDERS: Mapping[str, Contender] = {
     contender.name: contender
     for contender in (
         Contender("mpc", "masked MPC", _mpc, period=MPC_PERIOD),
+        Contender("mpc_paper", "masked MPC, the paper's horizon", _mpc_paper, period=MPC_PERIOD),
         Contender("mink", "differential IK with collision avoidance (mink)", _mink),
+        Contender("mink_low_pass", "mink behind the MPC's low-pass", _mink, SmoothedHandIntent),
         Contender("dls", "damped least squares, whole body", _whole_body),
         Contender("dls_arm", "damped least squares on the arm, nominal base", _nominal_base),
         Contender("decoupled", "decoupled base and arm", _decoupled),

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from handrail.collect.benchmark_metrics import SAFETY_METRICS
+from handrail.collect.benchmark_metrics import AIM, SAFETY_METRICS
 from handrail.collect.benchmark_published import PUBLISHED
 
 HEADINGS = {
@@ -17,16 +17,18 @@ HEADINGS = {
     "wall_time_s": "wall time s",
     "cpu_time_s": "CPU time s",
     "update_ms_median": "update ms",
+    "updates_per_s": "updates a second",
     "planned_position_error": "position error at the planner's end m",
     "planned_orientation_error": "orientation error at the planner's end",
     "smallest_distance": "smallest distance m",
     "contacts": "steps in contact",
     "brakes": "braked updates",
 }
-COMPARED = ("success", "final_position_error", "arm_effort", "base_path", "jerkiness", "wall_time_s")
+COMPARED = ("success", "final_position_error", "arm_effort", "base_path", "jerkiness", "update_ms_median")
 """What paired tables show."""
-_ONE, _TWO = ("length", "arm_effort", "contacts", "brakes"), ("base_path", "wall_time_s", "cpu_time_s")
-_DIGITS = dict.fromkeys(_ONE, 1) | dict.fromkeys(_TWO, 2)
+_ONE = ("length", "arm_effort", "contacts", "brakes", "updates_per_s")
+_TWO = ("base_path", "wall_time_s", "cpu_time_s", "update_ms_median")
+_DIGITS: dict[str, int] = {**dict.fromkeys(_ONE, 1), **dict.fromkeys(_TWO, 2)}
 
 Table = tuple[list[str], list[list[str]]]
 """Headings and rows."""
@@ -106,6 +108,24 @@ def safety_table(results: Mapping[str, Any], profile: str) -> Table:
         cells = _cells(summary, SAFETY_METRICS, everything)
         rows.append([name, touched, *cells])
     return ["controller", "episodes with contact", *(HEADINGS[metric] for metric in SAFETY_METRICS)], rows
+
+
+def settles(results: Mapping[str, Any]) -> bool:
+    """Return whether a planner that sees the hand was given the time to bring it where it belongs."""
+    return results["config"]["closed_loop"] and not results["config"]["early_stop"]
+
+
+def settling_table(results: Mapping[str, Any], profile: str) -> Table:
+    """Return mean and worst position error when the planner ends and at the end, against the aim."""
+    moments = {"planned_position_error": "the planner's last step", "final_position_error": "4 s later"}
+    rows = []
+    for name, summary in results["profiles"][profile].items():
+        for metric, moment in moments.items():
+            if metric in summary:
+                ends = [f"{1e3 * summary[metric][end]:.1f}" for end in ("mean", "max")]
+                missed = f"{summary['beyond_aim'][metric]} of {summary['episodes']}"
+                rows.append([name, moment, *ends, missed])
+    return ["controller", "position error at", "mean mm", "worst mm", f"beyond {1e3 * AIM:.0f} mm"], rows
 
 
 def paired_table(results: Mapping[str, Any], metrics: Sequence[str], profile: str) -> Table:

@@ -24,10 +24,13 @@ METRICS = (
 )
 """Those of the paper's Table I, in its order."""
 
-COST_METRICS = ("cpu_time_s", "update_ms_median")
+COST_METRICS = ("cpu_time_s", "update_ms_median", "updates_per_s")
+"""What a controller costs: of an episode, of an update (median of the episode's), updates a second of it."""
+
 SAFETY_METRICS = ("contacts", "smallest_distance", "brakes")
 SETTLED_METRICS = ("planned_position_error", "planned_orientation_error")
 """Errors right after the planner's last step; only of episodes that got there."""
+AIM = 0.01  # position error within which a planner that sees the hand was to bring it [m]
 
 
 @dataclass(frozen=True)
@@ -85,6 +88,7 @@ def measure(trace: Trace, collision: CollisionModel, base: int) -> dict[str, Any
         "brakes": sum(status.brakes for status in trace.statuses),
         "updates": len(trace.statuses),
         "update_ms_median": 1e3 * float(np.median(trace.solve_times)),
+        "updates_per_s": len(trace.statuses) / (len(trace.v) * STEP),
     }
     row.update(dict(zip(SETTLED_METRICS, _planned(trace), strict=True)))
     return row

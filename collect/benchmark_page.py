@@ -11,10 +11,17 @@ from handrail.collect.benchmark_format import (
     paired_table,
     profile_table,
     safety_table,
+    settles,
+    settling_table,
 )
 from handrail.collect.benchmark_metrics import COST_METRICS, METRICS, SETTLED_METRICS
 from handrail.collect.benchmark_results import save_json
 from handrail.collect.markdown import markdown_table, with_part
+
+_PAIRED = (
+    "Paired differences: mean, 95 % bootstrap interval, p of Wilcoxon's test, for success of McNemar's; every"
+    " p is for itself, not corrected for how many there are."
+)
 
 
 def write_page(
@@ -40,11 +47,14 @@ def write_page(
 
 
 def _parts(results: Mapping[str, Any], pictures: Mapping[str, bytes], stem: str) -> list[str]:
-    parts = [f"`{_command(results)}` wrote this. Mean ± SD (min, max) over the episodes."]
+    parts = [f"`{_command(results)}` wrote this. {_how(results)}"]
     profiles = list(results["profiles"])
     for profile in profiles:
         parts += [f"**Profile {profile}**"] if len(profiles) > 1 else []
-        parts.append(markdown_table(main_table(results, (*METRICS, COST_METRICS[0]), profile)))
+        parts.append(markdown_table(main_table(results, METRICS, profile)))
+        parts.append(markdown_table(main_table(results, COST_METRICS, profile)))
+        if settles(results):
+            parts.append(markdown_table(settling_table(results, profile)))
         if not results["config"]["early_stop"]:
             parts.append(markdown_table(main_table(results, SETTLED_METRICS, profile)))
         parts.append(markdown_table(safety_table(results, profile)))
@@ -54,6 +64,17 @@ def _parts(results: Mapping[str, Any], pictures: Mapping[str, bytes], stem: str)
         parts.append(markdown_table(profile_table(results)))
     parts += [f"![{name}]({stem}_{name}.png)" for name in pictures]
     return parts + [f"Left out: {name} ({reason})." for name, reason in results["skipped"].items()]
+
+
+def _how(results: Mapping[str, Any]) -> str:
+    """Return how the numbers are to be read, those that depend on the machine above all."""
+    machine, workers = results["machine"], results["config"]["workers"]
+    said = (
+        "Mean ± SD (min, max) over the episodes. Update ms: the median over an episode's updates, without the"
+        f" distances that rivals only report. {machine['cores']} cores; load at the end"
+        f" {machine['load']:.1f}, of which {workers} by this run: times are longer where others computed too."
+    )
+    return f"{said} {_PAIRED}" if any(results["paired"].values()) else said
 
 
 def _command(results: Mapping[str, Any]) -> str:

@@ -13,6 +13,8 @@ from handrail.collect.benchmark_format import (
     paired_table,
     profile_table,
     safety_table,
+    settles,
+    settling_table,
 )
 from handrail.collect.benchmark_metrics import COST_METRICS, METRICS, SETTLED_METRICS
 
@@ -41,7 +43,9 @@ def write_report(
     parts = ["<h1>Goal reaching</h1>", *(f'<p class="finding">{line}</p>' for line in _findings(results))]
     for profile in results["profiles"]:
         parts += [f"<h2>Profile {escape(profile)}</h2>", "<p>Mean ± SD (min, max) over the episodes.</p>"]
-        parts.append(_table(main_table(results, (*METRICS, COST_METRICS[0], *SETTLED_METRICS), profile)))
+        parts.append(_table(main_table(results, (*METRICS, *COST_METRICS, *SETTLED_METRICS), profile)))
+        if settles(results):
+            parts.append(_table(settling_table(results, profile)))
         parts += ["<h3>Safety</h3>", _table(safety_table(results, profile))]
         if results["paired"][profile]:
             parts += [f"<h3>Paired differences</h3><p>{_PAIRED}</p>"]
@@ -101,7 +105,7 @@ def _video(path: Path) -> str:
 
 
 def _conditions(results: Mapping[str, Any]) -> str:
-    groups = ("config", "mpc_settings", "physics", "machine", "versions", "skipped")
+    groups = ("config", "mpc_settings", "mpc_paper_settings", "physics", "machine", "versions", "skipped")
     lines = [
         f"<p><b>{group}</b>: "
         + ", ".join(f"<code>{escape(str(k))} {escape(str(v))}</code>" for k, v in results[group].items())

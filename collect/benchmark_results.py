@@ -11,13 +11,19 @@ from typing import Any
 import numpy as np
 
 from handrail.collect.benchmark_config import BenchmarkConfig
-from handrail.collect.benchmark_contenders import TAKE_UP, TAKE_UP_TURN, Contender, goal_reaching_settings
-from handrail.collect.benchmark_metrics import COST_METRICS, METRICS, SAFETY_METRICS, SETTLED_METRICS
+from handrail.collect.benchmark_contenders import (
+    TAKE_UP,
+    TAKE_UP_TURN,
+    Contender,
+    goal_reaching_settings,
+    paper_settings,
+)
+from handrail.collect.benchmark_metrics import AIM, COST_METRICS, METRICS, SAFETY_METRICS, SETTLED_METRICS
 from handrail.collect.benchmark_plants import PHYSICS
 from handrail.datasets.paired import paired_difference, paired_success, wilson
 
 Row = Mapping[str, Any]
-_COMPARED = tuple(name for name in METRICS if name != "success")
+_COMPARED = (*(name for name in METRICS if name != "success"), "update_ms_median")
 _PLACES = ("json", "report", "page")  # settings that say where results are written on a machine
 _VERSIONED = ("casadi", "coal", "daqp", "mujoco", "numpy", "pin", "scipy")
 
@@ -48,6 +54,7 @@ def summarise(
         "skipped": dict(skipped),
         "config": {name: value for name, value in asdict(config).items() if name not in _PLACES},
         "mpc_settings": asdict(goal_reaching_settings()) | {"take_up": TAKE_UP, "take_up_turn": TAKE_UP_TURN},
+        "mpc_paper_settings": asdict(paper_settings()),
         "physics": dict(PHYSICS) if config.physics else {},
         "machine": {"cores": os.cpu_count(), "load": os.getloadavg()[0]},
         "versions": {name: metadata.version(name) for name in _VERSIONED},
@@ -85,6 +92,8 @@ def _summary(rows: Sequence[Row]) -> dict[str, Any]:
     successes = int(sum(bool(row["success"]) for row in rows))
     summary["success"]["interval"] = list(wilson(successes, len(rows)))
     summary["episodes_with_contact"] = int(sum(row["contacts"] > 0 for row in rows))
+    errors = "planned_position_error", "final_position_error"
+    summary["beyond_aim"] = {name: int(np.sum(_column(rows, name) > AIM)) for name in errors}
     return summary
 
 

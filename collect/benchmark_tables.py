@@ -17,6 +17,8 @@ from handrail.collect.benchmark_format import (
     paired_table,
     profile_table,
     safety_table,
+    settles,
+    settling_table,
 )
 from handrail.collect.benchmark_metrics import COST_METRICS, METRICS, SETTLED_METRICS
 
@@ -40,6 +42,8 @@ def benchmark_tables(results: Mapping[str, Any]) -> Group:
         for group in (METRICS[:4], METRICS[4:], COST_METRICS, *settled):
             title = f"{profile}: mean ± SD, min … max"
             tables.append(_rich(main_table(results, group, profile, _stacked), title))
+        if settles(results):
+            tables.append(_rich(settling_table(results, profile), f"{profile}: settling"))
         tables.append(_rich(safety_table(results, profile), f"{profile}: safety"))
         if results["paired"][profile]:
             title = f"{profile}: paired differences [95 % bootstrap interval]"

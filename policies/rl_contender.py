@@ -1,8 +1,9 @@
-"""The reinforcement-learning baseline's entry in the goal-reaching benchmark."""
+"""The reinforcement-learning baseline's entries in the goal-reaching benchmark."""
 
+from collections.abc import Mapping
 from typing import cast
 
-from handrail.collect.benchmark_contenders import Contender
+from handrail.collect.benchmark_contenders import Contender, SmoothedHandIntent
 from handrail.collect.goal_reaching import Goal
 from handrail.controllers.controller import Controller
 from handrail.controllers.model import RobotModel
@@ -18,4 +19,10 @@ def _aim(controller: Controller, goal: Goal) -> None:
     cast(RlController, controller).aim(goal)
 
 
-RL = Contender("rl", "reinforcement-learning baseline (SAC)", _build, aim=_aim)
+RL_CONTENDERS: Mapping[str, Contender] = {
+    contender.name: contender
+    for contender in (
+        Contender("rl", "reinforcement-learning baseline (SAC)", _build, aim=_aim),
+        Contender("rl_low_pass", "SAC behind the MPC's low-pass", _build, SmoothedHandIntent, aim=_aim),
+    )
+}

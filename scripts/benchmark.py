@@ -16,10 +16,10 @@ def _benchmark(config: BenchmarkConfig) -> int:
     from handrail.collect.benchmark import benchmark
     from handrail.collect.benchmark_contenders import CONTENDERS
     from handrail.collect.benchmark_tables import benchmark_tables
-    from handrail.policies.rl_contender import RL
+    from handrail.policies.rl_contender import RL_CONTENDERS
 
     console = Console()
-    results = benchmark(config, {**CONTENDERS, RL.name: RL}, console)
+    results = benchmark(config, {**CONTENDERS, **RL_CONTENDERS}, console)
     console.print(benchmark_tables(results))
     for written in (config.json, config.report and f"{config.report}/benchmark.html", config.page):
         if written:

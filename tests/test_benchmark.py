@@ -24,7 +24,7 @@ from handrail.controllers.model import load_model
 
 MODEL = load_model()
 QUIET = Console(quiet=True)
-TIMED = ("wall_time_s", "cpu_time_s", "update_ms_median")
+TIMED = ("wall_time_s", "cpu_time_s", "update_ms_median")  # what depends on the machine
 QUICK = BenchmarkConfig(controllers="mpc,dls", goals=2, physics=False, video=False)
 
 
@@ -77,16 +77,34 @@ def test_the_page_keeps_what_others_wrote(written):
     config = replace(QUICK, profile="nominal,fast3")
     first = page.read_text()
     assert "| paper: proposed | 97.0 |" in first
+    assert "| controller | CPU time s | update ms | updates a second |" in first
+    assert re.search(r"\| mpc \|.*\| 10\.\d ± .*\n\| dls \|.*\| 33\.3 ± ", first)
+    assert re.search(r"\d+ cores; load at the end \d+\.\d, of which 1 by this run", first)
+    assert "not corrected for how many there are" in first
     assert all((folder / link).is_file() for link in re.findall(r"\]\((.+?)\)", first))
     page.write_text("# Mine\n\nBefore.\n\n" + first.split("\n\n", 1)[1] + "\nAfter.\n")
     write_page(results, {}, page, config)
     again = page.read_text()
     assert again.startswith("# Mine\n\nBefore.\n")
     assert again.endswith("\nAfter.\n")
-    assert again.count("<!-- profiles_ideal_seed_1 -->") == 1
+    assert again.count("<!-- nominal_fast3_ideal_seed_1 -->") == 1
     assert "![" not in again
-    write_page(results, {}, page, replace(config, seed=2))
-    assert page.read_text().startswith(again.rstrip())
+    for other in (replace(config, seed=2), replace(config, profile="nominal,steps"), QUICK):
+        write_page(results, {}, page, other)  # a part of its own: no other run's part is touched
+        assert page.read_text().startswith(again.rstrip())
+    assert replace(config, profile="all").label == "profiles_ideal_seed_1"
+
+
+def test_page_report_and_terminal_hold_a_closed_loop_to_its_aim(tmp_path):
+    places = {"report": str(tmp_path / "report"), "page": str(tmp_path / "page.md")}
+    config = BenchmarkConfig(controllers="dls", goals=1, physics=False, video=False, **places)
+    results = benchmark(replace(config, early_stop=False, closed_loop=True), CONTENDERS, QUIET)
+    console = Console(width=200, record=True, file=StringIO())
+    console.print(benchmark_tables(results))
+    html = (tmp_path / "report" / "benchmark.html").read_text()
+    for text in ((tmp_path / "page.md").read_text(), html, console.export_text()):
+        assert "beyond 10 mm" in text
+        assert "4 s later" in text
 
 
 def test_tables_show_every_controller(written):

@@ -5,6 +5,7 @@ import pytest
 
 from handrail.collect.benchmark_config import BenchmarkConfig
 from handrail.collect.benchmark_contenders import CONTENDERS
+from handrail.collect.benchmark_format import paired_table, settles, settling_table
 from handrail.collect.benchmark_metrics import METRICS, Trace, arm_effort, jerkiness, measure
 from handrail.collect.benchmark_results import summarise
 from handrail.collect.goal_reaching import STEP
@@ -44,6 +45,7 @@ def test_a_row_is_what_happened():
     assert row["jerkiness"] == pytest.approx(0.0)
     assert (row["contacts"], row["contact_names"], row["brakes"]) == (1, ["palm – floor"], 1)
     assert row["update_ms_median"] == pytest.approx(2.0)
+    assert row["updates_per_s"] == pytest.approx(3 / (4 * STEP))
     assert row["smallest_distance"] == pytest.approx(COLLISION.values(MODEL.description.home[None]).min())
     assert row["planned_position_error"] == pytest.approx(0.05)
 
@@ -90,3 +92,34 @@ def test_a_summary_is_over_the_episodes_and_pairs_are_by_goal():
     assert against["arm_effort"]["t_interval"] == pytest.approx((-10.0, -10.0))
     assert (against["success"]["only_first"], against["success"]["only_second"]) == (1, 0)
     assert len(results["episodes"]) == 6
+
+
+def test_what_an_update_costs_is_compared_on_the_same_goals():
+    rows = [row(goal, "mpc", update_ms_median=0.5 + goal) for goal in (0, 1, 2)]
+    rows += [row(goal, "dls", update_ms_median=0.25 + goal) for goal in (2, 1, 0)]
+    config = BenchmarkConfig(controllers="mpc,dls", goals=3)
+    results = summarise(rows, config, [CONTENDERS["mpc"], CONTENDERS["dls"]], {})
+    assert results["paired"]["nominal"]["dls"]["update_ms_median"]["mean"] == pytest.approx(0.25)
+    headings, ((*_, cell),) = paired_table(results, ("update_ms_median",), "nominal")
+    assert headings[1] == "update ms"
+    assert cell.startswith("0.25 [0.25, 0.25]")
+
+
+def test_a_planner_that_sees_the_hand_is_held_to_its_aim():
+    """Mean, worst and misses of 10 mm, when the planner ends and at the end, also where it got worse."""
+    errors = [(0.002, 0.004), (0.014, 0.008), (0.005, 0.012)]
+    rows = [
+        row(goal, "mpc", planned_position_error=one, final_position_error=two)
+        for goal, (one, two) in enumerate(errors)
+    ]
+    whole = BenchmarkConfig(controllers="mpc", goals=3, closed_loop=True, early_stop=False)
+    results = summarise(rows, whole, [CONTENDERS["mpc"]], {})
+    assert settles(results)
+    headings, found = settling_table(results, "nominal")
+    assert headings[-1] == "beyond 10 mm"
+    assert found == [
+        ["mpc", "the planner's last step", "7.0", "14.0", "1 of 3"],
+        ["mpc", "4 s later", "8.0", "12.0", "1 of 3"],
+    ]
+    for other in (BenchmarkConfig(closed_loop=True), BenchmarkConfig(early_stop=False)):
+        assert not settles(summarise(rows, other, [CONTENDERS["mpc"]], {}))

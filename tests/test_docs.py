@@ -27,7 +27,7 @@ from handrail.datasets.quality.catalogue import METRICS
 from handrail.policies.imitation.config import TrainConfig
 from handrail.policies.imitation.evaluate_config import PROTECTIONS, EvaluateConfig
 from handrail.policies.rl_config import TrainRlConfig
-from handrail.policies.rl_contender import RL
+from handrail.policies.rl_contender import RL_CONTENDERS
 from handrail.policies.study.config import StudyConfig
 from handrail.scripts import cli
 
@@ -133,7 +133,7 @@ def test_modes_and_tasks_are_all_there():
 
 def test_controllers_and_profiles_of_the_benchmark_are_all_there():
     assert table("Goal reaching against rivals") == set(CONTROLLERS) | set(PROFILES)
-    assert set(CONTROLLERS) == {*CONTENDERS, RL.name}
+    assert set(CONTROLLERS) == {*CONTENDERS, *RL_CONTENDERS}
     source = (ROOT / "collect" / "benchmark_config.py").read_text()
     helped = re.findall(r'^    """(.*?)"""', source, re.MULTILINE | re.DOTALL)
     assert all(re.search(rf"\b{name}\b", " ".join(helped)) for name in (*CONTROLLERS, *PROFILES))

@@ -170,7 +170,8 @@ def test_how_to_read_it_says_what_was_done(gathered):
         "same operator time",
         "Welch",
         "McNemar",
-        "all 2 undisturbed",
+        "all 2 undisturbed comparisons (1 like for like, 1 of a policy plus a controller)",
+        "ee against direct: what the operator steers and the controller differ at once",
         "mode ee",
         "“With training”",
     ):
@@ -182,6 +183,7 @@ def test_how_to_read_it_says_what_was_done(gathered):
     number = replace(DESIGN, modes=("leader", "direct"), budgets=("number",))
     said = how(number, gathered(number))
     assert "same number of successful demonstrations" in said
+    assert "differ at once" not in said  # no MPC behind either
     assert not any(
         words in said for words in ("operator time", "the MPC", "mode ee", "protection", "Without")
     )

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 
+from handrail.collect.operators.modes import find_mode
 from handrail.datasets.comparison.outcomes import OutcomeDifference, Outcomes
 from handrail.policies.study.design import StudyDesign
 from handrail.policies.study.results import TaskResults
@@ -23,6 +24,12 @@ def _policies(design: StudyDesign, results: Sequence[TaskResults]) -> Iterator[s
         "Policies of every mode were trained with the same settings for the same number of updates on"
         f" {data}; they were driven from the same beginnings."
     )
+    mixed = [mode for mode in design.modes if _differs_twice(mode, design.baseline)]
+    if mixed:
+        yield (
+            f"{', '.join(mixed)} against {design.baseline}: what the operator steers and the controller"
+            " differ at once, so a difference does not say which of the two made it."
+        )
     intents = any(arm.arm.actions == "intent" for each in results for arm in each.conditions.values())
     yield (
         "Like for like are policies that write joint velocities, whatever the mode they learnt from: these go"
@@ -36,6 +43,13 @@ def _policies(design: StudyDesign, results: Sequence[TaskResults]) -> Iterator[s
         )
     if "ee" in design.modes:
         yield "The policies' default settings were chosen in trials with demonstrations of mode ee."
+
+
+def _differs_twice(mode: str, baseline: str) -> bool:
+    """Return whether both the operator's input and the controller are others than in the baseline mode."""
+    one, other = find_mode(mode), find_mode(baseline)
+    inputs = [(each.device, each.groups("base"), each.groups("hand")) for each in (one, other)]
+    return inputs[0] != inputs[1] and one.controller != other.controller
 
 
 def _intervals(results: Sequence[TaskResults]) -> Iterator[str]:
@@ -65,7 +79,7 @@ def _tests(results: Sequence[TaskResults]) -> Iterator[str]:
     nested = ", nested bootstrap and Welch's t test over trained policies, the largest p of the three"
     yield f"Differences: Newcombe's method 10; {names}{nested if any(each.nested for each in both) else ''}."
     families = [
-        f"all {len(found)} {what}"
+        f"all {len(found)} {what}{_kinds(results) if found is main else ''}"
         for found, what in ((main, "undisturbed comparisons"), (shielded, "comparisons through a protection"))
         if found
     ]
@@ -74,6 +88,19 @@ def _tests(results: Sequence[TaskResults]) -> Iterator[str]:
         f"p is adjusted by Holm over {' and '.join(families)} of the study{apart}. ● marks a detected"
         " difference; “detectable” is what would be seen as one in 80 % of such studies."
     )
+
+
+def _kinds(results: Sequence[TaskResults]) -> str:
+    """Return how many undisturbed comparisons are of what, where they are of two kinds."""
+    actions = [
+        each.conditions[difference.label].arm.actions
+        for each in results
+        for difference in _differences([each.policies])
+    ]
+    controlled = actions.count("intent")
+    if controlled in (0, len(actions)):
+        return ""
+    return f" ({len(actions) - controlled} like for like, {controlled} of a policy plus a controller)"
 
 
 def _differences(found: Sequence[Outcomes | None]) -> list[OutcomeDifference]:
