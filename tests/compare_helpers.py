@@ -40,6 +40,28 @@ def lerobot_dataset(root: Path, names: list[str], fps: int, jitter: float, camer
     return root
 
 
+def arm_dataset(root: Path, scale: float, velocities: bool) -> Path:
+    """Record with plain LeRobot an arm with bare names, steered by positions or by velocities."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        from lerobot.datasets.lerobot_dataset import LeRobotDataset
+
+        vector = {"dtype": "float32", "shape": (3,), "names": ["pan", "lift", "elbow"]}
+        features = {"observation.state": vector, "action": vector}
+        dataset = LeRobotDataset.create(REPO, 30, features, root=root, robot_type="arm")
+        rng = np.random.default_rng(1)
+        for episode in range(8):
+            state = np.zeros(3, np.float32)
+            for index in range(FRAMES + 2 * episode):
+                goal = scale * (np.sin(0.1 * index + np.arange(3)) + 0.05 * rng.normal(size=3))
+                action = (30.0 * (goal - state) if velocities else goal).astype(np.float32)
+                dataset.add_frame({"observation.state": state, "action": action, "task": "wave"})
+                state = goal.astype(np.float32)
+            dataset.save_episode()
+        dataset.finalize()
+    return root
+
+
 def handrail_dataset(root: Path, fail_every: int, mode: str, episodes: int = 12, slow: int = 0) -> str:
     """Record with Handrail's writer: seeds are the same in every dataset, lengths are not."""
     names = ("tool.x", "tool.y", "tool.z")
