@@ -15,7 +15,7 @@ from handrail.controllers.errors import HandrailError
 from handrail.datasets.atomic import write_whole
 from handrail.datasets.comparison import markup
 from handrail.datasets.comparison.drawing import svg
-from handrail.datasets.comparison.findings import Finding
+from handrail.datasets.comparison.finding import Finding
 from handrail.datasets.comparison.report import plain
 from handrail.policies.study.config import StudyConfig
 from handrail.policies.study.figures import figures
@@ -71,7 +71,7 @@ def _html(standing: Standing, results: Sequence[TaskResults], drawn: Mapping[str
     parts += [markup.paragraph(answer, "headline") for answer in answers]
     parts += [markup.paragraph(f"{standing.words}.")] if standing.words else []
     for name, figure in drawn.items():
-        parts.append(markup.section(_CAPTIONS[name], markup.picture(svg(figure), name)))
+        parts.append(markup.section("", markup.panels([(_CAPTIONS[name], "", svg(figure))], "wide")))
     for each in results:
         shown = [
             f"<h3>{table.title}</h3>{markup.table(table.headings, table.rows)}" for table in tables(each)
