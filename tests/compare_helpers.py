@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 from datasets_helpers import REPO, create
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from handrail.datasets.schema import Feature
 
@@ -102,3 +103,27 @@ def quick_and_slow(folder: Path) -> list[str]:
         handrail_dataset(folder / "quick", 100, "ee"),
         handrail_dataset(folder / "slow", 2, "joints", slow=60),
     ]
+
+
+def texts(figure):
+    """Return the texts of a figure and the boxes that they take; ticks beyond the limits are not drawn."""
+    FigureCanvasAgg(figure).draw()
+    shown = []
+    for axes in figure.axes:
+        shown += [axes.title, axes.xaxis.label, axes.yaxis.label, *axes.texts]
+        for axis, (low, high) in ((axes.xaxis, axes.get_xlim()), (axes.yaxis, axes.get_ylim())):
+            ticks = zip(axis.get_ticklocs(), axis.get_ticklabels(), strict=False)  # shared axes have none
+            shown += [label for place, label in ticks if min(low, high) <= place <= max(low, high)]
+    return [(text.get_text(), text.get_window_extent()) for text in shown if text.get_text()]
+
+
+def check_texts(figure) -> None:
+    """Check that no text of a figure leaves it or covers another."""
+    shown = texts(figure)
+    assert shown
+    inside = figure.bbox.padded(1.0)
+    for place, (text, box) in enumerate(shown):
+        assert inside.containsx(box.x0) and inside.containsx(box.x1), text  # noqa: PT018
+        assert inside.containsy(box.y0) and inside.containsy(box.y1), text  # noqa: PT018
+        others = [other for other, its in shown[place + 1 :] if box.padded(-0.5).overlaps(its)]
+        assert not others, (text, others)

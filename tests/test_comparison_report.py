@@ -7,8 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from compare_helpers import handrail_dataset, quick_and_slow
-from matplotlib.backends.backend_agg import FigureCanvasAgg
+from compare_helpers import check_texts, handrail_dataset, quick_and_slow
 
 from handrail.datasets.comparison.compare import compare
 from handrail.datasets.comparison.config import CompareConfig
@@ -117,18 +116,6 @@ def test_what_has_no_better_direction_stands_apart(alike):
     assert rest.title.endswith("neither counts as good")
 
 
-def texts(figure):
-    """Return the texts of a figure and the boxes that they take; ticks beyond the limits are not drawn."""
-    FigureCanvasAgg(figure).draw()
-    shown = []
-    for axes in figure.axes:
-        shown += [axes.title, axes.xaxis.label, axes.yaxis.label, *axes.texts]
-        for axis, (low, high) in ((axes.xaxis, axes.get_xlim()), (axes.yaxis, axes.get_ylim())):
-            ticks = zip(axis.get_ticklocs(), axis.get_ticklabels(), strict=True)
-            shown += [label for place, label in ticks if min(low, high) <= place <= max(low, high)]
-    return [(text.get_text(), text.get_window_extent()) for text in shown if text.get_text()]
-
-
 def test_no_text_covers_another(alike):
     """Titles stand beside the figures, where the page breaks lines; within, nothing touches or is cut."""
     panels = [
@@ -136,14 +123,7 @@ def test_no_text_covers_another(alike):
     ]  # fmt: skip
     for panel in panels:
         assert not any(axes.get_title() for axes in panel.figure.axes)
-        shown = texts(panel.figure)
-        assert shown
-        for place, (text, box) in enumerate(shown):
-            inside = panel.figure.bbox.padded(1.0)
-            assert inside.containsx(box.x0) and inside.containsx(box.x1), (panel.title, text)  # noqa: PT018
-            assert inside.containsy(box.y0) and inside.containsy(box.y1), (panel.title, text)  # noqa: PT018
-            others = [other for other, its in shown[place + 1 :] if box.padded(-0.5).overlaps(its)]
-            assert not others, (panel.title, text, others)
+        check_texts(panel.figure)
 
 
 def test_figures_break_to_the_next_line_where_there_is_no_room(alike):

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from compare_helpers import check_texts
 
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.comparison.collection import Collected
@@ -194,3 +195,16 @@ def test_how_to_read_it_says_what_was_done(gathered):
     )
     empty = how(DESIGN, gathered(DESIGN, missing=("ee", "direct", "ee intent")))
     assert not any(words in empty for words in ("Holm", "Intervals", "McNemar"))
+
+
+def test_no_text_of_a_figure_covers_another(gathered):
+    names = ("reach", "tray", "pick_place", "drawer")
+    both = {"modes": ("ee", "direct", "leader"), "budgets": ("time", "number")}
+    design = replace(
+        ROBUST, tasks=dict.fromkeys(names, TASK), sweep=Sweep(names[:2], (0.0, 2.0), (0, 1)), **both
+    )
+    robust = replace(design, robustness=Robustness(("push", "shift", "delay"), rollouts=15))
+    made = figures(robust, gathered(robust))
+    assert made.keys() == {"answer", "robustness", "sweep"}
+    for figure in made.values():
+        check_texts(figure)
