@@ -198,11 +198,8 @@ def _nested(runs: Sequence[Run], resampled: FloatArray) -> Interval | None:
 
 def _mean(runs: Sequence[Run], rng: np.random.Generator) -> tuple[float, Interval]:
     (resampled,) = resample_runs([runs], rng)
-    values, means, interval = (
-        np.concatenate([run.values for run in runs]),
-        replicates(runs),
-        percentiles(resampled),
-    )
+    values, means = np.concatenate([run.values for run in runs]), replicates(runs)
+    interval = percentiles(resampled)
     if len(means) > 1:
         by_t = t_interval(float(means.mean()), *standard_error([runs], chance_of_means))
         interval = wider(interval, by_t, 0.0 if values.min() >= 0.0 else -np.inf, np.inf)
