@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 from datasets_helpers import REPO, create
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from handrail.datasets.schema import Feature
 
@@ -35,6 +36,28 @@ def lerobot_dataset(root: Path, names: list[str], fps: int, jitter: float, camer
                 frame = {"observation.state": state, "action": action, "task": "wave"}
                 dataset.add_frame(frame | ({CAMERA: picture} if camera else {}))
                 state = action
+            dataset.save_episode()
+        dataset.finalize()
+    return root
+
+
+def arm_dataset(root: Path, scale: float, velocities: bool) -> Path:
+    """Record with plain LeRobot an arm with bare names, steered by positions or by velocities."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        from lerobot.datasets.lerobot_dataset import LeRobotDataset
+
+        vector = {"dtype": "float32", "shape": (3,), "names": ["pan", "lift", "elbow"]}
+        features = {"observation.state": vector, "action": vector}
+        dataset = LeRobotDataset.create(REPO, 30, features, root=root, robot_type="arm")
+        rng = np.random.default_rng(1)
+        for episode in range(8):
+            state = np.zeros(3, np.float32)
+            for index in range(FRAMES + 2 * episode):
+                goal = scale * (np.sin(0.1 * index + np.arange(3)) + 0.05 * rng.normal(size=3))
+                action = (30.0 * (goal - state) if velocities else goal).astype(np.float32)
+                dataset.add_frame({"observation.state": state, "action": action, "task": "wave"})
+                state = goal.astype(np.float32)
             dataset.save_episode()
         dataset.finalize()
     return root
@@ -80,3 +103,27 @@ def quick_and_slow(folder: Path) -> list[str]:
         handrail_dataset(folder / "quick", 100, "ee"),
         handrail_dataset(folder / "slow", 2, "joints", slow=60),
     ]
+
+
+def texts(figure):
+    """Return the texts of a figure and the boxes that they take; ticks beyond the limits are not drawn."""
+    FigureCanvasAgg(figure).draw()
+    shown = []
+    for axes in figure.axes:
+        shown += [axes.title, axes.xaxis.label, axes.yaxis.label, *axes.texts]
+        for axis, (low, high) in ((axes.xaxis, axes.get_xlim()), (axes.yaxis, axes.get_ylim())):
+            ticks = zip(axis.get_ticklocs(), axis.get_ticklabels(), strict=False)  # shared axes have none
+            shown += [label for place, label in ticks if min(low, high) <= place <= max(low, high)]
+    return [(text.get_text(), text.get_window_extent()) for text in shown if text.get_text()]
+
+
+def check_texts(figure) -> None:
+    """Check that no text of a figure leaves it or covers another."""
+    shown = texts(figure)
+    assert shown
+    inside = figure.bbox.padded(1.0)
+    for place, (text, box) in enumerate(shown):
+        assert inside.containsx(box.x0) and inside.containsx(box.x1), text  # noqa: PT018
+        assert inside.containsy(box.y0) and inside.containsy(box.y1), text  # noqa: PT018
+        others = [other for other, its in shown[place + 1 :] if box.padded(-0.5).overlaps(its)]
+        assert not others, (text, others)

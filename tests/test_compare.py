@@ -77,7 +77,7 @@ def test_the_page_needs_nothing_else(foreign, tmp_path):
     assert addresses
     assert all(address.startswith("data:image/") for address in addresses)
     assert "<script" not in page
-    assert page.index("headline") < page.index('class="card"') < page.index('class="figure"')
+    assert page.index("headline") < page.index('class="card"') < page.index('class="panels')
 
 
 def test_the_same_seed_gives_the_same_report(ours, tmp_path):
@@ -103,7 +103,7 @@ def test_different_columns_are_not_put_on_one_scale(foreign, ours, tmp_path):
         d["metric"]: d.get("does_not_apply", "") for d in content["views"]["all episodes"]["differences"]
     }
     assert "no common scale" in reasons["state_coverage"]
-    assert reasons["sparc"] == ""
+    assert reasons["length"] == ""
     assert any("different columns" in finding["text"] for finding in content["findings"])
 
 
@@ -211,5 +211,5 @@ def test_the_command_says_what_it_found(ours, tmp_path, capsys):
     words = [*ours, "--output", str(tmp_path / "out"), "--no_pictures"]
     assert _compare(cli.parse(CompareConfig, "handrail-compare", words)) == 0
     said = capsys.readouterr().out
-    assert "Successes per operator hour" in said
+    assert "An operator hour gives" in said
     assert str(tmp_path / "out" / "report.html") in said

@@ -13,14 +13,13 @@ from handrail.datasets.comparison.differences import differences
 from handrail.datasets.comparison.evaluations import Arm, Policy
 from handrail.datasets.comparison.findings import findings
 from handrail.datasets.comparison.groups import Group
-from handrail.datasets.comparison.outcomes import judge, judge_pairs, one_family, welch_error, welch_p
+from handrail.datasets.comparison.outcomes import LIKE_FOR_LIKE, Pair, in_families, judge, judge_pairs
 from handrail.datasets.comparison.proportions import (
     holm,
     independent_trials,
     paired_shares,
     unpaired_shares,
 )
-from handrail.datasets.comparison.resampling import Run
 from handrail.datasets.paired import wilson
 from handrail.datasets.quality.catalogue import METRICS
 from handrail.datasets.quality.demonstration import Demonstration
@@ -173,11 +172,22 @@ def test_what_is_called_detectable_is_detected_four_times_in_five(quick, policie
 def test_more_comparisons_see_less(quick):
     generator = rng(10)
     arms = {x: arm(x, 0.5, 3, generator, luck=0.1) for x in "abcd"}
-    (alone,) = judge_pairs(arms, [("a", "d")], generator).differences
-    family = one_family([alone, *judge(arms, "d", generator).differences])
+    (alone,) = judge_pairs(arms, [Pair("a", "d")], generator).differences
+    family = in_families([alone, *judge(arms, "d", generator).differences])
     assert family[0].tests == 4
     assert family[0].detectable > alone.detectable
     assert [each.p_adjusted for each in family] == holm([each.p for each in family])
+
+
+def test_every_family_is_corrected_for_itself(quick):
+    generator = rng(15)
+    arms = {x: arm(x, 0.5, 3, generator, luck=0.1) for x in "abcd"}
+    pairs = [Pair("a", "d"), Pair("b", "d", "mixed"), Pair("c", "d")]
+    like, mixed, also = judge_pairs(arms, pairs, generator).differences
+    assert [each.family for each in (like, mixed, also)] == [LIKE_FOR_LIKE, "mixed", LIKE_FOR_LIKE]
+    assert [each.tests for each in (like, mixed, also)] == [2, 1, 2]
+    assert [like.p_adjusted, also.p_adjusted] == holm([like.p, also.p])
+    assert mixed.p_adjusted == mixed.p
 
 
 @pytest.mark.parametrize("hard", [0.0, 0.45])
@@ -207,6 +217,7 @@ def test_the_same_rollouts_three_times_say_no_more(paired):
     assert again.estimate == pytest.approx(once.estimate)
     assert again.interval == pytest.approx(once.interval, abs=2e-3)
     assert again.error == pytest.approx(once.error, rel=0.03)
+    assert again.p == pytest.approx(once.p, rel=1e-6 if paired else 0.1)
 
 
 def test_how_many_trials_scenes_are_worth():
@@ -218,26 +229,16 @@ def test_how_many_trials_scenes_are_worth():
     assert 750 < alike <= 900
 
 
-def test_shares_that_differ_by_rounding_are_the_same():
-    """The standard deviation of three times 0.1 is 1e-17; a t test of that warns, and warnings are errors."""
-    few, more = (
-        [Run(0, seed, tuple(range(10)), np.roll([1.0] * k + [0.0] * (10 - k), seed)) for seed in range(3)]
-        for k in (1, 2)
-    )
-    assert welch_p(few, few) == 1.0
-    assert welch_p(few, more) == 0.0
-    assert welch_error(few, more) == (0.0, float("inf"))
-
-
 def test_an_arm_is_compared_with_the_baseline_of_its_own_kind():
     labels = ["ee", "direct"]
     arms = ["ee", "ee intent", "direct", "ee intent same number", "direct same number", "ee filter"]
     assert comparing._pairs(arms, "direct", labels) == [
-        ("ee", "direct"),
-        ("ee intent", "direct"),
-        ("ee intent same number", "direct same number"),
-        ("ee filter", "direct"),
+        Pair("ee", "direct"),
+        Pair("ee intent", "direct", comparing.MIXED),
+        Pair("ee intent same number", "direct same number", comparing.MIXED),
+        Pair("ee filter", "direct", comparing.MIXED),
     ]
+    assert comparing._pairs(["ee"], "direct", labels) == []
     with pytest.raises(
         HandrailError, match="expected an arm 'direct' to compare 'ee' with, got ee, direct same"
     ):

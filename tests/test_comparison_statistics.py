@@ -9,7 +9,7 @@ from scipy.stats import fisher_exact
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.comparison.differences import at_equal_length
 from handrail.datasets.comparison.evaluations import FORMAT, read_evaluations
-from handrail.datasets.comparison.outcomes import judge, welch_p
+from handrail.datasets.comparison.outcomes import judge
 from handrail.datasets.comparison.proportions import (
     holm,
     newcombe_paired,
@@ -137,16 +137,6 @@ def test_what_is_paired_stays_paired():
     assert np.array_equal(one, other)
 
 
-def test_welch_knows_how_few_training_seeds_there_are():
-    """Golden: shares 0.8, 0.6 against 0.4, 0.2: t = 0.4 / √0.02, two degrees of freedom, p = 0.1056."""
-    shares = [
-        [Run(0, s, (0,), np.array([x])) for s, x in enumerate(each)] for each in ([0.8, 0.6], [0.4, 0.2])
-    ]
-    assert welch_p(*shares) == pytest.approx(0.1056, abs=1e-4)
-    same = [Run(0, seed, (0,), np.ones(1)) for seed in range(3)]
-    assert welch_p(same, same) == 1.0
-
-
 def arms(directory, **shares):
     content = {
         label: [
@@ -213,10 +203,10 @@ def test_one_training_seed_says_nothing_of_training(tmp_path):
 
 
 def test_two_training_seeds_are_too_few_where_they_differ_much(tmp_path):
-    """Resampling two policies of an arm never leaves their range and so would see a difference here."""
+    """Resampling two policies of an arm never leaves their range; Student's interval of two is 12 errors."""
     outcomes = judge(read_evaluations([arms(tmp_path, a=[0.95, 0.75], b=[0.6, 0.4])]), "a", rng())
     (difference,) = outcomes.differences
-    assert difference.nested[1] < 0
+    assert difference.nested[1] > 0
     assert difference.rollouts.p < 0.001
     assert not difference.detected
 

@@ -4,19 +4,22 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from compare_helpers import check_texts
 
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.comparison.collection import Collected
 from handrail.datasets.comparison.evaluations import Arm, Policy
+from handrail.datasets.comparison.outcomes import LIKE_FOR_LIKE
 from handrail.datasets.comparison.proportions import holm
 from handrail.policies.study import results as studied
-from handrail.policies.study.arms import identify
+from handrail.policies.study.arms import CONTROLLER, PROTECTED, identify
 from handrail.policies.study.design import Robustness, StudyDesign, Sweep, TaskDesign
 from handrail.policies.study.figures import _by_condition, figures
 from handrail.policies.study.how import how
 from handrail.policies.study.jobs import jobs
 from handrail.policies.study.tables import tables
 
+FAMILIES = (LIKE_FOR_LIKE, CONTROLLER, PROTECTED)
 TASK = TaskDesign(episodes=5, minutes=1.0, steps=10)
 DESIGN = StudyDesign("made", ("ee", "direct"), {"reach": TASK}, "direct", seeds=(0, 1, 2), rollouts=40)
 ROBUST = replace(DESIGN, robustness=Robustness(perturbations=("push",), rollouts=15))
@@ -125,13 +128,17 @@ def test_cautions_are_said(gathered):
     assert cautions.count("One draw of each dataset") == 1
 
 
-def test_one_family_over_all_tasks(gathered):
+def test_a_family_is_one_kind_of_comparison_over_all_tasks(gathered):
+    """A policy plus a controller is another question than the data: it changes no verdict on these."""
     several = gathered(replace(ROBUST, tasks={"reach": TASK, "tray": TASK}))
-    found = [each for task in several for each in task.policies.differences]
-    assert len(found) == 4
-    assert {each.tests for each in found} == {4}
-    assert [each.p_adjusted for each in found] == holm([each.p for each in found])
-    assert {each.tests for task in several for each in task.shielded.differences} == {2}
+    found = [each for task in several for each in (*task.policies.differences, *task.shielded.differences)]
+    families = {family: [each for each in found if each.family == family] for family in FAMILIES}
+    assert sum(map(len, families.values())) == len(found) == 6
+    for members in families.values():
+        assert {each.tests for each in members} == {2}
+        assert [each.p_adjusted for each in members] == holm([each.p for each in members])
+    assert {each.label for each in families[CONTROLLER]} == {"ee intent"}
+    assert all("over 2 like-for-like differences" in task.findings[0].text for task in several)
 
 
 def test_undisturbed_beside_disturbed_is_the_same_policies_in_the_same_scenes(gathered):
@@ -170,8 +177,9 @@ def test_how_to_read_it_says_what_was_done(gathered):
         "same operator time",
         "Welch",
         "McNemar",
-        "all 2 undisturbed comparisons (1 like for like, 1 of a policy plus a controller)",
+        "1 like-for-like difference, 1 policy-plus-controller difference and 1 protected difference",
         "ee against direct: what the operator steers and the controller differ at once",
+        "Student's t",
         "mode ee",
         "“With training”",
     ):
@@ -189,3 +197,16 @@ def test_how_to_read_it_says_what_was_done(gathered):
     )
     empty = how(DESIGN, gathered(DESIGN, missing=("ee", "direct", "ee intent")))
     assert not any(words in empty for words in ("Holm", "Intervals", "McNemar"))
+
+
+def test_no_text_of_a_figure_covers_another(gathered):
+    names = ("reach", "tray", "pick_place", "drawer")
+    both = {"modes": ("ee", "direct", "leader"), "budgets": ("time", "number")}
+    design = replace(
+        ROBUST, tasks=dict.fromkeys(names, TASK), sweep=Sweep(names[:2], (0.0, 2.0), (0, 1)), **both
+    )
+    robust = replace(design, robustness=Robustness(("push", "shift", "delay"), rollouts=15))
+    made = figures(robust, gathered(robust))
+    assert made.keys() == {"answer", "robustness", "sweep"}
+    for figure in made.values():
+        check_texts(figure)

@@ -17,13 +17,15 @@ from handrail.datasets.comparison.config import CompareConfig
 from handrail.datasets.comparison.differences import Difference, differences
 from handrail.datasets.comparison.evaluations import Arm, read_evaluations
 from handrail.datasets.comparison.groups import Group, baseline_of, group_of, load_groups
+from handrail.datasets.comparison.likeness import unlike
 from handrail.datasets.comparison.means import Means, means
-from handrail.datasets.comparison.outcomes import Outcomes, judge_pairs
+from handrail.datasets.comparison.outcomes import LIKE_FOR_LIKE, Outcomes, Pair, judge_pairs
 from handrail.datasets.comparison.productivity import RateRatio, rate_interval, rate_ratio
 from handrail.datasets.comparison.proportions import ShareDifference
 from handrail.datasets.comparison.resampling import Interval
 from handrail.datasets.quality.measure import Measurements, measure
 
+MIXED = "mixed"  # family of policies that differ in more than their data
 _SAME_NUMBER = "the same number of episodes"
 
 
@@ -85,6 +87,11 @@ class Comparison:
         """Labels of the groups."""
         return [group.label for group in self.everything.groups]
 
+    @property
+    def unlike(self) -> tuple[str, ...]:
+        """What differs so that nothing is ranked: tasks, robots."""
+        return unlike(self.everything.groups)
+
 
 def compare(config: CompareConfig) -> Comparison:
     """Compare as configured.
@@ -141,24 +148,27 @@ def _arms(config: CompareConfig, groups: Sequence[Group]) -> dict[str, Arm]:
     return arms
 
 
-def _pairs(arms: Sequence[str], baseline: str, labels: Sequence[str]) -> list[tuple[str, str]]:
+def _pairs(arms: Sequence[str], baseline: str, labels: Sequence[str]) -> list[Pair]:
     """Return each arm of another group with the arm of the baseline's group that it is compared with.
 
     That is the one that shares most of the words after the label and has none of its own: `ee intent same
-    number` is set against `direct same number`, not `direct`.
+    number` is set against `direct same number`, not `direct`. Like for like are those with the same words. A
+    single arm is compared with nothing.
 
     Raises:
         HandrailError: There is none.
     """
-    words = {arm: arm.removeprefix(group_of(arm, labels)).strip(" /").split() for arm in arms}
+    words = {arm: set(arm.removeprefix(group_of(arm, labels)).strip(" /").split()) for arm in arms}
     candidates = [arm for arm in arms if group_of(arm, labels) == baseline]
     found = []
-    for arm in arms:
-        fitting = [each for each in candidates if set(words[each]) <= set(words[arm])]
+    for arm in arms if len(arms) > 1 else ():
+        fitting = [each for each in candidates if words[each] <= words[arm]]
         if arm not in candidates and not fitting:
             raise HandrailError(
                 f"evaluations: expected an arm {baseline!r} to compare {arm!r} with, got {', '.join(arms)};"
                 " name another --baseline"
             )
-        found += [(arm, max(fitting, key=lambda each: len(words[each])))] if arm not in candidates else []
+        if arm not in candidates:
+            other = max(fitting, key=lambda each: len(words[each]))
+            found.append(Pair(arm, other, LIKE_FOR_LIKE if words[other] == words[arm] else MIXED))
     return found

@@ -21,6 +21,7 @@ from handrail.datasets.quality.catalogue import METRICS, Metric
 from handrail.datasets.quality.measure import Measured, Measurements
 
 FOLLOWS = 0.5  # |Spearman's ρ| with length from which a metric counts as following it
+_NO_SPREAD = 1e-9  # of a value: a standard deviation below is rounding
 
 _TOO_FEW = f"fewer than {FEWEST} episodes of a group have a value"
 
@@ -34,6 +35,7 @@ class Difference:
         label: The group.
         baseline: The other one.
         reason: Why there is no difference to speak of; "" if there is one.
+        incomparable: That reason, where both have values whose units are not known to be the same.
         paired: Whether episodes with the same start were compared.
         counts: Episodes of both that count.
         tested: Whether there are interval and p. Not for a metric of a group: the values of its episodes
@@ -52,6 +54,7 @@ class Difference:
     label: str
     baseline: str
     reason: str = ""
+    incomparable: str = ""
     paired: bool = False
     counts: tuple[int, int] = (0, 0)
     tested: bool = True
@@ -73,15 +76,25 @@ class Difference:
 
     @property
     def effect(self) -> tuple[float, float, float]:
-        """Estimate and interval in standard deviations; zero where nothing varies."""
-        unit = self.spread or float("inf")
-        return self.estimate / unit, self.interval[0] / unit, self.interval[1] / unit
+        """Estimate and interval in standard deviations; infinite for a difference where nothing varies."""
+        low, high = self.interval
+        return (
+            _in_spreads(self.estimate, self.spread),
+            _in_spreads(low, self.spread),
+            _in_spreads(high, self.spread),
+        )
 
     @property
     def at_equal_length(self) -> bool:
         """Whether what was detected, in its direction, is also there at equal length."""
         low, high = self.at_length_interval
         return self.detected and (low > 0.0 if self.estimate > 0.0 else high < 0.0)
+
+
+def _in_spreads(value: float, spread: float) -> float:
+    if spread > _NO_SPREAD * abs(value):
+        return value / spread
+    return float(np.copysign(np.inf, value)) if value else 0.0
 
 
 def differences(
@@ -110,8 +123,9 @@ def _difference(
     for each, values in zip((group, base), measured, strict=True):
         if not values.applies:
             return Difference(**names, reason=f"{each.label}: {values.reason}")
-    if not measurements.comparable(metric, group.label, base.label):
-        return Difference(**names, reason="the datasets have different columns, so there is no common scale")
+    apart = measurements.why_not(metric, group.label, base.label)
+    if apart:
+        return Difference(**names, reason=f"not comparable: {apart}", incomparable=apart)
     if metric.of_group:
         return _described(Difference(**names, tested=False), measured[0], measured[1])
     pairs = _finite_pairs(shared_seeds(group, base), measured[0].values, measured[1].values)

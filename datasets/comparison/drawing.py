@@ -2,6 +2,7 @@
 
 import base64
 import io
+from dataclasses import dataclass
 from typing import Any
 
 from handrail.controllers.errors import HandrailError
@@ -17,6 +18,29 @@ COLOURS = (
     "#7f7f7f",
 )  # Okabe–Ito
 INK, GREY, FAINT = "#1d2733", "#8a94a0", "#e3e7ec"
+
+
+@dataclass(frozen=True)
+class Panel:
+    """A figure of one pair of axes. What it is called stands beside it in the page, which breaks lines.
+
+    Attributes:
+        title: What it shows.
+        figure: Of matplotlib, without a title.
+        note: How to read it.
+    """
+
+    title: str
+    figure: Any
+    note: str = ""
+
+
+def short(label: str, most: int) -> str:
+    """Return a label that fits beside axes: the middle of a long one is left out."""
+    if len(label) <= most:
+        return label
+    head = (most - 1) // 2
+    return f"{label[:head]}…{label[len(label) - (most - 1 - head) :]}"
 
 
 def new_figure(width: float, height: float) -> Any:
@@ -49,7 +73,7 @@ def tidy(axes: Any, grid: str = "both") -> None:
     axes.set_axisbelow(True)
     axes.spines[["top", "right"]].set_visible(False)
     axes.spines[["left", "bottom"]].set_color(GREY)
-    axes.tick_params(colors=INK, labelsize=8, length=0)
+    axes.tick_params(colors=INK, labelsize=8, length=0, pad=6)
     axes.title.set(size=9.5, color=INK, weight="bold")
     for label in (axes.xaxis.label, axes.yaxis.label):
         label.set(size=8.5, color=INK)

@@ -63,9 +63,25 @@ def paragraph(text: str, look: str = "") -> str:
     return f'<p class="{look}">{escape(text)}</p>' if look else f"<p>{escape(text)}</p>"
 
 
-def picture(address: str, description: str) -> str:
-    """Return a figure over the whole width; nothing for an empty address."""
-    return f'<img class="figure" src="{address}" alt="{escape(description)}">' if address else ""
+def panels(shown: Iterable[tuple[str, str, str]], look: str = "") -> str:
+    """Return figures side by side as the page has room, each below its title.
+
+    Args:
+        shown: Title, note and address of each.
+        look: `small` or `wide`; "" for half the page.
+    """
+    figures = "".join(
+        f"<figure><figcaption><strong>{escape(title)}</strong> {escape(note)}</figcaption>"
+        f'<img src="{address}" alt="{escape(title)}"></figure>'
+        for title, note, address in shown
+    )
+    return f'<div class="panels {look}">{figures}</div>' if figures else ""
+
+
+def legend(colours: Iterable[tuple[str, str]]) -> str:
+    """Return which colour is whose."""
+    marks = (f'<span><i style="background: {colour}"></i>{escape(label)}</span>' for label, colour in colours)
+    return f'<p class="legend">{"".join(marks)}</p>'
 
 
 def gallery(pictures: Iterable[tuple[str, str]]) -> str:

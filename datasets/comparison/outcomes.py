@@ -4,7 +4,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy import stats
 
 from handrail.controllers.arrays import FloatArray
 from handrail.datasets.comparison.evaluations import SUCCESS, Arm
@@ -16,10 +15,18 @@ from handrail.datasets.comparison.proportions import (
     reach,
     unpaired_shares,
 )
+from handrail.datasets.comparison.replicates import (
+    chance_of_means,
+    replicates,
+    standard_error,
+    t_interval,
+    welch_p,
+    wider,
+)
 from handrail.datasets.comparison.resampling import Interval, Run, percentiles, resample_runs
 from handrail.datasets.paired import wilson
 
-_SAME = 1e-12  # shares that differ by less are the same
+LIKE_FOR_LIKE = "like-for-like"
 
 
 @dataclass(frozen=True)
@@ -32,10 +39,11 @@ class ArmOutcome:
         rollouts: Their number.
         wilson: 95 % interval of the success of these very policies: Wilson's, of as many rollouts as those of
             several policies in the same scenes are worth.
-        nested: 95 % interval over dataset draw, training seed and evaluation seed; None for one run.
+        nested: 95 % interval over dataset draw, training seed and evaluation seed: the wider of the nested
+            bootstrap's and Student's over replicates; None for one replicate.
         seeds: Success of each trained policy, one after the other.
         draws: Number of draws of the dataset.
-        means: Mean of every other outcome a rollout, by name, and its nested 95 % interval.
+        means: Mean of every other outcome a rollout, by name, and its 95 % interval, as `nested` is.
         trained_on: What the first policy was trained on.
     """
 
@@ -56,6 +64,19 @@ class ArmOutcome:
 
 
 @dataclass(frozen=True)
+class Pair:
+    """Labels of an arm and of what it is compared with, and which family of comparisons that belongs to.
+
+    A family is declared by the kind of comparison before anything is known of its result: Holm's correction
+    is over all of one family, and the report names it.
+    """
+
+    label: str
+    baseline: str
+    family: str = LIKE_FOR_LIKE
+
+
+@dataclass(frozen=True)
 class OutcomeDifference:
     """Success of an arm minus that of the baseline.
 
@@ -63,19 +84,22 @@ class OutcomeDifference:
         label: The arm.
         baseline: The other one.
         rollouts: Over all rollouts, as if these policies were all there is.
-        nested: 95 % interval over dataset draw, training seed and evaluation seed; None where an arm has
-            only one run, since then nothing is known of how much the training seed matters.
+        family: What kind of comparison it is: p is adjusted over all of this kind.
+        nested: 95 % interval over dataset draw, training seed and evaluation seed, the wider of the nested
+            bootstrap's and Welch's t interval over replicates; None where an arm has only one replicate,
+            since then nothing is known of how much the training seed matters.
         p: Two-sided, the largest of the exact test's, the nested bootstrap's, and Welch's t test of the
-            trained policies' success; resampling a handful of training seeds alone would see too much.
+            replicates' success; resampling a handful of training seeds alone would see too much.
         p_adjusted: By Holm, over all differences of the family.
         tests: Number of differences in the family.
-        training_error: Standard error over the trained policies, and its degrees of freedom, as Welch has
-            them; None where an arm has only one run.
+        training_error: Standard error over the replicates, and its degrees of freedom, as Welch has them;
+            None where an arm has only one replicate.
         detectable: The difference that would be seen as one in 80 % of such experiments.
     """
 
     label: str
     baseline: str
+    family: str
     rollouts: ShareDifference
     nested: Interval | None
     p: float
@@ -107,33 +131,35 @@ def judge(arms: Mapping[str, Arm], baseline: str, rng: np.random.Generator) -> O
         baseline: The label that the others are compared with.
         rng: Of the resampling.
     """
-    return judge_pairs(arms, [(label, baseline) for label in arms if label != baseline], rng)
+    return judge_pairs(arms, [Pair(label, baseline) for label in arms if label != baseline], rng)
 
 
-def judge_pairs(
-    arms: Mapping[str, Arm], pairs: Sequence[tuple[str, str]], rng: np.random.Generator
-) -> Outcomes:
-    """Compare the success of arms, each with a baseline of its own; all pairs are one family.
+def judge_pairs(arms: Mapping[str, Arm], pairs: Sequence[Pair], rng: np.random.Generator) -> Outcomes:
+    """Compare the success of arms, each with a baseline of its own, family by family.
 
     Args:
         arms: By label.
-        pairs: Labels of an arm and of what it is compared with.
+        pairs: What is compared with what.
         rng: Of the resampling.
     """
     runs = {label: arm.runs() for label, arm in arms.items()}
     resampled = dict(zip(runs, resample_runs(list(runs.values()), rng), strict=True))
     found = tuple(_arm(arm, resampled[label], rng) for label, arm in arms.items())
-    differences = [_difference(label, baseline, runs, resampled) for label, baseline in pairs]
-    return Outcomes(found, one_family(differences))
+    return Outcomes(found, in_families([_difference(pair, runs, resampled) for pair in pairs]))
 
 
-def one_family(differences: Sequence[OutcomeDifference]) -> tuple[OutcomeDifference, ...]:
-    """Return differences with p adjusted by Holm for all of them, and what is detectable then."""
-    adjusted, tests = holm([difference.p for difference in differences]), len(differences)
-    return tuple(
-        replace(difference, p_adjusted=p, tests=tests, detectable=_detectable(difference, tests))
-        for difference, p in zip(differences, adjusted, strict=True)
-    )
+def in_families(differences: Sequence[OutcomeDifference]) -> tuple[OutcomeDifference, ...]:
+    """Return differences with p adjusted by Holm for all of their family, and what is detectable then."""
+    members: dict[str, list[int]] = {}
+    for place, difference in enumerate(differences):
+        members.setdefault(difference.family, []).append(place)
+    found = list(differences)
+    for places in members.values():
+        adjusted, tests = holm([differences[place].p for place in places]), len(places)
+        for place, p in zip(places, adjusted, strict=True):
+            each = differences[place]
+            found[place] = replace(each, p_adjusted=p, tests=tests, detectable=_detectable(each, tests))
+    return tuple(found)
 
 
 def _detectable(difference: OutcomeDifference, tests: int) -> float:
@@ -155,7 +181,7 @@ def _arm(arm: Arm, resampled: FloatArray, rng: np.random.Generator) -> ArmOutcom
         successes=int(values.sum()),
         rollouts=len(values),
         wilson=wilson(float(values.mean()) * worth, worth),
-        nested=percentiles(resampled) if len(runs) > 1 else None,
+        nested=_nested(runs, resampled),
         seeds=tuple(float(run.values.mean()) for run in runs),
         draws=len({run.draw for run in runs}),
         means={name: _mean(arm.runs(name), rng) for name in names},
@@ -163,50 +189,37 @@ def _arm(arm: Arm, resampled: FloatArray, rng: np.random.Generator) -> ArmOutcom
     )
 
 
+def _nested(runs: Sequence[Run], resampled: FloatArray) -> Interval | None:
+    means = replicates(runs)
+    if len(means) < 2:
+        return None
+    return wider(percentiles(resampled), t_interval(float(means.mean()), *standard_error([runs])), 0.0, 1.0)
+
+
 def _mean(runs: Sequence[Run], rng: np.random.Generator) -> tuple[float, Interval]:
     (resampled,) = resample_runs([runs], rng)
-    return float(np.mean(np.concatenate([run.values for run in runs]))), percentiles(resampled)
+    values, means = np.concatenate([run.values for run in runs]), replicates(runs)
+    interval = percentiles(resampled)
+    if len(means) > 1:
+        by_t = t_interval(float(means.mean()), *standard_error([runs], chance_of_means))
+        interval = wider(interval, by_t, 0.0 if values.min() >= 0.0 else -np.inf, np.inf)
+    return float(values.mean()), interval
 
 
 def _difference(
-    label: str, baseline: str, runs: Mapping[str, Sequence[Run]], resampled: Mapping[str, FloatArray]
+    pair: Pair, runs: Mapping[str, Sequence[Run]], resampled: Mapping[str, FloatArray]
 ) -> OutcomeDifference:
-    shares = compare_rollouts(runs[label], runs[baseline])
-    if min(len(runs[label]), len(runs[baseline])) < 2:
-        return OutcomeDifference(label, baseline, shares, None, shares.p, shares.p, 1, None, 1.0)
-    nested = resampled[label] - resampled[baseline]
+    both = runs[pair.label], runs[pair.baseline]
+    names, shares = (pair.label, pair.baseline, pair.family), compare_rollouts(*both)
+    if min(len(replicates(each)) for each in both) < 2:
+        return OutcomeDifference(*names, shares, None, shares.p, shares.p, 1, None, 1.0)
+    nested = resampled[pair.label] - resampled[pair.baseline]
     tail = (1 + min(np.count_nonzero(nested <= 0), np.count_nonzero(nested >= 0))) / (len(nested) + 1)
-    p = max(shares.p, min(1.0, 2.0 * float(tail)), welch_p(runs[label], runs[baseline]))
-    error = welch_error(runs[label], runs[baseline])
-    return OutcomeDifference(label, baseline, shares, percentiles(nested), p, p, 1, error, 1.0)
-
-
-def welch_p(first: Sequence[Run], second: Sequence[Run]) -> float:
-    """Return the p of Welch's t test of the success of trained policies, one number a training seed."""
-    difference = float(np.mean(_shares(first)) - np.mean(_shares(second)))
-    error, freedom = welch_error(first, second)
-    if not error:
-        return 1.0 if abs(difference) < _SAME else 0.0
-    return 2.0 * float(stats.t.sf(abs(difference) / error, freedom))
-
-
-def welch_error(first: Sequence[Run], second: Sequence[Run]) -> tuple[float, float]:
-    """Return the standard error of the difference of two means over trained policies, as Welch has it.
-
-    √(v₁ + v₂) with v = s² / n, and (v₁ + v₂)² / (v₁² / (n₁ − 1) + v₂² / (n₂ − 1)) degrees of freedom; 0 and ∞
-    where the policies of each arm succeed equally often.
-    """
-    shares = [_shares(runs) for runs in (first, second)]
-    parts = [each.var(ddof=1) / len(each) if np.ptp(each) > _SAME else 0.0 for each in shares]
-    if not any(parts):
-        return 0.0, float("inf")
-    below = sum(part**2 / (len(each) - 1) for part, each in zip(parts, shares, strict=True))
-    return float(np.sqrt(sum(parts))), float(sum(parts) ** 2 / below)
-
-
-def _shares(runs: Sequence[Run]) -> FloatArray:
-    """Return the success of each trained policy."""
-    return np.array([run.values.mean() for run in runs])
+    p = max(shares.p, min(1.0, 2.0 * float(tail)), welch_p(*both))
+    error, freedom = standard_error(both)
+    estimate = float(replicates(both[0]).mean() - replicates(both[1]).mean())
+    interval = wider(percentiles(nested), t_interval(estimate, error, freedom), -1.0, 1.0)
+    return OutcomeDifference(*names, shares, interval, p, p, 1, (error, freedom), 1.0)
 
 
 def compare_rollouts(first: Sequence[Run], second: Sequence[Run]) -> ShareDifference:

@@ -1,40 +1,54 @@
 """The report as one page that needs nothing else: the answer first, then how it came about."""
 
+from collections.abc import Iterable, Sequence
 from html import escape
 
 from handrail.datasets.comparison import report_tables as tables
 from handrail.datasets.comparison.collection import Collected
-from handrail.datasets.comparison.compare import Comparison
-from handrail.datasets.comparison.figures import answer_figure, colours, effects_figure, metrics_figure
-from handrail.datasets.comparison.findings import Finding, headline
+from handrail.datasets.comparison.compare import MIXED, Comparison
+from handrail.datasets.comparison.drawing import Panel, svg
+from handrail.datasets.comparison.figures import answer_panels, colours
+from handrail.datasets.comparison.finding import Finding
+from handrail.datasets.comparison.findings import headline
+from handrail.datasets.comparison.groups import group_of
 from handrail.datasets.comparison.markup import (
     card,
     cards,
     folded,
     gallery,
     items,
+    legend,
     page,
+    panels,
     paragraph,
-    picture,
     section,
 )
-from handrail.datasets.comparison.outcomes import ArmOutcome
+from handrail.datasets.comparison.metric_figures import TURNED, effects_panels, metrics_panels
+from handrail.datasets.comparison.outcomes import Outcomes
 from handrail.datasets.comparison.pictures import first_pictures
-from handrail.datasets.comparison.resampling import Interval
-from handrail.datasets.comparison.trajectories import trajectories_figure
-from handrail.datasets.comparison.wording import duration, number, percent, percent_span, span
+from handrail.datasets.comparison.trajectories import trajectory_panels
+from handrail.datasets.comparison.wording import (
+    DASH,
+    duration,
+    families,
+    number,
+    percent,
+    percent_span,
+    span,
+)
 from handrail.datasets.quality.catalogue import METRICS
 
 _HOW = (
     "Every interval is 95 %. Shares: Wilson; their differences: Newcombe's method 10, exact McNemar test"
     " where the same seeds were tried under both, Boschloo's where not. Several trained policies that met the"
-    " same scenes: “these policies” takes the scene for the unit; “with training” is a bootstrap over dataset"
-    " draw, training seed and evaluation seed, nested, and Welch's t test over the policies has to agree."
+    " same scenes: “these policies” and these tests take the scene for the unit; “with training” is the wider"
+    " of a nested bootstrap over dataset draw, training seed and evaluation seed and of Student's t over the"
+    " policies (over draws where there are several), and Welch's t test over them has to agree."
     " Means of metrics: bootstrap over episodes and permutation tests, paired by seed where every episode has"
     " one that began alike. What needs all episodes of a group at once (action variance, state coverage,"
     " mutual information) depends on their number: it is described at the same number and not tested."
     " A difference counts as detected if its intervals leave zero out and p stays below 0.05 after"
-    " Holm's correction over all comparisons of its kind. “Detectable” is the difference that would be"
+    " Holm's correction over its family. “Detectable” is the difference that would be"
     " detected in 80 % of such experiments. ↔ marks metrics that follow the length of the episodes"
     " (Spearman's |ρ| ≥ 0.5); “same length” is the difference with that taken off by analysis of covariance."
 )
@@ -42,6 +56,10 @@ _QUALITY = (
     "Each with its 95 % interval; bold: detected. These numbers describe data; they do not rank it. Point at"
     " a name for what it means, and at a dash for why there is nothing."
 )
+_EFFECTS = (
+    "Filled: detected; hollow: not. An arrow: beyond what is shown, or a difference where nothing varies."
+)
+_TURNED = f" {TURNED}: less is better, so the metric is drawn the other way round."
 
 
 def report_page(comparison: Comparison, found: list[Finding]) -> str:
@@ -55,33 +73,50 @@ def report_page(comparison: Comparison, found: list[Finding]) -> str:
         section("What was collected", tables.collection_table(comparison.everything.collected)),
         section("Quality", *_quality(comparison)),
         section("The same number, the same time", _matched_note(), tables.matched_table(comparison.views)),
-        section(
-            "Trajectories",
-            picture(trajectories_figure(comparison), "paths and speeds"),
-            _pictures(comparison),
-        ),
+        section("Trajectories", _drawn(trajectory_panels(comparison)), _pictures(comparison)),
     ]
     missing = tables.not_applicable_table(comparison)
-    parts += [section("What does not apply", missing)] if missing else []
-    parts.append(section("How to read this", paragraph(_HOW), folded("What every metric means", _meanings())))
+    parts += [section("What does not apply, or is not comparable", missing)] if missing else []
+    how = paragraph(_HOW), paragraph(_families(comparison))
+    parts.append(section("How to read this", *how, folded("What every metric means", _meanings())))
     return page(title, "".join(parts))
 
 
-def _first_screen(comparison: Comparison, found: list[Finding]) -> str:
+def _drawn(shown: Iterable[Panel], look: str = "") -> str:
+    return panels([(panel.title, panel.note, svg(panel.figure)) for panel in shown], look)
+
+
+def _legend(comparison: Comparison) -> str:
     known = colours(comparison)
+    return legend((label, known[label]) for label in comparison.labels)
+
+
+def _families(comparison: Comparison) -> str:
+    """Return over which comparisons Holm's correction is, by name and number."""
+    others = len(comparison.success)
+    tested = len([each for each in comparison.everything.differences if each.tested and not each.reason])
+    told = [
+        f"success while collecting ({others})",
+        f"successes an hour ({others})",
+        f"all metrics that are tested ({tested}; as many in each other view)",
+    ]
+    if comparison.outcomes and comparison.outcomes.differences:
+        names = families(each.family for each in comparison.outcomes.differences)
+        told.insert(0, f"the success of policies ({names.removesuffix(',')})")
+    mixed = " Mixed: the policies' labels say that they differ in more than their data."
+    return f"Families of Holm's correction: {'; '.join(told)}.{mixed if MIXED in told[0] else ''}"
+
+
+def _first_screen(comparison: Comparison, found: list[Finding]) -> str:
     sources = sorted({str(group.info.root.name) for group in comparison.everything.groups})
     tasks = {
         task for group in comparison.everything.groups for e in group.episodes for task in e.meta["tasks"]
     }
     what = f"{', '.join(sources)} – {'; '.join(sorted(tasks)[:2])}{' …' if len(tasks) > 2 else ''}"
-    arms = {arm.label: arm for arm in comparison.outcomes.arms} if comparison.outcomes else {}
-    shown = [
-        _card(each, arms.get(each.label), comparison.rates[each.label], known[each.label])
-        for each in comparison.everything.collected
-    ]
+    shown = [_card(comparison, each) for each in comparison.everything.collected]
     answer = paragraph(headline(found), "headline")
     heading = f"<header><h1>{escape(_title(comparison))}</h1>{paragraph(what)}</header>"
-    figure = f"<section>{picture(answer_figure(comparison), 'success')}</section>"
+    figure = f"<section>{_legend(comparison)}{_drawn(answer_panels(comparison))}</section>"
     return heading + answer + cards(shown) + figure
 
 
@@ -90,22 +125,31 @@ def _title(comparison: Comparison) -> str:
     return f"{', '.join(first)} and {last}, compared"
 
 
-def _card(each: Collected, arm: ArmOutcome | None, rates: Interval | None, colour: str) -> str:
+def _card(comparison: Comparison, each: Collected) -> str:
+    rates, colour = comparison.rates[each.label], colours(comparison)[each.label]
     rate = number(each.successes_an_hour) + (f" ({span(rates)})" if rates else "")
     lines = [
         f"{each.episodes} episodes in {duration(each.operator_time)} of operator time",
         f"{rate} successes per operator hour" if each.successes is not None else "success was not recorded",
     ]
-    if arm:
-        collecting = f"collecting: {percent(each.success)}" if each.success is not None else ""
-        first = f"policy success, {percent_span(arm.nested or arm.wilson)} (95 %)"
-        return card(
-            each.label, colour, percent(arm.share), [first, *([collecting] if collecting else []), *lines]
-        )
+    if comparison.outcomes:
+        collecting = [f"collecting: {percent(each.success)}"] if each.success is not None else []
+        big, first = _policies(comparison.outcomes, each.label, comparison.labels)
+        return card(each.label, colour, big, [first, *collecting, *lines])
     if each.successes is None:
         return card(each.label, colour, f"{each.episodes} episodes", lines)
     first = f"succeeded while collecting, {percent_span(each.success_interval)} (95 %)"
     return card(each.label, colour, percent(each.success), [first, *lines])
+
+
+def _policies(outcomes: Outcomes, label: str, labels: Sequence[str]) -> tuple[str, str]:
+    """Return what a card says of a group's policies, in large and below: of the group's own name first."""
+    mine = [arm for arm in outcomes.arms if group_of(arm.label, labels) == label]
+    if not mine:
+        return DASH, "no policy was evaluated"
+    arm = min(mine, key=lambda arm: arm.label != label)
+    whose = "" if arm.label == label else f" of {arm.label}"
+    return percent(arm.share), f"policy success{whose}, {percent_span(arm.nested or arm.wilson)} (95 %)"
 
 
 def _findings(found: list[Finding]) -> str:
@@ -116,12 +160,15 @@ def _findings(found: list[Finding]) -> str:
 
 
 def _quality(comparison: Comparison) -> list[str]:
+    turned = "" if comparison.unlike else _TURNED
     parts = [
-        picture(effects_figure(comparison), "differences in standard deviations"),
-        paragraph(_QUALITY, "quiet"),
+        _legend(comparison),
+        _drawn(effects_panels(comparison), "wide"),
+        paragraph(_EFFECTS + turned, "quiet"),
     ]
     parts += [tables.metrics_table(comparison, label) for label in comparison.success]
-    return [*parts, picture(metrics_figure(comparison), "every metric, one dot an episode")]
+    parts.append(paragraph(_QUALITY, "quiet"))
+    return [*parts, _drawn(metrics_panels(comparison), "small")]
 
 
 def _matched_note() -> str:

@@ -27,6 +27,12 @@ class RateRatio:
     interval: Interval
     p: float
 
+    @property
+    def inverse(self) -> "RateRatio":
+        """Those of the baseline over those of the group."""
+        low, high = self.interval
+        return RateRatio(_over(self.estimate), (_over(high), _over(low)), self.p)
+
 
 def rate_interval(group: Group, rng: np.random.Generator) -> Interval | None:
     """Return the 95 % bootstrap interval of successes an hour; None where it cannot be told."""
@@ -87,6 +93,10 @@ def _numbers(group: Group) -> tuple[FloatArray, FloatArray]:
     """Return success, NaN where unknown, and duration [s] of every episode."""
     successes = [np.nan if e.success is None else float(e.success) for e in group.episodes]
     return np.array(successes), np.array([e.seconds for e in group.episodes])
+
+
+def _over(ratio: float) -> float:
+    return 1.0 / ratio if ratio else float("inf")
 
 
 def _rate(successes: FloatArray, seconds: FloatArray) -> FloatArray:

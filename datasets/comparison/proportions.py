@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import stats
 
-from handrail.controllers.arrays import FloatArray
+from handrail.controllers.arrays import FloatArray, IntArray
 from handrail.datasets.comparison.resampling import Interval
 from handrail.datasets.paired import paired_success, wilson
 
@@ -26,7 +26,7 @@ class ShareDifference:
     Attributes:
         estimate: Of the difference, −1 to 1.
         interval: 95 %, Newcombe's method 10; trials of one scene count for as many as they are worth.
-        p: Two-sided, exact: McNemar's where paired, else Boschloo's.
+        p: Two-sided, exact: McNemar's where paired, else Boschloo's; trials of one scene are one observation.
         paired: Whether the same trials were made under both.
         trials: Pairs, or trials of the first and of the second.
         error: Standard error of the difference if there were none, of shares that are never quite 0 or 1.
@@ -89,7 +89,7 @@ def paired_shares(
         first: `(N,)`.
         second: `(N,)`.
         scenes: What pairs may have in common, `(N,)`: for the interval and the error those of a scene count
-            for as many as they are worth; None where each is for itself.
+            for as many as they are worth, and the test turns them together; None where each is for itself.
 
     Raises:
         HandrailError: The sizes differ, or there are none.
@@ -97,20 +97,42 @@ def paired_shares(
     found = paired_success(np.asarray(first), np.asarray(second))
     one, other = np.asarray(first, bool), np.asarray(second, bool)
     both, neither = int(np.sum(one & other)), int(np.sum(~one & ~other))
-    worth = 1.0
+    worth, p = 1.0, found.p_mcnemar
     if scenes is not None:
         worth = independent_trials(one.astype(float) - other, scenes) / found.pairs
+        p = mcnemar_by_scene(one.astype(int) - other, scenes)
     cells = [worth * count for count in (both, found.only_first, found.only_second, neither)]
     pairs = sum(cells)
     discordant = (cells[1] + cells[2] + 2.0) / (pairs + 4.0)
     return ShareDifference(
         estimate=(found.only_first - found.only_second) / found.pairs,
         interval=newcombe_paired(*cells),
-        p=found.p_mcnemar,
+        p=p,
         paired=True,
         trials=(found.pairs,),
         error=float(np.sqrt(discordant / pairs)),
     )
+
+
+def mcnemar_by_scene(differences: IntArray, scenes: Sequence[int]) -> float:
+    """Return P(|Σ_j ± d_j| ≥ |Σ_j d_j|), d_j the sum over the pairs of scene j, signs fair and independent.
+
+    Under the null hypothesis the conditions may be exchanged in a scene, for all its pairs at once. Exact;
+    McNemar's exact test where no scene repeats.
+
+    Args:
+        differences: Success under the first condition minus that under the second, `(N,)`: −1, 0 or 1.
+        scenes: Which scene each pair met, `(N,)`.
+    """
+    _, owner = np.unique(np.asarray(scenes), return_inverse=True)
+    sums = np.bincount(owner, weights=differences).round().astype(int)
+    chances = np.ones(1)  # of every sum from −Σ |d_j| to Σ |d_j|
+    for size in np.abs(sums[sums != 0]):
+        step = np.zeros(2 * size + 1)
+        step[[0, -1]] = 0.5
+        chances = np.convolve(chances, step)
+    away = np.abs(np.arange(len(chances)) - len(chances) // 2)
+    return min(1.0, float(chances[away >= abs(sums.sum())].sum()))
 
 
 def unpaired_shares(
@@ -134,7 +156,9 @@ def unpaired_shares(
     for place, (values, each) in enumerate(zip(sides, scenes or (), strict=True)):
         worth[place] = independent_trials(np.asarray(values, float), each)
     shares = one[0] / one[1], other[0] / other[1]
-    table = [[one[0], other[0]], [one[1] - one[0], other[1] - other[0]]]
+    trials = [round(each) for each in worth]
+    hits = [round(share * count) for share, count in zip(shares, trials, strict=True)]
+    table = [hits, [count - hit for count, hit in zip(trials, hits, strict=True)]]
     share = (one[0] + other[0] + 2) / (one[1] + other[1] + 4)
     spread = np.sqrt(share * (1 - share) * (1 / worth[0] + 1 / worth[1]))
     return ShareDifference(

@@ -12,7 +12,8 @@ from typing import Any
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.comparison.compare import Comparison, View
 from handrail.datasets.comparison.differences import Difference
-from handrail.datasets.comparison.findings import Finding, findings
+from handrail.datasets.comparison.finding import Finding
+from handrail.datasets.comparison.findings import findings
 from handrail.datasets.comparison.page import report_page
 from handrail.datasets.quality.catalogue import METRICS
 
@@ -59,6 +60,7 @@ def as_json(comparison: Comparison, found: list[Finding]) -> dict[str, Any]:
         {
             "format": "handrail.comparison/1",
             "baseline": comparison.baseline,
+            "unlike": comparison.unlike,
             "config": asdict(comparison.config),
             "findings": [asdict(finding) for finding in found],
             "collection_differences": {

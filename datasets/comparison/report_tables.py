@@ -12,6 +12,7 @@ from handrail.datasets.comparison.wording import (
     DASH,
     THESE_POLICIES,
     WITH_TRAINING,
+    counted,
     duration,
     number,
     p_value,
@@ -123,8 +124,8 @@ def outcome_differences_table(outcomes: Outcomes) -> str:
             points_span(each.rollouts.interval),
             points_span(each.nested) if each.nested else DASH,
             ("McNemar" if each.rollouts.paired else "Boschloo")
-            + (", bootstrap, Welch" if each.nested else ""),
-            p_value(each.p_adjusted),
+            + (" by scene, bootstrap, Welch" if each.nested else ""),
+            Cell(p_value(each.p_adjusted), below=f"over {counted(each.tests, each.family)}"),
             f"{100 * each.detectable:.0f} points",
         ]
         for each in outcomes.differences
@@ -151,7 +152,7 @@ def _metric(comparison: Comparison, metric: Metric, label: str) -> list[Cell | s
     follows = abs(every.follows_length) >= FOLLOWS and metric.name != "length"
     name = metric.title + (" ↔" if follows else "")
     return [
-        Cell(name, "", metric.meaning, _below(metric)),
+        Cell(name, "", metric.meaning, _below(metric, ranked=not comparison.unlike)),
         _mean(other),
         _mean(one),
         *([_estimate(each) for each in (every, number_, time)]),
@@ -160,10 +161,9 @@ def _metric(comparison: Comparison, metric: Metric, label: str) -> list[Cell | s
     ]
 
 
-def _below(metric: Metric) -> str:
-    return " · ".join(
-        part for part in (metric.unit, f"{metric.good} is better" if metric.good else "") if part
-    )
+def _below(metric: Metric, ranked: bool) -> str:
+    judged = f"{metric.good} is better" if metric.good and ranked else ""
+    return " · ".join(part for part in (metric.unit, judged) if part)
 
 
 def _at_length(each: Difference) -> Cell:
@@ -184,7 +184,7 @@ def _mean(mean: Mean) -> Cell:
 
 def _estimate(each: Difference) -> Cell:
     if each.reason:
-        return Cell(DASH, "quiet", each.reason)
+        return Cell("not comparable" if each.incomparable else DASH, "quiet", each.reason)
     if not each.tested:
         return Cell(signed(each.estimate), "", _UNTESTED)
     look = "detected" if each.detected else ""
@@ -192,7 +192,7 @@ def _estimate(each: Difference) -> Cell:
 
 
 def not_applicable_table(comparison: Comparison) -> str:
-    """Return which metrics do not apply, to whom, and why; "" where all do."""
+    """Return which metrics do not apply or are not comparable, to whom, and why; "" where all do and are."""
     rows = []
     for metric in METRICS:
         reasons: dict[str, list[str]] = {}
@@ -200,5 +200,8 @@ def not_applicable_table(comparison: Comparison) -> str:
             if mean.reason:
                 who = label if mean.mean is None else f"{label} (some episodes)"
                 reasons.setdefault(mean.reason, []).append(who)
+        for each in comparison.everything.differences:
+            if each.metric is metric and each.incomparable:
+                reasons.setdefault(each.reason, []).append(f"{each.label} against {each.baseline}")
         rows += [[metric.title, ", ".join(labels), reason] for reason, labels in reasons.items()]
-    return table(("metric", "does not apply to", "why"), rows) if rows else ""
+    return table(("metric", "whose", "why"), rows) if rows else ""

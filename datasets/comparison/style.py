@@ -19,7 +19,17 @@ section > h2:first-child { margin-top: 0; }
 .card h3 { margin: 0 0 4px; font-size: 15px; }
 .card .big { font-size: 27px; font-weight: 700; line-height: 1.15; }
 .card small { color: var(--quiet); display: block; }
-img.figure { width: 100%; height: auto; display: block; }
+.panels { display: grid; gap: 14px; grid-template-columns: repeat(auto-fit, minmax(420px, 1fr)); }
+.panels.small { grid-template-columns: repeat(auto-fill, minmax(240px, 1fr)); margin-top: 14px; }
+.panels.wide { grid-template-columns: 1fr; }
+.panels img { width: 100%; height: auto; display: block; }
+.panels figcaption { margin: 4px 0; overflow-wrap: anywhere; }
+.panels strong { color: var(--ink); font-size: 13.5px; }
+.panels.small strong { font-size: 12.5px; }
+.legend { display: flex; flex-wrap: wrap; gap: 2px 16px; margin: 0 0 6px; font-size: 13px; }
+.legend i { display: inline-block; width: 11px; height: 11px; border-radius: 50%; margin-right: 6px; }
+h1, h3, .headline, .legend { overflow-wrap: anywhere; }
+td:first-child { overflow-wrap: break-word; min-width: 96px; max-width: 240px; }
 table { border-collapse: collapse; width: 100%; font-size: 13.5px; font-variant-numeric: tabular-nums; }
 th, td { text-align: left; padding: 5px 10px 5px 0; border-bottom: 1px solid var(--line);
   vertical-align: top; }
@@ -36,5 +46,8 @@ li.caution::marker { content: "!  "; font-weight: 700; color: #d55e00; }
 .pictures { display: flex; flex-wrap: wrap; gap: 10px; }
 figure { margin: 0; } figcaption { font-size: 12px; color: var(--quiet); }
 details summary { cursor: pointer; color: var(--quiet); }
+@media (max-width: 900px) { main { padding: 14px 10px 40px; } section { padding: 12px; }
+  table { font-size: 12px; } th, td { padding: 4px 7px 4px 0; } td small { font-size: 10px; }
+  .panels { grid-template-columns: 1fr; } .panels.small { grid-template-columns: 1fr 1fr; } }
 @media print { body { background: #fff; } section, .card { break-inside: avoid; } }
 """

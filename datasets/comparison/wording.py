@@ -1,6 +1,8 @@
 """Numbers as people read them."""
 
 import math
+from collections import Counter
+from collections.abc import Iterable
 
 from handrail.datasets.quality.catalogue import Metric
 
@@ -54,6 +56,17 @@ def points_span(interval: tuple[float, float]) -> str:
 def p_value(p: float) -> str:
     """Return a p-value with its sign of comparison."""
     return "p < 0.001" if p < 0.001 else f"p = {p:.2g}"
+
+
+def counted(number_: int, family: str) -> str:
+    """Return how many differences a family of comparisons has."""
+    return f"{number_} {family} difference{'' if number_ == 1 else 's'}"
+
+
+def families(names: Iterable[str]) -> str:
+    """Return over what Holm's correction is, from the family of each difference."""
+    *first, last = [counted(number_, family) for family, number_ in Counter(names).items()]
+    return f"{', '.join(first)} and {last}, each family for itself," if first else last
 
 
 def duration(seconds: float) -> str:

@@ -17,6 +17,7 @@ from handrail.datasets.quality.information import information
 from handrail.datasets.quality.missing import DoesNotApply
 from handrail.datasets.quality.neighbours import cloud, frames_of, mean_of_each
 from handrail.datasets.quality.pool import Pool
+from handrail.datasets.quality.units import Needs
 
 Group = Sequence[Demonstration]
 OfEpisode = Callable[[Demonstration, Pool], float]
@@ -36,7 +37,7 @@ class Metric:
         measure: Its value for one episode, or None.
         measure_group: Its values for all episodes of a group, for what needs the others; or None. Such values
             depend on how many episodes there are and, through the neighbours they share, on each other.
-        pooled: Whether its values depend on what it is compared with, and so only compare within one pool.
+        needs: What its unit hangs on, see `units.why_not`; "" where it has a unit of its own.
     """
 
     name: str
@@ -46,7 +47,7 @@ class Metric:
     meaning: str
     measure: OfEpisode | None = None
     measure_group: OfGroup | None = None
-    pooled: bool = False
+    needs: Needs = ""
 
     @property
     def of_group(self) -> bool:
@@ -111,6 +112,7 @@ METRICS = (
         "higher",
         "spectral arc length of the speed: minimum jerk −1.4, more negative is less smooth",
         lambda episode, pool: _known(sparc(_speed(episode), episode.fps)),
+        needs="motion",
     ),
     Metric(
         "ldlj",
@@ -119,6 +121,7 @@ METRICS = (
         "higher",
         "log dimensionless jerk of the speed: minimum jerk −5.2; very sensitive to noise",
         lambda episode, pool: _known(ldlj(_speed(episode), episode.fps)),
+        needs="motion",
     ),
     Metric(
         "path_efficiency",
@@ -127,6 +130,7 @@ METRICS = (
         "higher",
         "straight-line over travelled distance, each phase on its own",
         lambda episode, pool: path.measure(episode),
+        needs="motion",
     ),
     Metric(
         "idle_raw",
@@ -135,6 +139,7 @@ METRICS = (
         "lower",
         "share of time with hardly any net motion within 0.5 s",
         lambda episode, pool: idle.idle_share(episode.motion, episode.fps, pruned=False),
+        needs="position",
     ),
     Metric(
         "idle_pruned",
@@ -143,6 +148,7 @@ METRICS = (
         "lower",
         "the same up to the last motion",
         lambda episode, pool: idle.idle_share(episode.motion, episode.fps, pruned=True),
+        needs="position",
     ),
     Metric(
         "action_variance",
@@ -152,7 +158,7 @@ METRICS = (
         "spread of actions that other episodes took in like states; falls with more episodes, and is not"
         " monotone in quality",
         measure_group=_action_variance,
-        pooled=True,
+        needs="pool",
     ),
     Metric(
         "state_coverage",
@@ -162,7 +168,7 @@ METRICS = (
         "entropy of the configurations: more is more varied, too little and too much are both bad; for groups"
         " of the same size",
         measure_group=_state_coverage,
-        pooled=True,
+        needs="pool",
     ),
     Metric(
         "information",
@@ -171,7 +177,7 @@ METRICS = (
         "higher",
         "what the state says about the action (DemInf): varied and predictable at once",
         measure_group=_information,
-        pooled=True,
+        needs="pool",
     ),
     Metric(
         "tracking_error",
@@ -180,6 +186,7 @@ METRICS = (
         "lower",
         "distance of the next state from what was commanded",
         lambda episode, pool: tracking.tracking_error(episode.commanded, episode.reached),
+        needs="action",
     ),
     Metric(
         "saturation",
@@ -188,7 +195,7 @@ METRICS = (
         "lower",
         "share of time in which an entry of the action stays at the end of its range",
         lambda episode, pool: tracking.saturation(episode.matrix("action"), *pool.action_range),
-        pooled=True,
+        needs="pool",
     ),
     Metric(
         "variation_ratio",
@@ -197,6 +204,7 @@ METRICS = (
         "",
         "total variation of the commands over that of the motion; above 1 the robot smoothed them",
         lambda episode, pool: tracking.variation_ratio(episode.commanded, episode.reached),
+        needs="action",
     ),
     Metric(
         "smallest_distance",
@@ -237,6 +245,7 @@ METRICS = (
         "lower",
         "how far a soft limit was given up at most",
         lambda episode, pool: safety.slack_used(_vector(episode, "slack")),
+        needs="controller",
     ),
     Metric(
         "input_effort",
@@ -245,7 +254,7 @@ METRICS = (
         "lower",
         "seconds of full deflection, input axes added up",
         lambda episode, pool: effort.input_effort(episode.inputs, pool.input_scale, episode.fps),
-        pooled=True,
+        needs="pool",
     ),
     Metric(
         "input_reversals",
@@ -254,7 +263,7 @@ METRICS = (
         "lower",
         "how often an input axis changed its sign",
         lambda episode, pool: effort.input_reversals(episode.inputs, pool.input_scale),
-        pooled=True,
+        needs="pool",
     ),
     Metric(
         "mode_switches",
@@ -271,6 +280,6 @@ METRICS = (
         "lower",
         "mean number of input axes in use at a time",
         lambda episode, pool: effort.active_axes(episode.inputs, pool.input_scale),
-        pooled=True,
+        needs="pool",
     ),
 )

@@ -23,6 +23,21 @@ Names = Mapping[str, tuple[str, ...] | None]
 
 
 @dataclass(frozen=True)
+class Source:
+    """Where an episode is from, as far as that tells the units of its numbers.
+
+    Attributes:
+        root: Folder of the dataset.
+        robot: Its type, or "".
+        from_handrail: Whether Handrail recorded it: in metres, radians and seconds.
+    """
+
+    root: str = ""
+    robot: str = ""
+    from_handrail: bool = False
+
+
+@dataclass(frozen=True)
 class Demonstration:
     """One episode. What it does not hold raises `DoesNotApply` with the reason when it is asked for.
 
@@ -33,6 +48,7 @@ class Demonstration:
         names: Names of the columns' entries.
         meta: The episode's line of metadata.
         columns: Which column plays which part.
+        source: Where it is from.
     """
 
     number: int
@@ -41,6 +57,7 @@ class Demonstration:
     names: Names
     meta: Mapping[str, Any]
     columns: ColumnNames = field(default_factory=ColumnNames)
+    source: Source = field(default_factory=Source)
 
     @property
     def count(self) -> int:

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.quality.columns import ColumnNames
-from handrail.datasets.quality.demonstration import Demonstration
+from handrail.datasets.quality.demonstration import Demonstration, Source
 from handrail.datasets.reader import DatasetInfo, read_episodes, read_info, read_rows_of
 
 
@@ -24,6 +24,7 @@ def read_demonstrations(root: str | Path, columns: ColumnNames | None = None) ->
         raise HandrailError(f"dataset {str(info.root)!r}: expected one episode or more, got none")
     wanted = _wanted(info, columns)
     names = {name: info.features[name].names for name in wanted}
+    source = Source(str(info.root.resolve()), info.robot_type, info.from_handrail)
     return [
         Demonstration(
             number=row["episode_index"],
@@ -32,6 +33,7 @@ def read_demonstrations(root: str | Path, columns: ColumnNames | None = None) ->
             names=names,
             meta=row,
             columns=columns,
+            source=source,
         )
         for row in read_episodes(root)
     ]

@@ -10,7 +10,8 @@ from handrail.controllers.arrays import FloatArray
 from handrail.datasets.quality.catalogue import METRICS, Metric
 from handrail.datasets.quality.demonstration import Demonstration
 from handrail.datasets.quality.missing import DoesNotApply
-from handrail.datasets.quality.pool import Pool, signature
+from handrail.datasets.quality.pool import Pool
+from handrail.datasets.quality.units import why_not
 
 _FRAMES = 2048  # of a group at most, for what compares every frame with every other
 
@@ -42,15 +43,20 @@ class Measurements:
 
     Attributes:
         values: By metric and group.
-        pools: Which pool a group is in; pooled metrics only compare within one.
+        pools: Which pool a group is in: what is put on one scale only compares within one.
+        groups: What was measured.
     """
 
     values: Mapping[str, Mapping[str, Measured]]
     pools: Mapping[str, int]
+    groups: Groups
 
-    def comparable(self, metric: Metric, one: str, other: str) -> bool:
-        """Return whether a metric's values of two groups are on one scale."""
-        return not metric.pooled or self.pools[one] == self.pools[other]
+    def why_not(self, metric: Metric, one: str, other: str) -> str:
+        """Return why a metric's values of two groups cannot be compared; "" if they can."""
+        reason = why_not(metric.needs, self.groups[one], self.groups[other])
+        if not reason and metric.needs == "pool" and self.pools[one] != self.pools[other]:
+            return "they were put on different scales"
+        return reason
 
 
 def measure(
@@ -76,7 +82,7 @@ def measure(
         }
         for metric in metrics
     }
-    return Measurements(values, numbers)
+    return Measurements(values, numbers, groups)
 
 
 def _pool(groups: Sequence[Sequence[Demonstration]], margin: float) -> Pool:
@@ -86,9 +92,14 @@ def _pool(groups: Sequence[Sequence[Demonstration]], margin: float) -> Pool:
 
 
 def _pools(groups: Groups) -> dict[str, int]:
-    """Return a number for each group, the same for groups whose columns are the same."""
-    seen: dict[tuple[object, ...], int] = {}
-    return {label: seen.setdefault(signature(episodes[0]), len(seen)) for label, episodes in groups.items()}
+    """Return a number for each group, the same for groups that can be put on one scale."""
+    first: list[str] = []  # label of each pool's first group
+    numbers: dict[str, int] = {}
+    for label, episodes in groups.items():
+        fitting = [n for n, known in enumerate(first) if not why_not("pool", groups[known], episodes)]
+        first += [] if fitting else [label]
+        numbers[label] = fitting[0] if fitting else len(first) - 1
+    return numbers
 
 
 def _measured(

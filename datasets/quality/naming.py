@@ -37,6 +37,17 @@ def is_velocity(name: str) -> bool:
     return name.startswith("v_") or name.endswith((".vel", "_vel", ".velocity"))
 
 
+def quantity(name: str) -> str:
+    """Return what an entry is by its name: velocity, position, gripper, or "" where it does not say."""
+    lower = name.lower()
+    if "gripper" in lower:
+        return "gripper"
+    if is_velocity(lower):
+        return "velocity"
+    point = lower in ("x", "y", "z") or lower.startswith(tuple(f"{each}." for each in _POINTS))
+    return "position" if point or lower.endswith((".pos", "_pos", ".position")) else ""
+
+
 def same_thing(action: Sequence[str], state: Sequence[str]) -> list[Pair]:
     """Return which entry of the state measures what an entry of the action commands, in the same unit.
 

@@ -103,10 +103,3 @@ class Pool:
     def action_components(self) -> Embedding:
         """At most eight principal components of the relative actions."""
         return embed(np.vstack([episode.relative_action for episode in self.episodes]), most=8)
-
-
-def signature(episode: Demonstration) -> tuple[object, ...]:
-    """Return what two episodes on one scale have in common: sizes and entries of what is measured."""
-    choices = (*episode.columns.choices("action"), *episode.columns.choices("asked"))
-    names = sorted(name for name in episode.frames if name.startswith("observation") or name in choices)
-    return tuple((name, episode.frames[name].shape[1:], episode.names.get(name)) for name in names)

@@ -5,11 +5,14 @@ from dataclasses import dataclass
 from itertools import product
 
 from handrail.controllers.errors import unknown_name
+from handrail.datasets.comparison.outcomes import LIKE_FOR_LIKE, Pair
 from handrail.policies.study.design import StudyDesign
 from handrail.policies.study.jobs import Actions, Cell, PolicyArm
 
 UNPROTECTED = "joint velocities, unprotected"
 THROUGH_MPC = "intent through the MPC"
+CONTROLLER = "policy-plus-controller"  # families of comparisons, besides like for like
+PROTECTED = "protected"
 
 
 @dataclass(frozen=True)
@@ -32,6 +35,13 @@ class StudyArm:
     def label(self) -> str:
         """What the policies are called under whatever condition."""
         return PolicyArm(Cell("", self.mode), self.actions, self.budget, 0).label
+
+    @property
+    def family(self) -> str:
+        """Which family of comparisons it belongs to: p is adjusted over all of one, for every task."""
+        if self.actions == "intent":
+            return CONTROLLER
+        return PROTECTED if self.condition else LIKE_FOR_LIKE
 
     @property
     def driven(self) -> str:
@@ -66,8 +76,8 @@ def _place(arm: StudyArm, design: StudyDesign) -> tuple[int, bool, int]:
     return design.budgets.index(arm.budget), arm.actions == "intent", design.modes.index(arm.mode)
 
 
-def pairs(arms: Mapping[str, StudyArm], baseline: str) -> list[tuple[str, str]]:
-    """Return labels of arms and of what each is compared with.
+def pairs(arms: Mapping[str, StudyArm], baseline: str) -> list[Pair]:
+    """Return what is compared with what: like for like apart from a policy plus a controller.
 
     That is the baseline mode's joint velocities on the same budget under the same condition. An arm for which
     there is none (yet) is compared with nothing.
@@ -78,4 +88,6 @@ def pairs(arms: Mapping[str, StudyArm], baseline: str) -> list[tuple[str, str]]:
         if (arm.mode, arm.actions) == (baseline, "realised")
     }
     against = {label: base.get((arm.budget, arm.condition)) for label, arm in arms.items()}
-    return [(label, other) for label, other in against.items() if other not in (None, label)]
+    return [
+        Pair(label, other, arms[label].family) for label, other in against.items() if other and other != label
+    ]

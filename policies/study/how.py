@@ -4,6 +4,7 @@ from collections.abc import Iterator, Sequence
 
 from handrail.collect.operators.modes import find_mode
 from handrail.datasets.comparison.outcomes import OutcomeDifference, Outcomes
+from handrail.datasets.comparison.wording import families
 from handrail.policies.study.design import StudyDesign
 from handrail.policies.study.results import TaskResults
 
@@ -60,7 +61,10 @@ def _intervals(results: Sequence[TaskResults]) -> Iterator[str]:
     together = "; rollouts of several policies in one scene count together" if several else ""
     yield f"Intervals are 95 %. “These policies”: Wilson, for these very policies in any scenes{together}."
     if several:
-        yield "“With training”: bootstrap over dataset draws, training seeds and scenes, nested."
+        yield (
+            "“With training”: the wider of a nested bootstrap over dataset draws, training seeds and scenes"
+            " and of Student's t over training seeds (over draws where there are several)."
+        )
     else:
         yield "There is one training seed: how much another would differ is in none of the intervals."
     if any(each.disturbed or each.protected for each in results):
@@ -68,39 +72,24 @@ def _intervals(results: Sequence[TaskResults]) -> Iterator[str]:
 
 
 def _tests(results: Sequence[TaskResults]) -> Iterator[str]:
-    main = _differences([each.policies for each in results])
-    shielded = _differences([each.shielded for each in results])
-    both = [*main, *shielded]
-    if not both:
+    found = [*_differences([each.policies for each in results])]
+    found += _differences([each.shielded for each in results])
+    if not found:
         return
-    exact = {"exact McNemar test where the same scenes were met": True, "Boschloo's test where not": False}
-    used = {each.rollouts.paired for each in both}
+    exact = {
+        "exact McNemar test where the same scenes were met, each scene counted once": True,
+        "Boschloo's test where not": False,
+    }
+    used = {each.rollouts.paired for each in found}
     names = " or ".join(name for name, paired in exact.items() if paired in used)
     nested = ", nested bootstrap and Welch's t test over trained policies, the largest p of the three"
-    yield f"Differences: Newcombe's method 10; {names}{nested if any(each.nested for each in both) else ''}."
-    families = [
-        f"all {len(found)} {what}{_kinds(results) if found is main else ''}"
-        for found, what in ((main, "undisturbed comparisons"), (shielded, "comparisons through a protection"))
-        if found
-    ]
-    apart = ", each for itself" if len(families) > 1 else ""
+    yield f"Differences: Newcombe's method 10; {names}{nested if any(each.nested for each in found) else ''}."
+    told = families(each.family for each in found)
     yield (
-        f"p is adjusted by Holm over {' and '.join(families)} of the study{apart}. ● marks a detected"
-        " difference; “detectable” is what would be seen as one in 80 % of such studies."
+        f"p is adjusted by Holm over {told} of all tasks. Which family a comparison belongs to follows from"
+        " what is compared, never from what came out. ● marks a detected difference; “detectable” is what"
+        " would be seen as one in 80 % of such studies."
     )
-
-
-def _kinds(results: Sequence[TaskResults]) -> str:
-    """Return how many undisturbed comparisons are of what, where they are of two kinds."""
-    actions = [
-        each.conditions[difference.label].arm.actions
-        for each in results
-        for difference in _differences([each.policies])
-    ]
-    controlled = actions.count("intent")
-    if controlled in (0, len(actions)):
-        return ""
-    return f" ({len(actions) - controlled} like for like, {controlled} of a policy plus a controller)"
 
 
 def _differences(found: Sequence[Outcomes | None]) -> list[OutcomeDifference]:

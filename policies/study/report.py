@@ -15,7 +15,7 @@ from handrail.controllers.errors import HandrailError
 from handrail.datasets.atomic import write_whole
 from handrail.datasets.comparison import markup
 from handrail.datasets.comparison.drawing import svg
-from handrail.datasets.comparison.findings import Finding
+from handrail.datasets.comparison.finding import Finding
 from handrail.datasets.comparison.report import plain
 from handrail.policies.study.config import StudyConfig
 from handrail.policies.study.figures import figures
@@ -29,7 +29,7 @@ _CAPTIONS = {
     "answer": "Success of the policies; thick: 95 % for these policies, thin: with training, ticks: training"
     " seeds. Round: joint velocities, unprotected; diamonds: intent through the MPC, policy and controller.",
     "robustness": "Success disturbed and undisturbed, of the same policies in the same scenes.",
-    "sweep": "How human the operator is, and what that does to policies and to his time.",
+    "sweep": "How human the operator is, and what that does to policies and to the operator's time.",
 }
 _FORMAT = "handrail.study/1"
 _DPI = 110
@@ -70,8 +70,8 @@ def _html(standing: Standing, results: Sequence[TaskResults], drawn: Mapping[str
     answers = [f"{_title(each)}. {each.answer}" for each in results if each.answer]
     parts += [markup.paragraph(answer, "headline") for answer in answers]
     parts += [markup.paragraph(f"{standing.words}.")] if standing.words else []
-    for name, figure in drawn.items():
-        parts.append(markup.section(_CAPTIONS[name], markup.picture(svg(figure), name)))
+    pictures = [(_CAPTIONS[name], "", svg(figure)) for name, figure in drawn.items()]
+    parts += [markup.section("Figures", markup.panels(pictures, "wide"))] if pictures else []
     for each in results:
         shown = [
             f"<h3>{table.title}</h3>{markup.table(table.headings, table.rows)}" for table in tables(each)

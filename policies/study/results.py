@@ -7,9 +7,9 @@ import numpy as np
 
 from handrail.datasets.comparison.collection import Collected, collected
 from handrail.datasets.comparison.evaluations import Arm, read_evaluations
-from handrail.datasets.comparison.findings import Finding
+from handrail.datasets.comparison.finding import Finding
 from handrail.datasets.comparison.groups import Group
-from handrail.datasets.comparison.outcomes import ArmOutcome, Outcomes, judge_pairs, one_family
+from handrail.datasets.comparison.outcomes import ArmOutcome, Outcomes, in_families, judge_pairs
 from handrail.datasets.quality.load import read_demonstrations
 from handrail.datasets.reader import read_info
 from handrail.policies.study.arms import StudyArm, identify, pairs
@@ -78,18 +78,18 @@ def gather(standing: Standing, rng: np.random.Generator) -> list[TaskResults]:
 
 
 def _in_words(results: Sequence[TaskResults], design: StudyDesign) -> list[TaskResults]:
-    """Return results with p adjusted over all tasks, undisturbed and protected apart, and what that says."""
-    policies = _one_family([each.policies for each in results])
-    shielded = _one_family([each.shielded for each in results])
+    """Return results with p adjusted over all tasks, every family for itself, and what that says."""
+    policies = _in_families([each.policies for each in results])
+    shielded = _in_families([each.shielded for each in results])
     return [
         _told(replace(each, policies=open_, shielded=closed), design)
         for each, open_, closed in zip(results, policies, shielded, strict=True)
     ]
 
 
-def _one_family(found: Sequence[Outcomes | None]) -> list[Outcomes | None]:
-    """Return outcomes of all tasks with the p of their differences adjusted for all of these."""
-    adjusted = iter(one_family([each for outcomes in found if outcomes for each in outcomes.differences]))
+def _in_families(found: Sequence[Outcomes | None]) -> list[Outcomes | None]:
+    """Return outcomes of all tasks with the p of their differences adjusted for all of a family."""
+    adjusted = iter(in_families([each for outcomes in found if outcomes for each in outcomes.differences]))
     return [
         each and replace(each, differences=tuple(next(adjusted) for _ in each.differences)) for each in found
     ]

@@ -3,7 +3,9 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from handrail.datasets.comparison.findings import Finding, outcome_findings, training_cautions
+from handrail.datasets.comparison.cautions import training_cautions
+from handrail.datasets.comparison.finding import Finding
+from handrail.datasets.comparison.outcome_findings import outcome_findings
 from handrail.datasets.comparison.outcomes import OutcomeDifference, Outcomes
 from handrail.policies.study.arms import StudyArm
 
