@@ -1,5 +1,7 @@
 """Keep joints away from their position limits."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from handrail.controllers.arrays import BoolArray, FloatArray
@@ -34,3 +36,26 @@ def limit_centring(
     return Objective(
         name, lambda stage, p: ((stage.q - middle) / half) ** power, np.zeros(len(middle)), masked
     )
+
+
+def narrow_joint_centring(channels: Channels, limits: Limits, weight: float) -> tuple[Objective, ...]:
+    """Keep the arm's joints that cannot turn once around from their ends while the tool is steered.
+
+    A hand that is steered straight to where it shall be otherwise leads such joints into a corner of their
+    limits, out of which nothing leads but going back. Nothing for an arm whose joints all turn around.
+
+    Args:
+        channels: of the robot.
+        limits: of the robot.
+        weight: of each such joint.
+    """
+    narrow = limits.position_upper - limits.position_lower < 2 * np.pi - 1e-6
+    narrow[: len(channels.base)] = False
+    if not narrow.any():
+        return ()
+    centring = limit_centring(channels, limits, weight * narrow)
+
+    def masked(mask: BoolArray) -> FloatArray:
+        return centring.weights(mask) * bool(np.any(mask[channels.tool_slice]))
+
+    return (replace(centring, weights=masked),)
