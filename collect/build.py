@@ -61,7 +61,7 @@ OBJECTIVES: Mapping[str, Callable[[Channels], tuple[Objective, ...]]] = {
 LEFT = {"tray": ("ee.wx", "ee.wy")}  # a tray's tilt is the MPC's, not the operator's
 MINDED = {"tray": ("ee.vz",)}  # who drives with a tray in hand minds how high it is
 LEVEL = 20.0  # weight of a tray's tilt
-CENTRED = 30.0  # weight of how near a joint that cannot turn once around is to its ends
+CENTRED = 10.0  # weight of the middle of joints that cannot turn half around
 _VERSIONED = ("handrail", "lerobot", "mujoco", "pin", "coal", "casadi", "daqp", "numpy", "gymnasium")
 
 

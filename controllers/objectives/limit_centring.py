@@ -39,21 +39,21 @@ def limit_centring(
 
 
 def narrow_joint_centring(channels: Channels, limits: Limits, weight: float) -> tuple[Objective, ...]:
-    """Keep the arm's joints that cannot turn once around from their ends while the tool is steered.
+    """Draw joints of the arm that cannot turn half around to their middle while the tool is steered.
 
-    A hand that is steered straight to where it shall be otherwise leads such joints into a corner of their
-    limits, out of which nothing leads but going back. Nothing for an arm whose joints all turn around.
+    A hand that is steered straight to where it shall be may otherwise lead them into a corner of their limits
+    that only going back leads out of. Nothing for an arm whose joints all turn that far.
 
     Args:
         channels: of the robot.
         limits: of the robot.
         weight: of each such joint.
     """
-    narrow = limits.position_upper - limits.position_lower < 2 * np.pi - 1e-6
+    narrow = limits.position_upper - limits.position_lower < np.pi
     narrow[: len(channels.base)] = False
     if not narrow.any():
         return ()
-    centring = limit_centring(channels, limits, weight * narrow)
+    centring = limit_centring(channels, limits, weight * narrow, power=1)
 
     def masked(mask: BoolArray) -> FloatArray:
         return centring.weights(mask) * bool(np.any(mask[channels.tool_slice]))
