@@ -27,9 +27,10 @@ GROUPS = [
     ("joint",),
     ("base", "ee"),
     ("ee.vx", "ee.vy", "ee.vz"),
-    ("joint.elbow_joint",),
+    ("elbow",),
     (),
 ]
+_ELBOW = 5  # index of a joint in the middle of the arm
 CLEARANCE = 0.15  # of the robot at the start [m]
 
 
@@ -51,7 +52,8 @@ def cluttered_episode(env: HandrailEnv, rng: np.random.Generator) -> Episode:
     while True:
         q = np.array(model.description.home)
         q[:3] = rng.uniform([-1.5, -1.5, -3.0], [1.5, 1.5, 3.0])
-        q[3:] += rng.uniform(-0.7, 0.7, 6)
+        q[3:] += rng.uniform(-0.7, 0.7, model.size - 3)
+        q = np.clip(q, model.description.limits.position_lower, model.description.limits.position_upper)
         own = CollisionModel(model)
         if np.all(own.values(q[None])[0] > np.minimum(own.largest_margin, 0.10)):
             break
@@ -91,12 +93,16 @@ class RudeOperator:
         self._channels, self._limits, self._rng = channels, limits, rng
         self._until = 0.0
 
+    def _group(self, index):
+        elbow = self._channels.joints[_ELBOW]
+        return [elbow if name == "elbow" else name for name in GROUPS[index]]
+
     def intent(self, time):
         rng, size = self._rng, self._channels.size
         if time >= self._until:
             self._until = time + rng.uniform(0.05, 2.0)
             self._mask = (
-                self._channels.mask(*GROUPS[rng.integers(len(GROUPS))])
+                self._channels.mask(*self._group(rng.integers(len(GROUPS))))
                 if rng.random() < 0.8
                 else (rng.random(size) < 0.4)
             )

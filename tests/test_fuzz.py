@@ -5,13 +5,14 @@ import pytest
 from collect_helpers import environment
 from fuzz_helpers import failing, run
 
+from handrail.controllers.description import robot_names
 from handrail.controllers.mpc import MaskedMpc
 from handrail.controllers.safety_filter import safety_filter
 from handrail.controllers.threads import single_threaded
 
 
-def check(seeds, seconds, make=MaskedMpc, failures=0.0):
-    with environment("Reach") as env, single_threaded():
+def check(seeds, seconds, make=MaskedMpc, failures=0.0, robot="ridgeback_ur10"):
+    with environment("Reach", robot=robot) as env, single_threaded():
         controller = make(env.model)
         results = []
         for seed in seeds:
@@ -30,9 +31,10 @@ def check(seeds, seconds, make=MaskedMpc, failures=0.0):
     return statuses
 
 
+@pytest.mark.parametrize("robot", robot_names())
 @pytest.mark.parametrize("make", [MaskedMpc, safety_filter])
-def test_rude_intents_in_clutter(make):
-    statuses = check(range(1000, 1004), 5.0, make)
+def test_rude_intents_in_clutter(make, robot):
+    statuses = check(range(1000, 1004), 5.0, make, robot=robot)
     assert {"ok", "invalid_intent"} <= set(statuses)
 
 
@@ -42,8 +44,9 @@ def test_rude_intents_in_clutter_with_a_solver_that_fails():
 
 
 @pytest.mark.slow
-def test_rude_intents_in_clutter_at_length():
-    check(range(200), seconds=20.0)
+@pytest.mark.parametrize("robot", robot_names())
+def test_rude_intents_in_clutter_at_length(robot):
+    check(range(200), seconds=20.0, robot=robot)
 
 
 @pytest.mark.slow
