@@ -173,7 +173,9 @@ def _set_inertia(body: MjsBody, inertia: pin.Inertia) -> None:
 
 def _add_shape(mounts: Mounts, placed: PlacedShape, **arguments: object) -> None:
     body, at = mounts.place(placed.frame, placed.placement)
-    body.add_geom(**geometry.geom_shape(placed.shape), **geometry.pose(at.translation, at.rotation), **arguments)
+    body.add_geom(
+        **geometry.geom_shape(placed.shape), **geometry.pose(at.translation, at.rotation), **arguments
+    )
 
 
 def _add_contact_shapes(model: RobotModel, mounts: Mounts) -> tuple[str, ...]:

@@ -192,7 +192,9 @@ def _check(description: RobotDescription) -> None:
 
 def _gripper(data: dict[str, Any]) -> Gripper:
     placed = ("translation", "rpy")
-    values = {k: tuple(v) if isinstance(v, list) else v for k, v in data.items() if k not in placed}
+    values: dict[str, Any] = {
+        k: tuple(v) if isinstance(v, list) else v for k, v in data.items() if k not in placed
+    }
     return Gripper(placement=_placement(data), **values)
 
 

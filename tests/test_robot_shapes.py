@@ -107,7 +107,9 @@ def test_shapes_that_are_not_listed_never_meet(model):
     pairs = [
         (a, b)
         for a, b in itertools.combinations(of, 2)
-        if frozenset((a, b)) not in listed and of[a] not in (of[b], parents[of[b]]) and of[b] != parents[of[a]]
+        if frozenset((a, b)) not in listed
+        and of[a] not in (of[b], parents[of[b]])
+        and of[b] != parents[of[a]]
     ]
     q = configurations(model, 6000)
     q = q[distances(model, list(model.description.self_pairs), q).min(axis=1) > 0.0]
@@ -149,5 +151,5 @@ def test_a_file_with_a_list_of_its_own_is_refused(tmp_path, entry):
     text = (description._FOLDER / "ridgeback_ur10.toml").read_text()
     path = tmp_path / "robot.toml"
     path.write_text(text.replace("[self_collision]", f'[self_collision]\n{entry} = ["chassis"]', 1))
-    with pytest.raises(HandrailError, match=rf"ridgeback_ur10, entry {entry} of \[self_collision\]: .* remove it"):
+    with pytest.raises(HandrailError, match=rf"ridgeback_ur10, entry {entry} .*: remove it"):
         load_description(path)

@@ -121,7 +121,8 @@ def _draw_start(
         q[1] -= 0.5 * side
     ahead = np.array([np.cos(q[2]), np.sin(q[2]), 0.0]) if model.description.base_joints else np.eye(3)[0]
     base = model.pose(q, "planar_base").position
-    place = base + rng.uniform(1.05, 1.20) * reach_share(model) * ahead + np.array([0.0, 0.0, rng.uniform(0.90, 1.00)])
+    away = rng.uniform(1.05, 1.20) * reach_share(model)
+    place = base + away * ahead + np.array([0.0, 0.0, rng.uniform(0.90, 1.00)])
     return q, place, np.column_stack([ahead, np.cross([0.0, 0.0, -1.0], ahead), [0.0, 0.0, -1.0]])
 
 
