@@ -14,13 +14,20 @@ from handrail.controllers.mpc import MaskedMpc
 from handrail.controllers.objectives.limit_centring import narrow_joint_centring
 
 
-def test_only_narrow_joints_and_only_while_the_whole_tool_is_steered():
+def test_only_narrow_joints_and_only_while_just_the_whole_tool_is_steered():
     model = load_model("ridgeback_panda")
     channels = Channels.of(model.description)
     (centring,) = narrow_joint_centring(channels, model.description.limits, 10.0)
     narrow = np.isin(model.joints, ["panda_joint4", "panda_joint6"])
     np.testing.assert_array_equal(centring.weights(channels.mask("ee")), 10.0 * narrow)
-    for names in (("base",), ("ee.vx", "ee.vy", "ee.vz", "ee.wz"), ("joint",), ("ee", "arm"), ()):
+    for names in (
+        ("base",),
+        ("base", "ee"),
+        ("ee.vx", "ee.vy", "ee.vz", "ee.wz"),
+        ("joint",),
+        ("ee", "arm"),
+        (),
+    ):
         assert not centring.weights(channels.mask(*names)).any(), names
 
 
@@ -29,7 +36,9 @@ def test_an_arm_whose_joints_turn_around_is_left_alone():
     channels = Channels.of(model.description)
     assert narrow_joint_centring(channels, model.description.limits, 10.0) == ()
     entries = build_controller(find_mode("ee"), model, 20).residuals.objectives  # pyright: ignore
-    assert [entry.name for entry in entries] == [entry.name for entry in MaskedMpc(model).residuals.objectives]
+    assert [entry.name for entry in entries] == [
+        entry.name for entry in MaskedMpc(model).residuals.objectives
+    ]
 
 
 def test_a_hand_that_is_steered_to_a_far_pose_is_not_led_into_a_corner():

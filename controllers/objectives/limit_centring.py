@@ -39,11 +39,11 @@ def limit_centring(
 
 
 def narrow_joint_centring(channels: Channels, limits: Limits, weight: float) -> tuple[Objective, ...]:
-    """Draw joints of the arm that cannot turn half around to their middle while the whole tool is steered.
+    """Draw joints of the arm that cannot turn half around to their middle while just the whole tool is steered.
 
     A hand that is steered straight to where it shall be may otherwise lead them into a corner of their limits
-    that only going back leads out of. Nothing for an arm whose joints all turn that far, nor where the hand's
-    tilt is left to another objective, which this one would pull against.
+    that only going back leads out of. Nothing for an arm whose joints all turn that far; nor where base or
+    joints are steered too, or the hand's tilt is left to another objective: it would pull against these.
 
     Args:
         channels: of the robot.
@@ -57,6 +57,7 @@ def narrow_joint_centring(channels: Channels, limits: Limits, weight: float) -> 
     centring = limit_centring(channels, limits, weight * narrow, power=1)
 
     def masked(mask: BoolArray) -> FloatArray:
-        return centring.weights(mask) * bool(mask[channels.tool_slice].all())
+        alone = bool(mask[channels.tool_slice].all()) and not commanded_joints(channels, mask).any()
+        return centring.weights(mask) * alone
 
     return (replace(centring, weights=masked),)
