@@ -28,6 +28,7 @@ from handrail.controllers.errors import HandrailError
 from handrail.controllers.model import RobotModel
 from handrail.controllers.mpc import MaskedMpc
 from handrail.controllers.objective import Objective
+from handrail.controllers.objectives.limit_centring import narrow_joint_centring
 from handrail.controllers.objectives.tray import tray_levelling
 from handrail.controllers.safety_filter import safety_filter
 from handrail.controllers.split_controller import split_controller
@@ -60,6 +61,7 @@ OBJECTIVES: Mapping[str, Callable[[Channels], tuple[Objective, ...]]] = {
 LEFT = {"tray": ("ee.wx", "ee.wy")}  # a tray's tilt is the MPC's, not the operator's
 MINDED = {"tray": ("ee.vz",)}  # who drives with a tray in hand minds how high it is
 LEVEL = 20.0  # weight of a tray's tilt
+CENTRED = 10.0  # weight of the middle of joints that cannot turn half around
 _VERSIONED = ("handrail", "lerobot", "mujoco", "pin", "coal", "casadi", "daqp", "numpy", "gymnasium")
 
 
@@ -120,10 +122,16 @@ def build_operator(config: SessionConfig, mode: TeleopMode, model: RobotModel) -
 
 
 def build_controller(mode: TeleopMode, model: RobotModel, fps: int, task: str = "") -> Controller:
-    """Return the controller of a mode; the masked MPC's knows the objectives that a task brings."""
-    if mode.controller == "mpc" and task in OBJECTIVES:
-        return MaskedMpc(model, objectives=OBJECTIVES[task](Channels.of(model.description)))
+    """Return the controller of a mode; the masked MPC's knows the objectives that robot and task bring."""
+    if mode.controller == "mpc":
+        return MaskedMpc(model, objectives=_objectives(model, task))
     return CONTROLLERS[mode.controller](model, 1.0 / fps)
+
+
+def _objectives(model: RobotModel, task: str) -> tuple[Objective, ...]:
+    channels = Channels.of(model.description)
+    of_task = OBJECTIVES[task](channels) if task in OBJECTIVES else ()
+    return (*of_task, *narrow_joint_centring(channels, model.description.limits, CENTRED))
 
 
 def leave_to_objectives(mode: TeleopMode, task: str) -> TeleopMode:

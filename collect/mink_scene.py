@@ -5,6 +5,7 @@ from typing import Any
 
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.model import RobotModel
+from handrail.controllers.scene_shapes import floor_shapes, scene_shapes
 from handrail.controllers.shape import Obstacle
 
 _SOLVERS = ("daqp", "proxqp", "quadprog")  # PIQP is slower than these and prints
@@ -50,11 +51,10 @@ def shape_model(model: RobotModel, obstacles: tuple[Obstacle, ...]) -> Any:
 
 def standing_pairs(model: RobotModel, obstacles: tuple[Obstacle, ...]) -> tuple[tuple[str, str], ...]:
     """Return the pairs that keep apart, the same as the controllers' while nothing is held."""
-    description = model.description
     return (
-        *description.self_pairs,
-        *((name, "floor") for name in description.floor_shapes),
-        *((name, obstacle.name) for name in description.scene_shapes for obstacle in obstacles),
+        *model.description.self_pairs,
+        *((name, "floor") for name in floor_shapes(model)),
+        *((name, obstacle.name) for name in scene_shapes(model) for obstacle in obstacles),
     )
 
 

@@ -23,7 +23,7 @@ def robot_for(robot: str, pairs: str) -> RobotModel:
     description = load_description(robot)
     if pairs == "none":
         description = replace(
-            description, self_pairs=(), self_margins=np.zeros(0), floor_shapes=(), scene_shapes=()
+            description, gripper=None, collision=(), self_pairs=(), self_margins=np.zeros(0)
         )
     elif pairs == "few":
         few = slice(None, None, 4)

@@ -13,10 +13,11 @@ from handrail.collect import geometry
 from handrail.collect.gl import MjsBody, MjSpec, mujoco
 from handrail.collect.gripper import add_gripper
 from handrail.collect.meshes import pieces, placed_meshes
-from handrail.controllers.description import PlacedShape
+from handrail.controllers.description import PlacedShape, Placement
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.model import RobotModel
 from handrail.controllers.rotation import quaternion_from_matrix
+from handrail.controllers.scene_shapes import floor_shapes
 
 BASE_BODY = "planar_base"
 FINGERS = ("finger_left", "finger_right")
@@ -54,6 +55,11 @@ class Mounts:
         frame = self._model.pinocchio.frames[self._model.frame_id(name)]
         return self._bodies[frame.parentJoint], frame.placement
 
+    def place(self, frame: str, placement: Placement) -> tuple[MjsBody, pin.SE3]:
+        """Return the body that carries something placed on a frame, and where that is on the body."""
+        body, mount = self.frame(frame)
+        return body, mount * pin.SE3(np.array(placement.rotation), np.array(placement.translation))
+
 
 def build_robot(model: RobotModel, meshes: bool = True, grips: bool = True) -> RobotSpec:
     """Build the robot; without `meshes` it moves and collides alike, but is not for looking at.
@@ -73,8 +79,9 @@ def build_robot(model: RobotModel, meshes: bool = True, grips: bool = True) -> R
     site_body, placement = mounts.frame("tool")
     site_body.add_site(name="tool", group=4, **geometry.pose(placement.translation, placement.rotation))
     contact = _add_contact_shapes(model, mounts)
-    if model.description.gripper is not None:
-        add_gripper(spec, model.description.gripper, *mounts.frame(model.description.gripper.frame), grips)
+    gripper = model.description.gripper
+    if gripper is not None:
+        add_gripper(spec, gripper, *mounts.place(gripper.frame, gripper.placement), grips)
         contact += FINGERS
     _add_pairs(spec, model)
     _add_servos(spec, model)
@@ -165,18 +172,18 @@ def _set_inertia(body: MjsBody, inertia: pin.Inertia) -> None:
 
 
 def _add_shape(mounts: Mounts, placed: PlacedShape, **arguments: object) -> None:
-    body, frame = mounts.frame(placed.frame)
-    rotation = frame.rotation @ placed.placement.rotation
-    translation = frame.rotation @ placed.placement.translation + frame.translation
-    body.add_geom(**geometry.geom_shape(placed.shape), **geometry.pose(translation, rotation), **arguments)
+    body, at = mounts.place(placed.frame, placed.placement)
+    body.add_geom(
+        **geometry.geom_shape(placed.shape), **geometry.pose(at.translation, at.rotation), **arguments
+    )
 
 
 def _add_contact_shapes(model: RobotModel, mounts: Mounts) -> tuple[str, ...]:
-    """Add the description's collision shapes; real fingers stand in for the tool shapes."""
-    description = model.description
-    solid = [shape for shape in description.collision if not (shape.tool and description.gripper)]
+    """Add the description's collision shapes; real fingers stand in for the shape around them."""
+    gripper = model.description.gripper
+    solid = [shape for shape in model.description.collision if not (gripper and shape.name == gripper.shape)]
     for shape in solid:
-        floor = geometry.FLOOR_BIT if shape.name in description.floor_shapes else 0
+        floor = geometry.FLOOR_BIT if shape.name in floor_shapes(model) else 0
         _add_shape(
             mounts,
             shape,
@@ -192,9 +199,9 @@ def _add_contact_shapes(model: RobotModel, mounts: Mounts) -> tuple[str, ...]:
 def _add_pairs(spec: MjSpec, model: RobotModel) -> None:
     """Let the robot touch itself only where the description says that it can."""
     description = model.description
-    tools = {shape.name for shape in description.collision if shape.tool and description.gripper}
+    enclosing = description.gripper.shape if description.gripper else ""
     for pair in description.self_pairs:
-        firsts, seconds = (FINGERS if name in tools else (name,) for name in pair)
+        firsts, seconds = (FINGERS if name == enclosing else (name,) for name in pair)
         for first in firsts:
             for second in seconds:
                 spec.add_pair(name=f"{first}:{second}", geomname1=first, geomname2=second)

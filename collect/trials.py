@@ -49,7 +49,9 @@ def _run(config: TrialsConfig, task: str, mode: str, episodes: Sequence[int]) ->
         return
     limit = SLOW_LIMITS[task] if mode == SLOW_MODE else 0.0
     settings = [
-        SessionConfig(task=task, mode=mode, noise=config.noise, person=person, time_limit=limit)
+        SessionConfig(
+            task=task, mode=mode, robot=config.robot, noise=config.noise, person=person, time_limit=limit
+        )
         for person in range(config.persons)
     ]
     env = build_env(settings[0], _FPS)

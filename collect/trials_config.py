@@ -24,6 +24,8 @@ class TrialsConfig:
     """Scripted operators, who take turns episode by episode."""
     noise: float = 1.0
     """How human they are: 0 perfect, 1 as measured in people."""
+    robot: str = "ridgeback_ur10"
+    """A robot that comes with Handrail, or a `.toml` file."""
     seed: int = 900
     """Of scenes and operators."""
     json: str = "outputs/trials.json"

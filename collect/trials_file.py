@@ -14,6 +14,7 @@ from handrail.datasets.atomic import explained, make_folder, write_synced
 
 FORMAT = "handrail.trials/1"
 _PLACES = 4  # digits that are kept
+_UNNAMED = {"robot": "ridgeback_ur10"}  # of files from before there was a choice
 
 
 @dataclass(frozen=True)
@@ -52,7 +53,7 @@ class Trial:
 
 
 class TrialsFile:
-    """Trials of one seed, noise and number of persons, in memory and on the disk.
+    """Trials of one robot, seed, noise and number of persons, in memory and on the disk.
 
     Args:
         path: of the file.
@@ -64,7 +65,7 @@ class TrialsFile:
 
     def __init__(self, path: Path, config: TrialsConfig) -> None:
         self._path = path
-        self._settings = {"seed": config.seed, "noise": config.noise, "persons": config.persons}
+        self._settings = {name: getattr(config, name) for name in ("robot", "seed", "noise", "persons")}
         self._trials: dict[tuple[str, str, int], Trial] = {}
         for row in self._read():
             self._keep(Trial(**row))
@@ -92,7 +93,7 @@ class TrialsFile:
         expected = {"format": FORMAT, **self._settings}
         try:
             content = json.loads(self._path.read_bytes())
-            found = {name: content.get(name) for name in expected}
+            found = {name: content.get(name, _UNNAMED.get(name)) for name in expected}
         except (OSError, ValueError, AttributeError) as error:
             raise HandrailError(f"--json {self._path}: expected a file of trials, got {error}") from error
         if found != expected:

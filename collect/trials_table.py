@@ -65,6 +65,6 @@ def _line(group: Sequence[Trial]) -> list[str]:
 
 def _command(config: TrialsConfig) -> str:
     default = TrialsConfig()
-    names = ("tasks", "modes", "episodes", "persons", "noise", "seed", "json", "page")
+    names = ("tasks", "modes", "episodes", "persons", "noise", "robot", "seed", "json", "page")
     changed = [name for name in names if getattr(config, name) != getattr(default, name)]
     return " ".join(["handrail-trials", *(f"--{name} {getattr(config, name)}" for name in changed)])

@@ -52,9 +52,13 @@ class Limits:
 
 @dataclass(frozen=True)
 class Gripper:
-    """Two fingers that slide along the frame's x axis; lengths [m], force [N], speed [m/s]."""
+    """Two fingers that slide along the x axis of a placement on a frame; lengths [m], force [N], speed [m/s].
+
+    `shape` is the collision shape that encloses the fingers, open or closed: real ones stand in for it.
+    """
 
     frame: str
+    placement: Placement
     mass: float
     finger_mass: float
     finger_size: tuple[float, float, float]
@@ -65,6 +69,7 @@ class Gripper:
     friction: float
     camera: tuple[float, float, float]
     camera_tilt: float
+    shape: str = "fingers"
 
 
 @dataclass(frozen=True)
@@ -88,8 +93,6 @@ class RobotDescription:
     collision: tuple[PlacedShape, ...]
     self_pairs: tuple[tuple[str, str], ...]
     self_margins: FloatArray  # largest margin that each self pair can keep [m]
-    scene_shapes: tuple[str, ...]
-    floor_shapes: tuple[str, ...]
     visual: tuple[PlacedShape, ...]
 
     @property
@@ -131,6 +134,7 @@ def _parse(data: dict[str, Any], folder: Path) -> RobotDescription:
     urdf, mesh_root = _find_urdf(data["arm"]["urdf"], folder)
     gripper = data.get("gripper")
     self_collision = data["self_collision"]
+    _refuse_lists(data["name"], self_collision)
     description = RobotDescription(
         name=data["name"],
         base_kind=data["base"]["kind"],
@@ -149,12 +153,20 @@ def _parse(data: dict[str, Any], folder: Path) -> RobotDescription:
         collision=tuple(_placed_shape(entry) for entry in data["collision"]),
         self_pairs=tuple((first, second) for first, second, *_ in self_collision["pairs"]),
         self_margins=frozen([(*pair, np.inf)[2] for pair in self_collision["pairs"]]),
-        scene_shapes=tuple(self_collision["scene"]),
-        floor_shapes=tuple(self_collision["floor"]),
         visual=tuple(_placed_shape(entry) for entry in data.get("visual", [])),
     )
     _check(description)
     return description
+
+
+def _refuse_lists(name: str, self_collision: dict[str, Any]) -> None:
+    """Refuse the lists of older files: what they left out nobody looked at."""
+    for entry in ("scene", "floor"):
+        if entry in self_collision:
+            raise HandrailError(
+                f"robot {name}, entry {entry} of [self_collision]: expected none, got one; which shapes meet "
+                "scene and floor follows from how they move: remove it"
+            )
 
 
 def _check(description: RobotDescription) -> None:
@@ -169,7 +181,9 @@ def _check(description: RobotDescription) -> None:
             )
     names = {shape.name for shape in description.collision}
     used = {name for pair in description.self_pairs for name in pair}
-    for name in used.union(description.scene_shapes, description.floor_shapes) - names:
+    if description.gripper is not None:
+        used.add(description.gripper.shape)
+    for name in sorted(used - names):
         raise HandrailError(
             f"collision shape {name!r} of robot {description.name}: "
             f"expected one of {', '.join(sorted(names))}"
@@ -177,8 +191,11 @@ def _check(description: RobotDescription) -> None:
 
 
 def _gripper(data: dict[str, Any]) -> Gripper:
-    values: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in data.items()}
-    return Gripper(**values)
+    placed = ("translation", "rpy")
+    values: dict[str, Any] = {
+        k: tuple(v) if isinstance(v, list) else v for k, v in data.items() if k not in placed
+    }
+    return Gripper(placement=_placement(data), **values)
 
 
 def _placement(data: dict[str, Any], key: str = "translation") -> Placement:

@@ -11,6 +11,7 @@ from handrail.controllers.description import PlacedShape, Placement
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.levers import all_lever_arms, lever_arms
 from handrail.controllers.model import RobotModel
+from handrail.controllers.scene_shapes import floor_shapes, scene_shapes
 from handrail.controllers.shape import Obstacle, Shape
 
 FLOOR = "floor"
@@ -82,11 +83,10 @@ class ShapePairs:
 
     def _scene_pairs(self, obstacles: tuple[Obstacle, ...]) -> list[tuple[str, str]]:
         """Return the robot with the floor and with what stands around."""
-        description = self._model.description
         around = [obstacle.name for obstacle in obstacles if not obstacle.held]
         return [
-            *((name, FLOOR) for name in description.floor_shapes),
-            *((name, other) for name in description.scene_shapes for other in around),
+            *((name, FLOOR) for name in floor_shapes(self._model)),
+            *((name, other) for name in scene_shapes(self._model) for other in around),
         ]
 
     def _held_pairs(self, obstacles: tuple[Obstacle, ...], tools: set[str]) -> list[tuple[str, str]]:

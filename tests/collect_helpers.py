@@ -141,8 +141,6 @@ tool = true
 
 [self_collision]
 pairs = [["body", "forearm"], ["body", "palm"], ["body", "fingers"]]
-scene = ["body", "forearm", "palm", "fingers"]
-floor = ["forearm", "palm", "fingers"]
 
 [[visual]]
 frame = "planar_base"

@@ -12,6 +12,7 @@ from handrail.collect.tasks.furniture import footprint
 from handrail.collect.tasks.pick_place import PickPlace
 from handrail.collect.tasks.reach import Reach
 from handrail.collect.tasks.task import Episode
+from handrail.controllers.description import robot_names
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.model import load_model
 from handrail.controllers.rotation import rotation_vector
@@ -93,8 +94,9 @@ def test_pick_place_uses_both_sides():
     assert sides == {-1.0, 1.0}
 
 
-def test_pick_place_starts_in_contact_with_nothing_and_at_rest():
-    with environment() as env:
+@pytest.mark.parametrize("robot", robot_names())
+def test_pick_place_starts_in_contact_with_nothing_and_at_rest(robot):
+    with environment(robot=robot) as env:
         for seed in range(8):
             env.reset(seed=seed)
             start = env.task_state().pose("cube").position

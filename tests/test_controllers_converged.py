@@ -18,9 +18,7 @@ from handrail.controllers.shape import Obstacle, Shape
 from handrail.controllers.threads import single_threaded
 
 DESCRIPTION = load_model().description
-ALONE = RobotModel(
-    replace(DESCRIPTION, self_pairs=(), self_margins=np.zeros(0), floor_shapes=(), scene_shapes=())
-)
+ALONE = RobotModel(replace(DESCRIPTION, collision=(), self_pairs=(), self_margins=np.zeros(0)))
 LIMITS = DESCRIPTION.limits
 PERIOD = 0.05
 SETTLED = 5  # updates after a jump of the intent

@@ -25,9 +25,7 @@ from handrail.controllers.shape import Obstacle, Shape
 from handrail.controllers.threads import single_threaded
 
 MODEL = load_model()
-ALONE = RobotModel(
-    replace(MODEL.description, self_pairs=(), self_margins=np.zeros(0), floor_shapes=(), scene_shapes=())
-)
+ALONE = RobotModel(replace(MODEL.description, collision=(), self_pairs=(), self_margins=np.zeros(0)))
 HOME, LIMITS = MODEL.description.home, MODEL.description.limits
 CHANNELS = Channels.of(MODEL.description)
 JOINTS, MASK = CHANNELS.joint_slice, CHANNELS.mask("joint")

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from fuzz_helpers import failing, run
 
+from handrail.controllers.description import robot_names
 from handrail.controllers.model import load_model
 from handrail.controllers.mpc import MaskedMpc
 from handrail.controllers.safety_filter import safety_filter
@@ -39,8 +40,9 @@ def check(seeds, seconds, movers=0, robot="ridgeback_ur10", make=MaskedMpc, fail
 
 
 @pytest.mark.parametrize("make", [MaskedMpc, safety_filter])
-def test_rude_intents_in_clutter(make):
-    statuses, _ = check(range(1000, 1004), 5.0, make=make)
+@pytest.mark.parametrize("robot", robot_names())
+def test_rude_intents_in_clutter(make, robot):
+    statuses, _ = check(range(1000, 1004), 5.0, make=make, robot=robot)
     assert {"ok", "invalid_intent", "stale_intent"} <= set(statuses)
 
 
@@ -55,7 +57,7 @@ def test_rude_intents_in_clutter_with_a_solver_that_fails():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("robot", ["ridgeback_ur10", "ridgeback_panda"])
+@pytest.mark.parametrize("robot", robot_names())
 @pytest.mark.parametrize("movers", [0, 1, 2])
 def test_rude_intents_at_length(robot, movers):
     """Movers stop for nobody and can close in from two sides: met in 1 of 20 runs at most."""

@@ -6,19 +6,23 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from handrail.collect.operators.drawer_script import handle_rotation
 from handrail.collect.operators.hand import HumanHand, minimum_jerk
 from handrail.collect.operators.human import HumanSettings
 from handrail.collect.operators.input_map import StickMap
 from handrail.collect.operators.modes import MODES, find_mode
 from handrail.collect.operators.perception import Perception
 from handrail.collect.operators.pick_place_script import grasp_rotation
-from handrail.collect.operators.standing import standing_point, standing_pose
+from handrail.collect.operators.standing import standing_point, standing_pose, standing_within_reach
 from handrail.collect.operators.steering import Gains, base_twist, hand_twist
 from handrail.collect.operators.wish import Wish
+from handrail.collect.tasks.cabinet import HANDLE, inward
+from handrail.collect.tasks.drawer import Drawer
 from handrail.collect.tasks.reach import Reach
 from handrail.controllers.arm_pose import arm_configuration
 from handrail.controllers.collision import CollisionModel
 from handrail.controllers.controller import State
+from handrail.controllers.description import robot_names
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.model import Pose, load_model
 
@@ -241,3 +245,16 @@ def test_grasps_point_down_and_are_square_to_the_cube():
         assert np.linalg.det(grasp) == pytest.approx(1.0)
         across = cube.T @ grasp[:, 0]
         assert np.max(np.abs(across)) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("robot", robot_names())
+def test_a_person_stands_where_the_arm_reaches_the_handle(robot):
+    model, reached = load_model(robot), 0
+    for seed in range(10):
+        episode = Drawer().sample(model, np.random.default_rng(seed))
+        body, bar = episode.scene.find("cabinet"), episode.scene.find("drawer")
+        into = inward(body.rotation)
+        goal = Pose(bar.position + bar.rotation @ HANDLE, handle_rotation(np.eye(3), into))
+        stand = standing_within_reach(model, episode.q, goal, float(np.arctan2(into[1], into[0])))
+        reached += arm_configuration(model, np.concatenate([stand, episode.q[3:]]), goal)[1] <= 0.05
+    assert reached >= 8

@@ -14,10 +14,12 @@ from handrail.collect.tasks.cabinet import HANDLE, TRAVEL, inward
 from handrail.collect.tasks.drawer import Drawer, handle, opened
 from handrail.collect.tasks.task import Episode
 from handrail.collect.tasks.tray import Tray
+from handrail.controllers.description import robot_names
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.model import load_model
 
 MODEL = load_model()
+ROBOTS = robot_names()
 SEEDS = range(30)
 
 
@@ -37,8 +39,8 @@ class Watcher:
             self.opening.append(opened(self.env.task_state()))
 
 
-def run(task, mode="ee", noise=0.0, seed=1):
-    config = SessionConfig(task=task, mode=mode, noise=noise)
+def run(task, mode="ee", noise=0.0, seed=1, robot="ridgeback_ur10"):
+    config = SessionConfig(task=task, mode=mode, noise=noise, robot=robot)
     env, watcher = build_env(config, 20), Watcher()
     outcome = build_session(config, env, [watcher]).run(seed)
     env.close()
@@ -54,8 +56,9 @@ def hold(env: HandrailEnv, steps: int, gripper: float) -> dict:
     return info
 
 
-def test_a_perfect_operator_carries_the_tray_level():
-    outcome, watcher = run("tray")
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_a_perfect_operator_carries_the_tray_level(robot):
+    outcome, watcher = run("tray", robot=robot)
     assert outcome.success, outcome
     assert outcome.contacts == 0
     assert watcher.tilt < 0.1
@@ -71,16 +74,18 @@ def test_who_drives_with_a_tray_minds_its_height():
     assert (driving, steering) == (4, 4)  # base and height; where the hand is and which way it points
 
 
-def test_a_perfect_operator_opens_the_drawer():
-    outcome, watcher = run("drawer")
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_a_perfect_operator_opens_the_drawer(robot):
+    outcome, watcher = run("drawer", robot=robot)
     assert outcome.success, outcome
     assert outcome.contacts == 0
     assert 0.2 <= watcher.opening[-1] <= TRAVEL
     assert watcher.opening[0] == pytest.approx(0.0, abs=1e-3)
 
 
-def test_the_gripper_holds_the_tray_and_dropping_it_fails():
-    with environment("Tray") as env:
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_the_gripper_holds_the_tray_and_dropping_it_fails(robot):
+    with environment("Tray", robot=robot) as env:
         for seed in range(4):
             env.reset(seed=seed)
             before = env.task_state()
@@ -88,7 +93,7 @@ def test_the_gripper_holds_the_tray_and_dropping_it_fails():
             assert info["failure_reason"] == ""
             assert info["contacts"] == 0
             held = [state.pose("tray").position - state.tool.position for state in (before, env.task_state())]
-            assert np.linalg.norm(held[1] - held[0]) < 0.003
+            assert np.linalg.norm(held[1] - held[0]) < 0.005
         assert hold(env, 60, 0.0)["failure_reason"] == "tray_dropped"
 
 
@@ -131,17 +136,18 @@ def test_the_tray_has_to_be_left_on_the_table(grip, success):
         assert info["is_success"] == success, info
 
 
-def test_tray_scenes_follow_their_description():
-    sides = set()
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_tray_scenes_follow_their_description(robot):
+    model, sides = load_model(robot), set()
     for seed in SEEDS:
-        episode = Tray().sample(MODEL, np.random.default_rng(seed))
+        episode = Tray().sample(model, np.random.default_rng(seed))
         table, tray = episode.scene.find("table"), episode.scene.find("tray")
         sides.add(float(np.sign(table.position[1])))
         assert episode.q[1] * table.position[1] < 0  # it has to cross
         assert 0.55 <= table.top <= 0.65
         assert tray.rotation[2, 2] == pytest.approx(1.0, abs=1e-3)
         assert len([item for item in episode.scene.objects if item.name.startswith("obstacle")]) in (2, 3)
-        tool = MODEL.pose(episode.q).position
+        tool = model.pose(episode.q).position
         np.testing.assert_allclose(tool - tray.position, [0, 0, 0.2], atol=1e-3)
     assert sides == {-1.0, 1.0}
 

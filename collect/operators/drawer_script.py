@@ -4,7 +4,7 @@ import numpy as np
 
 from handrail.collect.operators.operator import View
 from handrail.collect.operators.phases import Phase, PhaseRunner
-from handrail.collect.operators.standing import standing_point
+from handrail.collect.operators.standing import standing_within_reach
 from handrail.collect.operators.steering import Gains
 from handrail.collect.operators.wish import Wish
 from handrail.collect.tasks.cabinet import inward
@@ -68,7 +68,7 @@ class DrawerScript:
         bar, grasp = handle(view.task), handle_rotation(view.tool.rotation, into)
         pull = max(_PULL - opened(view.task), 0.05)
         yaw = float(np.arctan2(into[1], into[0]))
-        base = standing_point(self._model, bar, yaw)
+        base = standing_within_reach(self._model, view.state.q, Pose(bar, grasp), yaw)
 
         def phase(name: str, back: float, **options: float) -> Phase:
             stand = base - np.array([pull * into[0], pull * into[1], 0.0]) * (name in ("pull", "release"))

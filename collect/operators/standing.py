@@ -10,6 +10,15 @@ from handrail.controllers.model import Pose, RobotModel
 
 _COMFORT = 0.85  # of the reach at home
 _YAWS = (0.0, 0.5, -0.5, 1.0, -1.0, 1.5, -1.5)  # in which a person would try to stand [rad]
+_FARTHER = (
+    _COMFORT,
+    0.95,
+    1.05,
+    1.1,
+    1.15,
+    0.75,
+)  # shares of the reach at home to try, the first that will do
+_ABOUT = 0.05  # error of the hand's pose there that a person puts up with [m, rad]
 _CLEAR = 0.08  # of the arm to itself that is enough [m]
 
 
@@ -30,6 +39,27 @@ def standing_point(
     spot = np.asarray(place, dtype=float)[:2] - comfort * offset
     lower, upper = description.limits.position_lower[:2], description.limits.position_upper[:2]
     return np.array([*np.clip(spot, lower, upper), yaw])
+
+
+def standing_within_reach(model: RobotModel, q: FloatArray, goal: Pose, yaw: float) -> FloatArray:
+    """Return a base pose (x, y, θ) with a heading from which the arm gets the hand to a pose.
+
+    At the comfortable distance if the arm reaches it there, else farther or nearer; the comfortable one if it
+    reaches it from none.
+
+    Args:
+        model: of the robot.
+        q: now, (n,).
+        goal: of the tool.
+        yaw: heading of the base [rad].
+    """
+    stands = [standing_point(model, goal.position, yaw, comfort) for comfort in _FARTHER]
+    if not model.description.base_joints:
+        return stands[0]
+    for stand in stands:
+        if arm_configuration(model, np.concatenate([stand, q[3:]]), goal)[1] <= _ABOUT:
+            return stand
+    return stands[0]
 
 
 def standing_pose(model: RobotModel, q: FloatArray, goal: Pose) -> FloatArray:

@@ -7,6 +7,7 @@ from handrail.collect.operators.phases import Phase, PhaseRunner
 from handrail.collect.operators.route import Route, front_edge
 from handrail.collect.operators.steering import Gains
 from handrail.collect.operators.wish import Wish
+from handrail.collect.tasks.arm_reach import reach_share
 from handrail.collect.tasks.tray import HANDLE
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.model import Pose, RobotModel
@@ -16,7 +17,7 @@ _ABOVE = 0.012  # the tray above the table when it is let go [m]
 _INSIDE = 0.22  # the tray's middle behind the table's edge [m]
 _DOWN = np.diag([1.0, -1.0, -1.0])  # of the tool: pointing down, its x ahead
 _TILT = 0.06  # that a person who minds the can allows himself on the way [rad]
-_AHEAD = 1.0  # hand before the base's centre while carrying [m]
+_AHEAD = 1.0  # hand before the base's centre while carrying, with an arm that reaches as far as usual [m]
 
 
 class TrayScript:
@@ -60,6 +61,6 @@ class TrayScript:
         ]
         if self._drives:
             return route.drive(view.state.q[:3], stand, Pose(over, _DOWN), 1.0) + phases
-        crossing = np.array([route.lane + _AHEAD, place[1], height])
+        crossing = np.array([route.lane + _AHEAD * reach_share(self._model), place[1], height])
         lane = np.array([route.lane, place[1], 0.0])
         return [phase("cross", crossing, lane, distance=0.12, angle=0.4), *phases]

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from handrail.collect.scene import Scene, SceneObject, View
+from handrail.collect.tasks.arm_reach import reach_share
 from handrail.collect.tasks.clutter import obstacle_features, obstacle_names, sample_obstacles
 from handrail.collect.tasks.furniture import TRAY_BAR, can, table, tray
 from handrail.collect.tasks.task import Episode, Outcome, TaskState
@@ -120,7 +121,8 @@ def _draw_start(
         q[1] -= 0.5 * side
     ahead = np.array([np.cos(q[2]), np.sin(q[2]), 0.0]) if model.description.base_joints else np.eye(3)[0]
     base = model.pose(q, "planar_base").position
-    place = base + rng.uniform(1.05, 1.20) * ahead + np.array([0.0, 0.0, rng.uniform(0.90, 1.00)])
+    away = rng.uniform(1.05, 1.20) * reach_share(model)
+    place = base + away * ahead + np.array([0.0, 0.0, rng.uniform(0.90, 1.00)])
     return q, place, np.column_stack([ahead, np.cross([0.0, 0.0, -1.0], ahead), [0.0, 0.0, -1.0]])
 
 

@@ -1,5 +1,7 @@
 """Keep joints away from their position limits."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from handrail.controllers.arrays import BoolArray, FloatArray
@@ -34,3 +36,28 @@ def limit_centring(
     return Objective(
         name, lambda stage, p: ((stage.q - middle) / half) ** power, np.zeros(len(middle)), masked
     )
+
+
+def narrow_joint_centring(channels: Channels, limits: Limits, weight: float) -> tuple[Objective, ...]:
+    """Draw joints of the arm that cannot turn half around to their middle while just the whole tool is steered.
+
+    A hand that is steered straight to where it shall be may otherwise lead them into a corner of their limits
+    that only going back leads out of. Nothing for an arm whose joints all turn that far; nor where base or
+    joints are steered too, or the hand's tilt is left to another objective: it would pull against these.
+
+    Args:
+        channels: of the robot.
+        limits: of the robot.
+        weight: of each such joint.
+    """
+    narrow = limits.position_upper - limits.position_lower < np.pi
+    narrow[: len(channels.base)] = False
+    if not narrow.any():
+        return ()
+    centring = limit_centring(channels, limits, weight * narrow, power=1)
+
+    def masked(mask: BoolArray) -> FloatArray:
+        alone = bool(mask[channels.tool_slice].all()) and not commanded_joints(channels, mask).any()
+        return centring.weights(mask) * alone
+
+    return (replace(centring, weights=masked),)
