@@ -2,10 +2,10 @@
 
 import hashlib
 import itertools
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -16,9 +16,11 @@ from handrail.controllers.errors import HandrailError
 from handrail.policies.imitation.checkpoint import PolicyMeta, model_folder, read_meta
 from handrail.policies.imitation.evaluate_config import EvaluateConfig
 from handrail.policies.imitation.interface import PolicyInterface
+from handrail.policies.imitation.trust import check_policy_folder
 
 UNPROTECTED = ("direct", "split")  # completions of modes that keep nothing but the joints' limits
 _IMAGES = "observation.images."
+_PART = 2**20  # bytes
 
 
 @dataclass(frozen=True)
@@ -94,22 +96,24 @@ def read_checkpoint(folder: Path) -> Checkpoint:
     """
     place = model_folder(folder)
     interface, meta = read_meta(place)
+    settings = check_policy_folder(place)
     if meta.environment not in TASKS:
         raise HandrailError(
             f"--policy {place}: expected one trained for one of {', '.join(TASKS)}, got {meta.environment!r}"
         )
-    return Checkpoint(place, meta, interface, _pictures(place), _digest(place))
+    return Checkpoint(place, meta, interface, _pictures(place, settings), _digest(place))
 
 
-def _pictures(place: Path) -> dict[str, tuple[int, int]]:
+def _pictures(place: Path, settings: Mapping[str, Any]) -> dict[str, tuple[int, int]]:
     """Return what a policy sees, from LeRobot's own settings."""
-    path = place / "config.json"
     try:
-        features = json.loads(path.read_bytes()).get("input_features") or {}
+        features = settings.get("input_features") or {}
         shapes = {name: feature["shape"] for name, feature in features.items() if name.startswith(_IMAGES)}
         return {name.removeprefix(_IMAGES): (int(h), int(w)) for name, (_, h, w) in shapes.items()}
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-        raise HandrailError(f"{str(path)!r}: expected a policy of LeRobot, got {error!r}") from error
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        raise HandrailError(
+            f"policy {str(place)!r}: expected features of LeRobot, got {error!r:.200}"
+        ) from error
 
 
 def arms(config: EvaluateConfig) -> tuple[Arm, ...]:
@@ -196,5 +200,8 @@ def _digest(folder: Path) -> str:
     digest = hashlib.sha256()
     for path in sorted(folder.iterdir()):
         if path.is_file():
-            digest.update(path.name.encode() + path.read_bytes())
+            digest.update(path.name.encode())
+            with open(path, "rb") as file:
+                while part := file.read(_PART):
+                    digest.update(part)
     return digest.hexdigest()[:16]

@@ -19,7 +19,10 @@ import numpy as np
 
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import HandrailError
+from handrail.controllers.strict_json import read_json
 from handrail.policies.imitation.interface import PolicyInterface
+from handrail.policies.imitation.meta_check import check_meta
+from handrail.policies.imitation.trust import check_policy_folder, registered_policies
 
 FORMAT = "handrail.policy/2"
 NAME = "handrail.json"
@@ -117,21 +120,23 @@ class TrainedPolicy:
 def load_policy(folder: str | Path, device: str = "cpu") -> TrainedPolicy:
     """Load a policy from a `pretrained_model` folder, a checkpoint, or a training's folder (the last one).
 
+    Whoever made it, loading it runs no code of theirs (`trust.py`).
+
     Raises:
-        HandrailError: there is none, or it is broken.
+        HandrailError: there is none, it is broken, or it could do harm.
     """
     place = model_folder(Path(folder).expanduser())
     interface, meta = read_meta(place)
-    import lerobot.policies  # noqa: F401  (registers them)
-    from lerobot.configs.policies import PreTrainedConfig
+    settings = check_policy_folder(place)
+    import draccus
     from lerobot.policies.factory import get_policy_class, make_pre_post_processors
 
-    override = {"device_processor": {"device": device}}
+    kind, override = settings.pop("type"), {"device_processor": {"device": device}}
     try:
-        config = PreTrainedConfig.from_pretrained(place, cli_overrides=[f"--device={device}"])
-        policy = get_policy_class(config.type).from_pretrained(place, config=config)
+        config = draccus.decode(registered_policies()[kind], settings | {"device": device})
+        policy = get_policy_class(kind).from_pretrained(place, config=config)
         before, after = make_pre_post_processors(config, str(place), preprocessor_overrides=override)
-    except (OSError, ValueError, KeyError, RuntimeError) as error:
+    except Exception as error:  # of LeRobot and all below it: whatever the files hold, they are refused
         raise HandrailError(f"policy {str(place)!r}: {' '.join(str(error).split())}") from error
     policy.eval()
     policy.eval = lambda: policy  # LeRobot asks for it twice an action: a third of its time
@@ -142,17 +147,20 @@ def read_meta(folder: Path) -> tuple[PolicyInterface | None, PolicyMeta]:
     """Return what `handrail.json` in a `pretrained_model` folder says.
 
     Raises:
-        HandrailError: it is not there, or not of this version.
+        HandrailError: it is not there, not of this version, or says something that cannot be.
     """
     path = folder / NAME
+    content = read_json(path, "a policy of handrail-train")
+    if not isinstance(content, dict) or content.get("format") != FORMAT or "interface" not in content:
+        known = content.get("format") if isinstance(content, dict) else content
+        raise HandrailError(f"{str(path)!r}: expected the format {FORMAT}, got {known!r:.80}")
+    del content["format"]
+    interface = content.pop("interface")
+    check_meta(content, repr(str(path)))
     try:
-        content = json.loads(path.read_bytes())
-        known, interface = content.pop("format"), content.pop("interface")
-        meta = PolicyMeta(**content) if known == FORMAT else None
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-        raise HandrailError(f"{str(path)!r}: expected a policy of handrail-train, got {error!r}") from error
-    if meta is None:
-        raise HandrailError(f"{str(path)!r}: expected the format {FORMAT}, got {known!r}")
+        meta = PolicyMeta(**content)
+    except TypeError as error:
+        raise HandrailError(f"{str(path)!r}: expected a policy of handrail-train, got {error}") from error
     return (None if interface is None else PolicyInterface.from_dict(interface)), meta
 
 
@@ -178,6 +186,8 @@ def model_folder(folder: Path) -> Path:
     last = last_checkpoint(folder)
     for place in (folder, folder / MODEL, *([last / MODEL] if last else [])):
         if (place / NAME).is_file():
+            if not place.resolve().is_relative_to(folder.resolve()):
+                raise HandrailError(f"{str(place)!r}: expected it in {str(folder)!r}, found a link out of it")
             return place
     raise HandrailError(f"policy {str(folder)!r}: expected a checkpoint with a {NAME}, found none")
 
