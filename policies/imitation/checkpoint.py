@@ -157,11 +157,7 @@ def read_meta(folder: Path) -> tuple[PolicyInterface | None, PolicyMeta]:
     del content["format"]
     interface = content.pop("interface")
     check_meta(content, repr(str(path)))
-    try:
-        meta = PolicyMeta(**content)
-    except TypeError as error:
-        raise HandrailError(f"{str(path)!r}: expected a policy of handrail-train, got {error}") from error
-    return (None if interface is None else PolicyInterface.from_dict(interface)), meta
+    return (None if interface is None else PolicyInterface.from_dict(interface)), PolicyMeta(**content)
 
 
 def write_meta(folder: Path, interface: PolicyInterface | None, meta: PolicyMeta) -> None:
