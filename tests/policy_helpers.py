@@ -114,15 +114,19 @@ def untrained_act(folder, actions):
     env = build_env(SessionConfig(task="reach"), 20)
     channels = Channels.of(env.model.description)
     masks = (tuple(channels.mask("ee").tolist()),) if actions == "intent" else ()
-    interface = PolicyInterface(actions, env.agent_names, env.state_names, channels.names, masks)
+    space = "realised" if actions == "recorded" else actions
+    interface = PolicyInterface(space, env.agent_names, env.state_names, channels.names, masks)
     env.close()
     state, environment = map(len, interface.observation_names)
+    written = len(interface.action_names)
+    if actions == "recorded":
+        state, environment, written = len(env.agent_names), len(env.state_names), len(channels.joints) + 1
     config = ACTConfig(
         input_features={
             "observation.state": PolicyFeature(FeatureType.STATE, (state,)),
             "observation.environment_state": PolicyFeature(FeatureType.ENV, (environment,)),
         },
-        output_features={"action": PolicyFeature(FeatureType.ACTION, (len(interface.action_names),))},
+        output_features={"action": PolicyFeature(FeatureType.ACTION, (written,))},
         dim_model=32,
         dim_feedforward=32,
         n_heads=2,
@@ -137,5 +141,5 @@ def untrained_act(folder, actions):
     for processor in make_pre_post_processors(config):
         processor.save_pretrained(folder)
     meta = PolicyMeta("reach", "ee", "ridgeback_ur10", 20, actions, 0, 0, {"episodes": 1}, "act", 0)
-    write_meta(folder, interface, meta)
+    write_meta(folder, None if actions == "recorded" else interface, meta)
     return str(folder)

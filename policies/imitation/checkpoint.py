@@ -6,6 +6,7 @@
 A checkpoint appears under its name only when it is whole.
 """
 
+import itertools
 import json
 import os
 import shutil
@@ -22,7 +23,7 @@ from handrail.controllers.errors import HandrailError
 from handrail.controllers.strict_json import read_json
 from handrail.policies.imitation.interface import PolicyInterface
 from handrail.policies.imitation.meta_check import check_meta
-from handrail.policies.imitation.trust import check_policy_folder, registered_policies
+from handrail.policies.imitation.trust import CONFIG, check_policy_folder, registered_policies
 
 FORMAT = "handrail.policy/2"
 NAME = "handrail.json"
@@ -76,14 +77,14 @@ class TrainedPolicy:
 
     Attributes:
         interface: what it reads and writes; None if that is what was recorded.
-        meta: what it is.
+        meta: what it is; None of a policy of plain LeRobot.
         policy: LeRobot's policy.
         before: LeRobot's preprocessor: normalises.
         after: LeRobot's postprocessor: the reverse.
     """
 
     interface: PolicyInterface | None
-    meta: PolicyMeta
+    meta: PolicyMeta | None
     policy: Any
     before: Callable[[dict[str, Any]], dict[str, Any]]
     after: Callable[[Any], Any]
@@ -108,13 +109,20 @@ class TrainedPolicy:
         import torch
 
         seen = zip(_KEYS, (state, environment), strict=True)
-        numbers = {key: np.asarray(values, np.float32) for key, values in seen if values is not None}
+        read = self.policy.config.input_features
+        numbers = {
+            k: np.asarray(values, np.float32) for k, values in seen if values is not None and k in read
+        }
         batch = {key: torch.from_numpy(values)[None] for key, values in numbers.items() if values.size}
         for camera, picture in (images or {}).items():
             pixels = torch.from_numpy(np.ascontiguousarray(picture)).permute(2, 0, 1)
             batch[f"observation.images.{camera}"] = pixels[None].float() / 255.0
-        with torch.inference_mode():
-            return self.after(self.policy.select_action(self.before(batch)))[0].cpu().numpy()
+        try:
+            with torch.inference_mode():
+                return self.after(self.policy.select_action(self.before(batch)))[0].cpu().numpy()
+        except Exception as error:  # of LeRobot and all below it
+            words = " ".join(str(error).split()) or type(error).__name__
+            raise HandrailError(f"policy {self.policy.config.type}: cannot act: {words}") from error
 
 
 def load_policy(folder: str | Path, device: str = "cpu") -> TrainedPolicy:
@@ -126,7 +134,7 @@ def load_policy(folder: str | Path, device: str = "cpu") -> TrainedPolicy:
         HandrailError: there is none, it is broken, or it could do harm.
     """
     place = model_folder(Path(folder).expanduser())
-    interface, meta = read_meta(place)
+    interface, meta = read_meta(place) if (place / NAME).is_file() else (None, None)
     settings = check_policy_folder(place)
     import draccus
     from lerobot.policies.factory import get_policy_class, make_pre_post_processors
@@ -177,15 +185,16 @@ def model_folder(folder: Path) -> Path:
     """Return the `pretrained_model` folder there, in a checkpoint, or in a training's last one.
 
     Raises:
-        HandrailError: there is none with a `handrail.json`.
+        HandrailError: there is none, neither Handrail's nor plain LeRobot's.
     """
     last = last_checkpoint(folder)
-    for place in (folder, folder / MODEL, *([last / MODEL] if last else [])):
-        if (place / NAME).is_file():
+    places = (folder, folder / MODEL, *([last / MODEL] if last else []))
+    for name, place in itertools.product((NAME, CONFIG), places):
+        if (place / name).is_file():
             if not place.resolve().is_relative_to(folder.resolve()):
                 raise HandrailError(f"{str(place)!r}: expected it in {str(folder)!r}, found a link out of it")
             return place
-    raise HandrailError(f"policy {str(folder)!r}: expected a checkpoint with a {NAME}, found none")
+    raise HandrailError(f"policy {str(folder)!r}: expected a checkpoint with a {CONFIG}, found none")
 
 
 def publish(draft: Path, final: Path) -> None:
