@@ -201,6 +201,13 @@ def test_a_policy_sees_cameras_where_it_is_asked_to(tmp_path):
     assert not np.array_equal(*acted)
 
 
+def test_what_a_dataset_lacks_is_not_fetched_from_anywhere(tmp_path):
+    root = write_dataset(tmp_path / "set", lengths=(5, 6), cameras=("wrist",))
+    sorted(root.rglob("*.mp4"))[0].unlink()
+    with pytest.raises(HandrailError, match="expected all its files, found some missing"):
+        train(tiny(root, tmp_path / "policy", steps=1, images=True), quiet=True)
+
+
 @pytest.mark.parametrize(
     ("settings", "said"),
     [
@@ -240,11 +247,11 @@ def test_what_is_there_is_kept_unless_it_may_go(trained, recorded, tmp_path):
 
 def another_tool_s(root, keys, cameras=False):
     """Write a dataset that is not Handrail's; return its root."""
-    from datasets_helpers import FEATURES, frame_of
+    from datasets_helpers import CAMERA_FEATURES, frame_of
 
     from handrail.datasets.writer import EpisodeWriter
 
-    features = {key: feature for key, feature in FEATURES.items() if key.startswith(keys)}
+    features = {key: feature for key, feature in CAMERA_FEATURES.items() if key.startswith(keys)}
     with EpisodeWriter.create(root, "a/b", 30, features, "testbot") as writer:
         for index in range(8):
             writer.add_frame({key: frame_of(0, index, cameras)[key] for key in features}, "lift")

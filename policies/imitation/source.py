@@ -27,6 +27,7 @@ Columns = dict[str, np.ndarray]
 STATE, ENVIRONMENT, ACTION = "observation.state", "observation.environment_state", "action"
 _LEARNT = ("observation", "action", "next.")
 _COUNTERS = ("timestamp", "frame_index", "episode_index", "index", "task_index")
+_NOWHERE = "handrail/local--only"  # no name on the hub, from where LeRobot would fetch what is missing
 _FLOOR = 1e-2  # [m, rad, m/s, …] least spread of a number: what hardly moved in training must not explode
 WANT_SCENE = (
     "act",
@@ -102,15 +103,21 @@ class Source:
         return [key for key in self.columns if key in self.features]
 
     def _pictures(self, stamps: Mapping[str, list[float]]) -> "LeRobotDataset":
+        from huggingface_hub.errors import HFValidationError
         from lerobot.datasets.lerobot_dataset import LeRobotDataset
 
-        return LeRobotDataset(
-            self.config.dataset.repo_id,
-            root=self.info.root,
-            episodes=[row["episode_index"] for row in self.selection.rows],
-            delta_timestamps=dict(stamps) or None,
-            return_uint8=True,
-        )
+        try:
+            return LeRobotDataset(
+                _NOWHERE,
+                root=self.info.root,
+                episodes=[row["episode_index"] for row in self.selection.rows],
+                delta_timestamps=dict(stamps) or None,
+                return_uint8=True,
+            )
+        except HFValidationError as error:
+            raise HandrailError(
+                f"dataset {str(self.info.root)!r}: expected all its files, found some missing"
+            ) from error
 
 
 def read_source(config: TrainConfig, began: PolicyMeta | None = None) -> Source:
@@ -211,7 +218,7 @@ def _recorded(
 
 
 def _check_has_scene(info: DatasetInfo, columns: Columns, config: TrainConfig) -> None:
-    """Check that the robot's state may stand for the environment's: neither that nor pictures are recorded."""
+    """Check that the robot's state may stand for the environment's: there are no pictures either."""
     cameras = [key for key, feature in info.features.items() if feature.dtype in ("video", "image")]
     if cameras:
         raise HandrailError(
