@@ -1,4 +1,4 @@
-"""A command that kills its own process, as SIGKILL does, at its k-th change below a folder; run by tests of kills.
+"""A command that kills its own process, as SIGKILL does, at its k-th change below a folder.
 
     killed_child.py FOLDER K MODULE [FLAG …]
 
