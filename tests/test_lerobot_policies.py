@@ -1,17 +1,20 @@
 """Policies of plain `lerobot-train` are evaluated, or it is said why not; a bad one stops no other."""
 
+import io
 import json
 import shutil
 
 import pytest
 from command_helpers import command
 from policy_helpers import StandIn, checkpoint, load, untrained_act
+from rich.console import Console
 
 from handrail.controllers.errors import HandrailError
 from handrail.policies.imitation.arms import arms
 from handrail.policies.imitation.checkpoint import NAME
 from handrail.policies.imitation.evaluate_config import EvaluateConfig
 from handrail.policies.imitation.evaluation import UnevaluatedError, evaluate
+from handrail.policies.imitation.evaluation_table import evaluation_table
 
 FEATURES = {
     "observation.state": {"type": "STATE", "shape": [26]},
@@ -178,6 +181,15 @@ def test_the_command_names_the_bad_policy_and_ends_with_1(honest, tmp_path):
         f"error: policy '{tmp_path / 'nothing'}': expected a checkpoint with a config.json, found none"
     ]
     assert "act" in done.stdout
+
+
+def test_a_label_is_shown_as_it_is(folder, tmp_path):
+    content = evaluate(config(folder / "good", label="[/red]"), load=load)
+    Console(file=(shown := io.StringIO()), width=200).print(evaluation_table(content))
+    assert "[/red]" in shown.getvalue()
+    (tmp_path / "e.json").write_text(json.dumps(content | {"conditions": []}))
+    with pytest.raises(HandrailError, match="expected conditions by arm"):
+        evaluate(config(folder / "good", json=str(tmp_path / "e.json")), load=load)
 
 
 def test_only_bad_policies_are_bad_input(folder):

@@ -29,10 +29,7 @@ _LEARNT = ("observation", "action", "next.")
 _COUNTERS = ("timestamp", "frame_index", "episode_index", "index", "task_index")
 _NOWHERE = "handrail/local--only"  # no name on the hub, from where LeRobot would fetch what is missing
 _FLOOR = 1e-2  # [m, rad, m/s, …] least spread of a number: what hardly moved in training must not explode
-WANT_SCENE = (
-    "act",
-    "diffusion",
-)  # policies that read pictures or the environment's state, one of them at least
+_WANT_SCENE = ("act", "diffusion")  # they read pictures, or the environment's state
 _RANGES = (("min", "max"), ("q01", "q99"), ("q10", "q90"))
 
 
@@ -211,7 +208,7 @@ def _recorded(
     columns = {key: np.concatenate([episode[key] for episode in episodes]) for key in keys}
     columns = {key: v.astype(np.float32) if v.dtype == np.float64 else v for key, v in columns.items()}
     features = {key: _feature(f.dtype, f.shape, f.names) for key in keys for f in (info.features[key],)}
-    if config.policy in WANT_SCENE and ENVIRONMENT not in columns and not config.images:
+    if config.policy in _WANT_SCENE and ENVIRONMENT not in columns and not config.images:
         _check_has_scene(info, columns, config)
         features[ENVIRONMENT], columns[ENVIRONMENT] = features[STATE], columns[STATE]
     return features, columns

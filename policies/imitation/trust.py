@@ -20,13 +20,8 @@ from handrail.controllers.strict_json import read_json
 
 CONFIG, WEIGHTS = "config.json", "model.safetensors"
 PROCESSORS = ("policy_preprocessor.json", "policy_postprocessor.json")
-_SAID = (
-    "pretrained_path",
-    "pretrained_revision",
-    "repo_id",
-    "license",
-    "tags",
-)  # notes; nothing is loaded by them
+# notes, by which nothing is loaded
+_SAID = ("pretrained_path", "pretrained_revision", "repo_id", "license", "tags")
 
 
 def check_links(folder: Path) -> None:
