@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from killed_child import killed
 from policy_helpers import untrained_act
 from study_helpers import SMALLEST
 from training_helpers import TINY, tiny, weights, write_dataset
@@ -30,14 +31,6 @@ pytestmark = [
     pytest.mark.filterwarnings("ignore:.*(torchcodec|pin_memory|video).*"),
 ]
 KILLS = 10
-
-
-def killed(folder: Path, change: int, module: str, *flags) -> bool:
-    """Run a command that dies at a change to a folder; return whether it died."""
-    child = [str(Path(__file__).parent / "killed_child.py"), str(folder), str(change), module]
-    done = subprocess.run([sys.executable, *child, *map(str, flags)], capture_output=True, text=True)
-    assert done.returncode in (0, -signal.SIGKILL), done.stderr[-2000:]
-    return done.returncode != 0
 
 
 def digests(folder: Path) -> dict[str, str]:
