@@ -1,17 +1,18 @@
 """A robot is data: the description file that MuJoCo, pinocchio and CasADi are all built from."""
 
-import tomllib
 from dataclasses import dataclass
 from importlib import metadata
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Any
 
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray, frozen
+from handrail.controllers.description_check import check_description
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.rotation import matrix_from_rpy, matrix_to_axis
 from handrail.controllers.shape import Shape, ShapeKind
+from handrail.controllers.strict_toml import read_toml
 
 _FOLDER = Path(__file__).parent / "robots"
 _PLANAR = ("x", "y", "theta")
@@ -115,27 +116,23 @@ def load_description(robot: str | Path) -> RobotDescription:
     """Read a robot by name, or from a description file.
 
     Raises:
-        HandrailError: no such robot, or the file lacks something.
+        HandrailError: no such robot, or the file cannot be one's.
     """
     path = Path(robot) if str(robot).endswith(".toml") else _FOLDER / f"{robot}.toml"
     if not path.is_file():
         raise HandrailError(
             f"unknown robot {str(robot)!r}: expected a .toml file or one of {', '.join(robot_names())}"
         )
-    try:
-        return _parse(tomllib.loads(path.read_text()), path.parent)
-    except tomllib.TOMLDecodeError as error:
-        raise HandrailError(f"robot description {path}: not valid TOML: {error}") from error
-    except KeyError as error:
-        raise HandrailError(f"robot description {path}: expected an entry {error}, found none") from error
+    content = read_toml(path, "robot description")
+    check_description(content, f"robot description {path}")
+    return _parse(content, path.parent)
 
 
 def _parse(data: dict[str, Any], folder: Path) -> RobotDescription:
     urdf, mesh_root = _find_urdf(data["arm"]["urdf"], folder)
     gripper = data.get("gripper")
     self_collision = data["self_collision"]
-    _refuse_lists(data["name"], self_collision)
-    description = RobotDescription(
+    return RobotDescription(
         name=data["name"],
         base_kind=data["base"]["kind"],
         base_mass=data["base"]["mass"],
@@ -155,39 +152,6 @@ def _parse(data: dict[str, Any], folder: Path) -> RobotDescription:
         self_margins=frozen([(*pair, np.inf)[2] for pair in self_collision["pairs"]]),
         visual=tuple(_placed_shape(entry) for entry in data.get("visual", [])),
     )
-    _check(description)
-    return description
-
-
-def _refuse_lists(name: str, self_collision: dict[str, Any]) -> None:
-    """Refuse the lists of older files: what they left out nobody looked at."""
-    for entry in ("scene", "floor"):
-        if entry in self_collision:
-            raise HandrailError(
-                f"robot {name}, entry {entry} of [self_collision]: expected none, got one; which shapes meet "
-                "scene and floor follows from how they move: remove it"
-            )
-
-
-def _check(description: RobotDescription) -> None:
-    if description.base_kind not in ("planar", "fixed"):
-        raise HandrailError(f"base kind {description.base_kind!r}: expected planar or fixed")
-    size = len(description.joints)
-    arrays = {"home": description.home, **vars(description.limits)}
-    for name, values in arrays.items():
-        if values.shape != (size,):
-            raise HandrailError(
-                f"{name} of robot {description.name}: expected {size} numbers, got {values.size}"
-            )
-    names = {shape.name for shape in description.collision}
-    used = {name for pair in description.self_pairs for name in pair}
-    if description.gripper is not None:
-        used.add(description.gripper.shape)
-    for name in sorted(used - names):
-        raise HandrailError(
-            f"collision shape {name!r} of robot {description.name}: "
-            f"expected one of {', '.join(sorted(names))}"
-        )
 
 
 def _gripper(data: dict[str, Any]) -> Gripper:
@@ -207,11 +171,7 @@ def _placed_shape(data: dict[str, Any]) -> PlacedShape:
     if "capsule" in data:
         shape, placement = _capsule(data)
     else:
-        kind: ShapeKind | None = next((kind for kind in _SIMPLE if kind in data), None)
-        if kind is None:
-            raise HandrailError(
-                f"shape {data.get('name', data)}: expected one of box, capsule, cylinder, sphere"
-            )
+        kind: ShapeKind = next(kind for kind in _SIMPLE if kind in data)
         shape, placement = Shape(kind, np.atleast_1d(data[kind])), _placement(data, "at")
     return PlacedShape(
         name=data.get("name", ""),
@@ -231,20 +191,31 @@ def _capsule(data: dict[str, Any]) -> tuple[Shape, Placement]:
 
 
 def _find_urdf(urdf: str, folder: Path) -> tuple[Path, Path]:
-    """Return the URDF and the folder that its `package://` paths start from."""
-    beside = folder / urdf
+    """Return the URDF and the folder that its `package://` paths start from.
+
+    Raises:
+        HandrailError: it is nowhere, or neither in the description's folder nor in a package.
+    """
+    name = PurePosixPath(urdf)
+    beside = folder / name
+    if name.is_absolute() or ".." in name.parts or not _inside(beside, folder):
+        raise HandrailError(f"URDF {urdf}: expected a path inside a package, or beside the description")
     if beside.is_file():
         return beside, folder
-    distribution = urdf.split("/")[0]
+    distribution = name.parts[0]
     try:
         files = metadata.files(distribution) or []
     except metadata.PackageNotFoundError:
         files = []
     for file in files:
-        if str(file).endswith(urdf):
+        if PurePosixPath(file).parts[-len(name.parts) :] == name.parts:
             path = Path(str(file.locate())).resolve()
-            return path, path.parents[len(Path(urdf).parts) - 1]
+            return path, path.parents[len(name.parts) - 1]
     raise HandrailError(
         f"URDF {urdf}: expected it beside the description or in the package {distribution}; "
         f"install it with: pip install {distribution}"
     )
+
+
+def _inside(path: Path, folder: Path) -> bool:
+    return path.resolve().is_relative_to(folder.resolve())

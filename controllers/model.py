@@ -1,5 +1,8 @@
 """The kinematic model of a robot: pinocchio's, built from the description."""
 
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -89,7 +92,11 @@ def _build(description: RobotDescription) -> pin.Model:
 
 def _arm(description: RobotDescription) -> pin.Model:
     """Return the arm with every joint that the description does not list locked at zero."""
-    model = pin.buildModelFromUrdf(str(description.urdf))
+    try:
+        with _without_words():
+            model = pin.buildModelFromUrdf(str(description.urdf))
+    except (ValueError, RuntimeError) as error:
+        raise HandrailError(f"URDF {description.urdf}: {' '.join(str(error).split())}") from error
     missing = set(description.arm_joints) - set(model.names)
     if missing:
         raise HandrailError(
@@ -97,7 +104,25 @@ def _arm(description: RobotDescription) -> pin.Model:
             f"expected some of {', '.join(list(model.names)[1:])}"
         )
     locked = [model.getJointId(name) for name in list(model.names)[1:] if name not in description.arm_joints]
-    return pin.buildReducedModel(model, locked, pin.neutral(model)) if locked else model
+    arm = pin.buildReducedModel(model, locked, pin.neutral(model)) if locked else model
+    if arm.nq != arm.nv or arm.nv != len(description.arm_joints):
+        raise HandrailError(
+            f"arm of robot {description.name}: expected revolute or prismatic joints in its URDF"
+        )
+    return arm
+
+
+@contextmanager
+def _without_words() -> Iterator[None]:
+    """Silence what is written past Python: the reader of URDF prints its error, and raises it too."""
+    before, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, 2)
+    try:
+        yield
+    finally:
+        os.dup2(before, 2)
+        os.close(before)
+        os.close(nowhere)
 
 
 def _add_tool(model: pin.Model, description: RobotDescription) -> None:

@@ -1,18 +1,31 @@
-"""The folder of a training run: settings, the last checkpoint, every evaluated actor."""
+"""The folder of a training run: settings, the last checkpoint, every evaluated actor.
+
+Stable-Baselines3's own loader unpickles what it finds, and so runs the code of whoever wrote it. Only arrays
+are read here: networks and optimisers from `model.zip`, transitions from `replay_buffer.npz`.
+"""
 
 import json
 import shutil
-from dataclasses import asdict
+from collections.abc import Mapping
+from dataclasses import asdict, fields
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
+import numpy as np
+import torch
 from stable_baselines3 import SAC
+from stable_baselines3.common.buffers import ReplayBuffer
+from stable_baselines3.common.save_util import load_from_zip_file
 
 from handrail.controllers.errors import HandrailError
+from handrail.controllers.strict_json import read_json
 from handrail.policies.rl_config import TrainRlConfig
 from handrail.policies.rl_policy import Actor
 
 Curve = list[dict[str, float]]
+_NETWORKS, _TRANSITIONS, _CURVE = "model.zip", "replay_buffer.npz", "curve.json"
+_ARRAYS = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
+_ENTROPY = "log_ent_coef"
 
 
 def begin_run(config: TrainRlConfig) -> None:
@@ -32,32 +45,63 @@ def begin_run(config: TrainRlConfig) -> None:
     settings.write_text(json.dumps(asdict(config), indent=1) + "\n")
 
 
-def resume_run(config: TrainRlConfig) -> tuple[SAC, Curve]:
-    """Return the model of the last checkpoint, replay buffer included, and the curve until then.
+def check_resumes(config: TrainRlConfig) -> None:
+    """Check that there is a run that goes on with these settings.
 
     Raises:
         HandrailError: there is no checkpoint, or the settings differ from those that the run began with.
     """
-    last = _last(config.folder)
-    if last is None:
+    if _last(config.folder) is None:
         raise HandrailError(f"--resume: expected a run with a checkpoint in {config.folder}, found none")
-    settings = json.loads((config.folder / "config.json").read_text())
-    config.check_continues(TrainRlConfig(**{**settings, "layers": tuple(settings["layers"])}))
-    model = SAC.load(last / "model.zip", device="cpu")
-    model.load_replay_buffer(last / "replay_buffer.pkl")
-    return model, json.loads((last / "curve.json").read_text())
+    path = config.folder / "config.json"
+    settings = read_json(path, "settings of a training run")
+    names = {entry.name for entry in fields(TrainRlConfig)}
+    if not isinstance(settings, dict) or not settings.keys() <= names or "layers" not in settings:
+        raise HandrailError(f"{str(path)!r}: expected settings of a training run, got {settings!r:.80}")
+    layers = settings["layers"]
+    earlier = {**settings, "layers": tuple(layers) if isinstance(layers, list) else layers}
+    config.check_continues(TrainRlConfig(**earlier))
 
 
-def last_networks(folder: Path) -> dict[str, Any]:
+def resume_run(config: TrainRlConfig, model: SAC) -> Curve:
+    """Give a model all that the last checkpoint has, transitions too; return the curve until then.
+
+    Args:
+        config: of the run.
+        model: untrained, with the same settings.
+
+    Raises:
+        HandrailError: the checkpoint is broken, or of another version.
+    """
+    last = _last(config.folder)
+    assert last is not None
+    curve = _curve(last / _CURVE)
+    parameters, variables = _tensors(last / _NETWORKS)
+    try:
+        model.set_parameters(dict(parameters), exact_match=True, device="cpu")
+        with torch.no_grad():
+            cast(torch.Tensor, model.log_ent_coef).copy_(variables[_ENTROPY])
+    except Exception as error:  # of PyTorch: whatever the tensors are, they do not fit
+        raise _broken(last / _NETWORKS, error) from error
+    assert model.replay_buffer is not None
+    _read_transitions(last / _TRANSITIONS, model.replay_buffer)
+    model.num_timesteps, model._n_updates = int(last.name), int(curve[-1]["updates"])
+    return curve
+
+
+def last_networks(folder: Path) -> Mapping[str, Any]:
     """Return actor, critics and target critics of a run's last checkpoint, without the optimisers' memory.
 
     Raises:
-        HandrailError: there is no checkpoint.
+        HandrailError: there is no checkpoint, or it is broken.
     """
     last = _last(folder)
     if last is None:
         raise HandrailError(f"--start_from: expected a run with a checkpoint in {folder}, found none")
-    return SAC.load(last / "model.zip", device="cpu").policy.state_dict()
+    parameters, _ = _tensors(last / _NETWORKS)
+    if "policy" not in parameters:
+        raise _broken(last / _NETWORKS, "no policy")
+    return parameters["policy"]
 
 
 def write_checkpoint(folder: Path, model: SAC, actor: Actor, curve: Curve) -> None:
@@ -69,9 +113,10 @@ def write_checkpoint(folder: Path, model: SAC, actor: Actor, curve: Curve) -> No
     partial = final.with_suffix(".partial")
     shutil.rmtree(partial, ignore_errors=True)
     partial.mkdir(parents=True)
-    model.save(partial / "model.zip")
-    model.save_replay_buffer(partial / "replay_buffer.pkl")
-    (partial / "curve.json").write_text(json.dumps(curve, indent=1) + "\n")
+    model.save(partial / _NETWORKS)
+    assert model.replay_buffer is not None
+    _write_transitions(partial / _TRANSITIONS, model.replay_buffer)
+    (partial / _CURVE).write_text(json.dumps(curve, indent=1) + "\n")
     partial.rename(final)
     if last is not None:
         shutil.rmtree(last)
@@ -83,5 +128,58 @@ def evaluated_actors(folder: Path, most: int) -> list[Actor]:
 
 
 def _last(folder: Path) -> Path | None:
-    found = sorted(path for path in (folder / "checkpoints").glob("*") if path.suffix != ".partial")
+    found = sorted(path for path in (folder / "checkpoints").glob("*") if path.name.isdigit())
     return found[-1] if found else None
+
+
+def _tensors(path: Path) -> tuple[Mapping[str, Any], Mapping[str, torch.Tensor]]:
+    """Return state dictionaries and single tensors of a model; what is pickled beside them is not read."""
+    try:
+        _, parameters, variables = load_from_zip_file(path, load_data=False, device="cpu")
+    except Exception as error:  # of zipfile, pickle and PyTorch: whatever the file holds, it is refused
+        raise _broken(path, error) from error
+    return parameters, variables or {}
+
+
+def _write_transitions(path: Path, buffer: ReplayBuffer) -> None:
+    count = buffer.size()
+    arrays: dict[str, Any] = {name: getattr(buffer, name)[:count] for name in _ARRAYS}
+    np.savez(path, place=np.array([buffer.pos, buffer.full]), **arrays)
+
+
+def _read_transitions(path: Path, buffer: ReplayBuffer) -> None:
+    if not path.is_file():
+        raise HandrailError(
+            f"{str(path)!r}: expected the transitions of a run of this version, found none;"
+            " --start_from begins a new run with the networks of this one"
+        )
+    try:
+        with open(path, "rb") as file, np.load(file, allow_pickle=False) as arrays:
+            place, full = map(int, arrays["place"])
+            count = buffer.buffer_size if full else place
+            for name in _ARRAYS:
+                target = getattr(buffer, name)[:count]
+                if arrays[name].shape != target.shape or not np.isfinite(arrays[name]).all():
+                    raise _broken(path, f"{name} of shape {arrays[name].shape}, finite or not")
+                target[...] = arrays[name]
+    except HandrailError:
+        raise
+    except Exception as error:  # of NumPy and zipfile: whatever the file holds, it is refused
+        raise _broken(path, error) from error
+    if not 0 <= place < buffer.buffer_size:
+        raise _broken(path, f"place {place}")
+    buffer.pos, buffer.full = place, bool(full)
+
+
+def _curve(path: Path) -> Curve:
+    curve = read_json(path, "the curve of a training run")
+    rows = [row if isinstance(row, dict) else {} for row in curve] if isinstance(curve, list) else []
+    if not rows or not all({"steps", "updates", "seconds"} <= row.keys() for row in rows):
+        raise HandrailError(f"{str(path)!r}: expected the curve of a training run, got {curve!r:.80}")
+    return rows
+
+
+def _broken(path: Path, reason: object) -> HandrailError:
+    return HandrailError(
+        f"{str(path)!r}: expected a checkpoint of this run, got {' '.join(str(reason).split())}"
+    )

@@ -17,6 +17,7 @@ from stable_baselines3.common.callbacks import BaseCallback
 from handrail.policies.rl_checkpoint import (
     Curve,
     begin_run,
+    check_resumes,
     evaluated_actors,
     last_networks,
     resume_run,
@@ -116,7 +117,14 @@ class Watch(BaseCallback):
 
 def _new(config: TrainRlConfig) -> tuple[SAC, Curve]:
     begin_run(config)
-    model = SAC(
+    model = _model(config)
+    if config.start_from:
+        model.policy.load_state_dict(last_networks(Path(config.start_from).expanduser()))
+    return model, []
+
+
+def _model(config: TrainRlConfig) -> SAC:
+    return SAC(
         "MlpPolicy",
         _environment(config),
         learning_rate=config.learning_rate,
@@ -134,18 +142,13 @@ def _new(config: TrainRlConfig) -> tuple[SAC, Curve]:
         seed=config.seed,
         device="cpu",
     )
-    if config.start_from:
-        model.policy.load_state_dict(last_networks(Path(config.start_from).expanduser()))
-    return model, []
 
 
 def _resumed(config: TrainRlConfig) -> tuple[SAC, Curve]:
-    model, curve = resume_run(config)
-    model.set_env(_environment(config))
+    check_resumes(config)
+    model = _model(config)
+    curve = resume_run(config, model)
     model.set_random_seed(config.seed + model.num_timesteps)  # else the same goals would come again
-    model.tensorboard_log = str(config.folder / "tensorboard")
-    model.learning_rate = config.learning_rate
-    model._setup_lr_schedule()
     return model, curve
 
 

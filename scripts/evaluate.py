@@ -1,5 +1,7 @@
 """`handrail-evaluate`: run trained policies on declared seeds, protected or not, disturbed or not."""
 
+import sys
+
 from handrail.policies.imitation.evaluate_config import EvaluateConfig
 from handrail.policies.imitation.installed import check_installed
 from handrail.scripts import cli
@@ -15,11 +17,15 @@ def _evaluate(config: EvaluateConfig) -> int:
     check_installed("handrail-evaluate", ("torch",))
     from rich.console import Console
 
-    from handrail.policies.imitation.evaluation import evaluate
+    from handrail.policies.imitation.evaluation import UnevaluatedError, evaluate
     from handrail.policies.imitation.evaluation_table import evaluation_table
     from handrail.policies.imitation.evaluation_video import film
 
-    content = evaluate(config, Console(stderr=True))
+    reasons: tuple[str, ...] = ()
+    try:
+        content = evaluate(config, Console(stderr=True))
+    except UnevaluatedError as some:
+        content, reasons = some.content, some.reasons
     console = Console(highlight=False, soft_wrap=True)
     console.print(evaluation_table(content))
     if config.json:
@@ -27,7 +33,9 @@ def _evaluate(config: EvaluateConfig) -> int:
     if config.video:
         trouble = film(config)
         console.print(f"Without a video: {trouble}" if trouble else f"Video: {config.video}")
-    return 0
+    for reason in reasons:
+        print(f"error: {reason}", file=sys.stderr)
+    return cli.FAILED if reasons else 0
 
 
 if __name__ == "__main__":

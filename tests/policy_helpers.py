@@ -12,6 +12,7 @@ from handrail.controllers.channels import Channels
 from handrail.controllers.model import load_model
 from handrail.policies.imitation.checkpoint import PolicyMeta, read_meta, write_meta
 from handrail.policies.imitation.interface import PolicyInterface
+from handrail.policies.imitation.trust import PROCESSORS
 
 HOLD = 15  # periods for which a random policy keeps to what it drew
 
@@ -95,6 +96,50 @@ def checkpoint(
     env.close()
     folder.mkdir(parents=True)
     write_meta(folder, interface, meta)
-    (folder / "config.json").write_text("{}")
+    (folder / "config.json").write_text('{"type": "act"}')
+    for name in PROCESSORS:
+        (folder / name).write_text('{"steps": []}')
+    (folder / "model.safetensors").touch()
     (folder / "kind").write_text(kind)
     return folder
+
+
+def untrained_act(folder, actions):
+    """Write a small ACT that nobody trained."""
+    from lerobot.configs.types import FeatureType, PolicyFeature
+    from lerobot.policies.act.configuration_act import ACTConfig
+    from lerobot.policies.act.modeling_act import ACTPolicy
+    from lerobot.policies.factory import make_pre_post_processors
+
+    env = build_env(SessionConfig(task="reach"), 20)
+    channels = Channels.of(env.model.description)
+    masks = (tuple(channels.mask("ee").tolist()),) if actions == "intent" else ()
+    space = "realised" if actions == "recorded" else actions
+    interface = PolicyInterface(space, env.agent_names, env.state_names, channels.names, masks)
+    env.close()
+    state, environment = map(len, interface.observation_names)
+    written = len(interface.action_names)
+    if actions == "recorded":
+        state, environment, written = len(env.agent_names), len(env.state_names), len(channels.joints) + 1
+    config = ACTConfig(
+        input_features={
+            "observation.state": PolicyFeature(FeatureType.STATE, (state,)),
+            "observation.environment_state": PolicyFeature(FeatureType.ENV, (environment,)),
+        },
+        output_features={"action": PolicyFeature(FeatureType.ACTION, (written,))},
+        dim_model=32,
+        dim_feedforward=32,
+        n_heads=2,
+        chunk_size=5,
+        n_action_steps=5,
+        use_vae=False,
+        device="cpu",
+        push_to_hub=False,
+        pretrained_backbone_weights=None,
+    )
+    ACTPolicy(config).save_pretrained(folder)
+    for processor in make_pre_post_processors(config):
+        processor.save_pretrained(folder)
+    meta = PolicyMeta("reach", "ee", "ridgeback_ur10", 20, actions, 0, 0, {"episodes": 1}, "act", 0)
+    write_meta(folder, None if actions == "recorded" else interface, meta)
+    return str(folder)

@@ -33,6 +33,23 @@ noises = [0.0]
 seeds = [0]
 """
 
+SMALLEST = """
+modes = ["ee", "direct"]
+baseline = "direct"
+seeds = [0]
+rollouts = 3
+persons = 2
+[tasks.reach]
+episodes = 2
+minutes = 0.3
+rollout_limit = 1.5
+steps = 20
+[robustness]
+perturbations = ["push"]
+protections = ["filter"]
+rollouts = 2
+"""  # of real jobs
+
 
 def make(job, design, layout):
     """Leave the files that a job leaves, made up: the better the operator, the better the policy."""

@@ -193,7 +193,7 @@ def test_a_policy_of_another_size_moves_nothing(folder):
 
 WRONG = {
     "nobody": ({}, (), "--policy: expected one checkpoint folder or more"),
-    "no checkpoint": ({}, ("nothing",), "expected a checkpoint with a handrail.json, found none"),
+    "no checkpoint": ({}, ("nothing",), "expected a checkpoint with a config.json, found none"),
     "episodes": ({"episodes": 0}, ("chase",), "--episodes 0: expected a whole number"),
     "protection": ({"protection": "prayer"}, ("chase",), "unknown protection 'prayer'"),
     "perturbation": ({"perturbation": "rain"}, ("chase",), "unknown perturbation 'rain'"),
@@ -244,7 +244,7 @@ def test_a_file_of_something_else_is_not_added_to(folder, tmp_path):
 def test_the_command_says_one_line():
     done = command("--policy", "nowhere", name="evaluate")
     assert (done.returncode, done.stderr.count("\n")) == (2, 1), done.stderr
-    assert "expected a checkpoint with a handrail.json" in done.stderr
+    assert "expected a checkpoint with a config.json" in done.stderr
     assert "--perturbation" in command("--help", name="evaluate").stdout
 
 

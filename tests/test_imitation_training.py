@@ -238,22 +238,6 @@ def test_what_is_there_is_kept_unless_it_may_go(trained, recorded, tmp_path):
         train(tiny(recorded, tmp_path / "other", overwrite=True), quiet=True)
 
 
-def test_a_dataset_of_another_tool_needs_its_columns_as_they_are(tmp_path):
-    from datasets_helpers import STATE_FEATURES, frame_of
-
-    from handrail.datasets.writer import EpisodeWriter
-
-    with EpisodeWriter.create(tmp_path / "set", "a/b", 30, STATE_FEATURES, "testbot") as writer:
-        for index in range(8):
-            writer.add_frame({key: frame_of(0, index, False)[key] for key in STATE_FEATURES}, "lift")
-        writer.save_episode({})
-    config = tiny(tmp_path / "set", tmp_path / "policy")
-    with pytest.raises(HandrailError, match="say --actions recorded"):
-        train(config, quiet=True)
-    with pytest.raises(HandrailError, match="environment state"):  # LeRobot's ACT needs one, or pictures
-        train(dataclasses.replace(config, actions="recorded"), quiet=True)
-
-
 def test_the_command_says_bad_input_in_one_line():
     done = command("--dataset.root", "nowhere", name="train")
     assert done.returncode == 2

@@ -3,32 +3,16 @@
 import json
 
 import pytest
+from study_helpers import SMALLEST
 
 from handrail.policies.study.config import StudyConfig
 from handrail.policies.study.run import run_study
-
-DESIGN = """
-modes = ["ee", "direct"]
-baseline = "direct"
-seeds = [0]
-rollouts = 3
-persons = 2
-[tasks.reach]
-episodes = 2
-minutes = 0.3
-rollout_limit = 1.5
-steps = 20
-[robustness]
-perturbations = ["push"]
-protections = ["filter"]
-rollouts = 2
-"""
 
 
 @pytest.mark.slow
 def test_from_collecting_to_the_report(tmp_path):
     preset = tmp_path / "tiny.toml"
-    preset.write_text(DESIGN)
+    preset.write_text(SMALLEST)
     study = tmp_path / "study"
     assert run_study(StudyConfig(preset=str(preset), output=str(study), workers=2)) == 0
 

@@ -2,23 +2,28 @@
 
 import hashlib
 import itertools
-import json
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from handrail.collect.config import TASKS
 from handrail.collect.operators.modes import find_mode
 from handrail.collect.perturbations import Perturbation
+from handrail.controllers.description import robot_names
+from handrail.controllers.entries import is_count
 from handrail.controllers.errors import HandrailError
-from handrail.policies.imitation.checkpoint import PolicyMeta, model_folder, read_meta
+from handrail.controllers.strict_json import read_json
+from handrail.policies.imitation.checkpoint import NAME, PolicyMeta, model_folder, read_meta
 from handrail.policies.imitation.evaluate_config import EvaluateConfig
+from handrail.policies.imitation.features import pictures, place_of
 from handrail.policies.imitation.interface import PolicyInterface
+from handrail.policies.imitation.trust import check_policy_folder
 
 UNPROTECTED = ("direct", "split")  # completions of modes that keep nothing but the joints' limits
-_IMAGES = "observation.images."
+_PART = 2**20  # bytes
 
 
 @dataclass(frozen=True)
@@ -30,6 +35,7 @@ class Checkpoint:
         meta: what it says of itself.
         interface: what it reads and writes; None if that is what was recorded.
         pictures: height and width of what it sees, by camera [px].
+        movers: how many moving obstacles it knows of.
         digest: of all its files.
     """
 
@@ -37,18 +43,13 @@ class Checkpoint:
     meta: PolicyMeta
     interface: PolicyInterface | None
     pictures: Mapping[str, tuple[int, int]]
+    movers: int
     digest: str
 
     @property
     def intent_mode(self) -> str:
         """Teleop mode whose intents it decides on; empty for joint velocities."""
         return self.meta.mode if self.meta.actions == "intent" else ""
-
-    @property
-    def movers(self) -> int:
-        """How many moving obstacles it knows of."""
-        names = self.interface.environment_names if self.interface else ()
-        return len({name.split(".")[0] for name in names if name.startswith("mover_")})
 
     @property
     def key(self) -> tuple[int, int]:
@@ -86,40 +87,77 @@ class Arm:
         }
 
 
-def read_checkpoint(folder: Path) -> Checkpoint:
+def read_checkpoint(folder: Path, config: EvaluateConfig) -> Checkpoint:
     """Return the checkpoint in a folder, or the last one of a training run's folder.
 
+    Args:
+        folder: of the checkpoint.
+        config: says what plain LeRobot's do not, their rate and perhaps their task.
+
     Raises:
-        HandrailError: there is none, or none of Handrail's.
+        HandrailError: there is none, it could do harm, or Handrail has no task for it.
     """
     place = model_folder(folder)
-    interface, meta = read_meta(place)
-    if meta.environment not in TASKS:
-        raise HandrailError(
-            f"--policy {place}: expected one trained for one of {', '.join(TASKS)}, got {meta.environment!r}"
+    settings = check_policy_folder(place)
+    where = f"--policy {place}"
+    interface, meta = (
+        read_meta(place) if (place / NAME).is_file() else (None, _plain(place, settings, config))
+    )
+    if config.task and meta.environment in TASKS and meta.environment != config.task:
+        raise HandrailError(f"{where}: expected one trained for {config.task}, got {meta.environment!r}")
+    if interface is not None:
+        _check_task(meta.environment, where)
+        movers = len({n.split(".")[0] for n in interface.environment_names if n.startswith("mover_")})
+    else:
+        robot = meta.robot if meta.robot in robot_names() else ""
+        known = place_of(
+            settings, where, robot, meta.environment if meta.environment in TASKS else config.task
         )
-    return Checkpoint(place, meta, interface, _pictures(place), _digest(place))
+        meta, movers = replace(meta, environment=known.task, robot=known.robot), known.movers
+    return Checkpoint(place, meta, interface, pictures(settings, where), movers, _digest(place))
 
 
-def _pictures(place: Path) -> dict[str, tuple[int, int]]:
-    """Return what a policy sees, from LeRobot's own settings."""
-    path = place / "config.json"
-    try:
-        features = json.loads(path.read_bytes()).get("input_features") or {}
-        shapes = {name: feature["shape"] for name, feature in features.items() if name.startswith(_IMAGES)}
-        return {name.removeprefix(_IMAGES): (int(h), int(w)) for name, (_, h, w) in shapes.items()}
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-        raise HandrailError(f"{str(path)!r}: expected a policy of LeRobot, got {error!r}") from error
+def _check_task(task: str, where: str) -> None:
+    if task not in TASKS:
+        raise HandrailError(f"{where}: expected one trained for one of {', '.join(TASKS)}, got {task!r}")
 
 
-def arms(config: EvaluateConfig) -> tuple[Arm, ...]:
+def _plain(place: Path, settings: Mapping[str, Any], config: EvaluateConfig) -> PolicyMeta:
+    """Return what is known of a policy of plain `lerobot-train`."""
+    path = place / "train_config.json"
+    training = read_json(path, "settings of LeRobot") if path.is_file() else {}
+    seed = training.get("seed") if isinstance(training, dict) else None
+    step = place.parent.name
+    return PolicyMeta(
+        environment="",
+        mode="",
+        robot="",
+        fps=config.fps,
+        actions="recorded",
+        training_seed=seed if is_count(seed) else 0,
+        dataset_draw=0,
+        trained_on={},
+        policy=settings["type"],
+        steps=int(step) if step.isdigit() else 0,
+    )
+
+
+def arms(config: EvaluateConfig, refused: list[str] | None = None) -> tuple[Arm, ...]:
     """Return every checkpoint under every condition of the settings.
 
+    Args:
+        config: of the evaluation.
+        refused: takes why a checkpoint is none, or cannot be under a condition; without it that is an error.
+
     Raises:
-        HandrailError: a checkpoint is none, a protection does not fit it, or two of them are one and the same
-            policy of an arm.
+        HandrailError: there is no arm, they are for several tasks, or two are one and the same policy.
     """
-    checkpoints = [read_checkpoint(folder) for folder in config.folders]
+    why: list[str] = []
+    checkpoints = [
+        each
+        for folder in config.folders
+        if (each := _tried(why, lambda f=folder: read_checkpoint(f, config)))
+    ]
     environments = {checkpoint.meta.environment for checkpoint in checkpoints}
     if len(environments) > 1:
         raise HandrailError(
@@ -128,14 +166,28 @@ def arms(config: EvaluateConfig) -> tuple[Arm, ...]:
     conditions = itertools.product(config.perturbations, config.protections, checkpoints)
     found: dict[tuple[str, tuple[int, int]], Arm] = {}
     for perturbation, protection, checkpoint in conditions:
-        arm = _arm(checkpoint, protection, perturbation, config)
+        arm = _tried(why, lambda: _arm(checkpoint, protection, perturbation, config))  # noqa: B023
+        if arm is None:
+            continue
         before = found.setdefault((arm.label, checkpoint.key), arm)
         if before != arm:
             raise HandrailError(
                 f"--policy {checkpoint.folder}: expected each dataset draw and training seed once, but arm "
                 f"{arm.label!r} has {checkpoint.key} already, {before.checkpoint.folder}; give it a --label"
             )
+    if why and (refused is None or not found):
+        raise HandrailError("; ".join(dict.fromkeys(why)))
+    if refused is not None:
+        refused += dict.fromkeys(why)
     return tuple(found.values())
+
+
+def _tried[Value](refused: list[str], make: Callable[[], Value]) -> Value | None:
+    try:
+        return make()
+    except HandrailError as error:
+        refused.append(str(error))
+        return None
 
 
 def _arm(checkpoint: Checkpoint, protection: str, perturbation: Perturbation, config: EvaluateConfig) -> Arm:
@@ -182,7 +234,8 @@ def _commands_joints(interface: PolicyInterface | None) -> bool:
 
 
 def _name(checkpoint: Checkpoint) -> str:
-    return checkpoint.meta.mode + (" intent" if checkpoint.intent_mode else "")
+    meta = checkpoint.meta
+    return (meta.mode or meta.policy) + (" intent" if checkpoint.intent_mode else "")
 
 
 def _protected(chosen: str, own: str) -> str:
@@ -196,5 +249,8 @@ def _digest(folder: Path) -> str:
     digest = hashlib.sha256()
     for path in sorted(folder.iterdir()):
         if path.is_file():
-            digest.update(path.name.encode() + path.read_bytes())
+            digest.update(path.name.encode())
+            with open(path, "rb") as file:
+                while part := file.read(_PART):
+                    digest.update(part)
     return digest.hexdigest()[:16]

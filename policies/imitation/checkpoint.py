@@ -6,6 +6,7 @@
 A checkpoint appears under its name only when it is whole.
 """
 
+import itertools
 import json
 import os
 import shutil
@@ -19,7 +20,10 @@ import numpy as np
 
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import HandrailError
+from handrail.controllers.strict_json import read_json
 from handrail.policies.imitation.interface import PolicyInterface
+from handrail.policies.imitation.meta_check import check_meta
+from handrail.policies.imitation.trust import CONFIG, check_policy_folder, registered_policies
 
 FORMAT = "handrail.policy/2"
 NAME = "handrail.json"
@@ -73,14 +77,14 @@ class TrainedPolicy:
 
     Attributes:
         interface: what it reads and writes; None if that is what was recorded.
-        meta: what it is.
+        meta: what it is; None of a policy of plain LeRobot.
         policy: LeRobot's policy.
         before: LeRobot's preprocessor: normalises.
         after: LeRobot's postprocessor: the reverse.
     """
 
     interface: PolicyInterface | None
-    meta: PolicyMeta
+    meta: PolicyMeta | None
     policy: Any
     before: Callable[[dict[str, Any]], dict[str, Any]]
     after: Callable[[Any], Any]
@@ -105,33 +109,42 @@ class TrainedPolicy:
         import torch
 
         seen = zip(_KEYS, (state, environment), strict=True)
-        numbers = {key: np.asarray(values, np.float32) for key, values in seen if values is not None}
+        read = self.policy.config.input_features
+        numbers = {
+            k: np.asarray(values, np.float32) for k, values in seen if values is not None and k in read
+        }
         batch = {key: torch.from_numpy(values)[None] for key, values in numbers.items() if values.size}
         for camera, picture in (images or {}).items():
             pixels = torch.from_numpy(np.ascontiguousarray(picture)).permute(2, 0, 1)
             batch[f"observation.images.{camera}"] = pixels[None].float() / 255.0
-        with torch.inference_mode():
-            return self.after(self.policy.select_action(self.before(batch)))[0].cpu().numpy()
+        try:
+            with torch.inference_mode():
+                return self.after(self.policy.select_action(self.before(batch)))[0].cpu().numpy()
+        except Exception as error:  # of LeRobot and all below it
+            words = " ".join(str(error).split()) or type(error).__name__
+            raise HandrailError(f"policy {self.policy.config.type}: cannot act: {words}") from error
 
 
 def load_policy(folder: str | Path, device: str = "cpu") -> TrainedPolicy:
     """Load a policy from a `pretrained_model` folder, a checkpoint, or a training's folder (the last one).
 
+    Whoever made it, loading it runs no code of theirs (`trust.py`).
+
     Raises:
-        HandrailError: there is none, or it is broken.
+        HandrailError: there is none, it is broken, or it could do harm.
     """
     place = model_folder(Path(folder).expanduser())
-    interface, meta = read_meta(place)
-    import lerobot.policies  # noqa: F401  (registers them)
-    from lerobot.configs.policies import PreTrainedConfig
+    interface, meta = read_meta(place) if (place / NAME).is_file() else (None, None)
+    settings = check_policy_folder(place)
+    import draccus
     from lerobot.policies.factory import get_policy_class, make_pre_post_processors
 
-    override = {"device_processor": {"device": device}}
+    kind, override = settings.pop("type"), {"device_processor": {"device": device}}
     try:
-        config = PreTrainedConfig.from_pretrained(place, cli_overrides=[f"--device={device}"])
-        policy = get_policy_class(config.type).from_pretrained(place, config=config)
+        config = draccus.decode(registered_policies()[kind], settings | {"device": device})
+        policy = get_policy_class(kind).from_pretrained(place, config=config)
         before, after = make_pre_post_processors(config, str(place), preprocessor_overrides=override)
-    except (OSError, ValueError, KeyError, RuntimeError) as error:
+    except Exception as error:  # of LeRobot and all below it: whatever the files hold, they are refused
         raise HandrailError(f"policy {str(place)!r}: {' '.join(str(error).split())}") from error
     policy.eval()
     policy.eval = lambda: policy  # LeRobot asks for it twice an action: a third of its time
@@ -142,18 +155,17 @@ def read_meta(folder: Path) -> tuple[PolicyInterface | None, PolicyMeta]:
     """Return what `handrail.json` in a `pretrained_model` folder says.
 
     Raises:
-        HandrailError: it is not there, or not of this version.
+        HandrailError: it is not there, not of this version, or says something that cannot be.
     """
     path = folder / NAME
-    try:
-        content = json.loads(path.read_bytes())
-        known, interface = content.pop("format"), content.pop("interface")
-        meta = PolicyMeta(**content) if known == FORMAT else None
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-        raise HandrailError(f"{str(path)!r}: expected a policy of handrail-train, got {error!r}") from error
-    if meta is None:
-        raise HandrailError(f"{str(path)!r}: expected the format {FORMAT}, got {known!r}")
-    return (None if interface is None else PolicyInterface.from_dict(interface)), meta
+    content = read_json(path, "a policy of handrail-train")
+    if not isinstance(content, dict) or content.get("format") != FORMAT or "interface" not in content:
+        known = content.get("format") if isinstance(content, dict) else content
+        raise HandrailError(f"{str(path)!r}: expected the format {FORMAT}, got {known!r:.80}")
+    del content["format"]
+    interface = content.pop("interface")
+    check_meta(content, repr(str(path)))
+    return (None if interface is None else PolicyInterface.from_dict(interface)), PolicyMeta(**content)
 
 
 def write_meta(folder: Path, interface: PolicyInterface | None, meta: PolicyMeta) -> None:
@@ -173,13 +185,16 @@ def model_folder(folder: Path) -> Path:
     """Return the `pretrained_model` folder there, in a checkpoint, or in a training's last one.
 
     Raises:
-        HandrailError: there is none with a `handrail.json`.
+        HandrailError: there is none, neither Handrail's nor plain LeRobot's.
     """
     last = last_checkpoint(folder)
-    for place in (folder, folder / MODEL, *([last / MODEL] if last else [])):
-        if (place / NAME).is_file():
+    places = (folder, folder / MODEL, *([last / MODEL] if last else []))
+    for name, place in itertools.product((NAME, CONFIG), places):
+        if (place / name).is_file():
+            if not place.resolve().is_relative_to(folder.resolve()):
+                raise HandrailError(f"{str(place)!r}: expected it in {str(folder)!r}, found a link out of it")
             return place
-    raise HandrailError(f"policy {str(folder)!r}: expected a checkpoint with a {NAME}, found none")
+    raise HandrailError(f"policy {str(folder)!r}: expected a checkpoint with a {CONFIG}, found none")
 
 
 def publish(draft: Path, final: Path) -> None:

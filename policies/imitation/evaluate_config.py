@@ -6,7 +6,7 @@ from typing import Annotated
 
 import tyro
 
-from handrail.collect.config import MOST_TIME
+from handrail.collect.config import FPS_RANGE, MOST_TIME, TASKS
 from handrail.collect.perturbations import Perturbation
 from handrail.controllers.errors import HandrailError, unknown_name
 
@@ -36,6 +36,10 @@ class EvaluateConfig:
     by + to have several at once."""
     label: str = ""
     """Name of the arm; the teleop mode, and what is special about it, when empty."""
+    task: str = ""
+    """Of policies that do not say it, such as lerobot-train's: drawer, pick_place, reach or tray."""
+    fps: int = 20
+    """Decisions a second of such policies: the rate of their dataset [Hz]."""
     time_limit: float = 0.0
     """Time after which a rollout is given up [s]; the task's own when 0."""
     workers: int = 1
@@ -85,11 +89,14 @@ class EvaluateConfig:
             ("episodes", 1, MOST_EPISODES),
             ("seed", 0, 10**9),
             ("workers", 1, MOST_WORKERS),
+            ("fps", *FPS_RANGE),
         ):
             if not least <= getattr(self, name) <= most:
                 raise HandrailError(
                     f"--{name} {getattr(self, name)}: expected a whole number from {least} to {most}"
                 )
+        if self.task and self.task not in TASKS:
+            raise unknown_name("task", self.task, TASKS)
         for name in self.protections:
             if name not in PROTECTIONS:
                 raise unknown_name("protection", name, PROTECTIONS)

@@ -1,8 +1,8 @@
 """Evaluates trained policies: every checkpoint under every condition on the same declared seeds."""
 
 import multiprocessing
-from collections.abc import Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 from time import monotonic
@@ -19,6 +19,20 @@ from handrail.policies.imitation.operator import Policy
 from handrail.policies.imitation.rollout import Load, Rollout, Row, run_rollout
 
 _SAVE_EVERY = 2.0  # [s]
+
+
+class UnevaluatedError(HandrailError):
+    """Some policies could not be evaluated; the others were, and what they did is kept.
+
+    Attributes:
+        content: of the file.
+        reasons: why not, a line for each.
+    """
+
+    def __init__(self, content: dict[str, Any], reasons: Sequence[str]) -> None:
+        super().__init__("; ".join(reasons))
+        self.content = content
+        self.reasons = tuple(reasons)
 
 
 def load_trained(folder: Path) -> Policy:
@@ -42,47 +56,83 @@ def evaluate(
         load: reads the policy of a checkpoint folder.
 
     Raises:
-        HandrailError: a setting or a checkpoint is wrong, or the file cannot be written.
+        UnevaluatedError: some policies could not be evaluated, the others were.
+        HandrailError: a setting is wrong, no policy could be evaluated, or the file cannot be written.
     """
     config.check()
-    found = arms(config)
+    refused: list[str] = []
+    found = arms(config, refused)
     file = EvaluationFile(config.file if config.json else None)
     file.open(found)
     rollouts = [Rollout(arm, seed) for arm in found for seed in config.seeds if seed not in file.done(arm)]
     try:
-        _run_all(rollouts, config.workers, load, file, console or Console(quiet=True))
+        refused += _run_all(rollouts, config.workers, load, file, console or Console(quiet=True))
     finally:
         file.save()
+    if refused and not file.content["arms"]:
+        raise HandrailError("; ".join(refused))
+    if refused:
+        raise UnevaluatedError(file.content, refused)
     return file.content
 
 
 def _run_all(
     rollouts: Sequence[Rollout], workers: int, load: Load, file: EvaluationFile, console: Console
-) -> None:
+) -> list[str]:
+    """Run rollouts; return why some policies could not be."""
     columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
-    saved, successes = monotonic(), 0
+    saved, successes, refused = monotonic(), 0, dict[Path, str]()
     with Progress(*columns, TextColumn("{task.fields[success]}"), console=console) as progress:
         bar = progress.add_task("rollouts", total=len(rollouts), success="")
-        for count, (rollout, row) in enumerate(_results(rollouts, workers, load), start=1):
+        for count, (rollout, row) in enumerate(_results(rollouts, workers, load, refused), start=1):
             file.add(rollout.arm, row)
             successes += row["success"]
             progress.update(bar, advance=1, success=f"{successes}/{count} succeeded")
             if monotonic() - saved > _SAVE_EVERY:
                 file.save()
                 saved = monotonic()
+    return list(refused.values())
 
 
-def _results(rollouts: Sequence[Rollout], workers: int, load: Load) -> Iterator[tuple[Rollout, Row]]:
-    """Yield the rollouts as they are done, in any order."""
-    if min(workers, len(rollouts)) <= 1:
-        yield from ((rollout, run_rollout(rollout, load)) for rollout in rollouts)
-        return
+def _results(
+    rollouts: Sequence[Rollout], workers: int, load: Load, refused: dict[Path, str]
+) -> Iterator[tuple[Rollout, Row]]:
+    """Yield the rollouts as they are done, in any order; note policies that cannot be run."""
+    tried = _here(rollouts, load, refused) if min(workers, len(rollouts)) <= 1 else None
+    for rollout, row in tried or _in_processes(rollouts, workers, load, refused):
+        if isinstance(row, HandrailError):
+            refused.setdefault(rollout.arm.checkpoint.folder, str(row))
+        else:
+            yield rollout, row
+
+
+def _try(rollout: Rollout, load: Load) -> Row | HandrailError:
+    """Return how a rollout went, or why it could not be run."""
+    try:
+        return run_rollout(rollout, load)
+    except HandrailError as error:
+        return HandrailError(str(error))
+
+
+def _here(
+    rollouts: Sequence[Rollout], load: Load, refused: dict[Path, str]
+) -> Iterator[tuple[Rollout, Row | HandrailError]]:
+    for rollout in rollouts:
+        if rollout.arm.checkpoint.folder not in refused:
+            yield rollout, _try(rollout, load)
+
+
+def _in_processes(
+    rollouts: Sequence[Rollout], workers: int, load: Load, refused: dict[Path, str]
+) -> Iterator[tuple[Rollout, Row | HandrailError]]:
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(min(workers, len(rollouts)), context) as pool:
         try:
-            running = {pool.submit(run_rollout, rollout, load): rollout for rollout in rollouts}
+            running = {pool.submit(_try, rollout, load): rollout for rollout in rollouts}
             for done in as_completed(running):
-                yield running[done], done.result()
+                if not done.cancelled():
+                    yield running[done], done.result()
+                _cancel(running, refused)
         except BrokenProcessPool as error:
             raise HandrailError(
                 "evaluation: a worker was killed, perhaps for want of memory; what was done is kept, and the "
@@ -91,3 +141,10 @@ def _results(rollouts: Sequence[Rollout], workers: int, load: Load) -> Iterator[
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
             raise
+
+
+def _cancel(running: Mapping[Future[Any], Rollout], refused: Mapping[Path, str]) -> None:
+    """Do not begin what is left of policies that cannot be run."""
+    for future, rollout in running.items() if refused else ():
+        if rollout.arm.checkpoint.folder in refused:
+            future.cancel()

@@ -30,6 +30,10 @@ class EvaluationFile:
         if path is not None and path.exists():
             read_evaluations([path])
             self.content |= json.loads(path.read_bytes())
+            if not isinstance(self.content["conditions"], dict):
+                raise HandrailError(
+                    f"--json {path}: expected conditions by arm, got {self.content['conditions']!r:.80}"
+                )
 
     def open(self, arms: Sequence[Arm]) -> None:
         """Check that arms fit what is there.

@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from rich.markup import escape
 from rich.table import Table
 
 from handrail.datasets.paired import wilson
@@ -19,12 +20,12 @@ def evaluation_table(content: Mapping[str, Any]) -> Table:
         content: of an evaluation file.
     """
     rollouts = [row for arm in content["arms"].values() for entry in arm for row in entry["rollouts"]]
-    table = Table(title=str(content.get("task", "")), caption=_caption(rollouts))
+    table = Table(title=escape(str(content.get("task", ""))), caption=_caption(rollouts))
     for heading in _HEADINGS:
         table.add_column(heading, justify="left" if heading in ("arm", "failures") else "right")
     for label, entries in content["arms"].items():
         rows = [row for entry in entries for row in entry["rollouts"]]
-        table.add_row(label, str(len(entries)), *_cells(rows))
+        table.add_row(escape(label), str(len(entries)), *_cells(rows))
     return table
 
 
@@ -38,7 +39,7 @@ def _cells(rows: Sequence[Mapping[str, Any]]) -> tuple[str, ...]:
         f"{low:.0%} – {high:.0%}",
         f"{np.median(times):.1f}" if times else "–",
         *(f"{100 * np.mean([row.get(name, 0) for row in rows]):.1f}" for name in ("contacts", "brakes")),
-        ", ".join(f"{reason} {count}" for reason, count in reasons.most_common()) or "none",
+        escape(", ".join(f"{reason} {count}" for reason, count in reasons.most_common())) or "none",
     )
 
 

@@ -21,7 +21,7 @@ def film(config: EvaluateConfig, load: Load = load_trained) -> str:
     trouble = graphics_trouble()
     if trouble:
         return trouble
-    arm = arms(config)[0]
+    arm = arms(config, refused=[])[0]
     rollout = Rollout(arm, config.seeds[0])
     with Filmer(Path(config.video).expanduser(), arm.checkpoint.meta.fps, arm.label, _words) as filmer:
         run_rollout(rollout, load, (filmer,), SIZE)

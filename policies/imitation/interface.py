@@ -107,17 +107,23 @@ class PolicyInterface:
             HandrailError: it describes none.
         """
         names = [field.name for field in fields(cls)]
-        try:
-            actions, state, environment, channels, masks = (content[name] for name in names)
-            masks = tuple(tuple(map(bool, mask)) for mask in masks)
-            interface = cls(actions, tuple(state), tuple(environment), tuple(channels), masks)
-        except (KeyError, TypeError) as error:
-            raise HandrailError(
-                f"policy interface: expected {', '.join(names)}, got {content!r:.200}"
-            ) from error
-        if interface.actions not in ACTIONS:
-            raise unknown_name("action space", interface.actions, ACTIONS)
-        return interface
+        found = content if isinstance(content, Mapping) and set(content) == set(names) else {}
+        size = len(found["channels"]) if found and _texts(found["channels"]) else 0
+        if not (
+            size
+            and _texts(found["state_names"])
+            and _texts(found["environment_names"])
+            and _masks(found["masks"], size)
+        ):
+            raise HandrailError(f"policy interface: expected {', '.join(names)}, got {content!r:.200}")
+        if found["actions"] not in ACTIONS:
+            raise unknown_name("action space", found["actions"], ACTIONS)
+        if found["actions"] == "intent" and not found["masks"]:
+            raise HandrailError("policy interface: expected masks of an intent, got none")
+        state, environment, channels = (
+            tuple(found[name]) for name in ("state_names", "environment_names", "channels")
+        )
+        return cls(found["actions"], state, environment, channels, tuple(map(tuple, found["masks"])))
 
     @cached_property
     def _view(self) -> RelativeView:
@@ -150,3 +156,14 @@ def _names(features: Mapping[str, Feature], key: str) -> tuple[str, ...]:
             f" got {'none' if feature is None else 'one without names'}"
         )
     return feature.names
+
+
+def _texts(value: Any) -> bool:
+    return isinstance(value, list) and all(isinstance(each, str) for each in value)
+
+
+def _masks(value: Any, size: int) -> bool:
+    return isinstance(value, list) and all(
+        isinstance(mask, list) and len(mask) == size and all(isinstance(each, bool) for each in mask)
+        for mask in value
+    )

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from handrail.controllers.errors import HandrailError, unknown_name
 from handrail.policies.imitation.config import TrainConfig
 from handrail.policies.imitation.refusal import in_one_line
+from handrail.policies.imitation.trust import registered_policies
 
 if TYPE_CHECKING:
     from lerobot.configs.policies import PreTrainedConfig
@@ -154,12 +155,7 @@ def _given(config: TrainConfig, known: set[str]) -> dict[str, Any]:
 
 
 def _registered(name: str) -> type:
-    import lerobot.policies  # noqa: F401  (registers its own)
-    from lerobot.configs.policies import PreTrainedConfig
-    from lerobot.utils.import_utils import register_third_party_plugins
-
-    register_third_party_plugins()
-    choices = PreTrainedConfig.get_known_choices()
+    choices = registered_policies()
     if name not in choices:
         raise unknown_name("policy", name, choices)
     return choices[name]

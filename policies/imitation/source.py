@@ -1,6 +1,7 @@
 """From a recorded dataset to what a policy is trained on: chosen episodes, seen through its interface."""
 
 import hashlib
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -8,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import torch
 
+from handrail.collect.config import MODE_NAMES
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.reader import DatasetInfo, read_episodes, read_info, read_rows_of
 from handrail.datasets.stats import column_stats
@@ -25,7 +27,9 @@ Columns = dict[str, np.ndarray]
 STATE, ENVIRONMENT, ACTION = "observation.state", "observation.environment_state", "action"
 _LEARNT = ("observation", "action", "next.")
 _COUNTERS = ("timestamp", "frame_index", "episode_index", "index", "task_index")
+_NOWHERE = "handrail/local--only"  # no name on the hub, from where LeRobot would fetch what is missing
 _FLOOR = 1e-2  # [m, rad, m/s, …] least spread of a number: what hardly moved in training must not explode
+_WANT_SCENE = ("act", "diffusion")  # they read pictures, or the environment's state
 _RANGES = (("min", "max"), ("q01", "q99"), ("q10", "q90"))
 
 
@@ -96,15 +100,21 @@ class Source:
         return [key for key in self.columns if key in self.features]
 
     def _pictures(self, stamps: Mapping[str, list[float]]) -> "LeRobotDataset":
+        from huggingface_hub.errors import HFValidationError
         from lerobot.datasets.lerobot_dataset import LeRobotDataset
 
-        return LeRobotDataset(
-            self.config.dataset.repo_id,
-            root=self.info.root,
-            episodes=[row["episode_index"] for row in self.selection.rows],
-            delta_timestamps=dict(stamps) or None,
-            return_uint8=True,
-        )
+        try:
+            return LeRobotDataset(
+                _NOWHERE,
+                root=self.info.root,
+                episodes=[row["episode_index"] for row in self.selection.rows],
+                delta_timestamps=dict(stamps) or None,
+                return_uint8=True,
+            )
+        except HFValidationError as error:
+            raise HandrailError(
+                f"dataset {str(self.info.root)!r}: expected all its files, found some missing"
+            ) from error
 
 
 def read_source(config: TrainConfig, began: PolicyMeta | None = None) -> Source:
@@ -124,13 +134,29 @@ def read_source(config: TrainConfig, began: PolicyMeta | None = None) -> Source:
         selection = select_again(rows, began.episodes, began.trained_on)
     else:
         selection = select(rows, info.fps, config)
+    if config.actions == "intent":
+        _check_one_mode(selection)
     if config.actions == "recorded":
-        interface, features, columns = None, *_recorded(info, selection)
+        interface, features, columns = None, *_recorded(info, selection, config)
     else:
         interface, features, columns = _interpreted(info, selection, config.actions)
     if config.images:
         features |= _cameras(info)
     return Source(config, info, selection, interface, features, columns | _counters(selection, info.fps))
+
+
+def _check_one_mode(selection: Selection) -> None:
+    """Check that an intent can be completed when the policy drives: as in its mode, and there is but one."""
+    modes = Counter(str(row.get("mode") or "") for row in selection.rows)
+    if len(modes) == 1 and modes.keys() <= set(MODE_NAMES):
+        return
+    found = ", ".join(f"{mode or 'no mode'} ({count})" for mode, count in modes.most_common())
+    known = next((mode for mode, _ in modes.most_common() if mode in MODE_NAMES), None)
+    flag = f"--mode {known}" if known else "--actions realised"
+    raise HandrailError(
+        f"--actions intent: expected episodes of one teleop mode, whose controller completes the intent when"
+        f" the policy drives; got {found}; say {flag}"
+    )
 
 
 def steadied(stats: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
@@ -168,7 +194,9 @@ def _interpreted(
     return interface, {key: _feature("float32", (len(names[key]),), names[key]) for key in columns}, columns
 
 
-def _recorded(info: DatasetInfo, selection: Selection) -> tuple[dict[str, dict[str, Any]], Columns]:
+def _recorded(
+    info: DatasetInfo, selection: Selection, config: TrainConfig
+) -> tuple[dict[str, dict[str, Any]], Columns]:
     keys = [
         key
         for key, feature in info.features.items()
@@ -179,8 +207,24 @@ def _recorded(info: DatasetInfo, selection: Selection) -> tuple[dict[str, dict[s
     episodes = [read_rows_of(info, dict(row), keys) for row in selection.rows]
     columns = {key: np.concatenate([episode[key] for episode in episodes]) for key in keys}
     columns = {key: v.astype(np.float32) if v.dtype == np.float64 else v for key, v in columns.items()}
-    described = {key: info.features[key] for key in keys}
-    return {key: _feature(f.dtype, f.shape, f.names) for key, f in described.items()}, columns
+    features = {key: _feature(f.dtype, f.shape, f.names) for key in keys for f in (info.features[key],)}
+    if config.policy in _WANT_SCENE and ENVIRONMENT not in columns and not config.images:
+        _check_has_scene(info, columns, config)
+        features[ENVIRONMENT], columns[ENVIRONMENT] = features[STATE], columns[STATE]
+    return features, columns
+
+
+def _check_has_scene(info: DatasetInfo, columns: Columns, config: TrainConfig) -> None:
+    """Check that the robot's state may stand for the environment's: there are no pictures either."""
+    cameras = [key for key, feature in info.features.items() if feature.dtype in ("video", "image")]
+    if cameras:
+        raise HandrailError(
+            f"--policy {config.policy}: expected --images: the scene is in {', '.join(cameras)} alone"
+        )
+    if STATE not in columns:
+        raise HandrailError(
+            f"--policy {config.policy}: expected a column {STATE!r}, got {', '.join(columns)}"
+        )
 
 
 def _cameras(info: DatasetInfo) -> dict[str, dict[str, Any]]:

@@ -26,6 +26,7 @@ from handrail.policies.imitation.presets import policy_config, resolved
 from handrail.policies.imitation.refusal import in_one_line
 from handrail.policies.imitation.resume import as_json, check_data, check_settings
 from handrail.policies.imitation.source import Source, read_source
+from handrail.policies.imitation.trust import check_policy_folder
 
 if TYPE_CHECKING:
     from handrail.policies.imitation.run import Pipeline
@@ -48,8 +49,9 @@ def train(config: TrainConfig, quiet: bool = False) -> Path:
     config.check()
     checkpoint = _begin(config)
     began = None if checkpoint is None else read_meta(checkpoint / MODEL)[1]
-    if began is not None:
+    if checkpoint is not None and began is not None:
         check_settings(config, began)
+        check_policy_folder(checkpoint / MODEL, asked=[policy_config(config)])
     source, steps = read_source(config, began), resolved(config).steps
     if began is not None:
         check_data(source, began)

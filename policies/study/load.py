@@ -1,13 +1,14 @@
 """Reading a study's design from a TOML file, and checking it whole."""
 
-import tomllib
 from pathlib import Path
 from typing import Any
 
 import draccus
 
 from handrail.controllers.errors import HandrailError, unknown_name
+from handrail.controllers.strict_toml import read_toml
 from handrail.policies.study.design import StudyDesign
+from handrail.policies.study.design_check import check_design
 from handrail.policies.study.settings import check_jobs
 
 PRESETS = Path(__file__).parent / "presets"
@@ -27,10 +28,8 @@ def load_design(name: str) -> StudyDesign:
     path = Path(name).expanduser() if name.endswith(".toml") else PRESETS / f"{name}.toml"
     if not path.is_file():
         raise unknown_name("study", name, [*design_names(), "a file that ends in .toml"])
-    try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise HandrailError(f"study {name}: expected TOML, got {error}") from error
+    content = read_toml(path, "study")
+    check_design(content, f"study {name}")
     design = _design(path.stem, content)
     design.check()
     check_jobs(design)

@@ -1,0 +1,29 @@
+"""Reading TOML that somebody else may have written: of sane size and depth, or one line."""
+
+import tomllib
+from pathlib import Path
+from typing import Any
+
+from handrail.controllers.errors import HandrailError
+
+MOST_BYTES = 2**20
+
+
+def read_toml(path: Path, what: str) -> dict[str, Any]:
+    """Return the content of a TOML file.
+
+    Args:
+        path: of the file.
+        what: it is, for the error: `robot description`.
+
+    Raises:
+        HandrailError: it cannot be read, is too large or too deep, or no TOML.
+    """
+    try:
+        if path.stat().st_size > MOST_BYTES:
+            raise HandrailError(f"{what} {path}: expected at most {MOST_BYTES >> 10} kB")
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except RecursionError as error:
+        raise HandrailError(f"{what} {path}: not valid TOML: nested too deeply") from error
+    except (OSError, ValueError) as error:
+        raise HandrailError(f"{what} {path}: not valid TOML: {' '.join(str(error).split())}") from error

@@ -1,0 +1,59 @@
+"""A command in a process of its own that dies, as by SIGKILL from outside, at its k-th change below a folder.
+
+A change is an `open` for writing, a rename, a removal, a link or a new folder. Processes are forked from a
+server that has loaded LeRobot and PyTorch once, as those of a study are.
+"""
+
+import importlib
+import multiprocessing
+import os
+import signal
+import sys
+from pathlib import Path
+
+from datasets_guillotine import CHANGES, WRITING
+
+_PRELOAD = "handrail.policies.study.preload"
+
+
+def killed(folder: Path, change: int, module: str, *flags: object) -> bool:
+    """Run a command until it dies at a change; return whether it died.
+
+    Args:
+        folder: changes to what begins with this path count.
+        change: the number of the last one, which is not made.
+        module: of the command.
+        flags: of the command line.
+    """
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload([_PRELOAD])
+    log = folder.parent / "killed.log"
+    process = context.Process(target=_run, args=(str(folder), change, module, [*map(str, flags)], str(log)))
+    process.start()
+    process.join()
+    assert process.exitcode in (0, -signal.SIGKILL), log.read_text()[-2000:]
+    return process.exitcode != 0
+
+
+def _run(folder: str, remaining: int, module: str, flags: list[str], log: str) -> None:
+    with open(log, "w") as file:
+        os.dup2(file.fileno(), 1)
+        os.dup2(file.fileno(), 2)
+
+    def audit(event: str, arguments: tuple) -> None:
+        nonlocal remaining
+        opened = event == "open" and bool((arguments[2] or 0) & WRITING)
+        if not opened and event not in (*CHANGES, "os.symlink"):
+            return
+        places = [os.fspath(path) for path in arguments[:2] if isinstance(path, str | os.PathLike)]
+        if any(place.startswith(folder) for place in places):
+            remaining -= 1
+            if not remaining:
+                os.kill(os.getpid(), signal.SIGKILL)
+
+    from handrail.policies.imitation import evaluation
+
+    evaluation._SAVE_EVERY = 0.0  # after every rollout, so that there is much to write
+    sys.argv = [module, *flags]
+    sys.addaudithook(audit)
+    importlib.import_module(module).main()
