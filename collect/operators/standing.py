@@ -10,14 +10,7 @@ from handrail.controllers.model import Pose, RobotModel
 
 _COMFORT = 0.85  # of the reach at home
 _YAWS = (0.0, 0.5, -0.5, 1.0, -1.0, 1.5, -1.5)  # in which a person would try to stand [rad]
-_FARTHER = (
-    _COMFORT,
-    0.95,
-    1.05,
-    1.1,
-    1.15,
-    0.75,
-)  # shares of the reach at home to try, the first that will do
+_FARTHER = (_COMFORT, 0.95, 1.05, 1.1, 1.15, 0.75)  # shares of it to try, the first that will do
 _ABOUT = 0.05  # error of the hand's pose there that a person puts up with [m, rad]
 _CLEAR = 0.08  # of the arm to itself that is enough [m]
 

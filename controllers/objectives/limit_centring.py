@@ -39,7 +39,7 @@ def limit_centring(
 
 
 def narrow_joint_centring(channels: Channels, limits: Limits, weight: float) -> tuple[Objective, ...]:
-    """Draw arm joints that cannot turn half around to their middle while just the whole tool is steered.
+    """Draw joints of the arm that cannot turn half around to their middle while just the tool is steered.
 
     A hand that is steered straight to where it shall be may otherwise lead them into a corner of their limits
     that only going back leads out of. Nothing for an arm whose joints all turn that far; nor where base or
