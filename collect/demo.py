@@ -36,7 +36,7 @@ def demo(config: DemoConfig) -> int:
     if trouble:
         console.print(f"Without pictures: {trouble}", **PLAIN)
     cameras = "" if trouble else "wrist,scene"
-    root = Path(config.root) / "dataset"
+    root = config.folder / "dataset"
     dataset = DatasetConfig(repo_id=_REPO, root=str(root), num_episodes=config.episodes)
     console.print(f"Recording {config.episodes} episodes: the operator steers the hand, the MPC the rest …")
     code = record(RecordConfig(dataset=dataset, cameras=cameras, overwrite=config.overwrite))
@@ -44,7 +44,7 @@ def demo(config: DemoConfig) -> int:
         return code
     console.print(summary_table(root))
     if not trouble:
-        sheet = Path(config.root) / "episode_0.png"
+        sheet = config.folder / "episode_0.png"
         save_sheet(replay_episode(root, 0, pictures=8)[1], sheet)
         console.print(f"Picture: {sheet}", **PLAIN)
     console.print(f"Dataset: {root}", **PLAIN)

@@ -99,7 +99,7 @@ def _open_writer(config: RecordConfig, env: HandrailEnv) -> EpisodeWriter:
     dataset = config.dataset
     arguments = (
         dataset.folder,
-        dataset.repo_id,
+        dataset.name,
         dataset.fps,
         session_features(env),
         env.model.description.name,

@@ -99,7 +99,7 @@ class Source:
         from lerobot.datasets.lerobot_dataset import LeRobotDataset
 
         return LeRobotDataset(
-            self.config.dataset.repo_id,
+            self.config.dataset.name,
             root=self.info.root,
             episodes=[row["episode_index"] for row in self.selection.rows],
             delta_timestamps=dict(stamps) or None,
