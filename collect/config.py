@@ -172,7 +172,9 @@ class RecordConfig(SessionConfig):
     overwrite: bool = False
     """Remove the dataset that is there."""
     display_data: bool = False
-    """Show robot, cameras, intent and distances in rerun."""
+    """Show robot, cameras, intent and distances in rerun's viewer (needs a screen)."""
+    display_web: bool = False
+    """Show that in a browser on this machine instead."""
     display_save: str = ""
     """Save what rerun would show to this .rrd file."""
 
@@ -186,6 +188,8 @@ class RecordConfig(SessionConfig):
         self.dataset.check()
         if self.resume and self.overwrite:
             raise HandrailError("--resume and --overwrite: expected one of them, got both")
+        if self.display_data and self.display_web:
+            raise HandrailError("--display_data and --display_web: expected one of them, got both")
         if self.display_save and not self.display_save.endswith(".rrd"):
             raise HandrailError(f"--display_save {self.display_save}: expected a file that ends in .rrd")
 
@@ -198,7 +202,9 @@ class ReplayConfig:
     episode: int = -1
     """Which episode; all of them when negative."""
     sheet: str = ""
-    """Also write a contact sheet of the episode to this .png file."""
+    """Also write a contact sheet of the episode to this .png file (needs OpenGL)."""
+    video: str = ""
+    """Also film the episode to this .mp4 file (needs OpenGL)."""
 
     def check(self) -> None:
         """Check the settings.
@@ -206,10 +212,11 @@ class ReplayConfig:
         Raises:
             HandrailError: one is wrong.
         """
-        if self.sheet and not (self.sheet.endswith(".png") and Path(self.sheet).expanduser().parent.is_dir()):
-            raise HandrailError(f"--sheet {self.sheet}: expected a .png file in an existing folder")
-        if self.sheet and self.episode < 0:
-            raise HandrailError("--sheet: expected --episode with the number of one episode")
+        for flag, file, ending in (("--sheet", self.sheet, ".png"), ("--video", self.video, ".mp4")):
+            if file and not (file.endswith(ending) and Path(file).expanduser().absolute().parent.is_dir()):
+                raise HandrailError(f"{flag} {file}: expected a {ending} file in an existing folder")
+            if file and self.episode < 0:
+                raise HandrailError(f"{flag}: expected --episode with the number of one episode")
 
 
 @dataclass(frozen=True)

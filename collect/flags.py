@@ -1,4 +1,4 @@
-"""What settings of several commands have in common: what may be said in two ways, names from a list, a page."""
+"""What settings of several commands have in common: two ways to say one thing, names from a list, a page."""
 
 from pathlib import Path
 

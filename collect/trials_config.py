@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 from handrail.collect.config import MODE_NAMES, TASKS
 from handrail.collect.flags import check_names, check_page, names
-from handrail.datasets.lists import Names
 from handrail.controllers.errors import HandrailError
+from handrail.datasets.lists import Names
 
 SLOW_MODE = "direct_single"  # needs more time than the tasks give
 SLOW_LIMITS = {"drawer": 180.0, "pick_place": 180.0, "reach": 60.0, "tray": 180.0}  # [s]

@@ -32,7 +32,8 @@ def check_target(layout: Layout, overwrite: bool) -> None:
         )
     if not overwrite:
         raise HandrailError(
-            f"dataset {str(root)!r} exists already: --resume adds to it, --overwrite removes it; or choose another folder"
+            f"dataset {str(root)!r} exists already: --resume adds to it, --overwrite removes it;"
+            " or choose another folder"
         )
 
 

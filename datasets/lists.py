@@ -8,7 +8,7 @@ from tyro.constructors import PrimitiveConstructorSpec
 
 
 def split_list(words: Sequence[str]) -> tuple[str, ...]:
-    """Return the entries of a list; what is in brackets stays together, and so does the path of what exists."""
+    """Return the entries of a list; what is in brackets stays together, so does the path of what exists."""
     parts = [part.strip() for word in words for part in _split_word(word)]
     return tuple(part for part in parts if part)
 

@@ -294,4 +294,6 @@ class EpisodeWriter:
 
     def _check_usable(self) -> None:
         if self._unusable:
-            raise HandrailError(f"writer of {str(self.root)!r} {self._unusable}: open the dataset again with --resume")
+            raise HandrailError(
+                f"writer of {str(self.root)!r} {self._unusable}: open the dataset again with --resume"
+            )

@@ -26,7 +26,8 @@ def _replay(config: ReplayConfig) -> int:
     episodes = range(len(read_episodes(root))) if config.episode < 0 else [config.episode]
     table = Table("episode", "largest deviation", "of", "tool at end [m]", "success", "recorded", "contacts")
     for episode in episodes:
-        replay, pictures = replay_episode(root, episode, _PICTURES if config.sheet else 0)
+        video = Path(config.video).expanduser() if config.video else None
+        replay, pictures = replay_episode(root, episode, _PICTURES if config.sheet else 0, video)
         table.add_row(
             str(episode),
             f"{replay.largest:.2e}",
@@ -38,7 +39,10 @@ def _replay(config: ReplayConfig) -> int:
         )
         if pictures:
             save_sheet(pictures, Path(config.sheet).expanduser())
-    Console().print(table)
+    console = Console(highlight=False, soft_wrap=True)
+    console.print(table)
+    for written in filter(None, (config.sheet, config.video)):
+        console.print(f"Written: {written}")
     return 0
 
 

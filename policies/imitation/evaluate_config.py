@@ -108,7 +108,9 @@ class EvaluateConfig:
                 f"--time_limit {self.time_limit}: expected 0 (the task's own) to {MOST_TIME} s"
             )
         if not self.folders:
-            raise HandrailError("policy: expected one checkpoint folder or more, such as outputs/act; got none")
+            raise HandrailError(
+                "policy: expected one checkpoint folder or more, such as outputs/act; got none"
+            )
         self._check_files()
 
     def _check_files(self) -> None:
