@@ -19,6 +19,7 @@ from handrail.collect.benchmark_format import (
     safety_table,
 )
 from handrail.collect.benchmark_metrics import COST_METRICS, METRICS, SETTLED_METRICS
+from handrail.collect.plain_table import PlainTable
 
 _SHORT = {
     HEADINGS["final_position_error"]: "d_p m",
@@ -59,9 +60,4 @@ def _stacked(metric: str, values: Values) -> str:
 def _rich(table: Table, title: str) -> RichTable:
     headings, rows = table
     headings = [_SHORT.get(heading, heading) for heading in headings]
-    rich = RichTable(title=title, show_lines=any("\n" in cell for row in rows for cell in row))
-    for index, heading in enumerate(headings):
-        rich.add_column(heading, no_wrap=index == 0)
-    for row in rows:
-        rich.add_row(*row)
-    return rich
+    return PlainTable(headings, rows, title)

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from rich.table import Table
 
+from handrail.collect.plain_table import PlainTable
 from handrail.datasets.paired import wilson
 
 _HEADINGS = ("arm", "policies", "success", "95 %", "time [s]", "contacts / 100", "brakes / 100", "failures")
@@ -19,13 +20,11 @@ def evaluation_table(content: Mapping[str, Any]) -> Table:
         content: of an evaluation file.
     """
     rollouts = [row for arm in content["arms"].values() for entry in arm for row in entry["rollouts"]]
-    table = Table(title=str(content.get("task", "")), caption=_caption(rollouts))
-    for heading in _HEADINGS:
-        table.add_column(heading, justify="left" if heading in ("arm", "failures") else "right")
-    for label, entries in content["arms"].items():
-        rows = [row for entry in entries for row in entry["rollouts"]]
-        table.add_row(label, str(len(entries)), *_cells(rows))
-    return table
+    lines = [
+        (label, str(len(entries)), *_cells([row for entry in entries for row in entry["rollouts"]]))
+        for label, entries in content["arms"].items()
+    ]
+    return PlainTable(_HEADINGS, lines, str(content.get("task", "")), _caption(rollouts))
 
 
 def _cells(rows: Sequence[Mapping[str, Any]]) -> tuple[str, ...]:
