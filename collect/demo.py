@@ -16,10 +16,11 @@ from handrail.controllers.errors import HandrailError
 
 _REPO = "handrail/demo"
 _NEXT = """Next:
-  {bin}handrail-inspect --dataset.root {root}
-  {bin}handrail-replay --dataset.root {root}
-  {bin}handrail-record --dataset.root {root} --resume --dataset.num_episodes 5 --mode switching{cameras}
-  {bin}lerobot-dataset-viz --repo-id {repo} --root {root} --episode-index 0    (extra: display)
+  {bin}handrail-inspect {root}
+  {bin}handrail-replay {root}
+  {bin}handrail-record {root} --resume --dataset.num_episodes 5 --mode switching{cameras}
+  {bin}lerobot-dataset-viz --repo-id {repo} --root {root} --episode-index 0 \
+      --save 1 --output-dir {folder}    # extra: display; without --save it needs a screen
   {bin}handrail-record --help"""
 
 
@@ -49,7 +50,7 @@ def demo(config: DemoConfig) -> int:
         console.print(f"Picture: {sheet}", **PLAIN)
     console.print(f"Dataset: {root}", **PLAIN)
     flags = f" --cameras {cameras}" if cameras else ""
-    console.print(_NEXT.format(root=root, repo=_REPO, cameras=flags, bin=_command_prefix()), **PLAIN)
+    console.print(_NEXT.format(root=root, folder=config.folder, repo=_REPO, cameras=flags, bin=_command_prefix()), **PLAIN)
     return 0
 
 

@@ -194,9 +194,9 @@ def test_inspect_prints_every_episode(recorded):
     done = command("--dataset.root", recorded, name="inspect")
     assert done.returncode == 0, done.stderr
     assert "2 episodes, 2 succeeded" in done.stdout
-    assert len(re.findall(r"│ \d+ +│ ee", done.stdout)) == 2
+    assert len(re.findall(r"^ *\d+  ee", done.stdout, re.MULTILINE)) == 2
     more = command("--dataset.root", recorded, "--quality", name="inspect")
-    assert len(re.findall(r"│ \d+ +│ ee", more.stdout)) == 4
+    assert len(re.findall(r"^ *\d+  ee", more.stdout, re.MULTILINE)) == 4
 
 
 def test_resume_goes_on_with_new_seeds(recorded, tmp_path):
