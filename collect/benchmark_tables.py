@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from typing import Any
 
 from rich.console import Group
-from rich.table import Table as RichTable
 
 from handrail.collect.benchmark_format import (
     COMPARED,
@@ -57,7 +56,7 @@ def _stacked(metric: str, values: Values) -> str:
     return mean if ends == "–" else f"{mean}\n{ends}"
 
 
-def _rich(table: Table, title: str) -> RichTable:
+def _rich(table: Table, title: str) -> PlainTable:
     headings, rows = table
     headings = [_SHORT.get(heading, heading) for heading in headings]
     return PlainTable(headings, rows, title)

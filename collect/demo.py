@@ -50,7 +50,10 @@ def demo(config: DemoConfig) -> int:
         console.print(f"Picture: {sheet}", **PLAIN)
     console.print(f"Dataset: {root}", **PLAIN)
     flags = f" --cameras {cameras}" if cameras else ""
-    console.print(_NEXT.format(root=root, folder=config.folder, repo=_REPO, cameras=flags, bin=_command_prefix()), **PLAIN)
+    console.print(
+        _NEXT.format(root=root, folder=config.folder, repo=_REPO, cameras=flags, bin=_command_prefix()),
+        **PLAIN,
+    )
     return 0
 
 

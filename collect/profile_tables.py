@@ -3,7 +3,6 @@
 from typing import Any
 
 from rich.console import Group
-from rich.table import Table
 
 from handrail.collect.plain_table import PlainTable
 
@@ -27,7 +26,7 @@ def _all(results: dict[str, Any]) -> dict[str, Any]:
     return {name: results[name] for name in ("no_collision", "pairs_30", "pairs_100")} | results["growth"]
 
 
-def _cases(results: dict[str, Any]) -> Table:
+def _cases(results: dict[str, Any]) -> PlainTable:
     machine = results["machine"]
     headings = ("case", "n", "N", "pairs", "near", "rows", "median", "p95", "p99", "worst")
     caption = f"{machine['cores']} cores, load {machine['load_before']:.1f} to {machine['load_after']:.1f}"
@@ -39,7 +38,7 @@ def _cases(results: dict[str, Any]) -> Table:
     return PlainTable(headings, rows, "Update of the masked MPC [ms]", caption)
 
 
-def _phases(results: dict[str, Any]) -> Table:
+def _phases(results: dict[str, Any]) -> PlainTable:
     cases = _all(results)
     names = list(cases["no_collision"]["phases_ms"])
     rows = [
@@ -49,7 +48,7 @@ def _phases(results: dict[str, Any]) -> Table:
     return PlainTable(("case", *names, "braked"), rows, "Where the time goes: medians [ms]")
 
 
-def _rivals(results: dict[str, Any]) -> Table:
+def _rivals(results: dict[str, Any]) -> PlainTable:
     headings, rows = ("case", "rival", "median", "p95", "p99", "worst", "solves", "failed"), []
     for case, rivals in results["rivals"].items():
         for rival in rivals:
@@ -59,7 +58,7 @@ def _rivals(results: dict[str, Any]) -> Table:
     return PlainTable(headings, rows, "Rivals [ms]")
 
 
-def _growth(results: dict[str, Any]) -> Table:
+def _growth(results: dict[str, Any]) -> PlainTable:
     rows = []
     for key, name in _RATIOS.items():
         ratio = results[key]

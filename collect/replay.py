@@ -141,6 +141,7 @@ class _Camera:
         if wanted:
             self.taken.append(picture)
         if self._video and self._film is None:  # only now: without OpenGL there shall be no file
-            self._film = self._stack.enter_context(VideoFile(self._video, picture.shape[:2], self._env.fps))
+            film = VideoFile(self._video, self._env.render_size, self._env.fps)
+            self._film = self._stack.enter_context(film)
         if self._film:
             self._film.add(picture)

@@ -2,15 +2,13 @@
 
 from pathlib import Path
 
-from rich.table import Table
-
 from handrail.collect.plain_table import PlainTable
 from handrail.datasets.summary import HEADINGS, QUALITY_HEADINGS, summarize
 
 _TASK = HEADINGS.index("task")
 
 
-def summary_table(root: Path) -> Table:
+def summary_table(root: Path) -> PlainTable:
     """Return a table with one line an episode of any LeRobot v3.0 dataset.
 
     Raises:
@@ -26,7 +24,7 @@ def summary_table(root: Path) -> Table:
     return PlainTable([HEADINGS[index] for index in shown], lines, title, caption)
 
 
-def quality_table(root: Path) -> Table:
+def quality_table(root: Path) -> PlainTable:
     """Return a table with the measures of quality of every episode of any LeRobot v3.0 dataset.
 
     Raises:

@@ -46,7 +46,17 @@ NOT_RUN = {
     "tensorboard": "runs until Ctrl-C",
 }
 MINUTES = ("lerobot-", "handrail-study", "handrail-profile", "handrail-train-rl", "handrail-benchmark")
-MINUTES_TOO = ("pick_place", "minute", "diffusion", "moving", "trials", "showcase", "demo")
+MINUTES_TOO = (
+    "pick_place",
+    "none,mpc",
+    "push:2",
+    "minute",
+    "diffusion",
+    "moving",
+    "trials",
+    "showcase",
+    "demo",
+)
 
 
 def readme_commands() -> list[list[str]]:

@@ -5,7 +5,6 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from rich.table import Table
 
 from handrail.collect.plain_table import PlainTable
 from handrail.datasets.paired import wilson
@@ -13,7 +12,7 @@ from handrail.datasets.paired import wilson
 _HEADINGS = ("arm", "policies", "success", "95 %", "time [s]", "contacts / 100", "brakes / 100", "failures")
 
 
-def evaluation_table(content: Mapping[str, Any]) -> Table:
+def evaluation_table(content: Mapping[str, Any]) -> PlainTable:
     """Return one line an arm: success with its Wilson interval, time to it, contacts, brakes, why it failed.
 
     Args:
