@@ -40,7 +40,6 @@ LESS_STUDY = {
 }  # of the design
 NOT_RUN = {
     "make": "sets up and tests this very clone",
-    ".": "a shell's own",
     "pip": "needs the network",
     "apt-get": "needs the network and the administrator",
     "tensorboard": "runs until Ctrl-C",
