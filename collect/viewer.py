@@ -44,16 +44,16 @@ class Viewer:
         self.address = f"http://{_HERE}:{page_port}/?url={quote(data, safe='')}" if web else ""
         served = ["--serve-web", "--web-viewer-port", str(page_port)] if web else []
         self._said = tempfile.TemporaryFile()  # noqa: SIM115 (as long as the process)
+        end, self._pipe = os.pipe()
+        os.set_blocking(self._pipe, False)
         self._process = subprocess.Popen(
             [_program(), "--bind", _HERE, "--port", str(data_port), *served, "-"],
-            stdin=subprocess.PIPE,
+            stdin=end,
             stdout=self._said,
             stderr=subprocess.STDOUT,
             start_new_session=True,  # Ctrl-C ends the recording; the window stays
         )
-        assert self._process.stdin is not None
-        self._pipe = self._process.stdin.fileno()
-        os.set_blocking(self._pipe, False)
+        os.close(end)
         try:
             self._begin(first, data_port)
         except BaseException:
@@ -91,8 +91,7 @@ class Viewer:
         """End the stream: a window stays open, a web viewer ends."""
         if self._web:
             self._kill()
-        assert self._process.stdin is not None
-        self._process.stdin.close()
+        os.close(self._pipe)
         self._said.close()
 
     def _begin(self, first: bytes, port: int) -> None:
@@ -103,7 +102,8 @@ class Viewer:
                 raise HandrailError(f"the rerun viewer did not start: {self._last_words()}")
             if time.monotonic() > until:
                 raise HandrailError(f"the rerun viewer did not start within {_BEGIN:.0f} s")
-            self.send(first)
+            with contextlib.suppress(HandrailError):  # it has ended: why is said above
+                self.send(first)
             first = b""
             time.sleep(0.05)
 
