@@ -35,7 +35,7 @@ LESS_STUDY = {
     "rollouts": "2",
     "persons": "1",
     "episodes": "2",
-    "minutes": "0.05",
+    "minutes": "0.3",
     "steps": "4",
 }  # of the design
 NOT_RUN = {
