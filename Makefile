@@ -19,7 +19,7 @@ $(STAMP): pyproject.toml constraints.txt .ci/setup
 	@touch $@
 
 demo: $(STAMP)
-	$(BIN)/handrail-demo --root $(DEMO) --overwrite
+	$(BIN)/handrail-demo $(DEMO) --overwrite
 
 test: $(STAMP)
 	$(BIN)/python -m pytest -n auto --dist loadfile

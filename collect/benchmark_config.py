@@ -5,6 +5,7 @@ from pathlib import Path
 
 from handrail.collect.flags import check_names, check_page, names
 from handrail.controllers.errors import HandrailError
+from handrail.datasets.lists import Names
 
 CONTROLLERS = (
     *("mpc", "rl", "mink", "mpc_paper", "rl_low_pass", "mink_low_pass"),
@@ -18,15 +19,15 @@ MOST_WORKERS = 64
 class BenchmarkConfig:
     """Run the paper's goal-reaching benchmark: every controller on the same goals, with the same planner."""
 
-    controllers: str = "all"
-    """Which controllers, comma-separated, or all: mpc, rl, mink, mpc_paper, rl_low_pass, mink_low_pass, dls,
+    controllers: Names = "all"
+    """Which controllers, or all: mpc, rl, mink, mpc_paper, rl_low_pass, mink_low_pass, dls,
     dls_arm, decoupled, blended, direct, cbf_filter, safety_filter."""
     goals: int = 100
     """Goals, the same for every controller."""
     seed: int = 1
     """Of the goals, obstacles and command noise."""
-    profile: str = "nominal"
-    """How the planner's twist arrives, comma-separated, or all: nominal, fast15, fast2, fast3, steps, noise,
+    profile: Names = "nominal"
+    """How the planner's twist arrives, one or more, or all: nominal, fast15, fast2, fast3, steps, noise,
     delay, dropouts, quantised."""
     physics: bool = True
     """MuJoCo physics; without it an ideal robot that does what it is told."""

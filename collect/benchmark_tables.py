@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from typing import Any
 
 from rich.console import Group
-from rich.table import Table as RichTable
 
 from handrail.collect.benchmark_format import (
     COMPARED,
@@ -21,6 +20,7 @@ from handrail.collect.benchmark_format import (
     settling_table,
 )
 from handrail.collect.benchmark_metrics import COST_METRICS, METRICS, SETTLED_METRICS
+from handrail.collect.plain_table import PlainTable
 
 _SHORT = {
     HEADINGS["final_position_error"]: "d_p m",
@@ -60,12 +60,7 @@ def _stacked(metric: str, values: Values) -> str:
     return mean if ends == "–" else f"{mean}\n{ends}"
 
 
-def _rich(table: Table, title: str) -> RichTable:
+def _rich(table: Table, title: str) -> PlainTable:
     headings, rows = table
     headings = [_SHORT.get(heading, heading) for heading in headings]
-    rich = RichTable(title=title, show_lines=any("\n" in cell for row in rows for cell in row))
-    for index, heading in enumerate(headings):
-        rich.add_column(heading, no_wrap=index == 0)
-    for row in rows:
-        rich.add_row(*row)
-    return rich
+    return PlainTable(headings, rows, title)

@@ -7,8 +7,10 @@ from typing import Annotated
 
 import tyro
 
+from handrail.collect.flags import only_one
 from handrail.collect.operators.human import HumanSettings
 from handrail.controllers.errors import HandrailError, unknown_name
+from handrail.datasets.lists import Names
 
 TASKS = ("drawer", "pick_place", "reach", "tray")
 MODE_NAMES = (
@@ -25,6 +27,7 @@ MODE_NAMES = (
     "switching",
 )
 OPERATORS = ("scripted",)
+REPO_ID = "handrail/demo"  # of a dataset whose name nobody says
 CAMERAS = ("wrist", "scene")
 FPS_RANGE = (10, 100)
 MOST_MOVING = 4
@@ -57,8 +60,8 @@ class SessionConfig:
     """A robot that comes with Handrail, or a description file (.toml)."""
     seed: int = 0
     """Of scenes and operator: the same seed and versions give the same data."""
-    cameras: Annotated[str, tyro.conf.arg(metavar="NAMES")] = ""
-    """Cameras to record, comma-separated: wrist, scene; none by default."""
+    cameras: Names = ""
+    """Cameras to record: wrist, scene or both; none by default."""
     image_size: int = 128
     """Height and width of the pictures [pixels]."""
     realtime: bool = False
@@ -103,13 +106,43 @@ class SessionConfig:
 
 
 @dataclass(frozen=True)
-class DatasetConfig:
-    """Where the episodes go; the flags are LeRobot's."""
+class StoredConfig:
+    """Where a dataset is; the flags are LeRobot's."""
 
-    repo_id: str = "handrail/demo"
-    """Name of the dataset, owner/name."""
+    repo_id: str = ""
+    """Name of the dataset, owner/name; without a folder it is in LeRobot's own place for this name."""
     root: str = ""
-    """Its folder; LeRobot's own place for the name when empty."""
+    """The same as FOLDER."""
+    place: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="FOLDER")] = ""
+    """Folder of the dataset."""
+
+    @property
+    def name(self) -> str:
+        """Its name."""
+        return self.repo_id or REPO_ID
+
+    @property
+    def folder(self) -> Path:
+        """The folder of the dataset: as given, or where LeRobot keeps its own.
+
+        Raises:
+            HandrailError: it is given twice, or neither it nor a name.
+        """
+        given = only_one(self.place, self.root, "--dataset.root")
+        if given:
+            return Path(given).expanduser()
+        if not self.repo_id:
+            raise HandrailError(
+                "dataset: expected its folder, such as outputs/reach, or --dataset.repo_id; got neither"
+            )
+        hub = Path(os.environ.get("HF_HOME", "~/.cache/huggingface")).expanduser()
+        return Path(os.environ.get("HF_LEROBOT_HOME", hub / "lerobot")).expanduser() / self.repo_id
+
+
+@dataclass(frozen=True)
+class DatasetConfig(StoredConfig):
+    """Where the episodes go, how many, how fast; the flags are LeRobot's."""
+
     num_episodes: int = 10
     """Episodes to record."""
     fps: int = 20
@@ -117,17 +150,13 @@ class DatasetConfig:
     single_task: str = ""
     """What is done, in words; the task's own sentence when empty."""
 
-    @property
-    def folder(self) -> Path:
-        """The folder of the dataset."""
-        return dataset_folder(self.repo_id, self.root)
-
     def check(self) -> None:
         """Check the settings.
 
         Raises:
             HandrailError: one is wrong.
         """
+        _ = self.folder
         check_fps(self.fps)
         if self.num_episodes < 1:
             raise HandrailError(f"--dataset.num_episodes {self.num_episodes}: expected 1 or more")
@@ -143,7 +172,9 @@ class RecordConfig(SessionConfig):
     overwrite: bool = False
     """Remove the dataset that is there."""
     display_data: bool = False
-    """Show robot, cameras, intent and distances in rerun."""
+    """Show robot, cameras, intent and distances in rerun's viewer (needs a screen)."""
+    display_web: bool = False
+    """Show that in a browser on this machine instead."""
     display_save: str = ""
     """Save what rerun would show to this .rrd file."""
 
@@ -157,23 +188,10 @@ class RecordConfig(SessionConfig):
         self.dataset.check()
         if self.resume and self.overwrite:
             raise HandrailError("--resume and --overwrite: expected one of them, got both")
+        if self.display_data and self.display_web:
+            raise HandrailError("--display_data and --display_web: expected one of them, got both")
         if self.display_save and not self.display_save.endswith(".rrd"):
             raise HandrailError(f"--display_save {self.display_save}: expected a file that ends in .rrd")
-
-
-@dataclass(frozen=True)
-class StoredConfig:
-    """A dataset that is there."""
-
-    repo_id: str = "handrail/demo"
-    """Name of the dataset, owner/name."""
-    root: str = ""
-    """Its folder; LeRobot's own place for the name when empty."""
-
-    @property
-    def folder(self) -> Path:
-        """The folder of the dataset."""
-        return dataset_folder(self.repo_id, self.root)
 
 
 @dataclass(frozen=True)
@@ -184,7 +202,9 @@ class ReplayConfig:
     episode: int = -1
     """Which episode; all of them when negative."""
     sheet: str = ""
-    """Also write a contact sheet of the episode to this .png file."""
+    """Also write a contact sheet of the episode to this .png file (needs OpenGL)."""
+    video: str = ""
+    """Also film the episode to this .mp4 file (needs OpenGL)."""
 
     def check(self) -> None:
         """Check the settings.
@@ -192,10 +212,11 @@ class ReplayConfig:
         Raises:
             HandrailError: one is wrong.
         """
-        if self.sheet and not (self.sheet.endswith(".png") and Path(self.sheet).expanduser().parent.is_dir()):
-            raise HandrailError(f"--sheet {self.sheet}: expected a .png file in an existing folder")
-        if self.sheet and self.episode < 0:
-            raise HandrailError("--sheet: expected --episode with the number of one episode")
+        for flag, file, ending in (("--sheet", self.sheet, ".png"), ("--video", self.video, ".mp4")):
+            if file and not (file.endswith(ending) and Path(file).expanduser().absolute().parent.is_dir()):
+                raise HandrailError(f"{flag} {file}: expected a {ending} file in an existing folder")
+            if file and self.episode < 0:
+                raise HandrailError(f"{flag}: expected --episode with the number of one episode")
 
 
 @dataclass(frozen=True)
@@ -213,20 +234,23 @@ class InspectConfig:
 class DemoConfig:
     """Record a few real demonstrations and show what came out."""
 
-    root: str = "outputs/demo"
-    """Folder for the dataset and the picture."""
+    root: str = ""
+    """The same as FOLDER."""
     episodes: int = 5
     """How many."""
     overwrite: bool = False
     """Remove an earlier demo's dataset."""
+    place: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="FOLDER")] = ""
+    """Folder for the dataset and the picture; outputs/demo when none is given."""
 
+    @property
+    def folder(self) -> Path:
+        """The folder of the demo.
 
-def dataset_folder(repo_id: str, root: str) -> Path:
-    """Return the folder of a dataset: as given, or where LeRobot keeps its own."""
-    if root:
-        return Path(root).expanduser()
-    hub = Path(os.environ.get("HF_HOME", "~/.cache/huggingface")).expanduser()
-    return Path(os.environ.get("HF_LEROBOT_HOME", hub / "lerobot")).expanduser() / repo_id
+        Raises:
+            HandrailError: it is given twice.
+        """
+        return Path(only_one(self.place, self.root, "--root") or "outputs/demo")
 
 
 def check_fps(fps: int) -> None:

@@ -16,10 +16,11 @@ from handrail.controllers.errors import HandrailError
 
 _REPO = "handrail/demo"
 _NEXT = """Next:
-  {bin}handrail-inspect --dataset.root {root}
-  {bin}handrail-replay --dataset.root {root}
-  {bin}handrail-record --dataset.root {root} --resume --dataset.num_episodes 5 --mode switching{cameras}
-  {bin}lerobot-dataset-viz --repo-id {repo} --root {root} --episode-index 0    (extra: display)
+  {bin}handrail-inspect {root}
+  {bin}handrail-replay {root}
+  {bin}handrail-record {root} --resume --dataset.num_episodes 5 --mode switching{cameras}
+  {bin}lerobot-dataset-viz --repo-id {repo} --root {root} --episode-index 0 \
+      --save 1 --output-dir {folder}    # extra: display; without --save it needs a screen
   {bin}handrail-record --help"""
 
 
@@ -36,7 +37,7 @@ def demo(config: DemoConfig) -> int:
     if trouble:
         console.print(f"Without pictures: {trouble}", **PLAIN)
     cameras = "" if trouble else "wrist,scene"
-    root = Path(config.root) / "dataset"
+    root = config.folder / "dataset"
     dataset = DatasetConfig(repo_id=_REPO, root=str(root), num_episodes=config.episodes)
     console.print(f"Recording {config.episodes} episodes: the operator steers the hand, the MPC the rest …")
     code = record(RecordConfig(dataset=dataset, cameras=cameras, overwrite=config.overwrite))
@@ -44,12 +45,15 @@ def demo(config: DemoConfig) -> int:
         return code
     console.print(summary_table(root))
     if not trouble:
-        sheet = Path(config.root) / "episode_0.png"
+        sheet = config.folder / "episode_0.png"
         save_sheet(replay_episode(root, 0, pictures=8)[1], sheet)
         console.print(f"Picture: {sheet}", **PLAIN)
     console.print(f"Dataset: {root}", **PLAIN)
     flags = f" --cameras {cameras}" if cameras else ""
-    console.print(_NEXT.format(root=root, repo=_REPO, cameras=flags, bin=_command_prefix()), **PLAIN)
+    console.print(
+        _NEXT.format(root=root, folder=config.folder, repo=_REPO, cameras=flags, bin=_command_prefix()),
+        **PLAIN,
+    )
     return 0
 
 

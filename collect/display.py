@@ -1,131 +1,119 @@
-"""Shows a session in rerun: robot, cameras, intent against motion, distances."""
+"""Shows a session in rerun, to a viewer or into a file."""
 
+import contextlib
+import time
+from collections.abc import Callable
 from pathlib import Path
-
-import numpy as np
+from typing import Any
 
 from handrail.collect.env import HandrailEnv
-from handrail.controllers.channels import Channels
-from handrail.controllers.errors import HandrailError
-from handrail.controllers.shape import Obstacle
+from handrail.collect.rerun_drawing import Drawing
+from handrail.collect.viewer import Viewer
+from handrail.controllers.errors import HandrailError, not_installed
 from handrail.datasets.frames import Moment
 
-_ROBOT = (235, 190, 40)
-_SCENE = (150, 160, 170)
+_PERIOD = 0.2  # between two transfers to the viewer [s]
+_PATIENCE = 10.0  # with rerun's own writing [s]
 
 
 class Display:
-    """Sends every moment to rerun; an observer of a session.
+    """Sends every moment to rerun; an observer that never stops a session.
 
     Args:
-        spawn: open the viewer.
-        save: also or instead write to this .rrd file; empty for none.
+        spawn: open the viewer in a window.
+        web: serve the viewer to browsers of this machine instead.
+        save: also or only write to this .rrd file; empty for none.
+        say: is told where the web viewer is, and what goes wrong later.
 
     Raises:
         HandrailError: rerun is not installed, or the viewer or the file cannot be opened.
     """
 
-    def __init__(self, spawn: bool = True, save: str = "") -> None:
+    def __init__(
+        self, spawn: bool = False, web: bool = False, save: str = "", say: Callable[[str], None] = print
+    ) -> None:
         try:
             import rerun as rr
         except ImportError as error:
-            raise HandrailError(
-                "--display_data, --display_save: expected rerun, found none; pip install 'handrail[display]'"
-            ) from error
-        self._rr = rr
+            raise not_installed("--display_data, _web, _save", "rerun", "display") from error
+        self._rr, self._save, self._say = rr, save, say
+        self._viewer: Viewer | None = None
+        self._stream: Any = None
+        self._off, self._sent = False, 0.0
+        self._drawing = Drawing(rr)
         rr.init("handrail")
         if save:
             _check_file(Path(save))
             rr.save(save)
-        if spawn:
-            try:
-                rr.spawn(connect=not save)
-            except (RuntimeError, OSError) as error:
-                raise HandrailError(f"--display_data: the rerun viewer did not start: {error}") from error
-        self._episode = -1
-        self._frame = 0
+        if spawn or web:
+            self._open_viewer(web)
+
+    def _open_viewer(self, web: bool) -> None:
+        """Open a viewer on a stream in memory, beside the file if there is one."""
+        rr = self._rr
+        self._stream = rr.binary_stream()
+        if self._save:
+            rr.set_sinks(rr.FileSink(self._save), self._stream)
+        rr.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+        try:
+            self._viewer = Viewer(self._read(), web)
+        except (HandrailError, OSError) as error:
+            flag, instead = "--display_data", "--display_web (in a browser) or --display_save FILE.rrd"
+            if web:
+                flag, instead = "--display_web", "--display_save FILE.rrd"
+            raise HandrailError(f"{flag}: {error}; say {instead} instead") from error
+        if web:
+            self._say(f"Watch while it records: {self._viewer.address}")
 
     def begin(self, env: HandrailEnv, seed: int) -> None:
         """Draw the scene of a new episode."""
-        self._model = env.model
-        self._channels = Channels.of(env.model.description)
-        self._period = 1.0 / env.fps
-        self._episode += 1
-        self._frame = 0
-        rr = self._rr
-        rr.set_time("episode", sequence=self._episode)
-        rr.set_time("time", duration=0.0)
-        rr.log("world", rr.Clear(recursive=True))
-        rr.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP)
-        self._movers = env.episode.scene.movers
-        for obstacle in env.episode.scene.obstacles():
-            self._log_shape(f"world/scene/{obstacle.name}", obstacle)
+        self._attempt(lambda: self._drawing.begin(env))
 
     def see(self, moment: Moment) -> None:
         """Log one moment."""
-        rr = self._rr
-        time = self._frame * self._period
-        rr.set_time("time", duration=time)
-        self._frame += 1
-        for mover in self._movers:
-            self._log_shape(f"world/scene/{mover.name}", mover.obstacle(time))
-        q = moment.state[: self._model.size].astype(float)
-        v = moment.state[self._model.size : 2 * self._model.size].astype(float)
-        self._log_robot(q)
-        self._log_tracking(moment, q, v)
-        for name, image in moment.images.items():
-            rr.log(f"camera/{name}", rr.Image(image))
-        health = moment.health
-        rr.log("distance/smallest", rr.Scalars(_finite(health.smallest_distance)))
-        rr.log("distance/work", rr.Scalars(_finite(health.work_distance)))
-        rr.log("controller/solve_time_ms", rr.Scalars(1e3 * health.solve_time))
-        rr.log("controller/slack", rr.Scalars(health.slack))
-        rr.log("controller/status", rr.TextLog(f"{moment.intent.mode}: {health.status.value}"))
-
-    def _log_robot(self, q: np.ndarray) -> None:
-        """Draw the robot's collision shapes where they are."""
-        for placed in self._model.description.collision:
-            pose = self._model.pose(q, placed.frame)
-            position = pose.position + pose.rotation @ placed.placement.translation
-            rotation = pose.rotation @ placed.placement.rotation
-            shape = Obstacle(placed.name, placed.shape, position, rotation)
-            self._log_shape(f"world/robot/{placed.name}", shape, _ROBOT)
-
-    def _log_tracking(self, moment: Moment, q: np.ndarray, v: np.ndarray) -> None:
-        """Plot what is asked on each owned channel against what happens."""
-        rr, channels = self._rr, self._channels
-        realised = np.concatenate([self._base_twist(q, v), self._model.jacobian(q) @ v, v])
-        for name, asked, owned, real in zip(
-            channels.names, moment.intent.values, moment.intent.mask, realised, strict=True
-        ):
-            rr.log(f"motion/{name}/realised", rr.Scalars(real))
-            if owned and np.isfinite(asked):
-                rr.log(f"motion/{name}/asked", rr.Scalars(asked))
-
-    def _base_twist(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        if not self._channels.base:
-            return np.zeros(0)
-        c, s = np.cos(q[2]), np.sin(q[2])
-        return np.array([c * v[0] + s * v[1], -s * v[0] + c * v[1], v[2]])
-
-    def _log_shape(self, path: str, thing: Obstacle, colour: tuple[int, int, int] = _SCENE) -> None:
-        rr, size = self._rr, thing.shape.size
-        self._rr.log(path, rr.Transform3D(translation=thing.position, mat3x3=thing.rotation))
-        shapes = {
-            "box": lambda: rr.Boxes3D(half_sizes=[size / 2], colors=[colour]),
-            "capsule": lambda: rr.Capsules3D(
-                radii=[size[0]], lengths=[size[-1]], translations=[[0, 0, -size[-1] / 2]], colors=[colour]
-            ),
-            "cylinder": lambda: rr.Cylinders3D(radii=[size[0]], lengths=[size[-1]], colors=[colour]),
-            "sphere": lambda: rr.Ellipsoids3D(half_sizes=[[size[0]] * 3], colors=[colour]),
-        }
-        rr.log(path, shapes[thing.shape.kind]())
+        self._attempt(lambda: self._drawing.see(moment))
+        if time.monotonic() > self._sent + _PERIOD:
+            self._attempt(self._pass_on)
 
     def close(self) -> None:
         """Write out what is still buffered."""
+        self._attempt(self._pass_on)
+        if self._viewer:
+            self._viewer.drain()
+            self._viewer.close()
         recording = self._rr.get_global_data_recording()
-        if recording is not None:
-            recording.flush()
+        with contextlib.suppress(RuntimeError):  # what cannot be written now never will be
+            recording.flush(timeout_sec=_PATIENCE)
+            recording.disconnect()
+
+    def _attempt(self, step: Callable[[], None]) -> None:
+        """Do what must not cost the recording whatever goes wrong; say once that it did, and do no more."""
+        if self._off:
+            return
+        try:
+            step()
+        except Exception as error:
+            self._off = True
+            self._complain(error)
+
+    def _pass_on(self) -> None:
+        """Let the viewer have what is new; go on without it if it fails and there is a file."""
+        self._sent = time.monotonic()
+        data = self._read() if self._stream else b""
+        if not self._viewer:
+            return
+        try:
+            self._viewer.send(data)
+        except HandrailError as error:
+            self._viewer.close()
+            self._viewer, self._off = None, not self._save
+            self._complain(error)
+
+    def _complain(self, error: Exception) -> None:
+        self._say(f"display: {' '.join(str(error).split())}; the recording goes on")
+
+    def _read(self) -> bytes:
+        return self._stream.read(flush=True, flush_timeout_sec=_PATIENCE) or b""
 
 
 def _check_file(path: Path) -> None:
@@ -133,7 +121,3 @@ def _check_file(path: Path) -> None:
         raise HandrailError(
             f"--display_save {path}: expected an existing folder, found none at {path.parent}"
         )
-
-
-def _finite(value: float) -> float:
-    return value if np.isfinite(value) else np.nan

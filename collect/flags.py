@@ -1,8 +1,23 @@
-"""What settings of several commands have in common: names from a list, a page to write."""
+"""What settings of several commands have in common: two ways to say one thing, names from a list, a page."""
 
 from pathlib import Path
 
 from handrail.controllers.errors import HandrailError, unknown_name
+
+
+def only_one[Given](place: Given, flagged: Given, flag: str) -> Given:
+    """Return what was given: without a flag, or with it, which says the same.
+
+    Raises:
+        HandrailError: both were given.
+    """
+    if place and flagged:
+        raise HandrailError(f"{_shown(place)} and {flag} {_shown(flagged)}: expected one of them, got both")
+    return place or flagged
+
+
+def _shown(given: object) -> str:
+    return " ".join(map(str, given)) if isinstance(given, tuple) else str(given)
 
 
 def names(given: str, everything: tuple[str, ...]) -> tuple[str, ...]:

@@ -3,7 +3,7 @@
 from dataclasses import replace
 from typing import Any
 
-from handrail.controllers.errors import HandrailError
+from handrail.controllers.errors import not_installed
 from handrail.controllers.model import RobotModel
 from handrail.controllers.scene_shapes import floor_shapes, scene_shapes
 from handrail.controllers.shape import Obstacle
@@ -20,7 +20,7 @@ def import_mink() -> Any:
     try:
         import mink
     except ImportError as error:
-        raise HandrailError("differential IK: expected mink, found none; pip install mink") from error
+        raise not_installed("differential IK", "mink", "profile") from error
     return mink
 
 

@@ -3,7 +3,8 @@
 from typing import Any
 
 from rich.console import Group
-from rich.table import Table
+
+from handrail.collect.plain_table import PlainTable
 
 _TIMES = ("median_ms", "p95_ms", "p99_ms", "worst_ms")
 _RATIOS = {
@@ -25,44 +26,43 @@ def _all(results: dict[str, Any]) -> dict[str, Any]:
     return {name: results[name] for name in ("no_collision", "pairs_30", "pairs_100")} | results["growth"]
 
 
-def _cases(results: dict[str, Any]) -> Table:
+def _cases(results: dict[str, Any]) -> PlainTable:
     machine = results["machine"]
-    table = Table(
-        *("case", "n", "N", "pairs", "near", "rows", "median", "p95", "p99", "worst"),
-        title="Update of the masked MPC [ms]",
-        caption=f"{machine['cores']} cores, load {machine['load_before']:.1f} to {machine['load_after']:.1f}",
-    )
+    headings = ("case", "n", "N", "pairs", "near", "rows", "median", "p95", "p99", "worst")
+    caption = f"{machine['cores']} cores, load {machine['load_before']:.1f} to {machine['load_after']:.1f}"
+    rows = []
     for name, case in _all(results).items():
         sizes = (case["degrees_of_freedom"], case["horizon"], case["pairs"])
         means = f"{case['near_mean']:.0f}", f"{case['rows_mean']:.0f}"
-        table.add_row(name, *map(str, sizes), *means, *(f"{case[t]:.2f}" for t in _TIMES))
-    return table
+        rows.append((name, *map(str, sizes), *means, *(f"{case[t]:.2f}" for t in _TIMES)))
+    return PlainTable(headings, rows, "Update of the masked MPC [ms]", caption)
 
 
-def _phases(results: dict[str, Any]) -> Table:
+def _phases(results: dict[str, Any]) -> PlainTable:
     cases = _all(results)
     names = list(cases["no_collision"]["phases_ms"])
-    table = Table("case", *names, "braked", title="Where the time goes: medians [ms]")
-    for name, case in cases.items():
-        table.add_row(name, *(f"{case['phases_ms'][phase]:.2f}" for phase in names), str(case["braked"]))
-    return table
+    rows = [
+        (name, *(f"{case['phases_ms'][phase]:.2f}" for phase in names), str(case["braked"]))
+        for name, case in cases.items()
+    ]
+    return PlainTable(("case", *names, "braked"), rows, "Where the time goes: medians [ms]")
 
 
-def _rivals(results: dict[str, Any]) -> Table:
-    table = Table("case", "rival", "median", "p95", "p99", "worst", "solves", "failed", title="Rivals [ms]")
+def _rivals(results: dict[str, Any]) -> PlainTable:
+    headings, rows = ("case", "rival", "median", "p95", "p99", "worst", "solves", "failed"), []
     for case, rivals in results["rivals"].items():
         for rival in rivals:
             counts = str(rival["solves"]), str(rival["failed"])
             name = f"{rival['name']} ({rival['qp_solver']})" if "qp_solver" in rival else rival["name"]
-            table.add_row(case, name, *(f"{rival[t]:.2f}" if t in rival else "" for t in _TIMES), *counts)
-    return table
+            rows.append((case, name, *(f"{rival[t]:.2f}" if t in rival else "–" for t in _TIMES), *counts))
+    return PlainTable(headings, rows, "Rivals [ms]")
 
 
-def _growth(results: dict[str, Any]) -> Table:
-    table = Table("against", "ours / theirs", "times as fast", title="Ratios and growth")
+def _growth(results: dict[str, Any]) -> PlainTable:
+    rows = []
     for key, name in _RATIOS.items():
         ratio = results[key]
-        table.add_row(name, *((f"{ratio:.4f}", f"{1 / ratio:.1f}") if ratio else ("not measured", "")))
+        rows.append((name, *((f"{ratio:.4f}", f"{1 / ratio:.1f}") if ratio else ("not measured", ""))))
     for name, exponent in results["growth_exponents"].items():
-        table.add_row(f"growth with {name}", f"size^{exponent:.2f}", "")
-    return table
+        rows.append((f"growth with {name}", f"size^{exponent:.2f}", ""))
+    return PlainTable(("against", "ours / theirs", "times as fast"), rows, "Ratios and growth")

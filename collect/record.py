@@ -59,7 +59,7 @@ def record(config: RecordConfig) -> int:
     env = build_env(config, config.dataset.fps)
     displays: list[Display] = []
     try:
-        displays = _displays(config)
+        displays = _displays(config, console)
         build_session(config, env)  # a wrong mask, or cameras without GL, show before anything is written
         env.reset(seed=config.seed)
         with _open_writer(config, env) as writer:
@@ -99,7 +99,7 @@ def _open_writer(config: RecordConfig, env: HandrailEnv) -> EpisodeWriter:
     dataset = config.dataset
     arguments = (
         dataset.folder,
-        dataset.repo_id,
+        dataset.name,
         dataset.fps,
         session_features(env),
         env.model.description.name,
@@ -170,10 +170,11 @@ def _summary(config: RecordConfig, outcomes: list[Outcome]) -> Table:
     return table
 
 
-def _displays(config: RecordConfig) -> list[Display]:
-    if not (config.display_data or config.display_save):
+def _displays(config: RecordConfig, console: Console) -> list[Display]:
+    spawn, web, save = config.display_data, config.display_web, config.display_save
+    if not (spawn or web or save):
         return []
-    return [Display(spawn=config.display_data, save=config.display_save)]
+    return [Display(spawn, web, save, say=lambda words: console.print(words, **PLAIN))]
 
 
 def _progress(console: Console) -> Progress:

@@ -1,5 +1,6 @@
 """Replays a recorded episode's commands and reports how far the motion deviates."""
 
+import contextlib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 from handrail.collect.build import build_env
 from handrail.collect.config import TASKS, SessionConfig
 from handrail.collect.env import HandrailEnv
+from handrail.collect.video_file import VideoFile
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.reader import read_episodes, read_frames, read_info
@@ -49,13 +51,16 @@ class Replay:
         return float(np.linalg.norm(self.final[tool]))
 
 
-def replay_episode(root: Path, episode: int, pictures: int = 0) -> tuple[Replay, list[NDArray[np.uint8]]]:
+def replay_episode(
+    root: Path, episode: int, pictures: int = 0, video: Path | None = None
+) -> tuple[Replay, list[NDArray[np.uint8]]]:
     """Run the recorded commands of an episode in its environment, from the same seed.
 
     Args:
         root: folder of the dataset.
         episode: its number.
         pictures: how many pictures to take, evenly over the episode.
+        video: also film the whole episode to this .mp4 file.
 
     Returns:
         What came out, and the pictures, (height, width, 3) each.
@@ -68,11 +73,11 @@ def replay_episode(root: Path, episode: int, pictures: int = 0) -> tuple[Replay,
     frames = read_frames(root, episode, ["action", "observation.state"])
     moving = int(row.get("moving_obstacles") or 0)
     config = SessionConfig(task=row["environment"], robot=row["robot"], moving_obstacles=moving)
-    env = build_env(config, info.fps, render=pictures > 0)
-    try:
-        states, last, taken = _run(env, row["seed"], frames["action"], pictures)
-    finally:
-        env.close()
+    env = build_env(config, info.fps, render=bool(pictures or video))
+    with contextlib.ExitStack() as stack:
+        stack.callback(env.close)
+        camera = _Camera(env, _moments(len(frames["action"]), pictures), video, stack)
+        states, last = _run(env, row["seed"], frames["action"], camera)
     difference = np.abs(states - frames["observation.state"])
     replay = Replay(
         episode=episode,
@@ -83,7 +88,7 @@ def replay_episode(root: Path, episode: int, pictures: int = 0) -> tuple[Replay,
         success=bool(last["is_success"]),
         contacts=last["contacts_in_all"],
     )
-    return replay, taken
+    return replay, camera.taken
 
 
 def _row(root: Path, episode: int) -> dict[str, Any]:
@@ -99,17 +104,44 @@ def _row(root: Path, episode: int) -> dict[str, Any]:
 
 
 def _run(
-    env: HandrailEnv, seed: int, actions: np.ndarray, pictures: int
-) -> tuple[np.ndarray, dict[str, Any], list[NDArray[np.uint8]]]:
-    """Return the observed states before each action, (T, s), the last info, and pictures."""
+    env: HandrailEnv, seed: int, actions: np.ndarray, camera: "_Camera"
+) -> tuple[np.ndarray, dict[str, Any]]:
+    """Return the observed states before each action, (T, s), and the last info."""
     observation, info = env.reset(seed=seed)
-    moments = set(np.linspace(0, len(actions) - 1, pictures).round().astype(int).tolist())
-    states, taken, contacts = [], [], 0
+    states, contacts = [], 0
     for index, action in enumerate(actions):
         states.append(observation["agent_pos"])
         observation, _, _, _, info = env.step(action)
         contacts += info["contacts"]
-        picture = env.render() if index in moments else None
-        if picture is not None:
-            taken.append(picture)
-    return np.array(states), info | {"contacts_in_all": contacts}, taken
+        camera.look(index)
+    return np.array(states), info | {"contacts_in_all": contacts}
+
+
+def _moments(frames: int, pictures: int) -> set[int]:
+    """Return the frames of which pictures are taken, evenly over the episode."""
+    return set(np.linspace(0, frames - 1, pictures).round().astype(int).tolist())
+
+
+class _Camera:
+    """Takes pictures at some moments, and films all of them if there is a file for it."""
+
+    def __init__(
+        self, env: HandrailEnv, moments: set[int], video: Path | None, stack: contextlib.ExitStack
+    ) -> None:
+        self._env, self._moments, self._video, self._stack = env, moments, video, stack
+        self._film: VideoFile | None = None
+        self.taken: list[NDArray[np.uint8]] = []
+
+    def look(self, index: int) -> None:
+        """Take the picture of this moment, if somebody wants it."""
+        wanted = index in self._moments
+        picture = self._env.render() if wanted or self._video else None
+        if picture is None:
+            return
+        if wanted:
+            self.taken.append(picture)
+        if self._video and self._film is None:  # only now: without OpenGL there shall be no file
+            film = VideoFile(self._video, self._env.render_size, self._env.fps)
+            self._film = self._stack.enter_context(film)
+        if self._film:
+            self._film.add(picture)

@@ -8,7 +8,7 @@ import numpy as np
 from handrail.collect.showcase_metrics import held_error, tracking_error
 from handrail.collect.showcase_run import Trace
 from handrail.controllers.arrays import FloatArray
-from handrail.controllers.errors import HandrailError
+from handrail.controllers.errors import not_installed
 from handrail.controllers.model import RobotModel
 
 _BASE, _HAND, _GREY, _OBSTACLE = "#2a6fbb", "#c8402f", "#666666", "#e0a050"
@@ -32,7 +32,7 @@ def save_figure(trace: Trace, model: RobotModel, margin: float, path: Path) -> N
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure
     except ImportError as error:
-        raise HandrailError("the figure: expected matplotlib, found none; pip install matplotlib") from error
+        raise not_installed("the figure", "matplotlib") from error
     figure = Figure(dpi=120, layout="constrained")
     FigureCanvasAgg(figure)
     above, upper, lower = _panels(figure, _extent(trace, model))

@@ -2,14 +2,13 @@
 
 from pathlib import Path
 
-from rich.table import Column, Table
-
+from handrail.collect.plain_table import PlainTable
 from handrail.datasets.summary import HEADINGS, QUALITY_HEADINGS, summarize
 
 _TASK = HEADINGS.index("task")
 
 
-def summary_table(root: Path) -> Table:
+def summary_table(root: Path) -> PlainTable:
     """Return a table with one line an episode of any LeRobot v3.0 dataset.
 
     Raises:
@@ -21,14 +20,11 @@ def summary_table(root: Path) -> Table:
     tasks = {row.task for row in rows}
     shown = [index for index in range(len(HEADINGS)) if index != _TASK or len(tasks) > 1]
     title = f"{root}\n{tasks.pop()}" if len(tasks) == 1 else str(root)
-    table = Table(*(_column(HEADINGS[index]) for index in shown), title=title, caption=caption)
-    for row in rows:
-        cells = row.cells()
-        table.add_row(*(cells[index] for index in shown))
-    return table
+    lines = [[row.cells()[index] for index in shown] for row in rows]
+    return PlainTable([HEADINGS[index] for index in shown], lines, title, caption)
 
 
-def quality_table(root: Path) -> Table:
+def quality_table(root: Path) -> PlainTable:
     """Return a table with the measures of quality of every episode of any LeRobot v3.0 dataset.
 
     Raises:
@@ -38,12 +34,4 @@ def quality_table(root: Path) -> Table:
         "rate of change and high-frequency content of the commanded velocities;\n"
         "corrections of joints that were commanded one by one, switched on or off"
     )
-    table = Table(*map(_column, QUALITY_HEADINGS), caption=caption)
-    for row in summarize(root):
-        table.add_row(*row.quality_cells())
-    return table
-
-
-def _column(heading: str) -> Column:
-    """Return a column; a mode's name is broken rather than cut where there is no room."""
-    return Column(heading, overflow="fold" if heading == "mode" else "ellipsis")
+    return PlainTable(QUALITY_HEADINGS, [row.quality_cells() for row in summarize(root)], caption=caption)

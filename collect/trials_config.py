@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from handrail.collect.config import MODE_NAMES, TASKS
 from handrail.collect.flags import check_names, check_page, names
 from handrail.controllers.errors import HandrailError
+from handrail.datasets.lists import Names
 
 SLOW_MODE = "direct_single"  # needs more time than the tasks give
 SLOW_LIMITS = {"drawer": 180.0, "pick_place": 180.0, "reach": 60.0, "tray": 180.0}  # [s]
@@ -14,10 +15,10 @@ SLOW_LIMITS = {"drawer": 180.0, "pick_place": 180.0, "reach": 60.0, "tray": 180.
 class TrialsConfig:
     """Let the scripted operators do every task in every mode, and count how it went."""
 
-    tasks: str = "all"
-    """Which tasks, comma-separated, or all: drawer, pick_place, reach, tray."""
-    modes: str = "ee,switching,base+ee,direct,direct_single,leader,decoupled"
-    """Which teleop modes, comma-separated, or all."""
+    tasks: Names = "all"
+    """Which tasks, or all: drawer, pick_place, reach, tray."""
+    modes: Names = "ee,switching,base+ee,direct,direct_single,leader,decoupled"
+    """Which teleop modes, or all."""
     episodes: int = 20
     """Episodes of each task in each mode; the same beginnings in all modes."""
     persons: int = 5

@@ -212,8 +212,8 @@ def _find_urdf(urdf: str, folder: Path) -> tuple[Path, Path]:
             path = Path(str(file.locate())).resolve()
             return path, path.parents[len(name.parts) - 1]
     raise HandrailError(
-        f"URDF {urdf}: expected it beside the description or in the package {distribution}; "
-        f"install it with: pip install {distribution}"
+        f"URDF {urdf}: expected it beside the description or in an installed package {distribution}, "
+        "found it in neither"
     )
 
 

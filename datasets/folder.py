@@ -28,11 +28,12 @@ def check_target(layout: Layout, overwrite: bool) -> None:
     if not is_dataset(layout):
         raise HandrailError(
             f"{str(root)!r}: expected a missing or empty folder, found {_listed(root)}; this is no LeRobot"
-            " dataset (no meta/info.json) and is never removed: choose another root"
+            " dataset (no meta/info.json) and is never removed: choose another folder"
         )
     if not overwrite:
         raise HandrailError(
-            f"dataset {str(root)!r} exists already: resume it, overwrite it, or choose another root"
+            f"dataset {str(root)!r} exists already: --resume adds to it, --overwrite removes it;"
+            " or choose another folder"
         )
 
 

@@ -42,7 +42,7 @@ class Manifest:
             HandrailError: The name, the rate, the robot or a feature is not valid.
         """
         if not self.repo_id or self.repo_id.count("/") > 1:
-            raise HandrailError(f"repo_id: expected 'owner/name' or 'name', got {self.repo_id!r}")
+            raise HandrailError(f"--dataset.repo_id: expected 'owner/name' or 'name', got {self.repo_id!r}")
         if not isinstance(self.fps, int) or isinstance(self.fps, bool) or self.fps < 1:
             raise HandrailError(f"fps: expected a whole number of 1 or more, got {self.fps!r}")
         if not isinstance(self.robot_type, str) or not self.robot_type:
@@ -104,8 +104,8 @@ def _why_no_manifest(layout: Layout) -> str:
     if not layout.root.is_dir():
         return f"dataset {root!r}: expected a folder, found none; create it first, or check the path"
     if layout.info.exists():
-        return f"dataset {root!r} was not written by Handrail (no meta/handrail.json): choose another root"
-    return f"{root!r} is not a LeRobot dataset (no meta/info.json): choose another root"
+        return f"dataset {root!r} was not written by Handrail (no meta/handrail.json): choose another folder"
+    return f"{root!r} is not a LeRobot dataset (no meta/info.json): choose another folder"
 
 
 def _feature_to_json(feature: Feature) -> dict[str, Any]:
@@ -127,6 +127,6 @@ def _describe(feature: Feature | None) -> str:
 
 def _differs(root: Path, thing: str, existing: object, given: object) -> HandrailError:
     return HandrailError(
-        f"cannot resume {str(root)!r}: {thing} of the existing episodes is {existing}, got {given};"
-        " give the same, or choose another root"
+        f"--resume: cannot add to {str(root)!r}: {thing} of the existing episodes is {existing}, got {given};"
+        " give the same, or choose another folder"
     )

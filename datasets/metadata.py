@@ -145,7 +145,7 @@ def read_record(path: Path, with_stats: bool) -> EpisodeRecord:
         if _MARK not in (schema.metadata or {}):
             raise HandrailError(
                 f"{str(path)!r} was written by another tool: Handrail neither repairs nor resumes a dataset"
-                " that another tool has appended to; record into another root"
+                " that another tool has appended to; record into another folder"
             )
         names = [name for name in schema.names if with_stats or not name.startswith("stats/")]
         rows = file.read(columns=names, use_threads=False).to_pylist()

@@ -132,7 +132,7 @@ class EpisodeWriter:
         manifest = Manifest(repo_id, fps, robot_type, dict(features), dict(versions or {}))
         manifest.check()
         manifest.check_continues(existing, layout.root)
-        with explained(f"cannot resume dataset {str(layout.root)!r}"):
+        with explained(f"--resume: cannot add to dataset {str(layout.root)!r}"):
             lock = DatasetLock(layout.staging)
             with lock.released_on_error():
                 _, totals = repair_locked(layout, existing, thorough=False)
@@ -294,4 +294,6 @@ class EpisodeWriter:
 
     def _check_usable(self) -> None:
         if self._unusable:
-            raise HandrailError(f"writer of {str(self.root)!r} {self._unusable}: resume the dataset instead")
+            raise HandrailError(
+                f"writer of {str(self.root)!r} {self._unusable}: open the dataset again with --resume"
+            )

@@ -4,6 +4,7 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 
 from handrail.controllers.errors import HandrailError
+from handrail.datasets.lists import Numbers
 
 _FREE_ON_RESUME = (
     *("output_dir", "steps", "learning_rate", "save_every", "final_goals", "average"),
@@ -39,7 +40,7 @@ class TrainRlConfig:
     """Environment steps between updates."""
     gradient_steps: int = 1
     """Updates each time."""
-    layers: tuple[int, ...] = (512, 512, 256)
+    layers: Numbers = (512, 512, 256)
     """Hidden layers of actor and critics."""
     temperature: float = 1.0
     """Of the entropy in the beginning; then tuned automatically."""

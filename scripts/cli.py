@@ -1,6 +1,8 @@
 """What every command shares: LeRobot-like flags, one line an error, exit codes."""
 
 import contextlib
+import importlib.metadata
+import inspect
 import io
 import re
 import sys
@@ -14,20 +16,25 @@ from handrail.controllers.errors import HandrailError
 BAD_INPUT = 2
 FAILED = 1
 INTERRUPTED = 130
+VERSION = "--version"
 
 
 def parse[Config](config: Callable[..., Config], prog: str, arguments: Sequence[str] | None = None) -> Config:
     """Return the config of a command line; `--flag=true` and `--flag` both work, as do `_` and `-`.
 
-    Exits with 0 after `--help` and with 2 and one line on standard error after bad input.
+    Exits with 0 after `--help` and `--version`, and with 2 and one line on standard error after bad input.
     """
     arguments = [_boolean(argument) for argument in (sys.argv[1:] if arguments is None else arguments)]
+    if VERSION in arguments:
+        print(f"{prog} {importlib.metadata.version('handrail')}")
+        sys.exit(0)
     said = io.StringIO()
     try:
         with contextlib.redirect_stderr(said):
             return tyro.cli(
                 config,
                 prog=prog,
+                description=f"{inspect.getdoc(config)} {VERSION} prints the version.",
                 args=arguments,
                 config=(tyro.conf.OmitSubcommandPrefixes,),
                 use_underscores=True,

@@ -1,11 +1,16 @@
 """`handrail-replay`: run a recorded episode's commands again and report the deviation."""
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from handrail.collect.config import ReplayConfig
 from handrail.scripts import cli
 
+if TYPE_CHECKING:
+    from handrail.collect.replay import Replay
+
 _PICTURES = 8
+_HEADINGS = ("episode", "largest deviation", "of", "tool at end [m]", "success", "recorded", "contacts")
 
 
 def main() -> None:
@@ -16,30 +21,38 @@ def main() -> None:
 def _replay(config: ReplayConfig) -> int:
     config.check()
     from rich.console import Console
-    from rich.table import Table
 
     from handrail.collect.contact_sheet import save_sheet
+    from handrail.collect.plain_table import PlainTable
     from handrail.collect.replay import replay_episode
     from handrail.datasets.reader import read_episodes
 
     root = config.dataset.folder
     episodes = range(len(read_episodes(root))) if config.episode < 0 else [config.episode]
-    table = Table("episode", "largest deviation", "of", "tool at end [m]", "success", "recorded", "contacts")
+    rows = []
     for episode in episodes:
-        replay, pictures = replay_episode(root, episode, _PICTURES if config.sheet else 0)
-        table.add_row(
-            str(episode),
-            f"{replay.largest:.2e}",
-            replay.names[int(replay.deviations.argmax())],
-            f"{replay.tool_at_end:.2e}",
-            "yes" if replay.success else "no",
-            "yes" if replay.recorded_success else "no",
-            str(replay.contacts),
-        )
+        video = Path(config.video).expanduser() if config.video else None
+        replay, pictures = replay_episode(root, episode, _PICTURES if config.sheet else 0, video)
+        rows.append(_row(replay))
         if pictures:
             save_sheet(pictures, Path(config.sheet).expanduser())
-    Console().print(table)
+    console = Console(highlight=False, soft_wrap=True)
+    console.print(PlainTable(_HEADINGS, rows))
+    for written in filter(None, (config.sheet, config.video)):
+        console.print(f"Written: {written}")
     return 0
+
+
+def _row(replay: "Replay") -> tuple[str, ...]:
+    return (
+        str(replay.episode),
+        f"{replay.largest:.2e}",
+        replay.names[int(replay.deviations.argmax())],
+        f"{replay.tool_at_end:.2e}",
+        "yes" if replay.success else "no",
+        "yes" if replay.recorded_success else "no",
+        str(replay.contacts),
+    )
 
 
 if __name__ == "__main__":

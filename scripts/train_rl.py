@@ -1,8 +1,6 @@
 """`handrail-train-rl`: train the reinforcement-learning baseline."""
 
-from importlib.util import find_spec
-
-from handrail.controllers.errors import HandrailError
+from handrail.policies.imitation.installed import check_installed
 from handrail.policies.rl_config import TrainRlConfig
 from handrail.scripts import cli
 
@@ -14,9 +12,7 @@ def main() -> None:
 
 def _train(config: TrainRlConfig) -> int:
     config.check()
-    for needed in ("stable_baselines3", "tensorboard"):
-        if find_spec(needed) is None:
-            raise HandrailError(f"handrail-train-rl: expected {needed}, found none; pip install '.[rl]'")
+    check_installed("handrail-train-rl", ("stable_baselines3", "tensorboard"), extra="rl")
     from handrail.policies.rl_train import train
 
     record = train(config)

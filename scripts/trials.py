@@ -12,8 +12,8 @@ def main() -> None:
 def _trials(config: TrialsConfig) -> int:
     config.check()
     from rich.console import Console
-    from rich.table import Table
 
+    from handrail.collect.plain_table import PlainTable
     from handrail.collect.trials import run_trials
     from handrail.collect.trials_table import trials_table, write_page
 
@@ -26,10 +26,7 @@ def _trials(config: TrialsConfig) -> int:
     )
     for task in config.task_names:
         headings, lines = trials_table([trial for trial in trials if trial.task == task], config.mode_names)
-        table = Table(*headings, title=task)
-        for line in lines:
-            table.add_row(*line)
-        console.print(table)
+        console.print(PlainTable(headings, lines, task))
     if config.page:
         write_page(trials, config)
         console.print(f"Written: {config.page}")

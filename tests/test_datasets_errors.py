@@ -142,7 +142,7 @@ def test_resume_refuses_another_schema(tmp_path, change, words):
     Layout(root).info.write_bytes(b"{torn")  # refused before anything is repaired
     before = tree(root)
     arguments = {"repo_id": REPO, "fps": FPS, "features": STATE_FEATURES, "robot_type": ROBOT} | change
-    _fails(lambda: EpisodeWriter.resume(root, **arguments), "cannot resume", *words)
+    _fails(lambda: EpisodeWriter.resume(root, **arguments), "--resume: cannot add to", *words)
     assert tree(root) == before
 
 
@@ -151,7 +151,7 @@ def test_resume_refuses_what_handrail_did_not_write(tmp_path):
     _fails(lambda: resume(tmp_path), "not a LeRobot dataset")
     (tmp_path / "meta").mkdir()
     (tmp_path / "meta" / "info.json").write_text(json.dumps({"codebase_version": "v3.0"}))
-    _fails(lambda: resume(tmp_path), "not written by Handrail", "another root")
+    _fails(lambda: resume(tmp_path), "not written by Handrail", "another folder")
     (tmp_path / "meta" / "handrail.json").write_text("{torn")
     _fails(lambda: resume(tmp_path), "handrail.json", "manifest")
     assert sorted(tree(tmp_path)) == ["meta/handrail.json", "meta/info.json"]

@@ -151,7 +151,8 @@ def flags(config: type, prefix: str = "") -> set[str]:
     names = set()
     for entry in fields(config):
         nested = entry.default_factory if is_dataclass(entry.default_factory) else None
-        names |= flags(nested, f"{prefix}{entry.name}.") if nested else {f"--{prefix}{entry.name}"}
+        flag = "FOLDER" if entry.name == "place" else f"--{prefix}{entry.name}"
+        names |= flags(nested, f"{prefix}{entry.name}.") if nested else {flag}
     return names
 
 

@@ -157,7 +157,7 @@ def test_an_intent_meets_the_controller_of_its_mode(folder):
         assert all(row["success"] for row in rollouts(content, label)), label
         assert all(row["time_to_success"] == row["length"] for row in rollouts(content, label))
     table = evaluation_table(content)
-    assert table.row_count == 3
+    assert len(table.rows) == 3
 
 
 @pytest.mark.parametrize(("name", "protection"), [("bold", "mpc"), ("bold", "filter"), ("bold_hand", "own")])
@@ -192,7 +192,7 @@ def test_a_policy_of_another_size_moves_nothing(folder):
 
 
 WRONG = {
-    "nobody": ({}, (), "--policy: expected one checkpoint folder or more"),
+    "nobody": ({}, (), "policy: expected one checkpoint folder or more"),
     "no checkpoint": ({}, ("nothing",), "expected a checkpoint with a config.json, found none"),
     "episodes": ({"episodes": 0}, ("chase",), "--episodes 0: expected a whole number"),
     "protection": ({"protection": "prayer"}, ("chase",), "unknown protection 'prayer'"),

@@ -182,7 +182,7 @@ def test_rerun_sees_a_session(tmp_path):
     from handrail.collect.display import Display
 
     path = tmp_path / "session.rrd"
-    display = Display(spawn=False, save=str(path))
+    display = Display(save=str(path))
     config = SessionConfig(task="reach")
     build_session(config, build_env(config, 20), [display]).run(2)
     display.close()

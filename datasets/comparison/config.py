@@ -3,10 +3,12 @@
 import math
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Annotated
 
 import tyro
 
 from handrail.controllers.errors import HandrailError
+from handrail.datasets.lists import Words
 from handrail.datasets.quality.columns import ColumnNames
 
 
@@ -14,17 +16,17 @@ from handrail.datasets.quality.columns import ColumnNames
 class CompareConfig:
     """Compare LeRobot datasets, or the teleop modes in one, and write a report."""
 
-    datasets: tyro.conf.Positional[tuple[str, ...]]
+    datasets: Annotated[tyro.conf.Positional[Words], tyro.conf.arg(metavar="FOLDER [FOLDER …]")]
     """Folders of LeRobot v3.0 datasets, whoever recorded them."""
     output: str = "outputs/compare"
     """Folder for report.html, report.json, episodes.csv and differences.csv."""
     by: str = ""
     """Split each dataset by this column of its episodes' metadata: mode, operator, success, …"""
-    labels: tuple[str, ...] = ()
+    labels: Words = ()
     """A name for each dataset; the folders' names when empty."""
     baseline: str = ""
     """What the others are compared with; the first when empty."""
-    evaluations: tuple[str, ...] = ()
+    evaluations: Words = ()
     """JSON files of what policies trained on the datasets did."""
     success_only: bool = False
     """Measure quality on episodes that did not fail."""
@@ -48,7 +50,7 @@ class CompareConfig:
             HandrailError: One setting is wrong.
         """
         if not self.datasets:
-            raise HandrailError("compare: expected one folder of a dataset or more, got none")
+            raise HandrailError("dataset: expected one folder or more, before the flags; got none")
         if not (math.isfinite(self.margin) and self.margin > 0.0):
             raise HandrailError(f"--margin {self.margin}: expected a positive distance [m]")
         if self.seed < 0:

@@ -5,7 +5,7 @@ import io
 from dataclasses import dataclass
 from typing import Any
 
-from handrail.controllers.errors import HandrailError
+from handrail.controllers.errors import not_installed
 
 COLOURS = (
     "#0072b2",
@@ -52,7 +52,7 @@ def new_figure(width: float, height: float) -> Any:
     try:
         from matplotlib.figure import Figure
     except ImportError as error:
-        raise HandrailError("the report: expected matplotlib, found none; pip install matplotlib") from error
+        raise not_installed("the report", "matplotlib") from error
     return Figure(figsize=(width, height), layout="constrained")
 
 

@@ -2,30 +2,32 @@
 
 from dataclasses import dataclass
 
+from handrail.datasets.lists import Names
+
 
 @dataclass(frozen=True)
 class ColumnNames:
-    """Names of columns; of several, comma-separated, the first that a dataset has."""
+    """Names of columns; of several, the first that a dataset has."""
 
-    state: str = "observation.state"
+    state: Names = "observation.state"
     """What the robot measured of itself."""
-    action: str = "action"
+    action: Names = "action"
     """What was commanded."""
-    asked: str = "teleop.raw, teleop.input, teleop.values"
+    asked: Names = "teleop.raw, teleop.input, teleop.values"
     """What the operator put in, one entry an input axis."""
-    owned: str = "teleop.mask"
+    owned: Names = "teleop.mask"
     """Which of these the operator owned."""
-    mode: str = "teleop.mode"
+    mode: Names = "teleop.mode"
     """The teleop mode."""
-    phase: str = "phase, subtask, subtask_index"
+    phase: Names = "phase, subtask, subtask_index"
     """The phase of the task; without one, phases end where the gripper opens or closes."""
-    distance: str = "controller.smallest_distance"
+    distance: Names = "controller.smallest_distance"
     """Smallest signed distance to a collision [m]."""
-    contacts: str = "safety.contacts"
+    contacts: Names = "safety.contacts"
     """How many unwanted contacts there were in the period."""
-    impulse: str = "safety.impulse"
+    impulse: Names = "safety.impulse"
     """Impulse of unwanted contacts in the period [N s]."""
-    slack: str = "controller.slack"
+    slack: Names = "controller.slack"
     """Largest violation of a soft limit in the plan."""
 
     def choices(self, part: str) -> tuple[str, ...]:

@@ -6,6 +6,7 @@ from typing import Literal
 
 from handrail.collect.config import StoredConfig
 from handrail.controllers.errors import HandrailError
+from handrail.datasets.lists import Words
 
 ACTION_SPACES = ("realised", "intent", "recorded")
 PRESETS = ("cpu", "gpu")
@@ -52,7 +53,7 @@ class TrainConfig:
     """cpu, cuda, cuda:1, mps; the preset's when empty."""
     save_freq: int = 2000
     """Updates between checkpoints; there is always one at the end."""
-    policy_options: tuple[str, ...] = ()
+    policy_options: Words = ()
     """More of LeRobot's settings of the policy, `key=value` each: chunk_size=50 use_vae=true."""
     resume: bool = False
     """Go on from the last checkpoint in the folder; begin if there is none."""
@@ -65,7 +66,7 @@ class TrainConfig:
         return Path(self.output).expanduser()
 
     def check(self) -> None:
-        """Check what can be checked without the dataset.
+        """Check what can be checked without reading the dataset.
 
         Raises:
             HandrailError: a setting is wrong.
@@ -79,6 +80,7 @@ class TrainConfig:
         if self.resume and self.overwrite:
             raise HandrailError("--resume and --overwrite: expected one of them, got both")
         self.options()
+        _ = self.dataset.folder
 
     def options(self) -> dict[str, str]:
         """Return `policy_options` by key.

@@ -7,8 +7,10 @@ from typing import Annotated
 import tyro
 
 from handrail.collect.config import FPS_RANGE, MOST_TIME, TASKS
+from handrail.collect.flags import only_one
 from handrail.collect.perturbations import Perturbation
 from handrail.controllers.errors import HandrailError, unknown_name
+from handrail.datasets.lists import Names, Words
 
 PROTECTIONS = ("own", "none", "mpc", "filter")
 MOST_WORKERS = 64
@@ -20,19 +22,19 @@ FIRST_SEED = 2**32  # recordings use the numbers below it
 class EvaluateConfig:
     """Run trained policies on declared seeds, with and without the MPC's protection, undisturbed or not."""
 
-    policy: Annotated[tuple[str, ...], tyro.conf.arg(metavar="FOLDER [FOLDER…]")] = ()
-    """Checkpoint folders; several training seeds of one arm add up."""
+    policy: Words = ()
+    """The same as FOLDER …"""
     json: str = ""
     """Write every rollout to this file; what is in it already is not run again."""
     episodes: int = 100
     """Rollouts of each policy under each condition."""
     seed: int = 0
     """Of the evaluation: which beginnings and disturbances; never those of a recording."""
-    protection: str = "own"
-    """What stands between policy and robot, comma-separated: own (an intent's own controller; none for joint
+    protection: Names = "own"
+    """What stands between policy and robot, one or more: own (an intent's own controller; none for joint
     velocities), none, mpc, filter."""
-    perturbation: str = "none"
-    """What disturbs, comma-separated: none, push, shift, delay, with a size such as push:2 or delay:5, joined
+    perturbation: Names = "none"
+    """What disturbs, one or more: none, push, shift, delay, with a size such as push:2 or delay:5, joined
     by + to have several at once."""
     label: str = ""
     """Name of the arm; the teleop mode, and what is special about it, when empty."""
@@ -46,11 +48,18 @@ class EvaluateConfig:
     """Processes that share the rollouts."""
     video: str = ""
     """Also film the first rollout to this .mp4 file (needs OpenGL)."""
+    checkpoints: Annotated[tyro.conf.Positional[Words], tyro.conf.arg(metavar="FOLDER [FOLDER …]")] = ()
+    """Checkpoint folders; several training seeds of one arm add up."""
 
     @property
     def folders(self) -> tuple[Path, ...]:
-        """The checkpoint folders."""
-        return tuple(Path(folder).expanduser() for folder in self.policy)
+        """The checkpoint folders.
+
+        Raises:
+            HandrailError: they are given in two ways.
+        """
+        given = only_one(self.checkpoints, self.policy, "--policy")
+        return tuple(Path(folder).expanduser() for folder in given)
 
     @property
     def file(self) -> Path:
@@ -83,8 +92,6 @@ class EvaluateConfig:
         Raises:
             HandrailError: one setting is wrong; the message says what may be chosen.
         """
-        if not self.policy:
-            raise HandrailError("--policy: expected one checkpoint folder or more, got none")
         for name, least, most in (
             ("episodes", 1, MOST_EPISODES),
             ("seed", 0, 10**9),
@@ -106,6 +113,10 @@ class EvaluateConfig:
         if not 0.0 <= self.time_limit <= MOST_TIME:
             raise HandrailError(
                 f"--time_limit {self.time_limit}: expected 0 (the task's own) to {MOST_TIME} s"
+            )
+        if not self.folders:
+            raise HandrailError(
+                "policy: expected one checkpoint folder or more, such as outputs/act; got none"
             )
         self._check_files()
 

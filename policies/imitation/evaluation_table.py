@@ -5,28 +5,25 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from rich.markup import escape
-from rich.table import Table
 
+from handrail.collect.plain_table import PlainTable
 from handrail.datasets.paired import wilson
 
 _HEADINGS = ("arm", "policies", "success", "95 %", "time [s]", "contacts / 100", "brakes / 100", "failures")
 
 
-def evaluation_table(content: Mapping[str, Any]) -> Table:
+def evaluation_table(content: Mapping[str, Any]) -> PlainTable:
     """Return one line an arm: success with its Wilson interval, time to it, contacts, brakes, why it failed.
 
     Args:
         content: of an evaluation file.
     """
     rollouts = [row for arm in content["arms"].values() for entry in arm for row in entry["rollouts"]]
-    table = Table(title=escape(str(content.get("task", ""))), caption=_caption(rollouts))
-    for heading in _HEADINGS:
-        table.add_column(heading, justify="left" if heading in ("arm", "failures") else "right")
-    for label, entries in content["arms"].items():
-        rows = [row for entry in entries for row in entry["rollouts"]]
-        table.add_row(escape(label), str(len(entries)), *_cells(rows))
-    return table
+    lines = [
+        (label, str(len(entries)), *_cells([row for entry in entries for row in entry["rollouts"]]))
+        for label, entries in content["arms"].items()
+    ]
+    return PlainTable(_HEADINGS, lines, str(content.get("task", "")), _caption(rollouts))
 
 
 def _cells(rows: Sequence[Mapping[str, Any]]) -> tuple[str, ...]:
@@ -39,7 +36,7 @@ def _cells(rows: Sequence[Mapping[str, Any]]) -> tuple[str, ...]:
         f"{low:.0%} – {high:.0%}",
         f"{np.median(times):.1f}" if times else "–",
         *(f"{100 * np.mean([row.get(name, 0) for row in rows]):.1f}" for name in ("contacts", "brakes")),
-        escape(", ".join(f"{reason} {count}" for reason, count in reasons.most_common())) or "none",
+        ", ".join(f"{reason} {count}" for reason, count in reasons.most_common()) or "none",
     )
 
 

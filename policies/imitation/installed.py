@@ -2,22 +2,23 @@
 
 from importlib.util import find_spec
 
-from handrail.controllers.errors import HandrailError
+from handrail.controllers.errors import not_installed
 
 _OF_POLICY = {"diffusion": ("diffusers",)}
 
 
-def check_installed(command: str, modules: tuple[str, ...], policy: str = "") -> None:
+def check_installed(command: str, modules: tuple[str, ...], policy: str = "", extra: str = "train") -> None:
     """Check that modules can be imported, and those of a policy.
 
     Args:
         command: that needs them.
         modules: that every policy needs.
         policy: its name in LeRobot.
+        extra: of Handrail that brings them.
 
     Raises:
         HandrailError: one is not there.
     """
     for module in (*modules, *_OF_POLICY.get(policy, ())):
         if find_spec(module) is None:
-            raise HandrailError(f"{command}: expected {module}, found none; pip install '.[train]'")
+            raise not_installed(command, module, extra)

@@ -96,7 +96,7 @@ def _pipeline(config: TrainConfig, steps: int, checkpoint: Path | None) -> "Pipe
 
     sizes = resolved(config)
     return Pipeline(
-        dataset=DatasetConfig(config.dataset.repo_id, root=str(config.dataset.folder), video_backend="pyav"),
+        dataset=DatasetConfig(config.dataset.name, root=str(config.dataset.folder), video_backend="pyav"),
         policy=policy_config(config),
         output_dir=config.folder,
         resume=checkpoint is not None,

@@ -1,0 +1,102 @@
+"""A table for a terminal of 80 columns: lines break between words, nothing is cut off."""
+
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from rich import box
+from rich.console import Console, ConsoleOptions
+from rich.table import Column, Table
+from rich.text import Text
+
+_NUMBER = re.compile(r"[-+]?\d[\d.]*(e[-+]?\d+)?|[-–]|")
+_WHOLE = 14  # a cell of so many letters is not broken
+_GAP = 2  # between two columns
+
+
+@dataclass(frozen=True)
+class PlainTable:
+    """Headings and rows; what does not fit side by side follows below, the first column once more beside it.
+
+    Attributes:
+        headings: of the columns; a unit in brackets is text like the rest.
+        rows: one cell a column each.
+        title: above it.
+        caption: below it.
+    """
+
+    headings: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    title: str = ""
+    caption: str = ""
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> Iterator[Table | Text]:
+        """Yield the parts that fit."""
+        if self.title:
+            yield Text(self.title, "bold")
+        for part in self._parts(options.max_width):
+            yield self._table(part, options.max_width)
+            yield Text()
+        if self.caption:
+            yield Text(f"{self.caption}\n", "dim")
+
+    def _cells(self, column: int) -> list[str]:
+        return [row[column] for row in self.rows]
+
+    def _least(self, column: int) -> int:
+        """Return the width below which a column reads badly."""
+        lines = [line for cell in self._cells(column) for line in cell.splitlines()]
+        words = [word for line in [self.headings[column], *lines] for word in line.split()]
+        return max(map(len, [*words, *(line[:_WHOLE] for line in lines), "–"]))
+
+    def _most(self, column: int) -> int:
+        """Return the width at which nothing is broken."""
+        lines = [line for cell in self._cells(column) for line in cell.splitlines()]
+        return max(map(len, [self.headings[column], *lines]))
+
+    def _parts(self, width: int) -> Iterator[list[int]]:
+        part = [0]
+        for column in range(1, len(self.headings)):
+            if len(part) > 1 and _total([self._least(each) for each in [*part, column]]) > width:
+                yield part
+                part = [0]
+            part.append(column)
+        yield part
+
+    def _table(self, part: Sequence[int], width: int) -> Table:
+        widths = self._widths(part, width)
+        columns = [self._column(column, widths[column]) for column in part]
+        tall = any("\n" in cell or len(cell) > widths[each] for each in part for cell in self._cells(each))
+        table = Table(
+            *columns,
+            box=box.SIMPLE_HEAD,
+            leading=int(tall),
+            padding=(0, 1, 0, 0),
+            pad_edge=False,
+            show_edge=False,
+        )
+        for row in self.rows:
+            table.add_row(*(Text(row[column]) for column in part))
+        return table
+
+    def _widths(self, part: Sequence[int], width: int) -> dict[int, int]:
+        """Return the columns' widths: the widest gives way first, down to where it reads badly."""
+        widths = {column: self._most(column) for column in part}
+        while _total(list(widths.values())) > width:
+            slack = [column for column in part if widths[column] > self._least(column)]
+            widest = max(slack or part, key=lambda column: widths[column])
+            if widths[widest] == 1:
+                break
+            widths[widest] -= 1
+        return widths
+
+    def _column(self, column: int, width: int) -> Column:
+        cells = self._cells(column)
+        numbers = all(map(_NUMBER.fullmatch, cells)) and any(map(str.strip, "".join(cells).strip("–")))
+        return Column(
+            Text(self.headings[column]), width=width, overflow="fold", justify="right" if numbers else "left"
+        )
+
+
+def _total(widths: Sequence[int]) -> int:
+    return sum(widths) + _GAP * (len(widths) - 1)
