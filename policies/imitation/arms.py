@@ -2,7 +2,6 @@
 
 import hashlib
 import itertools
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +12,7 @@ from handrail.collect.config import TASKS
 from handrail.collect.operators.modes import find_mode
 from handrail.collect.perturbations import Perturbation
 from handrail.controllers.errors import HandrailError
+from handrail.datasets.strict_json import read_json
 from handrail.policies.imitation.checkpoint import PolicyMeta, model_folder, read_meta
 from handrail.policies.imitation.evaluate_config import EvaluateConfig
 from handrail.policies.imitation.interface import PolicyInterface
@@ -105,7 +105,7 @@ def _pictures(place: Path) -> dict[str, tuple[int, int]]:
     """Return what a policy sees, from LeRobot's own settings."""
     path = place / "config.json"
     try:
-        features = json.loads(path.read_bytes()).get("input_features") or {}
+        features = read_json(path).get("input_features") or {}
         shapes = {name: feature["shape"] for name, feature in features.items() if name.startswith(_IMAGES)}
         return {name.removeprefix(_IMAGES): (int(h), int(w)) for name, (_, h, w) in shapes.items()}
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:

@@ -19,6 +19,7 @@ import numpy as np
 
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import HandrailError
+from handrail.datasets.strict_json import read_json
 from handrail.policies.imitation.interface import PolicyInterface
 
 FORMAT = "handrail.policy/2"
@@ -146,14 +147,15 @@ def read_meta(folder: Path) -> tuple[PolicyInterface | None, PolicyMeta]:
     """
     path = folder / NAME
     try:
-        content = json.loads(path.read_bytes())
+        content = read_json(path)
         known, interface = content.pop("format"), content.pop("interface")
         meta = PolicyMeta(**content) if known == FORMAT else None
+        seen = PolicyInterface.from_dict(interface) if meta and interface is not None else None
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise HandrailError(f"{str(path)!r}: expected a policy of handrail-train, got {error!r}") from error
     if meta is None:
         raise HandrailError(f"{str(path)!r}: expected the format {FORMAT}, got {known!r}")
-    return (None if interface is None else PolicyInterface.from_dict(interface)), meta
+    return seen, meta
 
 
 def write_meta(folder: Path, interface: PolicyInterface | None, meta: PolicyMeta) -> None:
