@@ -107,7 +107,7 @@ def check_format(layout: Layout) -> None:
 
 def json_bytes(content: Any) -> bytes:
     """Return JSON as LeRobot writes it, the same bytes for the same content."""
-    return json.dumps(content, indent=4, ensure_ascii=False).encode()
+    return json.dumps(content, indent=4, ensure_ascii=False, allow_nan=False).encode()
 
 
 def _content(layout: Layout) -> dict[str, Any]:
