@@ -9,10 +9,13 @@ from typing import Any
 from stable_baselines3 import SAC
 
 from handrail.controllers.errors import HandrailError
+from handrail.datasets.atomic import publish_folder, write_whole
 from handrail.policies.rl_config import TrainRlConfig
 from handrail.policies.rl_policy import Actor
 
 Curve = list[dict[str, float]]
+_WRITTEN = ("config.json", "actor.json", "actor.npz", "curve.png")
+_OURS = {*_WRITTEN, *(f".{name}.partial" for name in _WRITTEN), "checkpoints", "actors", "tensorboard"}
 
 
 def begin_run(config: TrainRlConfig) -> None:
@@ -25,11 +28,13 @@ def begin_run(config: TrainRlConfig) -> None:
     if folder.exists() and any(folder.iterdir()):
         if not config.overwrite:
             raise HandrailError(f"{folder}: there is something already; expected --resume or --overwrite")
-        if not settings.is_file():
-            raise HandrailError(f"--overwrite: expected a training run in {folder}, found something else")
+        foreign = sorted(path.name for path in folder.iterdir() if path.name not in _OURS)
+        if foreign or not settings.is_file():
+            found = ", ".join(foreign[:3]) or "something else"
+            raise HandrailError(f"--overwrite: expected only a training run in {folder}, found {found}")
         shutil.rmtree(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    settings.write_text(json.dumps(asdict(config), indent=1) + "\n")
+    write_whole(settings, (json.dumps(asdict(config), indent=1) + "\n").encode())
 
 
 def resume_run(config: TrainRlConfig) -> tuple[SAC, Curve]:
@@ -71,8 +76,8 @@ def write_checkpoint(folder: Path, model: SAC, actor: Actor, curve: Curve) -> No
     partial.mkdir(parents=True)
     model.save(partial / "model.zip")
     model.save_replay_buffer(partial / "replay_buffer.pkl")
-    (partial / "curve.json").write_text(json.dumps(curve, indent=1) + "\n")
-    partial.rename(final)
+    write_whole(partial / "curve.json", (json.dumps(curve, indent=1) + "\n").encode())
+    publish_folder(partial, final)
     if last is not None:
         shutil.rmtree(last)
 

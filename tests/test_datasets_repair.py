@@ -1,4 +1,4 @@
-"""Repair loses no episode that was saved: it names what is damaged, puts back what is whole, mends the rest."""
+"""Repair loses no saved episode: it names what is damaged, puts back what is whole, mends the rest."""
 
 import json
 import os
