@@ -8,6 +8,7 @@ from handrail.datasets.atomic import make_folder, move, remove
 from handrail.datasets.layout import DAMAGED, STAGING, Layout, episode_of
 from handrail.datasets.lock import LOCK_NAME
 
+_GIVEN_UP = "episodes"  # the lines of a dataset that is being cleared, in the staging folder
 _FOLDERS = ("data", "videos", "meta")  # of a dataset; what else lies beside them is not touched
 
 
@@ -56,8 +57,8 @@ def is_dataset(layout: Layout) -> bool:
 def clear_dataset(layout: Layout) -> None:
     """Remove a dataset that `check_target` lets go, the lock excepted; what lies beside it stays.
 
-    The lines of metadata go first and at once, `info.json` last: whenever this is cut short, what is left is
-    an empty dataset with leftovers, which `overwrite` and `resume` both accept.
+    The lines of metadata go first and at once, into the staging folder: whenever this is cut short later,
+    `finish_clearing` goes on, and what is left is an empty dataset, which may be overwritten and resumed.
 
     Raises:
         OSError: Something cannot be removed.
@@ -65,16 +66,25 @@ def clear_dataset(layout: Layout) -> None:
     clear_staging(layout)
     episodes = layout.root / "meta" / "episodes"
     if episodes.exists():
-        os.replace(episodes, layout.staging / "episodes")
+        os.replace(episodes, layout.staging / _GIVEN_UP)
+    _clear_given_up(layout)
+
+
+def finish_clearing(layout: Layout) -> None:
+    """Go on with a `clear_dataset` that was cut short, if there was one.
+
+    Raises:
+        OSError: Something cannot be removed.
+    """
+    if (layout.staging / _GIVEN_UP).exists() and not (layout.root / "meta" / "episodes").exists():
+        _clear_given_up(layout)
+
+
+def _clear_given_up(layout: Layout) -> None:
+    """Remove the files of a dataset whose lines of metadata are in the staging folder; these go last."""
     for name in ("data", "videos", DAMAGED):
         remove(layout.root / name)
-    meta = layout.root / "meta"
-    others = (
-        [path for path in meta.iterdir() if path not in (layout.info, layout.manifest)]
-        if meta.is_dir()
-        else []
-    )
-    for path in (*others, layout.staging / "episodes", layout.info):
+    for path in (layout.tasks, layout.stats, layout.info, layout.staging / _GIVEN_UP):
         remove(path)
 
 

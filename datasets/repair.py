@@ -15,14 +15,14 @@ from pathlib import Path
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.atomic import explained, remove, replace, sync_folder
 from handrail.datasets.checksums import Checksums
-from handrail.datasets.folder import clear_staging, set_aside
+from handrail.datasets.folder import clear_staging, finish_clearing, set_aside
 from handrail.datasets.layout import Layout
 from handrail.datasets.lock import DatasetLock
 from handrail.datasets.manifest import Manifest, read_manifest
 from handrail.datasets.metadata import Totals, info_bytes, read_encodings, resealed_bytes, stats_bytes
 from handrail.datasets.put_back import put_back, restore
 from handrail.datasets.schema import video_keys
-from handrail.datasets.survey import Survey, saved_in_info, survey
+from handrail.datasets.survey import Survey, said_to_be_saved, survey
 from handrail.datasets.tables import tasks_bytes
 
 _SHOWN = 3  # faults in one line
@@ -123,6 +123,7 @@ def tidy_locked(layout: Layout, manifest: Manifest, sums: Checksums) -> tuple[Re
         HandrailError: An episode is not whole, or another tool has added some. Nothing has been changed then.
         OSError: A file cannot be moved, removed or written.
     """
+    finish_clearing(layout)
     found = survey(layout, manifest, sums.of)
     sums.remember()
     require_whole(layout, found)
@@ -154,8 +155,9 @@ def require_whole(layout: Layout, found: Survey) -> None:
 
 
 def _repair_locked(layout: Layout, manifest: Manifest, set_aside_damaged: bool) -> RepairReport:
+    finish_clearing(layout)
     sums = Checksums(layout.root, anew=True)
-    restored = restore(layout, saved_in_info(layout))
+    restored = restore(layout, said_to_be_saved(layout))
     found = survey(layout, manifest, sums.of)
     removed, moved = _clear(layout, found)
     resealed = _reseal(layout, found)
@@ -186,6 +188,8 @@ def _without_damaged(layout: Layout, manifest: Manifest, found: Survey, sums: Ch
     Lines of metadata go last and from the end: cut short, `restore` undoes this. From when `info.json` counts
     only the episodes that stay, `put_back` finishes it.
     """
+    if found.counted:
+        _rebuild(layout, manifest, found.totals)
     first = found.damaged[0].number if found.damaged else len(found.states)
     streams, rows = [], []
     for number in range(first, len(found.states)):

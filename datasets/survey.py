@@ -65,8 +65,7 @@ def survey(layout: Layout, manifest: Manifest, seal_of: Seals) -> Survey:
         HandrailError: Another tool has added episodes.
     """
     rows, streams = _found(layout, _ROWS), [p for pattern in _STREAMS for p in _found(layout, pattern)]
-    saved = max((number + 1 for number in map(episode_of, rows) if number is not None), default=0)
-    counted = saved_in_info(layout)
+    saved, counted = _saved_by_lines(rows), _saved_in_info(layout)
     beyond = {number for number in map(episode_of, streams) if number is not None and number >= saved}
     interrupted = beyond == {saved} and counted <= saved  # what a crash leaves: files of the next episode
     count = saved if interrupted or not beyond else max(beyond) + 1
@@ -80,7 +79,16 @@ def survey(layout: Layout, manifest: Manifest, seal_of: Seals) -> Survey:
     )
 
 
-def saved_in_info(layout: Layout) -> int:
+def said_to_be_saved(layout: Layout) -> int:
+    """Return how many episodes there should be, by their lines of metadata and by `info.json`."""
+    return max(_saved_by_lines(_found(layout, _ROWS)), _saved_in_info(layout))
+
+
+def _saved_by_lines(rows: list[Path]) -> int:
+    return max((number + 1 for number in map(episode_of, rows) if number is not None), default=0)
+
+
+def _saved_in_info(layout: Layout) -> int:
     """Return how many episodes `info.json` says there are; 0 if it cannot be read."""
     try:
         return int(read_json(layout.info)["total_episodes"])
