@@ -6,19 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-_FORMULA = (
-    "=",
-    "+",
-    "-",
-    "@",
-    "\t",
-    "\r",
-    "\n",
-    "＝",
-    "＋",
-    "－",
-    "＠",
-)  # what OWASP lists, and its wide forms
+_FORMULA = tuple("=+-@\t\r\n＝＋－＠")  # how a formula begins, says OWASP
 
 
 def csv_text(rows: Sequence[Mapping[str, Any]]) -> str:
@@ -35,9 +23,11 @@ def csv_text(rows: Sequence[Mapping[str, Any]]) -> str:
 
 def defused(value: Any) -> Any:
     """Return what to write for a value so that no spreadsheet runs it."""
-    if isinstance(value, str) and value.lstrip(" ").startswith(_FORMULA) and not _is_number(value):
-        return f"'{value}"
-    return value
+    if not isinstance(value, str):
+        return value
+    text = value.replace("\r", " ")  # else half of the readers begin a new row there
+    harmful = value.lstrip(" ").startswith(_FORMULA) and not _is_number(value)
+    return f"'{text}" if harmful else text
 
 
 def _is_number(text: str) -> bool:

@@ -122,7 +122,7 @@ def _size(rows: np.ndarray, most: float) -> np.ndarray:
 
 def _times(value: np.ndarray, size: np.ndarray) -> np.ndarray:
     """Return a product of which rounding makes no infinity."""
-    return np.clip(value, -1.0, 1.0) * size if np.any(size > _LARGE) else value * size
+    return np.where(size > _LARGE, np.clip(value, -1.0, 1.0), value) * size
 
 
 def _quantiles(

@@ -30,15 +30,14 @@ HARMFUL = [
 @pytest.mark.parametrize("text", HARMFUL)
 def test_formulas_are_defused(text):
     rows = list(csv.reader(io.StringIO(csv_text([{text: text, "b": 1}]), newline="")))
-    assert rows == [["'" + text, "b"], ["'" + text, "1"]]
+    defused = "'" + text.replace("\r", " ")
+    assert rows == [[defused, "b"], [defused, "1"]]
 
 
 @pytest.mark.parametrize("value", [-1.5, 3, "-1.5", "+2e-3", "-0", None, True, "a-b", "x=1", ""])
 def test_what_is_harmless_stays(value):
-    (_, (cell,)) = csv.reader(
-        io.StringIO(csv_text([{"a": value, "b": 0}]).replace(",b", "").replace(",0", ""))
-    )
-    assert cell == ("" if value is None else str(value))
+    row = list(csv.reader(io.StringIO(csv_text([{"a": value, "b": 0}]))))[1]
+    assert row == ["" if value is None else str(value), "0"]
 
 
 def test_a_report_has_no_formula(tmp_path):
