@@ -155,7 +155,7 @@ def _check_nothing_lost(root: Path, kept: list[bytes]) -> None:
         assert record_one(writer, cameras=False) == 3
 
 
-@pytest.mark.parametrize("torn", [False, True])
+@pytest.mark.parametrize("torn", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_repair_killed_at_every_change(tmp_path, quick_disk, torn):
     lived, k = False, 0
     while not lived:

@@ -31,18 +31,18 @@ def _first_frame(info: DatasetInfo, key: str, episode: Demonstration) -> str:
     import av
     from av.error import FFmpegError
 
-    place = [episode.meta.get(f"videos/{key}/{name}") for name in ("chunk_index", "file_index")]
-    if not all(isinstance(number, int) for number in place):
+    chunk, file = (episode.meta.get(f"videos/{key}/{name}") for name in ("chunk_index", "file_index"))
+    if not (isinstance(chunk, int) and isinstance(file, int)):
         return ""
-    begin = float(episode.meta.get(f"videos/{key}/from_timestamp") or 0.0)
     try:
-        with av.open(str(info.root / fill(info.video_path, *place, video_key=key))) as container:
+        begin = float(episode.meta.get(f"videos/{key}/from_timestamp") or 0.0)
+        with av.open(str(info.root / fill(info.video_path, chunk, file, key))) as container:
             stream = container.streams.video[0]
             container.seek(int(begin * 1_000_000))
             for frame in container.decode(stream):
                 if frame.time is None or frame.time >= begin - 0.5 / episode.fps:
                     return _address(frame)
-    except (OSError, FFmpegError, ValueError, IndexError):
+    except (OSError, FFmpegError, ValueError, TypeError, OverflowError, IndexError):
         return ""
     return ""
 
