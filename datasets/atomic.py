@@ -36,6 +36,7 @@ def write_synced(path: Path, data: bytes) -> None:
     Raises:
         OSError: The disk is full, or the folder is missing or not writable.
     """
+    path.unlink(missing_ok=True)  # a link that lies there leads to somebody else's file
     with open(path, "wb") as file:
         file.write(data)
         file.flush()

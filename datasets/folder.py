@@ -41,12 +41,30 @@ def check_target(layout: Layout, overwrite: bool) -> None:
             f"dataset {str(root)!r} was not recorded by Handrail (no meta/handrail.json): never removed;"
             " choose another root"
         )
+    check_folders(layout)
     foreign = _foreign(layout)
     if foreign:
         raise HandrailError(
             f"dataset {str(root)!r}: found what Handrail did not write, {', '.join(foreign[:3])}; --overwrite"
             " removes only its own files: move this away, or choose another root"
         )
+
+
+def check_folders(layout: Layout) -> None:
+    """Check that a dataset's folders are its own before anything in them is moved or removed.
+
+    Raises:
+        HandrailError: One is a link to another place.
+    """
+    for name in (STAGING, DAMAGED, *_FOLDERS):
+        top = layout.root / name
+        within = [Path(folder) / each for folder, folders, _ in os.walk(top) for each in folders]
+        linked = next((path for path in (top, *within) if path.is_symlink()), None)
+        if linked is not None:
+            raise HandrailError(
+                f"dataset {str(layout.root)!r}: expected a folder, found a link at {layout.relative(linked)};"
+                " nothing is written through it"
+            )
 
 
 def is_dataset(layout: Layout) -> bool:

@@ -18,8 +18,10 @@ import pyarrow.parquet as pq
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.arrow import numbers, one_list, one_scalar, strings
 from handrail.datasets.columns import ColumnTypes, Scalar, is_extra
+from handrail.datasets.info_fields import MOST_EPISODES, MOST_FRAMES, whole_number
 from handrail.datasets.layout import DATA_PATH, FILES_IN_A_CHUNK, VIDEO_PATH, chunk_and_file
 from handrail.datasets.manifest import Manifest, json_bytes
+from handrail.datasets.path_pattern import inside
 from handrail.datasets.schema import AUTOMATIC, Feature, video_keys
 from handrail.datasets.stats import STATISTICS, Stats, merge_stats, stats_from_lists, stats_to_lists
 from handrail.datasets.strict_json import parse_json, read_json
@@ -199,13 +201,13 @@ def read_record(path: Path, with_stats: bool) -> EpisodeRecord:
     (row,) = rows
     seals = parse_json(schema.metadata[_MARK])
     return EpisodeRecord(
-        episode=row["episode_index"],
-        start=row["dataset_from_index"],
-        length=row["length"],
-        tasks=tuple(row["tasks"]),
+        episode=whole_number(row, "episode_index", MOST_EPISODES),
+        start=whole_number(row, "dataset_from_index", MOST_FRAMES),
+        length=whole_number(row, "length", MOST_FRAMES),
+        tasks=tuple(map(str, row["tasks"])),
         stats=_stats_of(row) if with_stats else None,
         columns={name: row[name] for name in names if is_extra(name)},
-        files={name: FileSeal(*seal) for name, seal in seals.items()},
+        files={inside(name): FileSeal(*seal) for name, seal in seals.items()},
     )
 
 

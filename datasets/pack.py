@@ -17,7 +17,7 @@ from handrail.controllers.errors import HandrailError
 from handrail.datasets.arrow import numbers
 from handrail.datasets.atomic import explained, make_folder, write_synced
 from handrail.datasets.checksums import Checksums
-from handrail.datasets.folder import check_target
+from handrail.datasets.folder import check_folders, check_target
 from handrail.datasets.layout import Layout
 from handrail.datasets.lock import DatasetLock
 from handrail.datasets.manifest import read_manifest
@@ -41,6 +41,7 @@ def pack(root: str | Path, output_root: str | Path) -> None:
     """
     source, target = (Layout(Path(path).expanduser().absolute()) for path in (root, output_root))
     manifest = read_manifest(source)
+    check_folders(source)
     check_target(target, overwrite=False)
     with explained(f"cannot pack into {str(target.root)!r}"):
         lock = DatasetLock(source.staging)

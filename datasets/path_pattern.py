@@ -39,7 +39,15 @@ def fill(pattern: str, chunk_index: int, file_index: int, video_key: str = "") -
         ValueError: It leaves the dataset's folder.
     """
     values = dict(zip(_NAMES, (chunk_index, file_index, video_key), strict=True))
-    path = pattern.format(**values)
+    return inside(pattern.format(**values))
+
+
+def inside(path: str) -> str:
+    """Return a path relative to a dataset.
+
+    Raises:
+        ValueError: It leaves the dataset's folder.
+    """
     if PurePosixPath(path).is_absolute() or ".." in re.split(r"[/\\]", path) or "\0" in path:
         raise ValueError(f"expected a path inside the dataset, got {path[:60]!r}")
     return path

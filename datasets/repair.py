@@ -15,7 +15,7 @@ from pathlib import Path
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.atomic import explained, remove, replace, sync_folder
 from handrail.datasets.checksums import Checksums
-from handrail.datasets.folder import clear_staging, finish_clearing, set_aside
+from handrail.datasets.folder import check_folders, clear_staging, finish_clearing, set_aside
 from handrail.datasets.layout import Layout
 from handrail.datasets.lock import DatasetLock
 from handrail.datasets.manifest import Manifest, read_manifest
@@ -105,6 +105,7 @@ def repair(root: str | Path, set_aside_damaged: bool = False) -> RepairReport:
     """
     layout = Layout(Path(root).expanduser().absolute())
     manifest = read_manifest(layout)
+    check_folders(layout)
     with explained(f"cannot repair dataset {str(layout.root)!r}"):
         lock = DatasetLock(layout.staging)
         try:

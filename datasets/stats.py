@@ -81,9 +81,15 @@ def sample_indices(length: int) -> list[int]:
 
 
 def merge_stats(first: Stats | None, second: Stats) -> Stats:
-    """Return the statistics of two sets of frames taken together, as LeRobot aggregates them."""
+    """Return the statistics of two sets of frames taken together, as LeRobot aggregates them.
+
+    Raises:
+        ValueError: They are not of the same columns.
+    """
     if first is None:
         return second
+    if first.keys() != second.keys():
+        raise ValueError(f"statistics of other columns: {', '.join(sorted(first.keys() ^ second.keys()))}")
     return {key: _merge_column(first[key], second[key]) for key in second}
 
 

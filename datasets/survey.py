@@ -3,6 +3,7 @@
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from handrail.controllers.errors import HandrailError
 from handrail.datasets.layout import Layout, episode_of
 from handrail.datasets.manifest import Manifest
 from handrail.datasets.metadata import Totals
@@ -10,6 +11,7 @@ from handrail.datasets.strict_json import read_json
 from handrail.datasets.wholeness import UNREADABLE, EpisodeState, Seals, examine
 
 _STREAMS = ("videos/*/*/*.mp4", "data/*/*.parquet")
+_GAP = 10_000  # episodes; more that nothing is left of are a name made up
 _ROWS = "meta/episodes/*/*.parquet"
 
 
@@ -62,13 +64,18 @@ def survey(layout: Layout, manifest: Manifest, seal_of: Seals) -> Survey:
     """Look at everything, change nothing.
 
     Raises:
-        HandrailError: Another tool has added episodes.
+        HandrailError: Another tool has added episodes, or a file has the number of an absurd one.
     """
     rows, streams = _found(layout, _ROWS), [p for pattern in _STREAMS for p in _found(layout, pattern)]
     saved, counted = _saved_by_lines(rows), _saved_in_info(layout)
     beyond = {number for number in map(episode_of, streams) if number is not None and number >= saved}
     interrupted = beyond == {saved} and counted <= saved  # what a crash leaves: files of the next episode
     count = saved if interrupted or not beyond else max(beyond) + 1
+    if count > 10 * len({*map(episode_of, (*rows, *streams))}) + _GAP:
+        raise HandrailError(
+            f"dataset {str(layout.root)!r}: a file says that it is of episode {count - 1}, with next to none"
+            " before it; move it away"
+        )
     states, totals = _states(layout, manifest, count, seal_of)
     return Survey(
         states,
@@ -104,7 +111,11 @@ def _states(
     for number in range(count):
         state = examine(layout, manifest, number, start, seal_of)
         record = state.record
-        totals = totals.grown(record) if record and totals.episodes == number else totals
+        try:
+            totals = totals.grown(record) if record and totals.episodes == number else totals
+        except UNREADABLE:
+            row = layout.relative(layout.row(number))
+            state = replace(state, fault=state.fault or f"the statistics in {row} do not fit the others")
         start = record.start + record.length if record else None
         states.append(replace(state, record=replace(record, stats=None) if record else None))
     return tuple(states), totals

@@ -30,7 +30,7 @@ from handrail.datasets.atomic import (
 from handrail.datasets.checksums import Checksums
 from handrail.datasets.columns import ColumnTypes, Scalar, column_types, fit_columns, plain_columns
 from handrail.datasets.episode import OpenEpisode, numeric_stats
-from handrail.datasets.folder import check_target, clear_dataset, clear_staging
+from handrail.datasets.folder import check_folders, check_target, clear_dataset, clear_staging
 from handrail.datasets.layout import Layout
 from handrail.datasets.lock import DatasetLock
 from handrail.datasets.manifest import Manifest, read_manifest
@@ -67,9 +67,8 @@ class EpisodeWriter:
     ):
         """Use `create` or `resume` instead; `repaired` says what the latter put in order."""
         self._layout, self._manifest, self._totals = layout, manifest, totals
-        self._lock, self._types = lock, types
+        self._lock, self._types, self.repaired, self._unusable = lock, types, repaired, ""
         self._episode = OpenEpisode(layout, manifest)
-        self._unusable, self.repaired = "", repaired
         self._encodings = read_encodings(layout.info, manifest)
 
     @classmethod
@@ -140,6 +139,7 @@ class EpisodeWriter:
         manifest = Manifest(repo_id, fps, robot_type, dict(features), dict(versions or {}))
         manifest.check()
         manifest.check_continues(existing, layout.root)
+        check_folders(layout)
         with explained(f"cannot resume dataset {str(layout.root)!r}"):
             lock = DatasetLock(layout.staging)
             with lock.released_on_error():
