@@ -17,6 +17,7 @@ from handrail.collect.benchmark_format import (
 from handrail.collect.benchmark_metrics import COST_METRICS, METRICS, SETTLED_METRICS
 from handrail.collect.benchmark_results import save_json
 from handrail.collect.markdown import markdown_table, with_part
+from handrail.datasets.atomic import write_whole
 
 _PAIRED = (
     "Paired differences: mean, 95 % bootstrap interval, p of Wilcoxon's test, for success of McNemar's; every"
@@ -39,11 +40,11 @@ def write_page(
     """
     stem = f"{page.stem}_{config.label}"
     for name, data in pictures.items():
-        (page.parent / f"{stem}_{name}.png").write_bytes(data)
+        write_whole(page.parent / f"{stem}_{name}.png", data)
     save_json({k: v for k, v in results.items() if k != "episodes"}, page.parent / f"{stem}.json")
     body = "\n\n".join(_parts(results, pictures, stem))
     text = page.read_text(encoding="utf-8") if page.exists() else "# Goal reaching\n"
-    page.write_text(with_part(text, config.label, body), encoding="utf-8")
+    write_whole(page, with_part(text, config.label, body).encode())
 
 
 def _parts(results: Mapping[str, Any], pictures: Mapping[str, bytes], stem: str) -> list[str]:

@@ -17,6 +17,7 @@ from handrail.collect.benchmark_format import (
     settling_table,
 )
 from handrail.collect.benchmark_metrics import COST_METRICS, METRICS, SETTLED_METRICS
+from handrail.datasets.atomic import write_whole
 
 _STYLE = """
 body { font: 15px/1.45 system-ui, sans-serif; color: #222; }
@@ -57,9 +58,8 @@ def write_report(
         parts.append(f"<h2>Example</h2>{_video(video)}")
     parts.append(_conditions(results))
     head = f'<meta charset="utf-8"><title>Goal reaching</title><style>{_STYLE}</style>'
-    path.write_text(
-        f'<!doctype html><html lang="en">{head}' + "\n".join(parts) + "</html>\n", encoding="utf-8"
-    )
+    page = f'<!doctype html><html lang="en">{head}' + "\n".join(parts) + "</html>\n"
+    write_whole(path, page.encode())
 
 
 _PAIRED = (

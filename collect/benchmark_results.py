@@ -20,6 +20,7 @@ from handrail.collect.benchmark_contenders import (
 )
 from handrail.collect.benchmark_metrics import AIM, COST_METRICS, METRICS, SAFETY_METRICS, SETTLED_METRICS
 from handrail.collect.benchmark_plants import PHYSICS
+from handrail.datasets.atomic import write_whole
 from handrail.datasets.paired import paired_difference, paired_success, wilson
 
 Row = Mapping[str, Any]
@@ -64,7 +65,7 @@ def summarise(
 
 def save_json(results: Mapping[str, Any], path: Path) -> None:
     """Write the results; what is no number becomes null."""
-    path.write_text(json.dumps(_finite(results), indent=1, allow_nan=False) + "\n")
+    write_whole(path, (json.dumps(_finite(results), indent=1, allow_nan=False) + "\n").encode())
 
 
 def _of(rows: Sequence[Row], profile: str, name: str) -> list[Row]:

@@ -168,9 +168,11 @@ class RecordConfig(SessionConfig):
 
     dataset: DatasetConfig = field(default_factory=DatasetConfig)
     resume: bool = False
-    """Add to the dataset that is there (repaired first if need be)."""
+    """Add to the dataset that is there; what a crash left behind is cleared first."""
+    verify: bool = False
+    """With --resume: read every file anew, not only those that have changed since they were checked."""
     overwrite: bool = False
-    """Remove the dataset that is there."""
+    """Remove the dataset that is there, if Handrail recorded it."""
     display_data: bool = False
     """Show robot, cameras, intent and distances in rerun's viewer (needs a screen)."""
     display_web: bool = False
@@ -220,12 +222,33 @@ class ReplayConfig:
 
 
 @dataclass(frozen=True)
+class RepairConfig:
+    """Say what is wrong with a dataset, mend it, and put back what was set aside and is whole.
+
+    Exit code 0 only if everything that was saved is in the dataset and whole, else 1.
+    """
+
+    folder: tyro.conf.Positional[str] = ""
+    """Folder of the dataset; or say --dataset.root."""
+    dataset: StoredConfig = field(default_factory=StoredConfig)
+    set_aside: bool = False
+    """Move episodes that cannot be mended to .damaged, and those after them up; without, they stay."""
+
+    @property
+    def root(self) -> Path:
+        """The folder of the dataset."""
+        return Path(self.folder).expanduser() if self.folder else self.dataset.folder
+
+
+@dataclass(frozen=True)
 class InspectConfig:
     """Print the episodes of a LeRobot dataset as a table."""
 
     dataset: StoredConfig = field(default_factory=StoredConfig)
     repair: bool = False
-    """Repair what a crash left behind, first."""
+    """Repair first what a crash left behind, as handrail-repair does."""
+    check: bool = False
+    """Read every byte and compare it with the checksums; exit code 1 if anything is not as it was saved."""
     quality: bool = False
     """Also print how smooth the motion was and how much the commands chattered."""
 

@@ -13,6 +13,7 @@ from handrail.collect.profile_lane import Case, Lane, Update
 from handrail.collect.profile_rivals import Converged, Mink
 from handrail.controllers.settings import MpcSettings
 from handrail.controllers.threads import single_threaded
+from handrail.datasets.atomic import write_whole
 
 _BLOCK = 10  # updates of one lane before the next has its turn
 _SHORT_REACH = 0.05  # beyond the margin: a mink that looks no farther than it needs to [m]
@@ -173,4 +174,4 @@ def _exponents(ours: dict[str, Any]) -> dict[str, float]:
 
 def save(results: dict[str, Any], path: str) -> None:
     """Write the results as JSON."""
-    Path(path).expanduser().write_text(json.dumps(results, indent=2) + "\n")
+    write_whole(Path(path).expanduser(), (json.dumps(results, indent=2) + "\n").encode())

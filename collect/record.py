@@ -63,6 +63,8 @@ def record(config: RecordConfig) -> int:
         build_session(config, env)  # a wrong mask, or cameras without GL, show before anything is written
         env.reset(seed=config.seed)
         with _open_writer(config, env) as writer:
+            if writer.repaired and not writer.repaired.clean:
+                console.print(str(writer.repaired), **PLAIN)
             task = config.dataset.single_task or env.task_description
             recorder = Recorder(writer, task, _session_columns(config))
             session = build_session(config, env, [*displays, recorder])
@@ -105,7 +107,7 @@ def _open_writer(config: RecordConfig, env: HandrailEnv) -> EpisodeWriter:
         env.model.description.name,
     )
     if config.resume:
-        return EpisodeWriter.resume(*arguments, versions=software_versions())
+        return EpisodeWriter.resume(*arguments, versions=software_versions(), verify=config.verify)
     return EpisodeWriter.create(*arguments, versions=software_versions(), overwrite=config.overwrite)
 
 

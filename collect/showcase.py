@@ -17,6 +17,7 @@ from handrail.collect.showcase_run import FPS, ShowcaseTask, Trace, build_contro
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.model import load_model
 from handrail.controllers.mpc import MaskedMpc
+from handrail.datasets.atomic import write_whole
 from handrail.datasets.frames import Moment
 
 
@@ -40,7 +41,7 @@ def showcase(config: ShowcaseConfig) -> dict[str, Any]:
     trace = _run(case, mpc, config, film=not trouble)
     save_figure(trace, mpc.model, mpc.settings.margin, config.folder / f"{case.name}.png")
     result = summary(trace) | {"video": f"{case.name}.mp4" if not trouble else f"none: {trouble}"}
-    (config.folder / f"{case.name}.json").write_text(json.dumps(result, indent=2) + "\n")
+    write_whole(config.folder / f"{case.name}.json", (json.dumps(result, indent=2) + "\n").encode())
     return result
 
 

@@ -1,5 +1,6 @@
 """The figure of a case: paths from above, distances and tracking error over time."""
 
+import io
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ from handrail.collect.showcase_run import Trace
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import not_installed
 from handrail.controllers.model import RobotModel
+from handrail.datasets.atomic import write_whole
 
 _BASE, _HAND, _GREY, _OBSTACLE = "#2a6fbb", "#c8402f", "#666666", "#e0a050"
 _FARTHEST = 0.5  # distance that is shown [m]
@@ -40,7 +42,9 @@ def save_figure(trace: Trace, model: RobotModel, margin: float, path: Path) -> N
     _paths(above, trace, model)
     _distances(upper, trace, margin)
     _errors(lower, trace)
-    figure.savefig(path)
+    stream = io.BytesIO()
+    figure.savefig(stream, format="png")
+    write_whole(path, stream.getvalue())
 
 
 def _extent(trace: Trace, model: RobotModel) -> FloatArray:

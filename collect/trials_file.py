@@ -11,6 +11,7 @@ from handrail.collect.build import software_versions
 from handrail.collect.trials_config import TrialsConfig
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.atomic import explained, make_folder, write_synced
+from handrail.datasets.strict_json import read_json
 
 FORMAT = "handrail.trials/1"
 _PLACES = 4  # digits that are kept
@@ -67,8 +68,11 @@ class TrialsFile:
         self._path = path
         self._settings = {name: getattr(config, name) for name in ("robot", "seed", "noise", "persons")}
         self._trials: dict[tuple[str, str, int], Trial] = {}
-        for row in self._read():
-            self._keep(Trial(**row))
+        try:
+            for row in self._read():
+                self._keep(Trial(**row))
+        except (TypeError, KeyError) as error:
+            raise HandrailError(f"--json {self._path}: expected a file of trials, got {error}") from error
 
     def add(self, trial: Trial) -> None:
         """Keep a trial, on the disk too."""
@@ -92,7 +96,7 @@ class TrialsFile:
             return []
         expected = {"format": FORMAT, **self._settings}
         try:
-            content = json.loads(self._path.read_bytes())
+            content = read_json(self._path)
             found = {name: content.get(name, _UNNAMED.get(name)) for name in expected}
         except (OSError, ValueError, AttributeError) as error:
             raise HandrailError(f"--json {self._path}: expected a file of trials, got {error}") from error

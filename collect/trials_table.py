@@ -9,6 +9,7 @@ import numpy as np
 from handrail.collect.markdown import Table, markdown_table, with_part
 from handrail.collect.trials_config import TrialsConfig
 from handrail.collect.trials_file import Trial
+from handrail.datasets.atomic import write_whole
 from handrail.datasets.paired import wilson
 
 HEADINGS = (
@@ -33,7 +34,7 @@ def write_page(trials: Sequence[Trial], config: TrialsConfig) -> None:
         table = markdown_table(trials_table(of_task, config.mode_names))
         parts.append(f"### `{task}`\n\n{table}")
     text = page.read_text(encoding="utf-8") if page.exists() else "# Scripted operators\n"
-    page.write_text(with_part(text, LABEL, "\n\n".join(parts)), encoding="utf-8")
+    write_whole(page, with_part(text, LABEL, "\n\n".join(parts)).encode())
 
 
 _WORDS = (

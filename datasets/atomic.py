@@ -36,6 +36,7 @@ def write_synced(path: Path, data: bytes) -> None:
     Raises:
         OSError: The disk is full, or the folder is missing or not writable.
     """
+    path.unlink(missing_ok=True)  # a link that lies there leads to somebody else's file
     with open(path, "wb") as file:
         file.write(data)
         file.flush()
@@ -85,6 +86,25 @@ def write_whole(path: Path, data: bytes) -> None:
         partial.unlink(missing_ok=True)
         raise
     sync_folder(path.parent)
+
+
+def publish_folder(draft: Path, final: Path) -> None:
+    """Give a finished folder its name, with everything in it on the disk; one of that name is replaced.
+
+    The old one is renamed first and removed last, so that one of the two is always there whole.
+
+    Raises:
+        OSError: The disk does not take it.
+    """
+    for path in (draft, *draft.rglob("*")):
+        _sync(path, os.O_RDONLY)
+    old = final.with_name(f".{final.name}.old")
+    remove(old)
+    if final.exists():
+        os.replace(final, old)
+    os.replace(draft, final)
+    sync_folder(final.parent)
+    remove(old)
 
 
 def move(source: Path, target: Path) -> None:

@@ -5,10 +5,11 @@ from pathlib import Path
 
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.atomic import make_folder, move, remove
-from handrail.datasets.layout import DAMAGED, STAGING, Layout
+from handrail.datasets.layout import DAMAGED, STAGING, Layout, episode_of
 from handrail.datasets.lock import LOCK_NAME
 
-_OWNED = ("data", "videos", "images", DAMAGED)  # what `overwrite` removes, before `meta`
+_GIVEN_UP = "episodes"  # the lines of a dataset that is being cleared, in the staging folder
+_FOLDERS = ("data", "videos", "meta")  # of a dataset; what else lies beside them is not touched
 
 
 def check_target(layout: Layout, overwrite: bool) -> None:
@@ -16,10 +17,10 @@ def check_target(layout: Layout, overwrite: bool) -> None:
 
     Args:
         layout: The dataset to be.
-        overwrite: Whether a dataset that is there may go.
+        overwrite: Whether a dataset that Handrail recorded there may go.
 
     Raises:
-        HandrailError: The path is no folder or cannot be written, or something is there.
+        HandrailError: The path is no folder or cannot be written, or something else is there.
     """
     root = layout.root
     _check_writable(root)
@@ -35,6 +36,35 @@ def check_target(layout: Layout, overwrite: bool) -> None:
             f"dataset {str(root)!r} exists already: --resume adds to it, --overwrite removes it;"
             " or choose another folder"
         )
+    if not layout.manifest.is_file():
+        raise HandrailError(
+            f"dataset {str(root)!r} was not recorded by Handrail (no meta/handrail.json): never removed;"
+            " choose another root"
+        )
+    check_folders(layout)
+    foreign = _foreign(layout)
+    if foreign:
+        raise HandrailError(
+            f"dataset {str(root)!r}: found what Handrail did not write, {', '.join(foreign[:3])}; --overwrite"
+            " removes only its own files: move this away, or choose another root"
+        )
+
+
+def check_folders(layout: Layout) -> None:
+    """Check that a dataset's folders are its own before anything in them is moved or removed.
+
+    Raises:
+        HandrailError: One is a link to another place.
+    """
+    for name in (STAGING, DAMAGED, *_FOLDERS):
+        top = layout.root / name
+        within = [Path(folder) / each for folder, folders, _ in os.walk(top) for each in folders]
+        linked = next((path for path in (top, *within) if path.is_symlink()), None)
+        if linked is not None:
+            raise HandrailError(
+                f"dataset {str(layout.root)!r}: expected a folder, found a link at {layout.relative(linked)};"
+                " nothing is written through it"
+            )
 
 
 def is_dataset(layout: Layout) -> bool:
@@ -43,10 +73,10 @@ def is_dataset(layout: Layout) -> bool:
 
 
 def clear_dataset(layout: Layout) -> None:
-    """Remove a dataset's own files and folders, the lock excepted; other files in the folder stay.
+    """Remove a dataset that `check_target` lets go, the lock excepted; what lies beside it stays.
 
-    The lines of metadata go first and at once, `info.json` last: whenever this is cut short, what is left is
-    an empty dataset with leftovers, which `overwrite` and `resume` both accept.
+    The lines of metadata go first and at once, into the staging folder: whenever this is cut short later,
+    `finish_clearing` goes on, and what is left is an empty dataset, which may be overwritten and resumed.
 
     Raises:
         OSError: Something cannot be removed.
@@ -54,16 +84,25 @@ def clear_dataset(layout: Layout) -> None:
     clear_staging(layout)
     episodes = layout.root / "meta" / "episodes"
     if episodes.exists():
-        os.replace(episodes, layout.staging / "episodes")
-    for name in _OWNED:
+        os.replace(episodes, layout.staging / _GIVEN_UP)
+    _clear_given_up(layout)
+
+
+def finish_clearing(layout: Layout) -> None:
+    """Go on with a `clear_dataset` that was cut short, if there was one.
+
+    Raises:
+        OSError: Something cannot be removed.
+    """
+    if (layout.staging / _GIVEN_UP).exists() and not (layout.root / "meta" / "episodes").exists():
+        _clear_given_up(layout)
+
+
+def _clear_given_up(layout: Layout) -> None:
+    """Remove the files of a dataset whose lines of metadata are in the staging folder; these go last."""
+    for name in ("data", "videos", DAMAGED):
         remove(layout.root / name)
-    meta = layout.root / "meta"
-    others = (
-        [path for path in meta.iterdir() if path not in (layout.info, layout.manifest)]
-        if meta.is_dir()
-        else []
-    )
-    for path in (*others, layout.staging / "episodes", layout.info):
+    for path in (layout.tasks, layout.stats, layout.info, layout.staging / _GIVEN_UP):
         remove(path)
 
 
@@ -88,13 +127,34 @@ def set_aside(layout: Layout, paths: list[Path]) -> list[str]:
     """
     if not paths:
         return []
-    number = 0
-    while (target := layout.damaged / f"{number:03d}").exists():
-        number += 1
+    there = [int(path.name) for path in layout.damaged.glob("*") if path.name.isdigit()]
+    target = layout.damaged / f"{max(there, default=-1) + 1:03d}"
     make_folder(target)
     for path in paths:
         move(path, target / layout.relative(path))
     return [layout.relative(path) for path in paths]
+
+
+def _foreign(layout: Layout) -> list[str]:
+    """Return what lies among a dataset's files and is none of them."""
+    summaries = {layout.info, layout.stats, layout.tasks, layout.manifest}
+    paths = [path for name in _FOLDERS for path in (layout.root / name, *(layout.root / name).rglob("*"))]
+    return sorted(
+        layout.relative(path)
+        for path in paths
+        if path.is_symlink() or (path.is_file() and path not in summaries and not _is_numbered(layout, path))
+    )
+
+
+def _is_numbered(layout: Layout, path: Path) -> bool:
+    """Return whether a path is that of an episode's rows, video or line of metadata."""
+    number = episode_of(path)
+    if number is None:
+        return False
+    first, key = path.relative_to(layout.root).parts[:2]
+    return path in (layout.data(number), layout.row(number)) or (
+        first == "videos" and path == layout.video(key, number)
+    )
 
 
 def _contents(root: Path) -> list[str]:

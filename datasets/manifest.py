@@ -13,6 +13,7 @@ from typing import Any
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.layout import Layout
 from handrail.datasets.schema import Feature, check_features
+from handrail.datasets.strict_json import read_json
 
 FORMAT = 1
 
@@ -41,7 +42,7 @@ class Manifest:
         Raises:
             HandrailError: The name, the rate, the robot or a feature is not valid.
         """
-        if not self.repo_id or self.repo_id.count("/") > 1:
+        if not isinstance(self.repo_id, str) or not self.repo_id or self.repo_id.count("/") > 1:
             raise HandrailError(f"--dataset.repo_id: expected 'owner/name' or 'name', got {self.repo_id!r}")
         if not isinstance(self.fps, int) or isinstance(self.fps, bool) or self.fps < 1:
             raise HandrailError(f"fps: expected a whole number of 1 or more, got {self.fps!r}")
@@ -77,26 +78,47 @@ def read_manifest(layout: Layout) -> Manifest:
         HandrailError: There is no dataset, it is another tool's, or a newer Handrail wrote it.
     """
     try:
-        content = json.loads(layout.manifest.read_bytes())
+        content = _content(layout)
         features = {key: _feature_from_json(value) for key, value in content["features"].items()}
-        if content["format"] != FORMAT:
-            raise HandrailError(
-                f"dataset {str(layout.root)!r}: expected format {FORMAT}, got {content['format']};"
-                " a newer Handrail wrote it"
-            )
-        fixed = {name: content[name] for name in ("repo_id", "fps", "robot_type", "versions")}
-        return Manifest(features=features, **fixed)
+        fixed = {name: content[name] for name in ("repo_id", "fps", "robot_type")}
+        manifest = Manifest(features=features, versions=dict(content["versions"]), **fixed)
     except (FileNotFoundError, NotADirectoryError) as error:
         raise HandrailError(_why_no_manifest(layout)) from error
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise HandrailError(
             f"{str(layout.manifest)!r}: expected Handrail's manifest, got {error!r}"
         ) from error
+    try:
+        manifest.check()
+    except HandrailError as error:
+        raise HandrailError(f"{str(layout.manifest)!r}: {error}") from error
+    return manifest
+
+
+def check_format(layout: Layout) -> None:
+    """Check that a dataset, if Handrail wrote it, is of a format that this version understands.
+
+    Raises:
+        HandrailError: A newer Handrail wrote it, or its manifest cannot be read.
+    """
+    if layout.manifest.exists():
+        read_manifest(layout)
 
 
 def json_bytes(content: Any) -> bytes:
     """Return JSON as LeRobot writes it, the same bytes for the same content."""
-    return json.dumps(content, indent=4, ensure_ascii=False).encode()
+    return json.dumps(content, indent=4, ensure_ascii=False, allow_nan=False).encode()
+
+
+def _content(layout: Layout) -> dict[str, Any]:
+    """Return what the manifest says, its format checked first: a newer one may say anything else."""
+    content = read_json(layout.manifest)
+    if content["format"] != FORMAT:
+        raise HandrailError(
+            f"dataset {str(layout.root)!r}: expected format {FORMAT}, got {str(content['format'])[:60]};"
+            " a newer Handrail wrote it"
+        )
+    return content
 
 
 def _why_no_manifest(layout: Layout) -> str:

@@ -18,15 +18,23 @@ import pyarrow.parquet as pq
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.arrow import numbers, one_list, one_scalar, strings
 from handrail.datasets.columns import ColumnTypes, Scalar, is_extra
+from handrail.datasets.info_fields import MOST_EPISODES, MOST_FRAMES, whole_number
 from handrail.datasets.layout import DATA_PATH, FILES_IN_A_CHUNK, VIDEO_PATH, chunk_and_file
 from handrail.datasets.manifest import Manifest, json_bytes
+from handrail.datasets.path_pattern import inside
 from handrail.datasets.schema import AUTOMATIC, Feature, video_keys
 from handrail.datasets.stats import STATISTICS, Stats, merge_stats, stats_from_lists, stats_to_lists
+from handrail.datasets.strict_json import parse_json, read_json
 from handrail.datasets.tables import parquet_bytes
 from handrail.datasets.video import video_info
 
 CODEBASE_VERSION = "v3.0"
 _MARK = b"handrail"  # key in the metadata of a row file: sizes and hashes of the episode's files
+_ORIGIN = b"handrail.origin"
+
+
+class ForeignLineError(HandrailError):
+    """A line of metadata that another tool wrote."""
 
 
 @dataclass(frozen=True)
@@ -97,13 +105,24 @@ class Totals:
         return Totals(self.episodes + 1, self.frames + record.length, self.with_tasks(record.tasks), stats)
 
 
-def info_bytes(manifest: Manifest, totals: Totals) -> bytes:
-    """Return `meta/info.json`."""
+def info_bytes(
+    manifest: Manifest, totals: Totals, encodings: Mapping[str, Mapping[str, Any]] | None = None
+) -> bytes:
+    """Return `meta/info.json`.
+
+    Args:
+        manifest: The schema.
+        totals: What the episodes add up to.
+        encodings: How the videos of some cameras are encoded, where that is not as Handrail does it.
+    """
     features = {**manifest.features, **AUTOMATIC}
+    described = {key: _info_feature(feature, manifest.fps) for key, feature in features.items()}
+    for key, encoding in (encodings or {}).items():
+        described[key]["info"] = dict(encoding)
     content = {
         "codebase_version": CODEBASE_VERSION,
         "fps": manifest.fps,
-        "features": {key: _info_feature(feature, manifest.fps) for key, feature in features.items()},
+        "features": described,
         "total_episodes": totals.episodes,
         "total_frames": totals.frames,
         "total_tasks": len(totals.tasks),
@@ -123,48 +142,82 @@ def stats_bytes(stats: Stats) -> bytes:
     return json_bytes(stats_to_lists(stats))
 
 
-def row_bytes(manifest: Manifest, record: EpisodeRecord, types: ColumnTypes) -> bytes:
-    """Return the file with the metadata of one episode, as LeRobot lays it out, with Handrail's seals."""
+def read_encodings(info: Path, manifest: Manifest) -> dict[str, Mapping[str, Any]]:
+    """Return how `info.json` says that videos are encoded: another tool may have done it anew."""
+    try:
+        described = read_json(info)["features"]
+        found = {key: described[key]["info"] for key in video_keys(manifest.features)}
+    except (OSError, ValueError, KeyError, TypeError):
+        return {}
+    return {key: value for key, value in found.items() if isinstance(value, dict) and "video.codec" in value}
+
+
+def row_bytes(manifest: Manifest, record: EpisodeRecord, types: ColumnTypes, origin: str = "") -> bytes:
+    """Return the file with the metadata of one episode, as LeRobot lays it out, with Handrail's seals.
+
+    Args:
+        manifest: The schema.
+        record: The episode.
+        types: Of the extra columns.
+        origin: SHA-256 of the line that the episode had before it was set aside and put back.
+    """
     extras = {name: one_scalar(record.columns.get(name), kind) for name, kind in types.items()}
     columns = _row_columns(manifest, record) | extras | _stats_columns(record.stats or {})
     columns |= _place("meta/episodes", record.episode)
-    seals = {path: [seal.size, seal.sha256] for path, seal in record.files.items()}
     table = pa.Table.from_arrays(list(columns.values()), names=list(columns))
-    return parquet_bytes(table.replace_schema_metadata({_MARK: json.dumps(seals)}), statistics=False)
+    marks = {_MARK: _seals_json(record.files)} | ({_ORIGIN: origin} if origin else {})
+    return parquet_bytes(table.replace_schema_metadata(marks), statistics=False)
+
+
+def resealed_bytes(path: Path, files: Mapping[str, FileSeal]) -> bytes:
+    """Return the file with the metadata of one episode as it is, but with other seals."""
+    with pq.ParquetFile(path) as file:
+        table = file.read(use_threads=False)
+    marks = dict(table.schema.metadata or {}) | {_MARK: _seals_json(files)}
+    return parquet_bytes(table.replace_schema_metadata(marks), statistics=False)
+
+
+def read_origin(path: Path) -> str:
+    """Return what the line of an episode that was put back says of the line that it had before, or ""."""
+    return (pq.read_schema(path).metadata or {}).get(_ORIGIN, b"").decode()
 
 
 def read_record(path: Path, with_stats: bool) -> EpisodeRecord:
     """Read the line of metadata of one episode that Handrail wrote.
 
     Raises:
-        HandrailError: The file is whole, but another tool wrote it.
+        ForeignLineError: The file is whole, but another tool wrote it.
         OSError, pyarrow.ArrowException, ValueError, KeyError: The file is not whole, or not one line.
     """
     with pq.ParquetFile(path) as file:
         schema = file.schema_arrow
         if _MARK not in (schema.metadata or {}):
-            raise HandrailError(
+            raise ForeignLineError(
                 f"{str(path)!r} was written by another tool: Handrail neither repairs nor resumes a dataset"
                 " that another tool has appended to; record into another folder"
             )
         names = [name for name in schema.names if with_stats or not name.startswith("stats/")]
         rows = file.read(columns=names, use_threads=False).to_pylist()
     (row,) = rows
-    seals = json.loads(schema.metadata[_MARK])
+    seals = parse_json(schema.metadata[_MARK])
     return EpisodeRecord(
-        episode=row["episode_index"],
-        start=row["dataset_from_index"],
-        length=row["length"],
-        tasks=tuple(row["tasks"]),
+        episode=whole_number(row, "episode_index", MOST_EPISODES),
+        start=whole_number(row, "dataset_from_index", MOST_FRAMES),
+        length=whole_number(row, "length", MOST_FRAMES),
+        tasks=tuple(map(str, row["tasks"])),
         stats=_stats_of(row) if with_stats else None,
         columns={name: row[name] for name in names if is_extra(name)},
-        files={name: FileSeal(*seal) for name, seal in seals.items()},
+        files={inside(name): FileSeal(*seal) for name, seal in seals.items()},
     )
 
 
 def read_column_types(path: Path) -> ColumnTypes:
     """Return the types of the extra columns in a row file."""
     return {field.name: field.type for field in pq.read_schema(path) if is_extra(field.name)}
+
+
+def _seals_json(files: Mapping[str, FileSeal]) -> str:
+    return json.dumps({path: [seal.size, seal.sha256] for path, seal in files.items()})
 
 
 def _row_columns(manifest: Manifest, record: EpisodeRecord) -> dict[str, pa.Array]:
@@ -205,8 +258,13 @@ def _stats_array(values: np.ndarray, kind: pa.DataType) -> pa.Array:
 
 
 def _stats_of(row: Mapping[str, Any]) -> Stats:
+    """Return the statistics in a line; what is not finite, as an earlier version wrote it, counts as 0."""
     keys = [name.removeprefix("stats/").removesuffix("/count") for name in row if name.endswith("/count")]
-    return stats_from_lists({key: {name: row[f"stats/{key}/{name}"] for name in STATISTICS} for key in keys})
+    stats = stats_from_lists({key: {name: row[f"stats/{key}/{name}"] for name in STATISTICS} for key in keys})
+    return {
+        key: {name: np.where(np.isfinite(values), values, 0) for name, values in column.items()}
+        for key, column in stats.items()
+    }
 
 
 def _info_feature(feature: Feature, fps: int) -> dict[str, Any]:

@@ -16,12 +16,13 @@ import pyarrow.parquet as pq
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.arrow import numbers
 from handrail.datasets.atomic import explained, make_folder, write_synced
-from handrail.datasets.folder import check_target
+from handrail.datasets.checksums import Checksums
+from handrail.datasets.folder import check_folders, check_target
 from handrail.datasets.layout import Layout
 from handrail.datasets.lock import DatasetLock
 from handrail.datasets.manifest import read_manifest
 from handrail.datasets.metadata import Totals, info_bytes, stats_bytes
-from handrail.datasets.repair import repair_locked
+from handrail.datasets.repair import tidy_locked
 from handrail.datasets.schema import video_keys
 from handrail.datasets.tables import parquet_bytes, tasks_bytes
 
@@ -40,11 +41,12 @@ def pack(root: str | Path, output_root: str | Path) -> None:
     """
     source, target = (Layout(Path(path).expanduser().absolute()) for path in (root, output_root))
     manifest = read_manifest(source)
+    check_folders(source)
     check_target(target, overwrite=False)
     with explained(f"cannot pack into {str(target.root)!r}"):
         lock = DatasetLock(source.staging)
         try:
-            _, totals = repair_locked(source, manifest, thorough=False)
+            _, totals = tidy_locked(source, manifest, Checksums(source.root))
             if not totals.episodes:
                 raise HandrailError(f"dataset {str(source.root)!r}: expected episodes to pack, found none")
             places = _pack_data(source, target, totals.episodes)

@@ -3,7 +3,6 @@
 Pictures are not read here; `LeRobotDataset` does that.
 """
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,9 +14,16 @@ import pyarrow.parquet as pq
 
 from handrail.controllers.errors import HandrailError, unknown_name
 from handrail.datasets.arrow import numbers, to_numpy
-from handrail.datasets.layout import Layout
-from handrail.datasets.schema import Feature
+from handrail.datasets.info_fields import MOST_EPISODES, MOST_FRAMES, features, rate, whole_number
+from handrail.datasets.layout import VIDEO_PATH, Layout
+from handrail.datasets.manifest import check_format
+from handrail.datasets.path_pattern import check_pattern, fill
+from handrail.datasets.schema import NUMBERS, Feature
+from handrail.datasets.strict_json import read_json
 
+_DAMAGED = " the dataset is damaged"
+_READABLE = (*NUMBERS, "float16", "string")
+_PLACE = ("episode_index", "length", "data/chunk_index", "data/file_index")
 _UNREADABLE = (OSError, pa.ArrowException, ValueError, KeyError, TypeError, AttributeError)
 
 
@@ -32,7 +38,8 @@ class DatasetInfo:
         features: All columns, LeRobot's own included.
         episodes: Number of episodes.
         frames: Number of frames.
-        data_path: Pattern of the data files.
+        data_path: Pattern of the data files; see `path_pattern.fill`.
+        video_path: Pattern of the video files.
         from_handrail: Whether Handrail recorded it.
     """
 
@@ -43,6 +50,7 @@ class DatasetInfo:
     episodes: int
     frames: int
     data_path: str
+    video_path: str
     from_handrail: bool
 
 
@@ -50,25 +58,32 @@ def read_info(root: str | Path) -> DatasetInfo:
     """Read what a dataset is.
 
     Raises:
-        HandrailError: There is no dataset, its `info.json` is torn, or it is of another version.
+        HandrailError: There is no dataset, its `info.json` is torn or absurd, or it is of another version.
     """
     layout = Layout(Path(root).expanduser().absolute())
     content = _info_content(layout)
-    version = content.get("codebase_version")
-    if not str(version).startswith("v3."):
+    version = str(content.get("codebase_version"))
+    if not version.startswith("v3."):
         raise HandrailError(
-            f"dataset {str(layout.root)!r}: expected version v3.0, got {version};"
+            f"dataset {str(layout.root)!r}: expected version v3.0, got {version[:60]};"
             " lerobot.scripts.convert_dataset_v21_to_v30 converts older ones"
         )
+    check_format(layout)
     try:
+        robot = content.get("robot_type") or ""
+        if not isinstance(robot, str):
+            raise ValueError(f"robot_type: expected a name, got {str(robot)[:60]}")
         return DatasetInfo(
             root=layout.root,
-            fps=content["fps"],
-            robot_type=content.get("robot_type") or "",
-            features={key: _feature(value) for key, value in content["features"].items()},
-            episodes=content["total_episodes"],
-            frames=content["total_frames"],
-            data_path=content["data_path"],
+            fps=rate(content),
+            robot_type=robot,
+            features=features(content),
+            episodes=whole_number(content, "total_episodes", MOST_EPISODES),
+            frames=whole_number(content, "total_frames", MOST_FRAMES),
+            data_path=check_pattern(content["data_path"], ("chunk_index", "file_index")),
+            video_path=check_pattern(
+                content.get("video_path") or VIDEO_PATH, ("video_key", "chunk_index", "file_index")
+            ),
             from_handrail=layout.manifest.is_file(),
         )
     except _UNREADABLE as error:
@@ -92,12 +107,15 @@ def read_episodes(root: str | Path) -> list[dict[str, Any]]:
     rows: list[dict[str, Any]] = []
     for path in sorted(info.root.glob("meta/episodes/*/*.parquet")):
         rows += _read_rows(path)
-    if len(rows) < info.episodes:
+    rows.sort(key=lambda row: row["episode_index"])
+    numbers = [row["episode_index"] for row in rows]
+    if numbers != list(range(max(len(rows), info.episodes))):
         raise HandrailError(
-            f"dataset {str(info.root)!r}: expected {info.episodes} lines in meta/episodes, got {len(rows)};"
-            + _advice(info.from_handrail)
+            f"dataset {str(info.root)!r}: expected {info.episodes} episodes in meta/episodes,"
+            f" got {len(rows)} lines{_first_odd(numbers)}: it was copied in part, or is damaged;"
+            + _advice(info)
         )
-    return sorted(rows, key=lambda row: row["episode_index"])
+    return rows
 
 
 def read_frames(
@@ -129,24 +147,28 @@ def read_rows_of(
 ) -> dict[str, np.ndarray]:
     """Read the rows of one episode whose line of metadata is at hand; see `read_frames`."""
     names = _chosen(info, columns)
-    place = {"chunk_index": episode["data/chunk_index"], "file_index": episode["data/file_index"]}
-    path = info.root / info.data_path.format(**place)
+    path = info.root / fill(info.data_path, episode["data/chunk_index"], episode["data/file_index"])
     number = episode["episode_index"]
     try:
         table = _episode_table(path, number, names)
         frames = {name: _to_numpy(table.column(name), info.features[name]) for name in names}
+    except FileNotFoundError as error:
+        raise HandrailError(
+            f"dataset {str(info.root)!r}: {path.relative_to(info.root)} of episode {number} is missing:"
+            f" it was copied in part;{_advice(info)}"
+        ) from error
     except _UNREADABLE as error:
-        raise _torn(path, error, _advice(info.from_handrail)) from error
+        raise _torn(path, error, _advice(info)) from error
     if table.num_rows != episode["length"]:
         raise HandrailError(
             f"{str(path)!r}: expected {episode['length']} rows of episode {number}, found {table.num_rows};"
-            + _advice(info.from_handrail)
+            + _advice(info)
         )
     return frames
 
 
 def _chosen(info: DatasetInfo, columns: Sequence[str] | None) -> tuple[str, ...]:
-    readable = [key for key, feature in info.features.items() if feature.dtype not in ("video", "image")]
+    readable = [key for key, feature in info.features.items() if feature.dtype in _READABLE]
     if columns is None:
         return tuple(readable)
     for column in columns:
@@ -186,9 +208,20 @@ def _read_rows(path: Path) -> list[dict[str, Any]]:
     try:
         with pq.ParquetFile(path) as file:
             names = [name for name in file.schema_arrow.names if not name.startswith("stats/")]
-            return file.read(columns=names, use_threads=False).to_pylist()
+            rows = file.read(columns=names, use_threads=False).to_pylist()
+        for row in rows:
+            for name in _PLACE:
+                whole_number(row, name, MOST_FRAMES)
+        return rows
     except _UNREADABLE as error:
         raise _torn(path, error) from error
+
+
+def _first_odd(numbers: list[int]) -> str:
+    """Return which is the first episode that is not there, or is there twice."""
+    odd = next((place for place, number in enumerate(numbers) if place != number), len(numbers))
+    twice = odd < len(numbers) and numbers[odd] < odd
+    return f" (episode {odd - 1} twice)" if twice else f" (no episode {odd})"
 
 
 def _info_content(layout: Layout) -> dict[str, Any]:
@@ -198,27 +231,20 @@ def _info_content(layout: Layout) -> dict[str, Any]:
     if not layout.info.is_file() and not layout.manifest.is_file():
         raise HandrailError(f"{root!r} is not a LeRobot dataset (no meta/info.json); check the path")
     try:
-        content = json.loads(layout.info.read_bytes())
+        content = read_json(layout.info)
         if not isinstance(content, dict):
             raise ValueError("no JSON object")
     except _UNREADABLE as error:
-        raise _torn(layout.info, error, _advice(layout.manifest.is_file())) from error
+        advice = f" handrail-repair {root} rebuilds it" if layout.manifest.is_file() else _DAMAGED
+        raise _torn(layout.info, error, advice) from error
     return content
 
 
-def _feature(value: dict[str, Any]) -> Feature:
-    names = value.get("names")
-    if isinstance(names, dict):  # older datasets: {"motors": [...]}
-        names = next((entry for entry in names.values() if isinstance(entry, list)), None)
-    return Feature(value["dtype"], tuple(value["shape"]), tuple(names) if names else None)
-
-
-def _torn(path: Path, error: Exception, advice: str = " the dataset is damaged") -> HandrailError:
+def _torn(path: Path, error: Exception, advice: str = _DAMAGED) -> HandrailError:
     reason = "no such file" if isinstance(error, FileNotFoundError) else str(error).partition("\n")[0]
     return HandrailError(f"{str(path)!r} cannot be read ({reason});{advice}")
 
 
-def _advice(from_handrail: bool) -> str:
-    if from_handrail:
-        return " repair it with handrail.datasets.repair"
-    return " the dataset is damaged, and Handrail repairs only its own"
+def _advice(info: DatasetInfo) -> str:
+    again = " copy it again"
+    return f"{again}, or see what handrail-repair {info.root} says" if info.from_handrail else again

@@ -1,83 +1,103 @@
-"""Bringing a dataset that Handrail wrote back to its longest run of complete episodes.
+"""Bringing a dataset that Handrail wrote into order, without losing an episode that was saved.
 
-An episode is complete if its line of metadata is there, follows on the one before, and its files have the
-sizes (thorough: the SHA-256) that they had when it was saved. What a crash leaves behind (staged files, the
-published files of the one episode that was never committed) is removed; anything that belonged to a saved
-episode, or that nobody can explain, is moved into `.damaged/`, never deleted. `info.json`, `stats.json` and
-`tasks.parquet` are then rebuilt if they are not, to the byte, what the episodes say.
+Whatever was saved stays where it is: an episode that is not whole is named, and set aside only when asked
+(`set_aside`), whereupon those after it move up. What a crash leaves behind (staged files, the published files
+of the one episode that was never saved) is removed. `info.json`, `stats.json` and `tasks.parquet` are rebuilt
+if they are not, to the byte, what the episodes say.
 
-    python -c "from handrail.datasets.repair import repair; print(repair('path/to/dataset'))"
+    handrail-repair path/to/dataset
 """
 
-import json
 from dataclasses import dataclass
+from dataclasses import replace as replaced
 from pathlib import Path
 
-import pyarrow as pa
-
+from handrail.controllers.errors import HandrailError
 from handrail.datasets.atomic import explained, remove, replace, sync_folder
-from handrail.datasets.folder import clear_staging, set_aside
-from handrail.datasets.layout import Layout, episode_of
+from handrail.datasets.checksums import Checksums
+from handrail.datasets.folder import check_folders, clear_staging, finish_clearing, set_aside
+from handrail.datasets.layout import Layout
 from handrail.datasets.lock import DatasetLock
 from handrail.datasets.manifest import Manifest, read_manifest
-from handrail.datasets.metadata import (
-    EpisodeRecord,
-    FileSeal,
-    Totals,
-    info_bytes,
-    read_record,
-    stats_bytes,
-)
+from handrail.datasets.metadata import Totals, info_bytes, read_encodings, resealed_bytes, stats_bytes
+from handrail.datasets.put_back import put_back, restore
 from handrail.datasets.schema import video_keys
-from handrail.datasets.stats import Stats, stats_from_lists
+from handrail.datasets.survey import Survey, said_to_be_saved, survey
 from handrail.datasets.tables import tasks_bytes
 
-_UNREADABLE = (OSError, pa.ArrowException, ValueError, KeyError, TypeError)
+_SHOWN = 3  # faults in one line
 
 
 @dataclass(frozen=True)
 class RepairReport:
-    """What `repair` found and did; printing it gives one line a fact.
+    """What a repair found and did; printing it gives one line.
 
     Attributes:
         root: The dataset.
-        episodes: Number of complete episodes kept.
+        episodes: Number of episodes in it now.
         frames: Number of their frames.
-        damage: What is wrong with the first episode that is not complete, or "".
+        damage: What is wrong with each episode that is not whole and still in its place.
+        lost: What was wrong with each episode that was set aside.
+        put_back: How many episodes of `.damaged/` are in the dataset again.
+        resealed: Files that another tool wrote anew and that are whole; their checksums were renewed.
         removed: Leftovers of an interrupted recording, deleted; paths in the dataset.
         moved: Files set aside in `.damaged/`; the paths that they had.
+        restored: Files moved back from there to where they were.
         rebuilt: Summary files written anew.
     """
 
     root: Path
     episodes: int
     frames: int
-    damage: str = ""
+    damage: tuple[str, ...] = ()
+    lost: tuple[str, ...] = ()
+    put_back: int = 0
+    resealed: tuple[str, ...] = ()
     removed: tuple[str, ...] = ()
     moved: tuple[str, ...] = ()
+    restored: tuple[str, ...] = ()
     rebuilt: tuple[str, ...] = ()
 
     @property
     def clean(self) -> bool:
         """Whether there was nothing to do."""
-        return not (self.damage or self.removed or self.moved or self.rebuilt)
+        return not (self.damage or self.lost or self.put_back or any(self._files().values()))
+
+    @property
+    def complete(self) -> bool:
+        """Whether everything that was saved is in the dataset and whole."""
+        return not (self.damage or self.lost)
 
     def __str__(self) -> str:
-        lines = [f"dataset {str(self.root)!r}: {self.episodes} complete episodes, {self.frames} frames"]
-        lines += [f"damage: {self.damage}"] if self.damage else []
-        for name in ("removed", "moved", "rebuilt"):
-            paths = getattr(self, name)
-            where = " to .damaged/" if name == "moved" else ""
-            lines += [f"{name}{where}: {', '.join(paths)}"] if paths else []
-        return "\n".join(lines if not self.clean else [f"{lines[0]}; nothing to repair"])
+        said = [f"dataset {str(self.root)!r}: {self.episodes} episodes"]
+        said += [f"{len(self.damage)} damaged ({shortened(self.damage)})"] if self.damage else []
+        said += [f"{len(self.lost)} set aside in .damaged ({shortened(self.lost)})"] if self.lost else []
+        said += [f"{self.put_back} put back"] if self.put_back else []
+        said += [f"{what}: {shortened(paths, ', ')}" for what, paths in self._files().items() if paths]
+        return "; ".join(said if not self.clean else [*said, "nothing to repair"])
+
+    def _files(self) -> dict[str, tuple[str, ...]]:
+        return {
+            "taken as another tool wrote them": self.resealed,
+            "leftovers removed": self.removed,
+            "files of no episode moved to .damaged": self.moved,
+            "files moved back": self.restored,
+            "written anew": self.rebuilt,
+        }
 
 
-def repair(root: str | Path, thorough: bool = True) -> RepairReport:
-    """Repair a dataset; doing it twice changes nothing more.
+def shortened(texts: tuple[str, ...] | list[str], comma: str = "; ") -> str:
+    """Return the first few of many texts, and how many more there are."""
+    more = f" and {len(texts) - _SHOWN} more" if len(texts) > _SHOWN else ""
+    return comma.join(texts[:_SHOWN]) + more
+
+
+def repair(root: str | Path, set_aside_damaged: bool = False) -> RepairReport:
+    """Repair a dataset; doing it twice changes nothing more. Every byte is read.
 
     Args:
         root: The dataset's folder.
-        thorough: Whether to hash every file (about 1 GB/s) rather than compare sizes only.
+        set_aside_damaged: Whether to set episodes aside that are not whole; without, they stay and are named.
 
     Raises:
         HandrailError: No dataset, another tool's, one that another tool has appended to, or one being
@@ -85,157 +105,134 @@ def repair(root: str | Path, thorough: bool = True) -> RepairReport:
     """
     layout = Layout(Path(root).expanduser().absolute())
     manifest = read_manifest(layout)
+    check_folders(layout)
     with explained(f"cannot repair dataset {str(layout.root)!r}"):
         lock = DatasetLock(layout.staging)
         try:
-            return repair_locked(layout, manifest, thorough)[0]
+            return _repair_locked(layout, manifest, set_aside_damaged)
         finally:
             lock.release()
 
 
-def repair_locked(layout: Layout, manifest: Manifest, thorough: bool) -> tuple[RepairReport, Totals]:
-    """Repair a dataset whose lock the caller holds, and return also what its episodes add up to.
+def tidy_locked(layout: Layout, manifest: Manifest, sums: Checksums) -> tuple[RepairReport, Totals]:
+    """Clear what a crash left in a dataset whose episodes are whole and whose lock the caller holds.
+
+    Returns:
+        What was done, and what the episodes add up to.
 
     Raises:
-        HandrailError: Another tool has appended to the dataset.
+        HandrailError: An episode is not whole, or another tool has added some. Nothing has been changed then.
         OSError: A file cannot be moved, removed or written.
     """
-    records, damage = _complete_episodes(layout, manifest, thorough)
-    leftovers, doubtful = _other_files(layout, len(records))
-    damage = damage or _gap(layout, len(records), doubtful)
-    removed = clear_staging(layout) + _remove_all(layout, leftovers)
-    moved = set_aside(layout, doubtful)
-    totals, rebuilt = _rebuild(layout, manifest, records, thorough)
+    finish_clearing(layout)
+    found = survey(layout, manifest, sums.of)
+    sums.remember()
+    require_whole(layout, found)
+    removed, moved = _clear(layout, found)
+    rebuilt = _rebuild(layout, manifest, found.totals)
+    totals = found.totals
     report = RepairReport(
-        layout.root, totals.episodes, totals.frames, damage, tuple(removed), tuple(moved), tuple(rebuilt)
+        layout.root, totals.episodes, totals.frames, removed=removed, moved=moved, rebuilt=rebuilt
     )
     return report, totals
 
 
-def _complete_episodes(layout: Layout, manifest: Manifest, thorough: bool) -> tuple[list[EpisodeRecord], str]:
-    """Return the longest run of complete episodes, and what is wrong with the next one, if anything."""
-    records: list[EpisodeRecord] = []
-    start = 0
-    while (path := layout.row(len(records))).exists():
-        try:
-            record = read_record(path, with_stats=False)
-        except _UNREADABLE as error:
-            return records, f"{layout.relative(path)} cannot be read ({_first_line(error)})"
-        damage = _damage(layout, manifest, record, (len(records), start), thorough)
-        if damage:
-            return records, damage
-        records.append(record)
-        start += record.length
-    return records, ""
+def require_whole(layout: Layout, found: Survey) -> None:
+    """Check that no episode is damaged.
 
-
-def _damage(
-    layout: Layout, manifest: Manifest, record: EpisodeRecord, place: tuple[int, int], thorough: bool
-) -> str:
-    """Return what is wrong with an episode, or ""."""
-    episode, start = place
-    if (record.episode, record.start) != place or record.length < 1:
-        return (
-            f"{layout.relative(layout.row(episode))} is not the line of episode {episode}, frame {start} on"
-        )
-    expected = {layout.data(episode), *(layout.video(key, episode) for key in video_keys(manifest.features))}
-    if {layout.root / path for path in record.files} != expected:
-        return f"{layout.relative(layout.row(episode))} names files that are not those of episode {episode}"
-    faults = (_file_damage(layout.root / path, path, seal, thorough) for path, seal in record.files.items())
-    return next((fault for fault in faults if fault), "")
-
-
-def _file_damage(path: Path, name: str, seal: FileSeal, thorough: bool) -> str:
-    if not path.is_file():
-        return f"{name} is missing"
-    size = path.stat().st_size
-    if size != seal.size:
-        return f"{name} has {size} bytes, expected {seal.size}"
-    return f"{name} has other content than was saved" if thorough and FileSeal.of(path) != seal else ""
-
-
-def _other_files(layout: Layout, kept: int) -> tuple[list[Path], list[Path]]:
-    """Return the files of no complete episode: leftovers of a crash, and those to be set aside.
-
-    A crash leaves files of one episode only, the next one, without its line of metadata. Anything beyond
-    it, any line of metadata, and a count in `info.json` that says more were saved, make all of them doubtful.
-    Lines of metadata come last, so that moving them may be cut short at any place and done again.
+    Raises:
+        HandrailError: One is; the line says which, why, and what to do.
     """
-    patterns = ("videos/*/*/*.mp4", "data/*/*.parquet")
-    streams = [path for pattern in patterns for path in sorted(layout.root.glob(pattern))]
-    others = [path for path in streams if _is_beyond(path, kept)]
-    rows = [path for path in sorted(layout.root.glob("meta/episodes/*/*.parquet")) if _is_beyond(path, kept)]
-    expected = not rows and _saved_in_info(layout) <= kept
-    if expected and all(episode_of(path) == kept for path in others):
-        return others, []
-    return [], others + rows[::-1]
+    if found.whole:
+        return
+    faults, count = found.faults(), len(found.states) + found.absent
+    lacking = found.absent or all("missing" in state.fault for state in found.damaged)
+    what = "was copied in part" if lacking else "is damaged"
+    raise HandrailError(
+        f"dataset {str(layout.root)!r} {what}: {len(found.damaged) + found.absent} of {count} episodes are"
+        f" not whole ({shortened(faults)}); nothing has been changed; copy it again, see what"
+        f" handrail-repair {layout.root} can mend, or go on without them with its --set_aside"
+    )
 
 
-def _gap(layout: Layout, kept: int, doubtful: list[Path]) -> str:
-    """Return why a run ends although none of its episodes is damaged: a line or a file out of place."""
-    if any(episode_of(path) is None for path in doubtful):
-        stray = next(path for path in doubtful if episode_of(path) is None)
-        return f"{layout.relative(stray)} is no file of a LeRobot dataset"
-    counted = _saved_in_info(layout)
-    if doubtful or counted > kept:
-        said = f"; info.json counts {counted} episodes" if counted > kept else ""
-        return f"{layout.relative(layout.row(kept))} is missing{said}"
-    return ""
+def _repair_locked(layout: Layout, manifest: Manifest, set_aside_damaged: bool) -> RepairReport:
+    finish_clearing(layout)
+    sums = Checksums(layout.root, anew=True)
+    restored = restore(layout, said_to_be_saved(layout))
+    found = survey(layout, manifest, sums.of)
+    removed, moved = _clear(layout, found)
+    resealed = _reseal(layout, found)
+    lost: list[str] = []
+    if set_aside_damaged and not found.whole:
+        lost, found = found.faults(), _without_damaged(layout, manifest, found, sums)
+    totals, back = put_back(layout, manifest, found.totals) if found.whole else (found.totals, 0)
+    rebuilt = _rebuild(layout, manifest, totals) if found.counted else ()
+    sums.remember()
+    return RepairReport(
+        root=layout.root,
+        episodes=max(totals.episodes, len(found.states) + found.absent),
+        frames=totals.frames,
+        damage=tuple(found.faults()),
+        lost=tuple(lost),
+        put_back=back,
+        resealed=resealed,
+        removed=removed,
+        moved=moved,
+        restored=tuple(restored),
+        rebuilt=rebuilt,
+    )
 
 
-def _is_beyond(path: Path, kept: int) -> bool:
-    episode = episode_of(path)
-    return episode is None or episode >= kept
+def _without_damaged(layout: Layout, manifest: Manifest, found: Survey, sums: Checksums) -> Survey:
+    """Set aside every episode from the first that is not whole on; `put_back` brings the whole ones back.
+
+    Lines of metadata go last and from the end: cut short, `restore` undoes this. From when `info.json` counts
+    only the episodes that stay, `put_back` finishes it.
+    """
+    if found.counted:
+        _rebuild(layout, manifest, found.totals)
+    first = found.damaged[0].number if found.damaged else len(found.states)
+    streams, rows = [], []
+    for number in range(first, len(found.states)):
+        videos = [layout.video(key, number) for key in video_keys(manifest.features)]
+        streams += [path for path in (*videos, layout.data(number)) if path.exists()]
+        rows += [layout.row(number)] if layout.row(number).exists() else []
+    set_aside(layout, streams + rows[::-1])
+    left = survey(layout, manifest, sums.of)
+    _rebuild(layout, manifest, left.totals)
+    return replaced(left, absent=0)
 
 
-def _saved_in_info(layout: Layout) -> int:
-    """Return how many episodes `info.json` says there are; 0 if it cannot be read."""
-    try:
-        return int(json.loads(layout.info.read_bytes())["total_episodes"])
-    except _UNREADABLE:
-        return 0
-
-
-def _remove_all(layout: Layout, paths: list[Path]) -> list[str]:
-    for path in paths:
+def _clear(layout: Layout, found: Survey) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Remove what a crash left and set aside what nobody can explain; return both."""
+    for path in found.leftovers:
         remove(path)
-    for folder in {path.parent for path in paths}:
+    for folder in {path.parent for path in found.leftovers}:
         sync_folder(folder)
-    return [layout.relative(path) for path in paths]
+    removed = [*clear_staging(layout), *map(layout.relative, found.leftovers)]
+    return tuple(removed), tuple(set_aside(layout, list(found.strays)))
 
 
-def _rebuild(
-    layout: Layout, manifest: Manifest, records: list[EpisodeRecord], thorough: bool
-) -> tuple[Totals, list[str]]:
+def _reseal(layout: Layout, found: Survey) -> tuple[str, ...]:
+    """Renew the checksums of files that another tool wrote anew and that are whole."""
+    names: list[str] = []
+    for state in found.rewritten:
+        assert state.record is not None
+        row, files = layout.row(state.number), {**state.record.files, **state.rewritten}
+        replace(row, resealed_bytes(row, files), layout.staging)
+        names += state.rewritten
+    return tuple(names)
+
+
+def _rebuild(layout: Layout, manifest: Manifest, totals: Totals) -> tuple[str, ...]:
     """Write the summary files that are not what the episodes say."""
-    totals = Totals()
-    for record in records:
-        totals = totals.grown(record)
-    trusted = None if thorough else _trusted_stats(layout, totals)
-    stats = trusted or _folded_stats(layout, len(records))
-    totals = Totals(totals.episodes, totals.frames, totals.tasks, stats)
+    encodings = read_encodings(layout.info, manifest)
     wanted = {
         layout.tasks: tasks_bytes(totals.tasks) if totals.tasks else None,
-        layout.stats: stats_bytes(stats) if stats else None,
-        layout.info: info_bytes(manifest, totals),
+        layout.stats: stats_bytes(totals.stats) if totals.stats else None,
+        layout.info: info_bytes(manifest, totals, encodings),
     }
-    return totals, [layout.relative(path) for path, data in wanted.items() if _settle(layout, path, data)]
-
-
-def _trusted_stats(layout: Layout, totals: Totals) -> Stats | None:
-    """Return the statistics on the disk if they are of exactly these frames: saves reading every line."""
-    try:
-        stats = stats_from_lists(json.loads(layout.stats.read_bytes()))
-        return stats if int(stats["index"]["count"][0]) == totals.frames else None
-    except _UNREADABLE:
-        return None
-
-
-def _folded_stats(layout: Layout, count: int) -> Stats | None:
-    totals = Totals()
-    for episode in range(count):
-        totals = totals.grown(read_record(layout.row(episode), with_stats=True))
-    return totals.stats
+    return tuple(layout.relative(path) for path, data in wanted.items() if _settle(layout, path, data))
 
 
 def _settle(layout: Layout, path: Path, data: bytes | None) -> bool:
@@ -249,7 +246,3 @@ def _settle(layout: Layout, path: Path, data: bytes | None) -> bool:
     else:
         replace(path, data, layout.staging)
     return True
-
-
-def _first_line(error: Exception) -> str:
-    return str(error).partition("\n")[0]

@@ -16,6 +16,7 @@ Stats = dict[str, dict[str, np.ndarray]]
 QUANTILES = {"q01": 0.01, "q10": 0.10, "q50": 0.50, "q90": 0.90, "q99": 0.99}
 BINS = 5000
 STATISTICS = ("min", "max", "mean", "std", "count", *QUANTILES)
+_LARGE = 1e150  # what may be squared
 _LEVELS = np.arange(256, dtype=np.float64)
 
 
@@ -36,7 +37,9 @@ def column_stats(values: np.ndarray) -> dict[str, np.ndarray]:
         stats = {name: rows[0].astype(np.float64) for name in STATISTICS}
         stats |= {"std": np.zeros(rows.shape[1]), "count": np.array([len(rows)])}
         return stats
-    return _many_rows_stats(rows.astype(np.result_type(rows.dtype, np.float32), copy=False))
+    rows = rows.astype(np.result_type(rows.dtype, np.float32), copy=False)
+    too_large = rows.dtype.kind == "f" and np.abs(rows).max() > np.finfo(rows.dtype).max ** 0.4
+    return _scaled(rows) if too_large else _many_rows_stats(rows)
 
 
 def image_levels(image: np.ndarray) -> np.ndarray:
@@ -78,9 +81,15 @@ def sample_indices(length: int) -> list[int]:
 
 
 def merge_stats(first: Stats | None, second: Stats) -> Stats:
-    """Return the statistics of two sets of frames taken together, as LeRobot aggregates them."""
+    """Return the statistics of two sets of frames taken together, as LeRobot aggregates them.
+
+    Raises:
+        ValueError: They are not of the same columns.
+    """
     if first is None:
         return second
+    if first.keys() != second.keys():
+        raise ValueError(f"statistics of other columns: {', '.join(sorted(first.keys() ^ second.keys()))}")
     return {key: _merge_column(first[key], second[key]) for key in second}
 
 
@@ -102,6 +111,24 @@ def _many_rows_stats(rows: np.ndarray) -> dict[str, np.ndarray]:
     return {name: value.astype(np.float64) for name, value in stats.items()} | {
         "count": np.array([len(rows)])
     }
+
+
+def _scaled(rows: np.ndarray) -> dict[str, np.ndarray]:
+    """Return the statistics of numbers whose squares are too large for their type."""
+    size = _size(rows.astype(np.float64), 1.0)
+    stats = _many_rows_stats(rows / size)
+    return {name: value if name == "count" else _times(value, size) for name, value in stats.items()}
+
+
+def _size(rows: np.ndarray, most: float) -> np.ndarray:
+    """Return what to divide columns by, (d,): their largest number where that is above `most`, else 1."""
+    size = np.abs(rows).max(axis=0)
+    return np.where(size > most, size, 1.0)
+
+
+def _times(value: np.ndarray, size: np.ndarray) -> np.ndarray:
+    """Return a product of which rounding makes no infinity."""
+    return np.where(size > _LARGE, np.clip(value, -1.0, 1.0), value) * size
 
 
 def _quantiles(
@@ -156,17 +183,20 @@ def _finite_stats(rows: np.ndarray) -> dict[str, np.ndarray]:
 
 def _merge_column(first: dict[str, np.ndarray], second: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     n, m = first["count"], second["count"]
-    mean = (first["mean"] * n + second["mean"] * m) / (n + m)
-    parts = ((first, n), (second, m))
+    names = ("mean", "std", *QUANTILES)
+    size = _size(np.stack([part[name] for part in (first, second) for name in names]), _LARGE)
+    one, two = ({name: part[name] / size for name in names} for part in (first, second))
+    mean = (one["mean"] * n + two["mean"] * m) / (n + m)
+    parts = ((one, n), (two, m))
     variance = sum((part["std"] ** 2 + (part["mean"] - mean) ** 2) * k for part, k in parts) / (n + m)
-    merged = {
+    merged = {"mean": mean, "std": np.sqrt(variance)}
+    merged |= {name: (one[name] * n + two[name] * m) / (n + m) for name in QUANTILES}
+    return {
         "min": np.minimum(first["min"], second["min"]),
         "max": np.maximum(first["max"], second["max"]),
-        "mean": mean,
-        "std": np.sqrt(variance),
         "count": n + m,
+        **{name: _times(value, size) for name, value in merged.items()},
     }
-    return merged | {name: (first[name] * n + second[name] * m) / (n + m) for name in QUANTILES}
 
 
 def _stride(image: np.ndarray) -> int:

@@ -53,8 +53,33 @@ def count_frames(path: Path) -> int:
         with av.open(str(path)) as container:
             sizes = [packet.size for packet in container.demux(video=0)]
         return sum(size > 0 for size in sizes)
-    except (av.error.FFmpegError, IndexError) as error:
+    except (av.error.FFmpegError, IndexError, ValueError) as error:  # ValueError: text that is none
         raise HandrailError(f"video {str(path)!r}: expected a whole mp4, got {error}") from error
+
+
+def decoded_stats(path: Path, frames: int, height: int, width: int) -> dict[str, np.ndarray]:
+    """Decode every picture of an mp4 and return their statistics.
+
+    Raises:
+        HandrailError: It does not decode to so many pictures of one size.
+        OSError: The file cannot be read.
+    """
+    levels: list[np.ndarray] = []
+    try:
+        with av.open(str(path)) as container:
+            stream = container.streams.video[0]
+            if stream.codec_context is None:
+                raise ValueError("a codec that nobody knows")
+            stream.codec_context.options = {"err_detect": "explode"}
+            for frame in container.decode(stream):
+                if frame.is_corrupt or (frame.height, frame.width) != (height, width):
+                    raise ValueError(f"a broken picture {len(levels)}, or one of another size")
+                levels.append(image_levels(frame.to_ndarray(format="rgb24")))
+    except (av.error.FFmpegError, IndexError, ValueError) as error:  # ValueError: also text that is none
+        raise HandrailError(f"expected a whole mp4, got {error}".partition("\n")[0]) from error
+    if len(levels) != frames:
+        raise HandrailError(f"expected {frames} pictures, got {len(levels)}")
+    return image_stats(levels)
 
 
 class VideoEncoder:

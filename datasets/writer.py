@@ -27,9 +27,10 @@ from handrail.datasets.atomic import (
     sync_folder,
     write_synced,
 )
+from handrail.datasets.checksums import Checksums
 from handrail.datasets.columns import ColumnTypes, Scalar, column_types, fit_columns, plain_columns
 from handrail.datasets.episode import OpenEpisode, numeric_stats
-from handrail.datasets.folder import check_target, clear_dataset, clear_staging
+from handrail.datasets.folder import check_folders, check_target, clear_dataset, clear_staging
 from handrail.datasets.layout import Layout
 from handrail.datasets.lock import DatasetLock
 from handrail.datasets.manifest import Manifest, read_manifest
@@ -39,10 +40,11 @@ from handrail.datasets.metadata import (
     Totals,
     info_bytes,
     read_column_types,
+    read_encodings,
     row_bytes,
     stats_bytes,
 )
-from handrail.datasets.repair import repair_locked
+from handrail.datasets.repair import RepairReport, tidy_locked
 from handrail.datasets.schema import Feature, video_keys
 from handrail.datasets.tables import data_bytes, tasks_bytes
 
@@ -55,14 +57,19 @@ class EpisodeWriter:
     """
 
     def __init__(
-        self, layout: Layout, manifest: Manifest, totals: Totals, lock: DatasetLock, types: ColumnTypes | None
+        self,
+        layout: Layout,
+        manifest: Manifest,
+        totals: Totals,
+        lock: DatasetLock,
+        types: ColumnTypes | None,
+        repaired: RepairReport | None = None,
     ):
-        """Use `create` or `resume` instead."""
+        """Use `create` or `resume` instead; `repaired` says what the latter put in order."""
         self._layout, self._manifest, self._totals = layout, manifest, totals
-        self._lock, self._types = lock, types
+        self._lock, self._types, self.repaired, self._unusable = lock, types, repaired, ""
         self._episode = OpenEpisode(layout, manifest)
-        self._versions: Mapping[str, str] = manifest.versions
-        self._unusable = ""
+        self._encodings = read_encodings(layout.info, manifest)
 
     @classmethod
     def create(
@@ -84,11 +91,10 @@ class EpisodeWriter:
             features: The columns; LeRobot's own (timestamp, indices) are added.
             robot_type: The robot.
             versions: Software versions, kept with the dataset and with each episode.
-            overwrite: Remove the LeRobot dataset that is there. Anything else is never removed.
+            overwrite: Remove the dataset that Handrail recorded there. Anything else is never removed.
 
         Raises:
-            HandrailError: An argument is not valid, the folder is taken or cannot be written. Nothing has
-                been created or removed then.
+            HandrailError: A wrong argument, or a folder taken or not to be written; unchanged then.
         """
         layout = Layout(Path(root).expanduser().absolute())
         manifest = Manifest(repo_id, fps, robot_type, dict(features), dict(versions or {}))
@@ -112,33 +118,34 @@ class EpisodeWriter:
         features: Mapping[str, Feature],
         robot_type: str,
         versions: Mapping[str, str] | None = None,
+        verify: bool = False,
     ) -> Self:
-        """Go on with a dataset that Handrail wrote, repaired first if need be.
+        """Go on with a dataset that Handrail wrote; what a crash left is cleared first, see `repaired`.
 
         Args:
             root: Its folder.
             repo_id: Its name; a dataset may have been renamed since.
-            fps: Frames a second [Hz]; must be the dataset's.
-            features: The columns; must be the dataset's.
-            robot_type: The robot; must be the dataset's.
+            fps: Frames a second [Hz]; like features and robot_type, must be the dataset's.
+            features: The columns.
+            robot_type: The robot.
             versions: Software versions of this session, kept with each of its episodes.
+            verify: Read every file anew, also those that have not changed since they were last checked.
 
         Raises:
-            HandrailError: No dataset, another tool's, one that differs, or one being written. Nothing has
-                been changed then.
+            HandrailError: Not Handrail's, or one that differs, is damaged or being written; unchanged then.
         """
         layout = Layout(Path(root).expanduser().absolute())
         existing = read_manifest(layout)
         manifest = Manifest(repo_id, fps, robot_type, dict(features), dict(versions or {}))
         manifest.check()
         manifest.check_continues(existing, layout.root)
+        check_folders(layout)
         with explained(f"--resume: cannot add to dataset {str(layout.root)!r}"):
             lock = DatasetLock(layout.staging)
             with lock.released_on_error():
-                _, totals = repair_locked(layout, existing, thorough=False)
-                last = layout.row(totals.episodes - 1) if totals.episodes else None
-                types = None if last is None else read_column_types(last)
-        return cls(layout, manifest, totals, lock, types)
+                report, totals = tidy_locked(layout, existing, Checksums(layout.root, anew=verify))
+                types = read_column_types(layout.row(totals.episodes - 1)) if totals.episodes else None
+        return cls(layout, manifest, totals, lock, types, report)
 
     @property
     def root(self) -> Path:
@@ -179,23 +186,20 @@ class EpisodeWriter:
         self._episode.add(frame, task)
 
     def save_episode(self, columns: Mapping[str, Scalar | None] | None = None) -> int:
-        """Save the open episode; when this returns, it survives a crash and a power failure.
+        """Save the open episode and return its number; it survives a crash and a power failure from then on.
 
         Args:
-            columns: Extra columns of the episode's metadata, such as success or operator. The first
-                episode fixes which there are; `versions` is added.
-
-        Returns:
-            The number of the episode.
+            columns: Of the episode's metadata, such as success; the first episode fixes which there are.
 
         Raises:
-            HandrailError: There is no frame or a column does not fit (the episode stays open), or an
-                encoder or the disk failed (the episode is gone, the saved ones are whole).
+            HandrailError: There is no frame or a column does not fit (the episode stays open), or an encoder
+                or the disk failed (the episode is gone, the saved ones are whole).
         """
         self._check_usable()
         if not self._episode.length:
             raise HandrailError(f"episode {self.num_episodes}: expected at least one frame, got none")
-        extras = plain_columns({"versions": json.dumps(self._versions, sort_keys=True), **(columns or {})})
+        versions = json.dumps(dict(self._manifest.versions), sort_keys=True)
+        extras = plain_columns({"versions": versions, **(columns or {})})
         types = self._types or column_types(extras)
         extras = fit_columns(extras, types)
         self._unusable = "was interrupted while it saved an episode"  # until the state is known again
@@ -250,7 +254,7 @@ class EpisodeWriter:
         totals = self._totals.grown(record)
         write_synced(staging / "row.parquet", row_bytes(self._manifest, record, types))
         write_synced(staging / "tasks.parquet", tasks_bytes(totals.tasks))
-        write_synced(staging / "info.json", info_bytes(self._manifest, totals))
+        write_synced(staging / "info.json", info_bytes(self._manifest, totals, self._encodings))
         write_synced(staging / "stats.json", stats_bytes(totals.stats or {}))
         for path in (self._layout.row(self.num_episodes), *(path for _, path in self._streams())):
             make_folder(path.parent)
@@ -258,8 +262,7 @@ class EpisodeWriter:
 
     def _streams(self) -> list[tuple[Path, Path]]:
         """Return the staged and the final path of each video and of the data."""
-        number = self.num_episodes
-        keys = video_keys(self._manifest.features)
+        number, keys = self.num_episodes, video_keys(self._manifest.features)
         videos = [(self._episode.staged_video(key), self._layout.video(key, number)) for key in keys]
         return [*videos, (self._layout.staging / "data.parquet", self._layout.data(number))]
 

@@ -18,7 +18,8 @@ from stable_baselines3.common.buffers import ReplayBuffer
 from stable_baselines3.common.save_util import load_from_zip_file
 
 from handrail.controllers.errors import HandrailError
-from handrail.controllers.strict_json import read_json
+from handrail.datasets.atomic import publish_folder, write_whole
+from handrail.datasets.strict_json import load_json
 from handrail.policies.rl_config import TrainRlConfig
 from handrail.policies.rl_policy import Actor
 
@@ -26,6 +27,8 @@ Curve = list[dict[str, float]]
 _NETWORKS, _TRANSITIONS, _CURVE = "model.zip", "replay_buffer.npz", "curve.json"
 _ARRAYS = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
 _ENTROPY = "log_ent_coef"
+_WRITTEN = ("config.json", "actor.json", "actor.npz", "curve.png")
+_OURS = {*_WRITTEN, *(f".{name}.partial" for name in _WRITTEN), "checkpoints", "actors", "tensorboard"}
 
 
 def begin_run(config: TrainRlConfig) -> None:
@@ -38,11 +41,13 @@ def begin_run(config: TrainRlConfig) -> None:
     if folder.exists() and any(folder.iterdir()):
         if not config.overwrite:
             raise HandrailError(f"{folder}: there is something already; expected --resume or --overwrite")
-        if not settings.is_file():
-            raise HandrailError(f"--overwrite: expected a training run in {folder}, found something else")
+        foreign = sorted(path.name for path in folder.iterdir() if path.name not in _OURS)
+        if foreign or not settings.is_file():
+            found = ", ".join(foreign[:3]) or "something else"
+            raise HandrailError(f"--overwrite: expected only a training run in {folder}, found {found}")
         shutil.rmtree(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    settings.write_text(json.dumps(asdict(config), indent=1) + "\n")
+    write_whole(settings, (json.dumps(asdict(config), indent=1) + "\n").encode())
 
 
 def check_resumes(config: TrainRlConfig) -> None:
@@ -54,7 +59,7 @@ def check_resumes(config: TrainRlConfig) -> None:
     if _last(config.folder) is None:
         raise HandrailError(f"--resume: expected a run with a checkpoint in {config.folder}, found none")
     path = config.folder / "config.json"
-    settings = read_json(path, "settings of a training run")
+    settings = load_json(path, "settings of a training run")
     names = {entry.name for entry in fields(TrainRlConfig)}
     if not isinstance(settings, dict) or not settings.keys() <= names or "layers" not in settings:
         raise HandrailError(f"{str(path)!r}: expected settings of a training run, got {settings!r:.80}")
@@ -116,8 +121,8 @@ def write_checkpoint(folder: Path, model: SAC, actor: Actor, curve: Curve) -> No
     model.save(partial / _NETWORKS)
     assert model.replay_buffer is not None
     _write_transitions(partial / _TRANSITIONS, model.replay_buffer)
-    (partial / _CURVE).write_text(json.dumps(curve, indent=1) + "\n")
-    partial.rename(final)
+    write_whole(partial / _CURVE, (json.dumps(curve, indent=1) + "\n").encode())
+    publish_folder(partial, final)
     if last is not None:
         shutil.rmtree(last)
 
@@ -172,7 +177,7 @@ def _read_transitions(path: Path, buffer: ReplayBuffer) -> None:
 
 
 def _curve(path: Path) -> Curve:
-    curve = read_json(path, "the curve of a training run")
+    curve = load_json(path, "the curve of a training run")
     rows = [row if isinstance(row, dict) else {} for row in curve] if isinstance(curve, list) else []
     if not rows or not all({"steps", "updates", "seconds"} <= row.keys() for row in rows):
         raise HandrailError(f"{str(path)!r}: expected the curve of a training run, got {curve!r:.80}")

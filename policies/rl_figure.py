@@ -1,11 +1,14 @@
 """The figure of a training: what the evaluations said, over steps."""
 
+import io
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+
+from handrail.datasets.atomic import write_whole
 
 PUBLISHED = {"success": 0.97, "arm_effort": 62.6, "jerkiness": 0.681}  # of the paper's own baseline, Table I
 _NAMES = {
@@ -30,4 +33,6 @@ def save_curve(curve: Sequence[dict[str, float]], path: Path) -> None:
         axis.axhline(published, color="#666666", linestyle="--", label="published")
         axis.set(xlabel="thousand steps", title=_NAMES[name], ylim=(0.0, None))
     axes[0].legend(loc="lower right")
-    figure.savefig(path)
+    stream = io.BytesIO()
+    figure.savefig(stream, format="png")
+    write_whole(path, stream.getvalue())

@@ -1,5 +1,6 @@
 """The trained actor without PyTorch: a small network in plain arrays."""
 
+import io
 import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -10,6 +11,7 @@ import numpy as np
 
 from handrail.controllers.arrays import FloatArray, frozen
 from handrail.controllers.errors import HandrailError
+from handrail.datasets.atomic import write_whole
 from handrail.policies.rl_observation import ACTION_SIZE, OBSERVATION_SIZE
 
 SHIPPED = Path(__file__).parent / "rl_actor"  # the actor that comes with Handrail, and how it was trained
@@ -83,7 +85,9 @@ class Actor:
         """Write the arrays to an .npz file."""
         arrays: dict[str, Any] = {f"weight_{i}": weight for i, weight in enumerate(self.weights)}
         arrays |= {f"bias_{i}": bias for i, bias in enumerate(self.biases)}
-        np.savez_compressed(path, **arrays)
+        stream = io.BytesIO()
+        np.savez_compressed(stream, **arrays)
+        write_whole(path, stream.getvalue())
 
     @classmethod
     def load(cls, path: Path | None = None) -> "Actor":

@@ -14,6 +14,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from stable_baselines3 import SAC
 from stable_baselines3.common.callbacks import BaseCallback
 
+from handrail.datasets.atomic import write_whole
 from handrail.policies.rl_checkpoint import (
     Curve,
     begin_run,
@@ -54,7 +55,7 @@ def train(config: TrainRlConfig) -> dict[str, Any]:
     actor.save(config.folder / "actor.npz")
     final = spreads(evaluate(actor, evaluation_goals(config.final_goals, FINAL_SEED), config.physics))
     record = training_record(config, curve, final)
-    (config.folder / "actor.json").write_text(json.dumps(record, indent=1) + "\n")
+    write_whole(config.folder / "actor.json", (json.dumps(record, indent=1) + "\n").encode())
     save_curve(curve, config.folder / "curve.png")
     return record
 

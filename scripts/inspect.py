@@ -13,11 +13,22 @@ def _inspect(config: InspectConfig) -> int:
     from rich.console import Console
 
     from handrail.collect.tables import quality_table, summary_table
+    from handrail.datasets.check import check_report
     from handrail.datasets.repair import repair
 
     console = Console()
+    faults: list[str] = []
     if config.repair:
-        console.print(str(repair(config.dataset.folder)), highlight=False)
+        report = repair(config.dataset.folder)
+        faults += report.damage
+        console.print(str(report), highlight=False, markup=False, soft_wrap=True)
+    if config.check:
+        found = check_report(config.dataset.folder)
+        faults += found
+        said = found or ["checked: everything is as it was saved"]
+        console.print(*said, sep="\n", highlight=False, markup=False, soft_wrap=True)
+    if faults:
+        return cli.FAILED
     console.print(summary_table(config.dataset.folder))
     if config.quality:
         console.print(quality_table(config.dataset.folder))

@@ -6,6 +6,7 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
+from unittest import mock
 
 import pytest
 from hypothesis import settings
@@ -34,6 +35,16 @@ def pytest_xdist_auto_num_workers() -> int:
     given = os.environ.get("PYTEST_XDIST_AUTO_NUM_WORKERS")
     allowed = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     return int(given) if given else min(allowed, MOST_WORKERS)
+
+
+@pytest.fixture(autouse=True, scope="session")
+def _checksums_elsewhere(tmp_path_factory: pytest.TempPathFactory):
+    """Remember the checksums of tests' datasets below the tests' own folder, not in the user's cache."""
+    from handrail.datasets import checksums
+
+    folder = tmp_path_factory.mktemp("checksums")
+    with mock.patch.object(checksums, "_folder", return_value=folder):
+        yield
 
 
 @functools.cache

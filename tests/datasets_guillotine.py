@@ -12,7 +12,7 @@ import warnings
 from collections.abc import Callable
 from pathlib import Path
 
-CHANGES = ("os.rename", "os.remove", "os.mkdir", "os.rmdir", "os.truncate")
+CHANGES = ("os.rename", "os.link", "os.remove", "os.mkdir", "os.rmdir", "os.truncate")
 WRITING = os.O_WRONLY | os.O_RDWR | os.O_CREAT
 
 
@@ -45,7 +45,7 @@ class Guillotine:
         return not self.dead
 
     def _audit(self, event: str, arguments: tuple) -> None:
-        if not self._root or not _is_change(event, arguments) or not self._concerns(arguments):
+        if not self._root or not is_change(event, arguments) or not self._concerns(arguments):
             return
         self._left -= 1
         if self._left <= 0:
@@ -57,7 +57,7 @@ class Guillotine:
         return any(path.startswith(self._root) for path in paths)
 
 
-def _is_change(event: str, arguments: tuple) -> bool:
+def is_change(event: str, arguments: tuple) -> bool:
     return event in CHANGES or (event == "open" and bool((arguments[2] or 0) & WRITING))
 
 

@@ -57,6 +57,31 @@ def test_an_existing_dataset_is_overwritten_when_asked(tmp_path):
     assert len(list(root.glob("data/*/*"))) == 1
 
 
+@pytest.mark.parametrize(
+    "mine", ["data/notes.txt", "data/chunk-000/mine.parquet", "videos/holiday.mp4", "meta/todo.md"]
+)
+def test_overwriting_removes_only_what_is_ours(tmp_path, mine):
+    root = record(tmp_path / "set", 1)
+    (root / mine).parent.mkdir(parents=True, exist_ok=True)
+    (root / mine).write_text("mine")
+    (root / "images").mkdir()
+    (root / "images" / "photo.png").write_text("mine too")
+    before = tree(root)
+    _fails(lambda: create(root, overwrite=True), mine, "--overwrite", "only its own")
+    assert tree(root) == before
+    (root / mine).unlink()
+    create(root, overwrite=True).close()
+    assert (root / "images" / "photo.png").read_text() == "mine too"
+
+
+def test_a_dataset_of_another_tool_is_never_overwritten(tmp_path):
+    root = record(tmp_path / "set", 1)
+    Layout(root).manifest.unlink()
+    before = tree(root)
+    _fails(lambda: create(root, overwrite=True), "not recorded by Handrail", "never removed")
+    assert tree(root) == before
+
+
 @pytest.mark.parametrize("overwrite", [False, True])
 def test_a_folder_that_is_no_dataset_is_never_removed(tmp_path, overwrite):
     (tmp_path / "thesis").mkdir()
@@ -259,7 +284,7 @@ def test_reading_what_is_not_there(tmp_path):
     _fails(lambda: read_frames(root, 2), "episode 2", "0 to 1")
     _fails(lambda: read_frames(root, 0, ["speed"]), "speed", "action")
     Layout(root).data(1).write_bytes(b"no parquet")
-    _fails(lambda: read_frames(root, 1), "file-001.parquet", "handrail.datasets.repair")
+    _fails(lambda: read_frames(root, 1), "file-001.parquet", "handrail-repair")
     Layout(root).row(1).unlink()
     _fails(lambda: read_episodes(root), "expected 2", "repair")
     Layout(root).info.write_text('{"codebase_version": "v2.1"}')

@@ -1,7 +1,11 @@
 """Killed at any moment, a recording loses at most the open episode, and nothing it had reported as saved."""
 
 import gc
+import json
+import os
 import random
+import shutil
+import signal
 import subprocess
 import sys
 import time
@@ -132,22 +136,103 @@ def test_overwriting_killed_at_every_change(tmp_path, quick_disk):
     assert k > 10
 
 
-def test_repair_killed_at_every_change(tmp_path, quick_disk):
-    """Nothing that belonged to a saved episode is ever lost, and repairing again ends the same."""
+def _damage(root: Path) -> list[bytes]:
+    """Damage episode 1; return what the files of the whole episodes hold that are not renumbered."""
+    layout = Layout(root)
+    os.truncate(layout.data(1), 100)
+    return [read_frames(root, episode)["action"].tobytes() for episode in (0, 2, 3)]
+
+
+def _check_nothing_lost(root: Path, kept: list[bytes]) -> None:
+    """However far a repair came, another one ends as if it had not been killed."""
+    repair(root)
+    assert repair(root, set_aside_damaged=True).episodes == 3
+    assert repair(root).clean
+    assert [row["seed"] for row in read_episodes(root)] == [0, 2, 3]
+    assert [read_frames(root, episode)["action"].tobytes() for episode in range(3)] == kept
+    assert Path(root / ".damaged").exists()
+    with resume(root, features=TINY_FEATURES) as writer:
+        assert record_one(writer, cameras=False) == 3
+
+
+@pytest.mark.parametrize("torn", [False, pytest.param(True, marks=pytest.mark.slow)])
+def test_repair_killed_at_every_change(tmp_path, quick_disk, torn):
     lived, k = False, 0
     while not lived:
         k += 1
         root = record(tmp_path / str(k), 4, features=TINY_FEATURES)
-        layout = Layout(root)
-        layout.data(1).write_bytes(b"damaged")
-        layout.info.write_bytes(b"{torn")
-        kept = {path.read_bytes() for e in (1, 2, 3) for path in (layout.data(e), layout.row(e))}
-        lived = GUILLOTINE.run(root, k, lambda root=root: repair(root))
-        repair(root)
-        assert repair(root).clean
-        _check_episodes(root, 1)
-        assert kept <= {path.read_bytes() for path in layout.damaged.rglob("*.parquet")}
-    assert k > 10
+        kept = _damage(root)
+        if torn:
+            Layout(root).info.write_bytes(b"{torn")
+        lived = GUILLOTINE.run(root, k, lambda root=root: repair(root, set_aside_damaged=True))
+        if k % 2:
+            tear_staged_files(root)
+        _check_nothing_lost(root, kept)
+    assert k > 30
+
+
+def _run(folder: Path, k: int, *words: object) -> subprocess.CompletedProcess:
+    script = Path(__file__).parent / "killed_command.py"
+    command = [sys.executable, script, folder, k, *words]
+    return subprocess.run(list(map(str, command)), capture_output=True, text=True)
+
+
+def _killed(folder: Path, k: int, *words: object) -> bool:
+    """Run a command that kills itself at its k-th change below a folder; return whether it did."""
+    done = _run(folder, k, *words)
+    assert done.returncode in (-signal.SIGKILL, 0), done.stderr
+    return done.returncode == -signal.SIGKILL
+
+
+def _changes(folder: Path, *words: object) -> int:
+    """Return how many changes below a folder a command makes."""
+    return int(_run(folder, 0, *words).stderr.splitlines()[-1])
+
+
+@pytest.mark.slow
+def test_repair_killed_30_times(tmp_path):
+    original = record(tmp_path / "original", 4, features=TINY_FEATURES)
+    kept = _damage(original)
+    trial = shutil.copytree(original, tmp_path / "trial")
+    changes = _changes(trial, "repair", trial, "--set_aside")
+    assert changes >= 30
+    for k in np.linspace(1, changes, 30).astype(int).tolist():
+        root = shutil.copytree(original, tmp_path / str(k))
+        assert _killed(root, k, "repair", root, "--set_aside")
+        _check_nothing_lost(root, kept)
+
+
+@pytest.mark.slow
+def test_compare_killed_10_times(tmp_path):
+    """Each file of a report is the old one or the new one, whole; the datasets are as they were."""
+    from compare_helpers import quick_and_slow
+
+    roots = list(map(Path, quick_and_slow(tmp_path)))
+    before = [tree(root) for root in roots]
+    output = tmp_path / "report"
+    words = ("compare", *roots, "--output", output, "--no_pictures", "--seed")
+    assert not _killed(output, 0, *words, 0)
+    old = tree(output)
+    changes = _changes(output, *words, 0)
+    assert changes >= 2 * len(old)
+    for number in range(10):
+        shutil.rmtree(output)
+        output.mkdir()
+        for name, content in old.items():
+            (output / name).write_bytes(content)
+        assert _killed(output, 1 + number % changes, *words, number)
+        assert set(old) <= set(tree(output))
+        assert all(_is_whole(output / name) for name in old)
+        assert [tree(root) for root in roots] == before
+    assert not _killed(output, 0, *words, 0)
+    assert tree(output) == old  # what a killed one left behind is gone
+
+
+def _is_whole(path: Path) -> bool:
+    content = path.read_text()
+    if path.suffix == ".json":
+        return bool(json.loads(content))
+    return content.endswith("</html>\n" if path.suffix == ".html" else "\n") and len(content) > 1000
 
 
 def _kill_repeatedly(root: Path, kills: int) -> tuple[int, int]:

@@ -1,4 +1,4 @@
-"""Repair keeps the longest run of complete episodes, rebuilds the rest, deletes nothing that was saved."""
+"""Repair loses no saved episode: it names what is damaged, puts back what is whole, mends the rest."""
 
 import json
 import os
@@ -6,11 +6,11 @@ import shutil
 
 import numpy as np
 import pytest
+from command_helpers import command
 from datasets_helpers import (
     CAMERAS,
     FPS,
     create,
-    digest,
     files_of,
     frame_of,
     length_of,
@@ -23,6 +23,7 @@ from datasets_helpers import (
 
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.layout import Layout
+from handrail.datasets.reader import read_episodes, read_frames
 from handrail.datasets.repair import repair
 
 
@@ -36,16 +37,36 @@ def root(original, tmp_path):
     return shutil.copytree(original, tmp_path / "set")
 
 
-def _flip_a_byte(path):
+def _flip_a_byte(path, place=1 / 3):
     content = bytearray(path.read_bytes())
-    content[len(content) // 3] ^= 0xFF
+    content[int(len(content) * place)] ^= 0xFF
     path.write_bytes(content)
+
+
+def _cut(path, count):
+    os.truncate(path, path.stat().st_size - count)
+
+
+def _check_is(root, originals):
+    """Check that the episodes are, in order, those that were recorded under these numbers."""
+    rows = read_episodes(root)
+    assert [row["seed"] for row in rows] == list(originals)
+    start = 0
+    for place, number in enumerate(originals):
+        assert (rows[place]["dataset_from_index"], rows[place]["length"]) == (start, length_of(number))
+        frames = read_frames(root, place)
+        expected = [frame_of(number, i, cameras=False)["action"] for i in range(length_of(number))]
+        assert np.array_equal(frames["action"], np.array(expected))
+        assert frames["index"].tolist() == list(range(start, start + length_of(number)))
+        assert set(frames["episode_index"]) == {place}
+        start += length_of(number)
 
 
 def test_a_whole_dataset_is_left_alone(root):
     before = tree(root)
     report = repair(root)
     assert report.clean
+    assert report.complete
     assert report.episodes == 4
     assert str(report).endswith("nothing to repair")
     assert tree(root) == before
@@ -70,6 +91,7 @@ def test_resume_repairs_torn_files_by_itself(root):
     Layout(root).stats.unlink()
     Layout(root).tasks.unlink()
     with resume(root, cameras=True) as writer:
+        assert len(writer.repaired.rebuilt) == 3
         assert record_one(writer, cameras=True) == 4
     assert open_with_lerobot(root).num_episodes == 5
     assert repair(root).clean
@@ -77,7 +99,7 @@ def test_resume_repairs_torn_files_by_itself(root):
 
 @pytest.mark.parametrize("stream", range(4), ids=["data", "line", "wrist", "scene"])
 @pytest.mark.parametrize("harm", ["cut", "empty", "gone", "flipped"])
-def test_a_damaged_episode_ends_the_run_and_is_set_aside(root, stream, harm):
+def test_a_damaged_episode_is_named_and_costs_no_other(root, stream, harm):
     path = files_of(root, 1, cameras=True)[stream]
     if harm == "gone":
         path.unlink()
@@ -85,24 +107,76 @@ def test_a_damaged_episode_ends_the_run_and_is_set_aside(root, stream, harm):
         _flip_a_byte(path)
     else:
         os.truncate(path, path.stat().st_size // 2 if harm == "cut" else 0)
-    first = digest(root, 0, cameras=True)
-    saved = [p for episode in (1, 2, 3) for p in files_of(root, episode, cameras=True) if p.exists()]
-    contents = sorted(p.read_bytes() for p in saved)
-    report = repair(root)
-    if stream == 1 and harm == "flipped" and report.episodes == 4:
+    before = tree(root)
+    checked = command("--dataset.root", root, "--check", name="inspect")
+    if stream == 1 and harm == "flipped" and checked.returncode == 0:
         return  # the byte was one that nothing depends on
-    assert report.episodes == 1
-    assert report.frames == length_of(0)
-    assert path.relative_to(root).as_posix() in report.damage
-    assert sorted(p.read_bytes() for p in (root / ".damaged").rglob("*.*") if p.is_file()) == contents
-    assert not report.removed
-    assert digest(root, 0, cameras=True) == first
+    assert checked.returncode == 1
+    assert path.relative_to(root).as_posix() in checked.stdout
+    if "but the right frames" in checked.stdout:
+        return  # it decodes to what was saved: noticed, and no damage
+    with pytest.raises(HandrailError, match=r"\A[^\n]*episode 1[^\n]*handrail-repair[^\n]*\Z"):
+        resume(root, cameras=True)
+    assert tree(root) == before
+    done = command(root, name="repair")
+    assert (done.returncode, done.stdout.count("\n")) == (1, 1)
+    assert path.relative_to(root).as_posix() in done.stdout
+    assert tree(root) == before  # nothing that was saved is moved without being asked
+    done = command(root, "--set_aside", name="repair")
+    assert (done.returncode, done.stdout.count("\n")) == (1, 1)
+    assert "3 put back" not in done.stdout
+    assert "2 put back" in done.stdout
+    _check_is(root, [0, 2, 3])
+    assert not path.exists() or path.read_bytes() != before.get(path.relative_to(root).as_posix())
     assert repair(root).clean
     with resume(root, cameras=True) as writer:
-        assert record_one(writer, cameras=True) == 1
+        assert record_one(writer, cameras=True) == 3
     dataset = open_with_lerobot(root)
-    assert (dataset.num_episodes, len(dataset)) == (2, length_of(0) + length_of(1))
+    assert dataset.num_episodes == 4
     assert dataset.meta.stats["index"]["count"].tolist() == [len(dataset)]
+
+
+def test_pictures_move_up_with_their_episode(root):
+    os.truncate(Layout(root).data(0), 10)
+    repair(root, set_aside_damaged=True)
+    dataset = open_with_lerobot(root)
+    moved = {key: dataset[length_of(1) + 2][key].mean().item() * 255 for key in CAMERAS}
+    for place, key in enumerate(CAMERAS):
+        assert moved[key] == pytest.approx(frame_of(2, 2, cameras=True)[CAMERAS[place]].mean(), abs=2.5)
+
+
+def test_one_byte_missing_in_episode_2_of_24(tmp_path):
+    """The first version moved 22 episodes away, 21 of them whole, and said nothing."""
+    root = record(tmp_path / "set", 24)
+    _cut(Layout(root).data(2), 1)
+    before = tree(root)
+    with pytest.raises(HandrailError, match=r"1 of 24 episodes are not whole \(episode 2: data/chunk-000"):
+        resume(root)
+    assert tree(root) == before
+    report = repair(root, set_aside_damaged=True)
+    assert (report.episodes, len(report.lost), report.put_back, report.complete) == (23, 1, 21, False)
+    _check_is(root, [0, 1, *range(3, 24)])
+
+
+def test_what_the_first_version_moved_away_is_put_back(tmp_path):
+    """As it left them: everything from the damaged episode on in `.damaged/000`, and recorded on since."""
+    root = record(tmp_path / "set", 6)
+    os.truncate(Layout(root).data(2), 100)
+    layout, target = Layout(root), tmp_path / "set" / ".damaged" / "000"
+    for number in range(2, 6):
+        for path in (layout.data(number), layout.row(number)):
+            (target / layout.relative(path)).parent.mkdir(parents=True, exist_ok=True)
+            path.rename(target / layout.relative(path))
+    layout.info.write_text(layout.info.read_text().replace('"total_episodes": 6', '"total_episodes": 2'))
+    with resume(root) as writer:
+        record_one(writer, cameras=False)
+    done = command(root, name="repair")
+    assert done.returncode == 0
+    assert "3 put back" in done.stdout
+    _check_is(root, [0, 1, 2, 3, 4, 5])
+    assert [path.name for path in target.rglob("*.parquet")] == ["file-002.parquet"] * 2  # what is not whole
+    assert repair(root).clean
+    assert open_with_lerobot(root).num_episodes == 6
 
 
 def test_leftovers_of_a_save_that_was_never_committed_are_removed(root):
@@ -125,24 +199,40 @@ def test_leftovers_of_a_save_that_was_never_committed_are_removed(root):
     assert not layout.data(4).exists()
 
 
-def test_lost_lines_of_metadata_never_cost_data(root):
+@pytest.mark.parametrize("asked", [False, True])
+def test_lost_lines_of_metadata_never_cost_data(root, asked):
     """If the lines of saved episodes vanish, their files are no leftovers of a crash."""
     before = {content for path, content in tree(root).items() if path.startswith(("data", "videos"))}
     shutil.rmtree(root / "meta" / "episodes")
     Layout(root).info.unlink()
-    report = repair(root)
-    assert report.episodes == 0
-    assert "is missing" in report.damage
-    assert before <= set(tree(root / ".damaged").values())
+    report = repair(root, asked)
+    assert report.episodes == (0 if asked else 4)
+    assert all("is missing" in fault for fault in report.damage or report.lost)
+    assert before <= set(tree(root / ".damaged" if asked else root).values())
     assert not report.removed
 
 
 def test_the_last_line_gone_is_noticed_by_the_count(root):
     Layout(root).row(3).unlink()
     report = repair(root)
-    assert "info.json counts 4 episodes" in report.damage
+    assert report.damage == ("episode 3: meta/episodes/chunk-000/file-003.parquet is missing",)
     assert not report.removed
-    assert len(report.moved) == 3
+    assert len(repair(root, set_aside_damaged=True).lost) == 1
+    assert len(tree(root / ".damaged")) == 3
+
+
+def test_a_dataset_copied_in_part_is_named_as_such(root):
+    layout = Layout(root)
+    for path in files_of(root, 3, cameras=True):
+        path.unlink()
+    with pytest.raises(HandrailError, match=r"copied in part.*episodes 3 to 3: missing"):
+        resume(root, cameras=True)
+    layout.video(CAMERAS[0], 2).unlink()
+    with pytest.raises(HandrailError, match=r"copied in part: 2 of 4 episodes"):
+        resume(root, cameras=True)
+    assert repair(root).episodes == 4
+    assert repair(root, set_aside_damaged=True).episodes == 2
+    _check_is(root, [0, 1])
 
 
 def test_a_stray_file_that_lerobot_would_read_is_set_aside(root):
@@ -162,17 +252,20 @@ def test_a_dataset_with_no_episode(tmp_path):
     assert json.loads(Layout(tmp_path / "set").info.read_bytes())["total_episodes"] == 0
 
 
-def test_episodes_of_another_tool_are_not_touched(tmp_path):
-    root = record(tmp_path / "set", 2)
-    import pyarrow.parquet as pq
-
-    layout = Layout(root)
-    pq.write_table(pq.read_table(layout.row(1)).replace_schema_metadata(None), layout.row(2))
-    before = tree(root)
-    for attempt in (lambda: repair(root), lambda: resume(root)):
-        with pytest.raises(HandrailError, match="written by another tool"):
-            attempt()
-        assert tree(root) == before
+def test_an_episode_put_back_comes_once(root):
+    """Cut short after the episode was saved and before `.damaged` was cleared, nothing comes twice."""
+    os.truncate(Layout(root).data(1), 10)
+    copies = shutil.copytree(root, root.parent / "copies")
+    repair(root, set_aside_damaged=True)
+    for number in (2, 3):
+        for path in files_of(copies, number, cameras=True):
+            target = root / ".damaged" / "007" / path.relative_to(copies)
+            target.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy(path, target)
+    report = repair(root)
+    assert (report.episodes, report.put_back) == (3, 0)
+    assert not (root / ".damaged" / "007").exists()
+    _check_is(root, [0, 2, 3])
 
 
 def test_chunks_roll_over(tmp_path, monkeypatch):
@@ -191,3 +284,6 @@ def test_chunks_roll_over(tmp_path, monkeypatch):
     assert dataset[len(dataset) - 1]["timestamp"].item() == pytest.approx((length_of(7) - 1) / FPS)
     last = frame_of(7, length_of(7) - 1, cameras=False)["action"]
     assert np.array_equal(dataset[len(dataset) - 1]["action"].numpy(), last)
+    os.truncate(Layout(root).data(1), 10)
+    repair(root, set_aside_damaged=True)
+    _check_is(root, [0, *range(2, 8)])

@@ -7,7 +7,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from handrail.datasets.stats import STATISTICS, column_stats, image_levels, image_stats, sample_indices
+from handrail.datasets.stats import (
+    STATISTICS,
+    column_stats,
+    image_levels,
+    image_stats,
+    merge_stats,
+    sample_indices,
+)
 
 with warnings.catch_warnings():
     warnings.simplefilter("ignore")
@@ -61,6 +68,18 @@ def test_pictures(shape, count):
 @pytest.mark.parametrize("length", [1, 2, 99, 100, 101, 463, 465, 2000, 300_000])
 def test_the_same_frames_are_looked_at(length):
     assert sample_indices(length) == lerobot.sample_indices(length)
+
+
+@pytest.mark.parametrize(("dtype", "large"), [("float32", 3e38), ("float64", 1.7e308), ("float64", 1e160)])
+def test_numbers_of_any_size_have_finite_statistics(dtype, large):
+    """Squares of large numbers are infinite, and NaN or Infinity in `stats.json` is no JSON."""
+    rows = np.array([[1.0, large], [2.0, -large], [3.0, large], [4.0, large]], dtype)
+    stats = column_stats(rows)
+    twice = merge_stats({"a": stats}, {"a": stats})["a"]
+    for each in (stats, twice):
+        assert all(np.isfinite(value).all() for value in each.values())
+        assert np.allclose(each["mean"], [2.5, large / 2], rtol=1e-6)
+        assert np.allclose(each["std"], [np.std(rows[:, 0]), large * np.sqrt(0.75)], rtol=1e-6)
 
 
 def test_values_that_are_not_finite_are_left_out():

@@ -15,7 +15,14 @@ import pytest
 from handrail.collect.benchmark_config import CONTROLLERS, PROFILES, BenchmarkConfig
 from handrail.collect.benchmark_contenders import CONTENDERS
 from handrail.collect.build import build_env, session_features
-from handrail.collect.config import DemoConfig, InspectConfig, RecordConfig, ReplayConfig, SessionConfig
+from handrail.collect.config import (
+    DemoConfig,
+    InspectConfig,
+    RecordConfig,
+    RepairConfig,
+    ReplayConfig,
+    SessionConfig,
+)
 from handrail.collect.operators.modes import MODES
 from handrail.collect.perturbations import DEFAULTS
 from handrail.collect.profile_config import ProfileConfig
@@ -37,6 +44,7 @@ CONFIGS = {
     "handrail-record": RecordConfig,
     "handrail-replay": ReplayConfig,
     "handrail-inspect": InspectConfig,
+    "handrail-repair": RepairConfig,
     "handrail-demo": DemoConfig,
     "handrail-showcase": ShowcaseConfig,
     "handrail-profile": ProfileConfig,

@@ -232,10 +232,13 @@ def test_what_is_there_is_kept_unless_it_may_go(trained, recorded, tmp_path):
     with pytest.raises(HandrailError, match="--resume with --seed 5: expected 0"):
         train(dataclasses.replace(config, resume=True, seed=5), quiet=True)
     assert train(dataclasses.replace(config, resume=True), quiet=True) == folder  # already there
-    (tmp_path / "other").mkdir()
-    (tmp_path / "other" / "thesis.tex").touch()
-    with pytest.raises(HandrailError, match="missing or empty"):
-        train(tiny(recorded, tmp_path / "other", overwrite=True), quiet=True)
+    for name in ("thesis.tex", "checkpoints/thesis.tex"):
+        thesis = tmp_path / name.replace("/", "-") / name
+        thesis.parent.mkdir(parents=True)
+        thesis.touch()
+        with pytest.raises(HandrailError, match=f"missing or empty folder, found {name}"):
+            train(tiny(recorded, tmp_path / name.replace("/", "-"), overwrite=True), quiet=True)
+        assert thesis.exists()
 
 
 def test_the_command_says_bad_input_in_one_line():

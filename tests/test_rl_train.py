@@ -133,8 +133,13 @@ def test_the_actor_may_be_the_mean_of_the_last_ones(run):
 
 def test_only_a_training_run_is_overwritten(tmp_path):
     (tmp_path / "thesis.txt").write_text("years of work")
-    with pytest.raises(HandrailError, match="expected a training run"):
-        train(replace(TINY, output_dir=str(tmp_path), overwrite=True))
+    for settings in ("{}", None):  # a config.json alone makes no training run of a folder
+        if settings:
+            (tmp_path / "config.json").write_text(settings)
+        else:
+            (tmp_path / "config.json").unlink()
+        with pytest.raises(HandrailError, match="expected only a training run"):
+            train(replace(TINY, output_dir=str(tmp_path), overwrite=True))
     with pytest.raises(HandrailError, match="expected a run with a checkpoint"):
         train(replace(TINY, output_dir=str(tmp_path), resume=True))
     assert (tmp_path / "thesis.txt").read_text() == "years of work"

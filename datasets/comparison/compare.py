@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from handrail.controllers.errors import HandrailError
+from handrail.datasets.check import check_whole
 from handrail.datasets.comparison.collection import (
     Collected,
     collected,
@@ -100,6 +101,8 @@ def compare(config: CompareConfig) -> Comparison:
         HandrailError: A setting is wrong, or a dataset or an evaluation cannot be read.
     """
     config.check()
+    for root in config.datasets:
+        check_whole(root, config.verify)
     groups = load_groups(config.datasets, config.by, config.labels, config.columns)
     baseline = baseline_of(groups, config.baseline)
     arms = _arms(config, groups)

@@ -36,6 +36,8 @@ class CompareConfig:
     """Show first pictures of the cameras."""
     seed: int = 0
     """Of the resampling: the same seed gives the same report."""
+    verify: bool = False
+    """Read every file of the datasets anew, not only those that have changed since they were checked."""
     columns: ColumnNames = field(default_factory=ColumnNames)
 
     @property

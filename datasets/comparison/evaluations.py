@@ -19,7 +19,6 @@ A rollout needs `seed` and `success`; other numbers (`contacts`, `length` [s], â
 where every rollout of an arm has them. Several files add up; the same rollout twice is an error.
 """
 
-import json
 from collections.abc import Iterable, Mapping, Set
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -29,6 +28,7 @@ import numpy as np
 
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.comparison.resampling import Run
+from handrail.datasets.strict_json import read_json
 
 FORMAT = "handrail.evaluations/1"
 SUCCESS = "success"
@@ -135,7 +135,7 @@ def _add(known: dict[tuple[int, int], Policy], policy: Policy, where: str) -> No
 
 def _content(path: Path) -> dict[str, Any]:
     try:
-        content = json.loads(path.expanduser().read_bytes())
+        content = read_json(path.expanduser())
     except FileNotFoundError as error:
         raise HandrailError(f"evaluations {str(path)!r}: expected a JSON file, found none") from error
     except (OSError, ValueError) as error:

@@ -2,12 +2,12 @@
 
 import base64
 import io
-from pathlib import Path
 from typing import Any
 
 from handrail.datasets.comparison.groups import Group
-from handrail.datasets.layout import VIDEO_PATH
+from handrail.datasets.path_pattern import fill
 from handrail.datasets.quality.demonstration import Demonstration
+from handrail.datasets.reader import DatasetInfo
 from handrail.datasets.schema import video_keys
 
 _EPISODES = 3  # shown of each group
@@ -19,7 +19,7 @@ def first_pictures(group: Group) -> list[tuple[str, str]]:
     shown = []
     for episode in group.episodes[:_EPISODES]:
         for key in video_keys(group.info.features):
-            picture = _first_frame(group.info.root, key, episode)
+            picture = _first_frame(group.info, key, episode)
             if picture:
                 shown.append(
                     (f"episode {episode.number}, {key.removeprefix('observation.images.')}", picture)
@@ -27,22 +27,22 @@ def first_pictures(group: Group) -> list[tuple[str, str]]:
     return shown
 
 
-def _first_frame(root: Path, key: str, episode: Demonstration) -> str:
+def _first_frame(info: DatasetInfo, key: str, episode: Demonstration) -> str:
     import av
     from av.error import FFmpegError
 
-    place = {name: episode.meta.get(f"videos/{key}/{name}") for name in ("chunk_index", "file_index")}
-    if None in place.values():
+    chunk, file = (episode.meta.get(f"videos/{key}/{name}") for name in ("chunk_index", "file_index"))
+    if not (isinstance(chunk, int) and isinstance(file, int)):
         return ""
-    begin = float(episode.meta.get(f"videos/{key}/from_timestamp") or 0.0)
     try:
-        with av.open(str(root / VIDEO_PATH.format(video_key=key, **place))) as container:
+        begin = float(episode.meta.get(f"videos/{key}/from_timestamp") or 0.0)
+        with av.open(str(info.root / fill(info.video_path, chunk, file, key))) as container:
             stream = container.streams.video[0]
             container.seek(int(begin * 1_000_000))
             for frame in container.decode(stream):
                 if frame.time is None or frame.time >= begin - 0.5 / episode.fps:
                     return _address(frame)
-    except (OSError, FFmpegError):
+    except (OSError, FFmpegError, ValueError, TypeError, OverflowError, IndexError):
         return ""
     return ""
 

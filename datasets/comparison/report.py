@@ -1,7 +1,5 @@
 """Writing what was found: a page for people, JSON and CSV for programs."""
 
-import csv
-import io
 import json
 import math
 from collections.abc import Mapping
@@ -10,11 +8,13 @@ from pathlib import Path
 from typing import Any
 
 from handrail.controllers.errors import HandrailError
+from handrail.datasets.atomic import write_whole
 from handrail.datasets.comparison.compare import Comparison, View
 from handrail.datasets.comparison.differences import Difference
 from handrail.datasets.comparison.finding import Finding
 from handrail.datasets.comparison.findings import findings
 from handrail.datasets.comparison.page import report_page
+from handrail.datasets.csv_file import csv_text
 from handrail.datasets.quality.catalogue import METRICS
 
 _FIELDS = (
@@ -36,17 +36,17 @@ def write_report(comparison: Comparison) -> list[Path]:
         HandrailError: The folder cannot be written.
     """
     found = findings(comparison)
+    numbers = as_json(comparison, found)
     texts = {
         "report.html": report_page(comparison, found),
-        "report.json": json.dumps(as_json(comparison, found), indent=1, ensure_ascii=False) + "\n",
-        "episodes.csv": _csv(_episode_rows(comparison)),
-        "differences.csv": _csv(_difference_rows(comparison)),
+        "report.json": json.dumps(numbers, indent=1, ensure_ascii=False, allow_nan=False) + "\n",
+        "episodes.csv": csv_text([plain(row) for row in _episode_rows(comparison)]),
+        "differences.csv": csv_text([plain(row) for row in _difference_rows(comparison)]),
     }
     folder = comparison.config.folder
     try:
-        folder.mkdir(parents=True, exist_ok=True)
         for name, text in texts.items():
-            (folder / name).write_text(text, encoding="utf-8")
+            write_whole(folder / name, text.encode())
     except OSError as error:
         raise HandrailError(
             f"--output {str(folder)!r}: expected a folder that can be written, {error}"
@@ -136,14 +136,6 @@ def _difference_rows(comparison: Comparison) -> list[dict[str, Any]]:
                     row[name] = value
             rows.append(row)
     return rows
-
-
-def _csv(rows: list[dict[str, Any]]) -> str:
-    stream = io.StringIO()
-    writer = csv.DictWriter(stream, rows[0].keys(), lineterminator="\n")
-    writer.writeheader()
-    writer.writerows([{key: plain(value) for key, value in row.items()} for row in rows])
-    return stream.getvalue()
 
 
 def plain(value: Any) -> Any:

@@ -15,7 +15,7 @@ from handrail.collect.perturbations import Perturbation
 from handrail.controllers.description import robot_names
 from handrail.controllers.entries import is_count
 from handrail.controllers.errors import HandrailError
-from handrail.controllers.strict_json import read_json
+from handrail.datasets.strict_json import load_json
 from handrail.policies.imitation.checkpoint import NAME, PolicyMeta, model_folder, read_meta
 from handrail.policies.imitation.evaluate_config import EvaluateConfig
 from handrail.policies.imitation.features import pictures, place_of
@@ -125,7 +125,7 @@ def _check_task(task: str, where: str) -> None:
 def _plain(place: Path, settings: Mapping[str, Any], config: EvaluateConfig) -> PolicyMeta:
     """Return what is known of a policy of plain `lerobot-train`."""
     path = place / "train_config.json"
-    training = read_json(path, "settings of LeRobot") if path.is_file() else {}
+    training = load_json(path, "settings of LeRobot") if path.is_file() else {}
     seed = training.get("seed") if isinstance(training, dict) else None
     step = place.parent.name
     return PolicyMeta(

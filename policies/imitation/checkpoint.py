@@ -9,7 +9,6 @@ A checkpoint appears under its name only when it is whole.
 import itertools
 import json
 import os
-import shutil
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from importlib import metadata
@@ -20,7 +19,8 @@ import numpy as np
 
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import HandrailError
-from handrail.controllers.strict_json import read_json
+from handrail.datasets.atomic import sync_folder, write_whole
+from handrail.datasets.strict_json import load_json
 from handrail.policies.imitation.interface import PolicyInterface
 from handrail.policies.imitation.meta_check import check_meta
 from handrail.policies.imitation.trust import CONFIG, check_policy_folder, registered_policies
@@ -158,7 +158,7 @@ def read_meta(folder: Path) -> tuple[PolicyInterface | None, PolicyMeta]:
         HandrailError: it is not there, not of this version, or says something that cannot be.
     """
     path = folder / NAME
-    content = read_json(path, "a policy of handrail-train")
+    content = load_json(path, "a policy of handrail-train")
     if not isinstance(content, dict) or content.get("format") != FORMAT or "interface" not in content:
         known = content.get("format") if isinstance(content, dict) else content
         raise HandrailError(f"{str(path)!r}: expected the format {FORMAT}, got {known!r:.80}")
@@ -172,7 +172,7 @@ def write_meta(folder: Path, interface: PolicyInterface | None, meta: PolicyMeta
     """Write `handrail.json` into a `pretrained_model` folder."""
     described = None if interface is None else interface.to_dict()
     content = {"format": FORMAT, "interface": described} | asdict(meta)
-    (folder / NAME).write_text(json.dumps(content, indent=1) + "\n")
+    write_whole(folder / NAME, (json.dumps(content, indent=1, allow_nan=False) + "\n").encode())
 
 
 def last_checkpoint(training: Path) -> Path | None:
@@ -197,26 +197,13 @@ def model_folder(folder: Path) -> Path:
     raise HandrailError(f"policy {str(folder)!r}: expected a checkpoint with a {CONFIG}, found none")
 
 
-def publish(draft: Path, final: Path) -> None:
-    """Give a finished draft of a checkpoint its name, durably; one of that name is replaced.
-
-    Raises:
-        OSError: the disk does not take it.
-    """
-    for path in draft.rglob("*"):
-        if path.is_file():
-            with open(path, "rb") as file:
-                os.fsync(file.fileno())
-    shutil.rmtree(final, ignore_errors=True)
-    os.replace(draft, final)
-
-
 def point_to(checkpoint: Path) -> None:
     """Let `checkpoints/last` lead to a checkpoint, at once."""
     link, fresh = checkpoint.parent / "last", checkpoint.parent / ".last"
     fresh.unlink(missing_ok=True)
     fresh.symlink_to(checkpoint.name)
     os.replace(fresh, link)
+    sync_folder(checkpoint.parent)
 
 
 def software_versions() -> dict[str, str]:

@@ -10,7 +10,17 @@ from handrail.datasets.lists import Words
 
 ACTION_SPACES = ("realised", "intent", "recorded")
 PRESETS = ("cpu", "gpu")
-FREE_ON_RESUME = ("output", "save_freq", "threads", "device", "resume", "overwrite", "steps", "dataset")
+FREE_ON_RESUME = (
+    "output",
+    "save_freq",
+    "threads",
+    "device",
+    "resume",
+    "overwrite",
+    "steps",
+    "dataset",
+    "verify",
+)
 
 
 @dataclass(frozen=True)
@@ -59,6 +69,8 @@ class TrainConfig:
     """Go on from the last checkpoint in the folder; begin if there is none."""
     overwrite: bool = False
     """Remove the training that is there."""
+    verify: bool = False
+    """Read every file of the dataset anew, not only those that have changed since they were checked."""
 
     @property
     def folder(self) -> Path:

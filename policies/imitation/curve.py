@@ -1,12 +1,14 @@
 """How a training goes: a progress bar, and the curve of its loss in `curve.csv`."""
 
-import csv
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+from handrail.datasets.atomic import write_whole
 
 NAME = "curve.csv"
 COLUMNS = ("step", "loss", "grad_norm", "lr", "update_s", "dataloading_s")
@@ -23,18 +25,21 @@ class Curve:
 
     def __init__(self, folder: Path, step: int) -> None:
         self._path = folder / NAME
-        folder.mkdir(parents=True, exist_ok=True)
         self.rows = [row for row in read_curve(folder) if row["step"] <= step]
-        with open(self._path, "w", newline="") as file:
-            writer = csv.writer(file)
-            writer.writerow(COLUMNS)
-            writer.writerows([row[name] for name in COLUMNS] for row in self.rows)
+        lines = [",".join(COLUMNS), *(_line(row) for row in self.rows)]
+        write_whole(self._path, "".join(f"{line}\r\n" for line in lines).encode())
 
     def add(self, row: Row) -> None:
         """Add a row."""
         self.rows.append({name: row[name] for name in COLUMNS})
-        with open(self._path, "a", newline="") as file:
-            csv.writer(file).writerow([row[name] for name in COLUMNS])
+        with open(self._path, "ab") as file:
+            file.write(f"{_line(row)}\r\n".encode())
+            file.flush()
+            os.fsync(file.fileno())
+
+
+def _line(row: Row) -> str:
+    return ",".join(str(row[name]) for name in COLUMNS)
 
 
 def read_curve(folder: Path) -> list[dict[str, float]]:
@@ -42,9 +47,16 @@ def read_curve(folder: Path) -> list[dict[str, float]]:
     path = folder / NAME
     if not path.is_file():
         return []
-    with open(path, newline="") as file:
-        rows = list(csv.reader(file))[1:]
-    return [dict(zip(COLUMNS, map(float, row), strict=True)) for row in rows if len(row) == len(COLUMNS)]
+    lines = path.read_text(encoding="utf-8", errors="replace").splitlines(keepends=True)[1:]
+    rows = [_numbers(line) for line in lines if line.endswith("\n")]
+    return [dict(zip(COLUMNS, row, strict=True)) for row in rows if len(row) == len(COLUMNS)]
+
+
+def _numbers(line: str) -> list[float]:
+    try:
+        return [float(cell) for cell in line.split(",")]
+    except ValueError:
+        return []
 
 
 class Bar:

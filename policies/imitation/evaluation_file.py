@@ -8,6 +8,7 @@ from typing import Any
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.atomic import explained, write_whole
 from handrail.datasets.comparison.evaluations import FORMAT, read_evaluations
+from handrail.datasets.strict_json import read_json
 from handrail.policies.imitation.arms import Arm, Checkpoint
 
 
@@ -29,7 +30,7 @@ class EvaluationFile:
         self.content: dict[str, Any] = {"format": FORMAT, "conditions": {}, "arms": {}}
         if path is not None and path.exists():
             read_evaluations([path])
-            self.content |= json.loads(path.read_bytes())
+            self.content |= read_json(path)
             if not isinstance(self.content["conditions"], dict):
                 raise HandrailError(
                     f"--json {path}: expected conditions by arm, got {self.content['conditions']!r:.80}"

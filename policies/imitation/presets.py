@@ -1,11 +1,11 @@
 """Sizes of policies that suit a CPU or a GPU, and LeRobot's configuration of a policy."""
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, Any
 
 from handrail.controllers.errors import HandrailError, unknown_name
+from handrail.datasets.strict_json import parse_json
 from handrail.policies.imitation.config import TrainConfig
 from handrail.policies.imitation.refusal import in_one_line
 from handrail.policies.imitation.trust import registered_policies
@@ -163,7 +163,7 @@ def _registered(name: str) -> type:
 
 def _value(text: str) -> Any:
     try:
-        return json.loads(text)
+        return parse_json(text.encode())
     except ValueError:
         return None if text in ("None", "none") else {"True": True, "False": False}.get(text, text)
 

@@ -20,7 +20,8 @@ from lerobot.optim.factory import make_optimizer_and_scheduler
 from lerobot.scripts import lerobot_train
 from lerobot.utils.logging_utils import MetricsTracker
 
-from handrail.policies.imitation.checkpoint import MODEL, point_to, publish
+from handrail.datasets.atomic import publish_folder
+from handrail.policies.imitation.checkpoint import MODEL, point_to
 from handrail.policies.imitation.curve import Bar, Curve, Watch
 from handrail.policies.imitation.memory import MemoryDataset
 
@@ -91,7 +92,7 @@ class Run:
         shutil.rmtree(draft, ignore_errors=True)
         train_utils.save_checkpoint(checkpoint_dir=draft, step=step, **rest)
         self.finish(draft / MODEL, step)
-        publish(draft, checkpoint_dir)
+        publish_folder(draft, checkpoint_dir)
 
     def _tracker(self, watches: list[Watch]) -> type[MetricsTracker]:
         folder, total, quiet = self.pipeline.output_dir, self.pipeline.steps, self.quiet

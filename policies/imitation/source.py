@@ -11,6 +11,7 @@ import torch
 
 from handrail.collect.config import MODE_NAMES
 from handrail.controllers.errors import HandrailError
+from handrail.datasets.check import check_whole
 from handrail.datasets.reader import DatasetInfo, read_episodes, read_info, read_rows_of
 from handrail.datasets.stats import column_stats
 from handrail.policies.imitation.checkpoint import PolicyMeta
@@ -128,6 +129,7 @@ def read_source(config: TrainConfig, began: PolicyMeta | None = None) -> Source:
         HandrailError: there is no such dataset, it cannot be read, or it lacks what the policy needs.
     """
     root = config.dataset.folder
+    check_whole(root, config.verify)
     info = read_info(root)
     rows = read_episodes(root)
     if began is not None and began.episodes:
@@ -258,6 +260,8 @@ def _picture_stats(pictures: "LeRobotDataset", key: str) -> dict[str, np.ndarray
     from lerobot.datasets.factory import IMAGENET_STATS
 
     stats = {name: np.asarray(value) for name, value in (pictures.meta.stats or {}).get(key, {}).items()}
+    if not all(np.isfinite(value).all() for value in stats.values()):
+        raise HandrailError(f"meta/stats.json: expected finite numbers for {key}; compute them anew")
     return stats | {name: np.asarray(value, np.float32) for name, value in IMAGENET_STATS.items()}
 
 

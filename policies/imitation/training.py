@@ -22,6 +22,7 @@ from handrail.policies.imitation.checkpoint import (
     write_meta,
 )
 from handrail.policies.imitation.config import TrainConfig
+from handrail.policies.imitation.curve import NAME as CURVE
 from handrail.policies.imitation.presets import policy_config, resolved
 from handrail.policies.imitation.refusal import in_one_line
 from handrail.policies.imitation.resume import as_json, check_data, check_settings
@@ -118,15 +119,30 @@ def _begin(config: TrainConfig) -> Path | None:
         raise HandrailError(f"--output {config.output}: expected a folder, found a file")
     if config.resume or not folder.exists() or not _is_main_process():
         return last_checkpoint(folder) if config.resume else None
-    ours = {"checkpoints", RECORD, "curve.csv"}
-    if any(path.name not in ours for path in folder.iterdir()):
-        raise HandrailError(f"--output {config.output}: expected a missing or empty folder; choose another")
+    foreign = _foreign(folder)
+    if foreign:
+        raise HandrailError(
+            f"--output {config.output}: expected a missing or empty folder, found {', '.join(foreign[:3])};"
+            " choose another"
+        )
     if any(folder.iterdir()) and not config.overwrite:
         raise HandrailError(
             f"--output {config.output}: there is a training already; say --resume or --overwrite"
         )
     shutil.rmtree(folder)
     return None
+
+
+def _foreign(folder: Path) -> list[str]:
+    """Return what lies in a training's folder and is not the training's."""
+    files = {name for each in (RECORD, CURVE) for name in (each, f".{each}.partial")}
+    kept = [path for path in (folder / "checkpoints").glob("*") if not _is_checkpoint(path)]
+    others = [path for path in folder.iterdir() if path.name not in files | {"checkpoints"}]
+    return sorted(path.relative_to(folder).as_posix() for path in (*others, *kept))
+
+
+def _is_checkpoint(path: Path) -> bool:
+    return path.name in ("last", ".last") or path.name.strip(".").removesuffix(".old").isdigit()
 
 
 def _meta(source: Source, steps: int) -> PolicyMeta:

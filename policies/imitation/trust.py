@@ -16,7 +16,7 @@ from pathlib import Path, PurePath
 from typing import Any
 
 from handrail.controllers.errors import HandrailError, unknown_name
-from handrail.controllers.strict_json import read_json
+from handrail.datasets.strict_json import load_json
 
 CONFIG, WEIGHTS = "config.json", "model.safetensors"
 PROCESSORS = ("policy_preprocessor.json", "policy_postprocessor.json")
@@ -45,7 +45,7 @@ def policy_settings(folder: Path) -> dict[str, Any]:
         HandrailError: there are none, or of no registered policy.
     """
     path = folder / CONFIG
-    settings = read_json(path, "a policy of LeRobot")
+    settings = load_json(path, "a policy of LeRobot")
     if not isinstance(settings, dict):
         raise HandrailError(f"{str(path)!r}: expected a policy of LeRobot, got {settings!r:.80}")
     kinds = registered_policies()
@@ -103,7 +103,7 @@ def registered_policies() -> Mapping[str, type]:
 
 def _steps(path: Path, policy: str) -> list[dict[str, Any]]:
     """Return the steps of a processor, each checked."""
-    content = read_json(path, "a processor of LeRobot")
+    content = load_json(path, "a processor of LeRobot")
     steps = content.get("steps") if isinstance(content, dict) else None
     if not isinstance(steps, list):
         raise HandrailError(f"{str(path)!r}: expected a processor with steps, got {content!r:.80}")

@@ -5,13 +5,14 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from handrail.datasets import strict_json
 from handrail.datasets.atomic import write_whole
 
 
 def read_json(path: Path) -> dict[str, Any]:
     """Return a JSON object; an empty one if there is none."""
     try:
-        content = json.loads(path.read_bytes())
+        content = strict_json.read_json(path)
     except (OSError, ValueError):
         return {}
     return content if isinstance(content, dict) else {}

@@ -1,0 +1,101 @@
+"""Reading JSON that somebody else may have written: small, shallow, finite, or not at all."""
+
+import json
+import math
+import os
+import stat
+from pathlib import Path
+from typing import Any, NoReturn
+
+from handrail.controllers.errors import HandrailError
+
+MOST_BYTES = 16 * 1024 * 1024
+MOST_DEPTH = 50
+_WHOLE = 2**64  # beyond it a number is a mistake, and one of 400 digits no float
+
+
+def read_json(path: Path) -> Any:
+    """Return what a file says; see `parse_json`.
+
+    Raises:
+        OSError: It is not there or cannot be read.
+        ValueError: It is no plain file, or `parse_json` refuses it; one line.
+    """
+    found = os.stat(path)
+    if not stat.S_ISREG(found.st_mode):
+        raise ValueError("no plain file")
+    with open(path, "rb") as file:
+        return parse_json(file.read(MOST_BYTES + 1))
+
+
+def load_json(path: Path, what: str) -> Any:
+    """Return what a file says that is no part of a dataset.
+
+    Args:
+        path: of the file.
+        what: it is, for the error: `a policy of handrail-train`.
+
+    Raises:
+        HandrailError: It is not there, or no JSON that `parse_json` takes.
+    """
+    try:
+        return read_json(path)
+    except (OSError, ValueError) as error:
+        said = " ".join(str(error).split())
+        raise HandrailError(f"{str(path)!r}: expected {what}, got {said}") from error
+
+
+def parse_json(data: bytes) -> Any:
+    """Return a JSON text as Python values.
+
+    Raises:
+        ValueError: It is no JSON, has NaN or an infinity in it, or is too large or too deep; one line.
+    """
+    if len(data) > MOST_BYTES:
+        raise ValueError(f"expected at most {MOST_BYTES >> 20} MB of JSON, got more")
+    try:
+        content = json.loads(data, parse_constant=_refuse, parse_float=_finite, parse_int=_whole)
+    except RecursionError as error:
+        raise _too_deep() from error
+    _check(content)
+    return content
+
+
+def _check(content: Any) -> None:
+    """Check how deep values lie and that all text can be printed, level by level."""
+    level, depth = [content], 0
+    while level:
+        for text in level:
+            if isinstance(text, str):
+                text.encode()  # half of a surrogate pair is no text: a ValueError
+        inner = [each for each in level if isinstance(each, dict | list)]
+        level = [child for each in inner for child in _children(each)]
+        depth += bool(inner)
+        if depth > MOST_DEPTH:
+            raise _too_deep()
+
+
+def _children(value: dict[str, Any] | list[Any]) -> list[Any]:
+    return [*value, *value.values()] if isinstance(value, dict) else value
+
+
+def _too_deep() -> ValueError:
+    return ValueError(f"expected JSON nested at most {MOST_DEPTH} deep, got more")
+
+
+def _refuse(name: str) -> NoReturn:
+    raise ValueError(f"{name} is no JSON")
+
+
+def _finite(text: str) -> float:
+    value = float(text)
+    if not math.isfinite(value):
+        raise ValueError(f"{text[:20]} is too large a number")
+    return value
+
+
+def _whole(text: str) -> int:
+    value = int(text) if len(text) < 25 else _WHOLE + 1
+    if abs(value) > _WHOLE:
+        raise ValueError(f"{text[:20]}… is too large a number")
+    return value

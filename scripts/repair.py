@@ -1,0 +1,22 @@
+"""`handrail-repair`: say what is wrong with a dataset, mend what can be mended, lose nothing."""
+
+from handrail.collect.config import RepairConfig
+from handrail.scripts import cli
+
+
+def main() -> None:
+    """Run the command."""
+    cli.run(lambda: _repair(cli.parse(RepairConfig, "handrail-repair")))
+
+
+def _repair(config: RepairConfig) -> int:
+    """Return 0 only if everything that was saved is in the dataset and whole."""
+    from handrail.datasets.repair import repair
+
+    report = repair(config.root, config.set_aside)
+    print(report)
+    return 0 if report.complete else cli.FAILED
+
+
+if __name__ == "__main__":
+    main()
