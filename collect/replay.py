@@ -1,6 +1,6 @@
 """Replays a recorded episode's commands and reports how far the motion deviates."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -8,10 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handrail.collect.build import build_env
-from handrail.collect.config import TASKS, SessionConfig
 from handrail.collect.env import HandrailEnv
+from handrail.collect.recorded_settings import recorded_settings
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import HandrailError
+from handrail.datasets.quality.safety import contacts_begun
 from handrail.datasets.reader import read_episodes, read_frames, read_info
 
 
@@ -26,7 +27,7 @@ class Replay:
         final: deviation of each number at the end, (s,).
         recorded_success: what the dataset says.
         success: what happened now.
-        contacts: forbidden contacts now.
+        contacts: forbidden contacts that began now.
     """
 
     episode: int
@@ -65,9 +66,8 @@ def replay_episode(root: Path, episode: int, pictures: int = 0) -> tuple[Replay,
     """
     info = read_info(root)
     row = _row(root, episode)
+    config = replace(recorded_settings(row), cameras="")
     frames = read_frames(root, episode, ["action", "observation.state"])
-    moving = int(row.get("moving_obstacles") or 0)
-    config = SessionConfig(task=row["environment"], robot=row["robot"], moving_obstacles=moving)
     env = build_env(config, info.fps, render=pictures > 0)
     try:
         states, last, taken = _run(env, row["seed"], frames["action"], pictures)
@@ -81,7 +81,7 @@ def replay_episode(root: Path, episode: int, pictures: int = 0) -> tuple[Replay,
         final=difference[-1],
         recorded_success=bool(row["success"]),
         success=bool(last["is_success"]),
-        contacts=last["contacts_in_all"],
+        contacts=last["contacts_begun"],
     )
     return replay, taken
 
@@ -91,10 +91,8 @@ def _row(root: Path, episode: int) -> dict[str, Any]:
     if not 0 <= episode < len(rows):
         raise HandrailError(f"--episode {episode}: expected one of 0 to {len(rows) - 1} in {root}")
     row = rows[episode]
-    if row.get("environment") not in TASKS or "seed" not in row:
-        raise HandrailError(
-            f"dataset {root}: expected one that handrail-record made, found no environment and seed"
-        )
+    if not isinstance(row.get("seed"), int):
+        raise HandrailError(f"dataset {root}: expected one that handrail-record made, found no seed")
     return row
 
 
@@ -104,12 +102,12 @@ def _run(
     """Return the observed states before each action, (T, s), the last info, and pictures."""
     observation, info = env.reset(seed=seed)
     moments = set(np.linspace(0, len(actions) - 1, pictures).round().astype(int).tolist())
-    states, taken, contacts = [], [], 0
+    states, taken, contacts = [], [], []
     for index, action in enumerate(actions):
         states.append(observation["agent_pos"])
         observation, _, _, _, info = env.step(action)
-        contacts += info["contacts"]
+        contacts.append(info["contacts"])
         picture = env.render() if index in moments else None
         if picture is not None:
             taken.append(picture)
-    return np.array(states), info | {"contacts_in_all": contacts}, taken
+    return np.array(states), info | {"contacts_begun": int(contacts_begun(contacts))}, taken

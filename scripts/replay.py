@@ -24,7 +24,8 @@ def _replay(config: ReplayConfig) -> int:
 
     root = config.dataset.folder
     episodes = range(len(read_episodes(root))) if config.episode < 0 else [config.episode]
-    table = Table("episode", "largest deviation", "of", "tool at end [m]", "success", "recorded", "contacts")
+    headings = ("largest deviation", "of", "tool at end [m]", "success", "recorded", "contacts begun")
+    table = Table("episode", *headings)
     for episode in episodes:
         replay, pictures = replay_episode(root, episode, _PICTURES if config.sheet else 0)
         table.add_row(
