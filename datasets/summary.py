@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from handrail.datasets.labels import with_success
 from handrail.datasets.metrics import corrections, high_frequency_content, rate_of_change, sparc
 from handrail.datasets.quality.safety import contacts_begun
 from handrail.datasets.reader import DatasetInfo, read_episodes, read_info, read_rows_of
@@ -113,7 +114,8 @@ def summarize(root: str | Path) -> list[EpisodeSummary]:
     info = read_info(root)
     known = (STATE, ACTION, ASKED, OWNED, MODE, DISTANCE, CONTACTS)
     wanted = [name for name in known if _is_column(info, name)]
-    return [_summary(info, row, read_rows_of(info, row, wanted)) for row in read_episodes(root)]
+    rows = with_success(info, read_episodes(root))
+    return [_summary(info, row, read_rows_of(info, row, wanted)) for row in rows]
 
 
 def _summary(info: DatasetInfo, row: dict[str, Any], frames: dict[str, np.ndarray]) -> EpisodeSummary:

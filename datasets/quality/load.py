@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from handrail.controllers.errors import HandrailError
+from handrail.datasets.labels import with_success
 from handrail.datasets.quality.columns import ColumnNames
 from handrail.datasets.quality.demonstration import Demonstration
 from handrail.datasets.reader import DatasetInfo, read_episodes, read_info, read_rows_of
@@ -33,7 +34,7 @@ def read_demonstrations(root: str | Path, columns: ColumnNames | None = None) ->
             meta=row,
             columns=columns,
         )
-        for row in read_episodes(root)
+        for row in with_success(info, read_episodes(root))
     ]
 
 

@@ -9,6 +9,7 @@ import numpy as np
 import torch
 
 from handrail.controllers.errors import HandrailError
+from handrail.datasets.labels import with_success
 from handrail.datasets.reader import DatasetInfo, read_episodes, read_info, read_rows_of
 from handrail.datasets.stats import column_stats
 from handrail.policies.imitation.checkpoint import PolicyMeta
@@ -119,7 +120,7 @@ def read_source(config: TrainConfig, began: PolicyMeta | None = None) -> Source:
     """
     root = config.dataset.folder
     info = read_info(root)
-    rows = read_episodes(root)
+    rows = with_success(info, read_episodes(root))
     if began is not None and began.episodes:
         selection = select_again(rows, began.episodes, began.trained_on)
     else:
