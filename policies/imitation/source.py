@@ -11,6 +11,7 @@ import torch
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.labels import with_success
 from handrail.datasets.reader import DatasetInfo, read_episodes, read_info, read_rows_of
+from handrail.datasets.schema import Feature
 from handrail.datasets.stats import column_stats
 from handrail.policies.imitation.checkpoint import PolicyMeta
 from handrail.policies.imitation.config import TrainConfig
@@ -27,6 +28,8 @@ STATE, ENVIRONMENT, ACTION = "observation.state", "observation.environment_state
 _LEARNT = ("observation", "action", "next.")
 _COUNTERS = ("timestamp", "frame_index", "episode_index", "index", "task_index")
 _FLOOR = 1e-2  # [m, rad, m/s, …] least spread of a number: what hardly moved in training must not explode
+_READ_STATE = ("act", "diffusion", "multi_task_dit", "vqbet")  # of LeRobot's, what cannot do without it
+_READ_SCENE = ("act", "diffusion")  # what needs pictures or the environment's state
 _RANGES = (("min", "max"), ("q01", "q99"), ("q10", "q90"))
 
 
@@ -129,6 +132,8 @@ def read_source(config: TrainConfig, began: PolicyMeta | None = None) -> Source:
         interface, features, columns = None, *_recorded(info, selection)
     else:
         interface, features, columns = _interpreted(info, selection, config.actions)
+    if config.actions == "recorded":
+        _check_inputs(config, info, features)
     if config.images:
         features |= _cameras(info)
     return Source(config, info, selection, interface, features, columns | _counters(selection, info.fps))
@@ -184,12 +189,33 @@ def _recorded(info: DatasetInfo, selection: Selection) -> tuple[dict[str, dict[s
     return {key: _feature(f.dtype, f.shape, f.names) for key, f in described.items()}, columns
 
 
-def _cameras(info: DatasetInfo) -> dict[str, dict[str, Any]]:
-    found = {
+def _check_inputs(config: TrainConfig, info: DatasetInfo, features: Mapping[str, Any]) -> None:
+    """Check that there is what the policy reads, before LeRobot stumbles over what is not there."""
+    numbers = [key for key in features if key.startswith("observation")]
+    dataset, cameras = f"dataset {str(info.root)!r}", _pictured(info)
+    if STATE not in numbers and config.policy in _READ_STATE:
+        beside = " beside pictures (--images)" if cameras else ""
+        raise HandrailError(
+            f"{dataset}: expected a column {STATE!r}, which policy {config.policy} needs{beside};"
+            f" got {', '.join((*numbers, *cameras)) or 'no observation'}"
+        )
+    blind = not numbers or (config.policy in _READ_SCENE and ENVIRONMENT not in numbers)
+    if blind and cameras and not config.images:
+        raise HandrailError(
+            f"{dataset}: expected {ENVIRONMENT!r} for policy {config.policy}, got pictures only; say --images"
+        )
+
+
+def _pictured(info: DatasetInfo) -> dict[str, Feature]:
+    return {
         key: feature
         for key, feature in info.features.items()
         if feature.dtype in ("video", "image") and key.startswith("observation")
     }
+
+
+def _cameras(info: DatasetInfo) -> dict[str, dict[str, Any]]:
+    found = _pictured(info)
     if not found:
         raise HandrailError(f"--images: expected cameras in {str(info.root)!r}, found none")
     return {key: _feature(f.dtype, f.shape, f.names) for key, f in found.items()}
