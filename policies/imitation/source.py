@@ -181,7 +181,9 @@ def _recorded(info: DatasetInfo, selection: Selection) -> tuple[dict[str, dict[s
         if key.startswith(_LEARNT) and feature.dtype not in ("video", "image", "string")
     ]
     if ACTION not in keys:
-        raise HandrailError(f"dataset {str(info.root)!r}: expected a column 'action', got {', '.join(keys)}")
+        raise HandrailError(
+            f"dataset {str(info.root)!r}: expected a column 'action', got {', '.join(keys) or 'none'}"
+        )
     episodes = [read_rows_of(info, dict(row), keys) for row in selection.rows]
     columns = {key: np.concatenate([episode[key] for episode in episodes]) for key in keys}
     columns = {key: v.astype(np.float32) if v.dtype == np.float64 else v for key, v in columns.items()}
