@@ -110,16 +110,6 @@ def test_a_frame_says_whether_it_is_done_and_well(touching, masked):
             assert frames["next.success"].any() == frames["next.success"][-1] == row["success"]
 
 
-def test_lerobot_s_policies_read_and_write_what_they_did(masked):
-    from lerobot.utils.feature_utils import dataset_to_policy_features
-
-    features = read_info(masked).features
-    described = {key: {"dtype": f.dtype, "shape": f.shape, "names": f.names} for key, f in features.items()}
-    found = dataset_to_policy_features(described)
-    assert set(NEW) <= set(features)
-    assert set(found) == {"observation.state", "observation.environment_state", "action"}
-
-
 @pytest.mark.parametrize("number", [np.nan, np.inf, -np.inf, 1e300])
 def test_no_column_is_ever_infinite(number):
     """Whatever an operator sends, and however little a controller knows."""

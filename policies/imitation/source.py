@@ -204,7 +204,8 @@ def _check_inputs(config: TrainConfig, info: DatasetInfo, features: Mapping[str,
     blind = not numbers or (config.policy in _READ_SCENE and ENVIRONMENT not in numbers)
     if blind and cameras and not config.images:
         raise HandrailError(
-            f"{dataset}: expected {ENVIRONMENT!r} for policy {config.policy}, got pictures only; say --images"
+            f"{dataset}: expected {ENVIRONMENT!r} or --images for policy {config.policy};"
+            f" there are pictures ({', '.join(cameras)}): say --images"
         )
 
 
