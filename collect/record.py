@@ -19,12 +19,7 @@ from rich.progress import (
 )
 from rich.table import Table
 
-from handrail.collect.build import (
-    build_env,
-    build_session,
-    session_features,
-    software_versions,
-)
+from handrail.collect.build import build_env, build_session, session_features, software_versions
 from handrail.collect.config import RecordConfig
 from handrail.collect.display import Display
 from handrail.collect.env import HandrailEnv

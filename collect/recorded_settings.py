@@ -44,9 +44,12 @@ def recorded_settings(row: Mapping[str, Any]) -> SessionConfig:
 
 def _parsed(text: Any) -> dict[str, Any]:
     try:
-        return dict(json.loads(text))
+        settings = json.loads(text)
     except (TypeError, ValueError, RecursionError) as error:
-        raise _wrong(f"expected a JSON object, got {text!r:.80}") from error
+        raise _wrong(f"expected JSON, got {text!r:.80}") from error
+    if not isinstance(settings, dict) or not {"task", "robot"} <= set(settings):
+        raise _wrong(f"expected a JSON object with task, robot, …, got {text!r:.80}")
+    return settings
 
 
 def _older(row: Mapping[str, Any]) -> dict[str, Any]:

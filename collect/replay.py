@@ -79,7 +79,7 @@ def replay_episode(root: Path, episode: int, pictures: int = 0) -> tuple[Replay,
         names=env.agent_names,
         deviations=difference.max(axis=0),
         final=difference[-1],
-        recorded_success=bool(row["success"]),
+        recorded_success=bool(row.get("success")),
         success=bool(last["is_success"]),
         contacts=last["contacts_begun"],
     )
