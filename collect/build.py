@@ -161,7 +161,7 @@ def build_mode(config: SessionConfig, model: RobotModel) -> TeleopMode:
         )
     names = tuple(np.array(channels.names)[np.array(list(config.mask)) == "1"])
     return TeleopMode(
-        f"mask:{config.mask}", lambda focus: names, mode.controller, "a mask of one's own", gains=mode.gains
+        config.mode_name, lambda focus: names, mode.controller, "a mask of one's own", gains=mode.gains
     )
 
 

@@ -72,6 +72,11 @@ class SessionConfig:
         """The cameras asked for."""
         return tuple(name.strip() for name in self.cameras.split(",") if name.strip())
 
+    @property
+    def mode_name(self) -> str:
+        """What the data calls it: the mode's name, or the mask that is steered with instead."""
+        return f"mask:{self.mask}" if self.mask else self.mode
+
     def check(self) -> None:
         """Check what can be checked without loading anything heavy.
 

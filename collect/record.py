@@ -23,6 +23,8 @@ from handrail.collect.build import build_env, build_session, session_features, s
 from handrail.collect.config import RecordConfig
 from handrail.collect.display import Display
 from handrail.collect.env import HandrailEnv
+from handrail.collect.recorded_settings import COLUMN as SETTINGS
+from handrail.collect.recorded_settings import settings_json
 from handrail.collect.recorder import Recorder
 from handrail.collect.session import Outcome, Session
 from handrail.controllers.errors import HandrailError
@@ -84,17 +86,16 @@ def episode_seed(seed: int, episode: int) -> int:
 
 
 def _session_columns(config: RecordConfig) -> dict[str, str | float]:
-    """Return what every episode's metadata says of the session; a replay builds it anew from this."""
-    columns: dict[str, str | float] = {
+    """Return what every episode's metadata says of the session: what one asks for most, and all settings."""
+    return {
         "environment": config.task,
         "robot": config.robot,
         "operator": config.operator,
-        "mode": config.mode,
+        "mode": config.mode_name,
         "noise": config.noise,
         "person": config.person,
+        SETTINGS: settings_json(config),
     }
-    moving = config.moving_obstacles
-    return columns | {"moving_obstacles": moving} if moving else columns
 
 
 def _open_writer(config: RecordConfig, env: HandrailEnv) -> EpisodeWriter:
@@ -155,12 +156,14 @@ def _summary(config: RecordConfig, outcomes: list[Outcome]) -> Table:
     simulated = sum(outcome.seconds for outcome in outcomes)
     wall = sum(outcome.wall_time for outcome in outcomes)
     distance = min(outcome.smallest_distance for outcome in outcomes)
+    contacts = sum(outcome.contacts for outcome in outcomes)
+    periods = sum(outcome.contact_periods for outcome in outcomes)
     rows = {
-        "task, mode": f"{config.task}, {config.mode}",
+        "task, mode": f"{config.task}, {config.mode_name}",
         "success": f"{sum(outcome.success for outcome in outcomes)} of {len(outcomes)}",
         "recorded": f"{simulated:.1f} s in {wall:.1f} s: {simulated / wall:.1f} × real time",
         "smallest distance": f"{distance:.3f} m",
-        "contacts": str(sum(outcome.contacts for outcome in outcomes)),
+        "contacts begun": f"{contacts}, {periods} periods in contact",
         "braked updates": str(sum(outcome.brakes for outcome in outcomes)),
     }
     spent = {part: sum(outcome.spent.get(part, 0.0) for outcome in outcomes) for part in outcomes[0].spent}

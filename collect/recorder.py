@@ -47,6 +47,7 @@ class Recorder:
                 "wall_time": outcome.wall_time,
                 "brakes": outcome.brakes,
                 "late": outcome.late,
-                "contacts": outcome.contacts,
+                "contact_onsets": outcome.contacts,
+                "contact_periods": outcome.contact_periods,
             }
         )

@@ -1,7 +1,7 @@
 """Replays a recorded episode's commands and reports how far the motion deviates."""
 
 import contextlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -9,11 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handrail.collect.build import build_env
-from handrail.collect.config import TASKS, SessionConfig
 from handrail.collect.env import HandrailEnv
+from handrail.collect.recorded_settings import recorded_settings
 from handrail.collect.video_file import VideoFile
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import HandrailError
+from handrail.datasets.quality.safety import contacts_begun
 from handrail.datasets.reader import read_episodes, read_frames, read_info
 
 
@@ -28,7 +29,7 @@ class Replay:
         final: deviation of each number at the end, (s,).
         recorded_success: what the dataset says.
         success: what happened now.
-        contacts: forbidden contacts now.
+        contacts: forbidden contacts that began now.
     """
 
     episode: int
@@ -70,9 +71,8 @@ def replay_episode(
     """
     info = read_info(root)
     row = _row(root, episode)
+    config = replace(recorded_settings(row), cameras="")
     frames = read_frames(root, episode, ["action", "observation.state"])
-    moving = int(row.get("moving_obstacles") or 0)
-    config = SessionConfig(task=row["environment"], robot=row["robot"], moving_obstacles=moving)
     env = build_env(config, info.fps, render=bool(pictures or video))
     with contextlib.ExitStack() as stack:
         stack.callback(env.close)
@@ -84,9 +84,9 @@ def replay_episode(
         names=env.agent_names,
         deviations=difference.max(axis=0),
         final=difference[-1],
-        recorded_success=bool(row["success"]),
+        recorded_success=bool(row.get("success")),
         success=bool(last["is_success"]),
-        contacts=last["contacts_in_all"],
+        contacts=last["contacts_begun"],
     )
     return replay, camera.taken
 
@@ -96,10 +96,8 @@ def _row(root: Path, episode: int) -> dict[str, Any]:
     if not 0 <= episode < len(rows):
         raise HandrailError(f"--episode {episode}: expected one of 0 to {len(rows) - 1} in {root}")
     row = rows[episode]
-    if row.get("environment") not in TASKS or "seed" not in row:
-        raise HandrailError(
-            f"dataset {root}: expected one that handrail-record made, found no environment and seed"
-        )
+    if not isinstance(row.get("seed"), int):
+        raise HandrailError(f"dataset {root}: expected one that handrail-record made, found no seed")
     return row
 
 
@@ -108,13 +106,13 @@ def _run(
 ) -> tuple[np.ndarray, dict[str, Any]]:
     """Return the observed states before each action, (T, s), and the last info."""
     observation, info = env.reset(seed=seed)
-    states, contacts = [], 0
+    states, contacts = [], []
     for index, action in enumerate(actions):
         states.append(observation["agent_pos"])
         observation, _, _, _, info = env.step(action)
-        contacts += info["contacts"]
+        contacts.append(info["contacts"])
         camera.look(index)
-    return np.array(states), info | {"contacts_in_all": contacts}
+    return np.array(states), info | {"contacts_begun": int(contacts_begun(contacts))}
 
 
 def _moments(frames: int, pictures: int) -> set[int]:

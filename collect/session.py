@@ -16,6 +16,7 @@ from handrail.controllers.controller import Controller
 from handrail.controllers.model import RobotModel
 from handrail.controllers.threads import single_threaded
 from handrail.datasets.frames import Moment
+from handrail.datasets.quality.safety import contacts_begun
 
 
 @dataclass(frozen=True)
@@ -31,7 +32,8 @@ class Outcome:
         wall_time: time it took [s].
         brakes: updates in which the controller braked the robot.
         late: periods that a real-time loop overran.
-        contacts: forbidden contacts.
+        contacts: forbidden contacts that began.
+        contact_periods: control periods with a forbidden contact.
         smallest_distance: smallest signed distance, tool against work surfaces left out [m].
         spent: where the wall time went, by part of the loop [s].
         started: Unix time at its beginning [s].
@@ -46,6 +48,7 @@ class Outcome:
     brakes: int
     late: int
     contacts: int
+    contact_periods: int
     smallest_distance: float
     spent: Mapping[str, float]
     started: float
@@ -133,6 +136,7 @@ class Session:
                 for disturbance in self._disturbances:
                     disturbance.act(self.env.simulation)
                 following, _, terminated, truncated, info = self.env.step(action)
+            done = terminated or truncated
             moment = Moment(
                 state=observation["agent_pos"],
                 environment=observation["environment_state"],
@@ -142,13 +146,15 @@ class Session:
                 command=action,
                 health=command.health,
                 contacts=info["contacts"],
+                success=bool(info["is_success"]),
+                done=done,
                 wall_clock=wall_clock,
             )
             with tally.timed("observers"):
                 for observer in self._observers:
                     observer.see(moment)
             tally.add(moment)
-            observation, done = following, terminated or truncated
+            observation = following
             if self._realtime:
                 tally.pace()
         return tally.outcome(info)
@@ -186,7 +192,8 @@ class _Tally:
         self._period = period
         self._started = time.time()
         self._start = time.perf_counter()
-        self._frames = self._brakes = self._late = self._contacts = 0
+        self._frames = self._brakes = self._late = 0
+        self._contacts: list[int] = []
         self._smallest = np.inf
         self._spent: dict[str, float] = {}
 
@@ -205,7 +212,7 @@ class _Tally:
     def add(self, moment: Moment) -> None:
         self._frames += 1
         self._brakes += Status(moment.health.status).brakes
-        self._contacts += moment.contacts
+        self._contacts.append(moment.contacts)
         self._smallest = min(self._smallest, moment.health.smallest_distance)
 
     def pace(self) -> None:
@@ -226,7 +233,8 @@ class _Tally:
             wall_time=self.elapsed,
             brakes=self._brakes,
             late=self._late,
-            contacts=self._contacts,
+            contacts=int(contacts_begun(self._contacts)),
+            contact_periods=int(np.count_nonzero(self._contacts)),
             smallest_distance=float(self._smallest),
             spent=dict(self._spent),
             started=self._started,

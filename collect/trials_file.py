@@ -31,7 +31,7 @@ class Trial:
         failure_reason: why not.
         seconds: simulated time [s].
         frames: control periods.
-        contacts: forbidden contacts, counted in every control period in which there is one.
+        contacts: forbidden contacts that began.
         smallest_distance: signed, tool against work surfaces left out [m].
         brakes: updates in which the controller braked the robot.
         switches: how often the operator changed to other channels.

@@ -11,6 +11,9 @@ from handrail.controllers.command import Health
 from handrail.controllers.intent import Intent
 from handrail.datasets.schema import Feature
 
+FARTHEST = 10.0  # [m] what a distance is cut to: nothing is nearer, there is nothing to measure, or no state
+MOST = 1e6  # [m/s, rad/s, …] what any other number is cut to
+
 
 @dataclass(frozen=True)
 class Moment:
@@ -25,6 +28,8 @@ class Moment:
         command: what the controller asked for, (n + 1,); the robot's own limits may have cut it.
         health: of the controller.
         contacts: forbidden contacts in the period.
+        success: whether the task is done at the end of the period.
+        done: whether the episode ends with it.
         wall_clock: wall time since the episode began [s].
     """
 
@@ -36,6 +41,8 @@ class Moment:
     command: FloatArray
     health: Health
     contacts: int
+    success: bool
+    done: bool
     wall_clock: float
 
 
@@ -82,31 +89,48 @@ def moment_features(
         "controller.smallest_distance": scalar,
         "controller.work_distance": scalar,
         "safety.contacts": Feature("int64"),
+        "next.success": Feature("bool"),
+        "next.done": Feature("bool"),
         "wall_clock": Feature("float64"),
     }
 
 
 def moment_row(moment: Moment) -> dict[str, Any]:
-    """Return a moment as a frame of `moment_features`."""
-    intent, health = moment.intent, moment.health
+    """Return a moment as a frame of `moment_features`.
+
+    What stands beside a policy's inputs and outputs is finite too: no tool's statistics may become NaN.
+    """
+    intent, raw, health = moment.intent, moment.intent.raw.values, moment.health
     pictures = {f"observation.images.{name}": image for name, image in moment.images.items()}
     return {
         "observation.state": moment.state,
         "observation.environment_state": moment.environment,
         **pictures,
         "action": moment.action,
-        "teleop.values": np.append(np.where(intent.mask, intent.values, 0.0), intent.gripper),
+        "teleop.values": _finite(np.append(np.where(intent.mask, intent.values, 0.0), intent.gripper)),
         "teleop.mask": np.append(intent.mask, True),
         "teleop.mode": intent.mode,
-        "teleop.raw": intent.raw.values if intent.raw.values.size else np.zeros(len(intent.values)),
+        "teleop.raw": _finite(raw if raw.size else np.zeros(len(intent.values))),
         "teleop.axes": intent.raw.axes,
         "teleop.switches": intent.raw.switches,
         "controller.command": moment.command,
         "controller.solve_time": health.solve_time,
         "controller.status": health.status.value,
-        "controller.slack": health.slack,
-        "controller.smallest_distance": health.smallest_distance,
-        "controller.work_distance": health.work_distance,
+        "controller.slack": _finite(health.slack),
+        "controller.smallest_distance": _distance(health.smallest_distance),
+        "controller.work_distance": _distance(health.work_distance),
         "safety.contacts": moment.contacts,
+        "next.success": moment.success,
+        "next.done": moment.done,
         "wall_clock": moment.wall_clock,
     }
+
+
+def _finite(numbers: FloatArray | float) -> FloatArray:
+    """Return numbers cut to ±`MOST`; what is none becomes 0."""
+    return np.clip(np.nan_to_num(numbers, nan=0.0), -MOST, MOST)
+
+
+def _distance(distance: float) -> float:
+    """Return a distance cut to `FARTHEST`, which also stands for one that nobody knows [m]."""
+    return min(distance, FARTHEST) if np.isfinite(distance) else FARTHEST

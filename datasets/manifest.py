@@ -12,7 +12,7 @@ from typing import Any
 
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.layout import Layout
-from handrail.datasets.schema import Feature, check_features
+from handrail.datasets.schema import OUTCOME_PREFIX, Feature, check_features
 from handrail.datasets.strict_json import read_json
 
 FORMAT = 1
@@ -61,6 +61,11 @@ class Manifest:
                 raise _differs(root, name, getattr(existing, name), getattr(self, name))
         for key in (*existing.features, *self.features):
             ours, theirs = self.features.get(key), existing.features.get(key)
+            if theirs is None and key.startswith(OUTCOME_PREFIX):
+                raise HandrailError(
+                    f"cannot resume {str(root)!r}: an earlier version recorded it, without {key!r};"
+                    " choose another root (the episodes there can still be replayed, trained on and compared)"
+                )
             if ours != theirs:
                 raise _differs(root, f"feature {key!r}", _describe(theirs), _describe(ours))
 

@@ -17,6 +17,7 @@ NUMBERS = (
 )
 DTYPES = (*NUMBERS, "string", "video")
 POLICY_PREFIXES = ("observation", "action")
+OUTCOME_PREFIX = "next."  # LeRobot's name for what came of a frame
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from handrail.datasets.labels import with_success
 from handrail.datasets.metrics import corrections, high_frequency_content, rate_of_change, sparc
+from handrail.datasets.quality.safety import contacts_begun
 from handrail.datasets.reader import DatasetInfo, read_episodes, read_info, read_rows_of
 
 UNKNOWN = "–"
@@ -22,7 +24,7 @@ HEADINGS = (
     "length [s]",
     "smallest distance [m]",
     "smoothness",
-    "contacts",
+    "contacts begun",
 )
 QUALITY_HEADINGS = (
     "episode",
@@ -112,7 +114,8 @@ def summarize(root: str | Path) -> list[EpisodeSummary]:
     info = read_info(root)
     known = (STATE, ACTION, ASKED, OWNED, MODE, DISTANCE, CONTACTS)
     wanted = [name for name in known if _is_column(info, name)]
-    return [_summary(info, row, read_rows_of(info, row, wanted)) for row in read_episodes(root)]
+    rows = with_success(info, read_episodes(root))
+    return [_summary(info, row, read_rows_of(info, row, wanted)) for row in rows]
 
 
 def _summary(info: DatasetInfo, row: dict[str, Any], frames: dict[str, np.ndarray]) -> EpisodeSummary:
@@ -128,7 +131,7 @@ def _summary(info: DatasetInfo, row: dict[str, Any], frames: dict[str, np.ndarra
         length=row["length"] / info.fps,
         smallest_distance=None if distance is None else float(distance.min()),
         smoothness=_smoothness(info, frames),
-        contacts=None if contacts is None or contacts.ndim != 1 else _contacts_begun(contacts),
+        contacts=None if contacts is None or contacts.ndim != 1 else int(contacts_begun(contacts)),
         rate_of_change=None if commands is None else _known(rate_of_change(commands, info.fps)),
         high_frequency_content=None
         if commands is None
@@ -181,11 +184,6 @@ def _corrections(info: DatasetInfo, frames: dict[str, np.ndarray]) -> int | None
     sent, asked = np.array(joints, dtype=int).reshape(-1, 2).T
     owned = frames[OWNED][:, asked]
     return corrections(frames[ASKED][:, asked], frames[ACTION][:, sent], owned) if owned.any() else None
-
-
-def _contacts_begun(contacts: np.ndarray) -> int:
-    """Return how many contacts began: the sum of all rises of their number, `(N,)`."""
-    return int(np.maximum(np.diff(contacts.astype(np.int64), prepend=0), 0).sum())
 
 
 def _finite(values: np.ndarray | None) -> np.ndarray | None:

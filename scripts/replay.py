@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from handrail.collect.replay import Replay
 
 _PICTURES = 8
-_HEADINGS = ("episode", "largest deviation", "of", "tool at end [m]", "success", "recorded", "contacts")
+_HEADINGS = ("episode", "largest deviation", "of", "tool at end [m]", "success", "recorded", "contacts begun")
 
 
 def main() -> None:

@@ -192,7 +192,7 @@ def test_moving_obstacles_move_again_in_a_replay(tmp_path):
         "--task", "reach", "--moving_obstacles", 1, "--dataset.num_episodes", 1, "--dataset.root", root
     )
     assert done.returncode == 0, done.stderr
-    assert read_episodes(root)[0]["moving_obstacles"] == 1
+    assert json.loads(read_episodes(root)[0]["settings"])["moving_obstacles"] == 1
     assert "mover_0.vx" in (read_info(root).features["observation.environment_state"].names or ())
     assert replay_episode(root, 0)[0].largest == 0.0
     refused = command("--task", "reach", "--dataset.root", root, "--resume")

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from handrail.controllers.errors import HandrailError
+from handrail.datasets.labels import with_success
 from handrail.datasets.quality.columns import ColumnNames
 from handrail.datasets.quality.demonstration import Demonstration, Source
 from handrail.datasets.reader import DatasetInfo, read_episodes, read_info, read_rows_of
@@ -35,7 +36,7 @@ def read_demonstrations(root: str | Path, columns: ColumnNames | None = None) ->
             columns=columns,
             source=source,
         )
-        for row in read_episodes(root)
+        for row in with_success(info, read_episodes(root))
     ]
 
 

@@ -1,6 +1,7 @@
 """How close an episode came to harm, from what was recorded of distances, contacts and slack."""
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from handrail.controllers.arrays import FloatArray
 from handrail.datasets.quality.missing import DoesNotApply
@@ -28,13 +29,13 @@ def time_within(distance: FloatArray, margin: float, fps: float) -> float:
     return float(np.count_nonzero(_finite(distance) < margin)) / fps
 
 
-def contacts_begun(contacts: FloatArray) -> float:
-    """Return how many contacts began: the sum of all rises of their number.
+def contacts_begun(contacts: ArrayLike) -> float:
+    """Return how many contacts began, their onsets: the sum of all rises of their number.
 
     Args:
         contacts: How many there were in each period, `(N,)`.
     """
-    return float(np.maximum(np.diff(contacts, prepend=0.0), 0.0).sum())
+    return float(np.maximum(np.diff(np.asarray(contacts, np.float64), prepend=0.0), 0.0).sum())
 
 
 def impulse(impulses: FloatArray) -> float:

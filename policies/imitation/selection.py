@@ -83,9 +83,10 @@ def select_again(rows: Sequence[Row], numbers: Sequence[int], trained_on: Mappin
 
 
 def _attempts(rows: Sequence[Row], config: TrainConfig) -> list[Row]:
-    for column, wanted in (("mode", config.mode), ("success", config.success_only)):
-        if wanted and not all(column in row for row in rows):
-            raise HandrailError(f"--{column}: expected episodes that say their {column}; these do not")
+    if config.mode and any(row.get("mode") is None for row in rows):
+        raise HandrailError("--mode: expected episodes that say their mode; these do not")
+    if config.success_only and any(row.get("success") is None for row in rows):
+        raise HandrailError("--success_only: expected episodes that say whether they succeeded; these do not")
     modes = {str(row.get("mode")) for row in rows}
     if config.mode and config.mode not in modes:
         raise unknown_name("mode in the dataset", config.mode, modes)

@@ -12,7 +12,9 @@ import torch
 from handrail.collect.config import MODE_NAMES
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.check import check_whole
+from handrail.datasets.labels import with_success
 from handrail.datasets.reader import DatasetInfo, read_episodes, read_info, read_rows_of
+from handrail.datasets.schema import Feature
 from handrail.datasets.stats import column_stats
 from handrail.policies.imitation.checkpoint import PolicyMeta
 from handrail.policies.imitation.config import TrainConfig
@@ -30,7 +32,8 @@ _LEARNT = ("observation", "action", "next.")
 _COUNTERS = ("timestamp", "frame_index", "episode_index", "index", "task_index")
 _NOWHERE = "handrail/local--only"  # no name on the hub, from where LeRobot would fetch what is missing
 _FLOOR = 1e-2  # [m, rad, m/s, …] least spread of a number: what hardly moved in training must not explode
-_WANT_SCENE = ("act", "diffusion")  # they read pictures, or the environment's state
+_READ_STATE = ("act", "diffusion", "multi_task_dit", "vqbet")  # of LeRobot's, what cannot do without it
+_READ_SCENE = ("act", "diffusion")  # what needs pictures or the environment's state
 _RANGES = (("min", "max"), ("q01", "q99"), ("q10", "q90"))
 
 
@@ -131,7 +134,7 @@ def read_source(config: TrainConfig, began: PolicyMeta | None = None) -> Source:
     root = config.dataset.folder
     check_whole(root, config.verify)
     info = read_info(root)
-    rows = read_episodes(root)
+    rows = with_success(info, read_episodes(root))
     if began is not None and began.episodes:
         selection = select_again(rows, began.episodes, began.trained_on)
     else:
@@ -142,6 +145,8 @@ def read_source(config: TrainConfig, began: PolicyMeta | None = None) -> Source:
         interface, features, columns = None, *_recorded(info, selection, config)
     else:
         interface, features, columns = _interpreted(info, selection, config.actions)
+    if config.actions == "recorded":
+        _check_inputs(config, info, features)
     if config.images:
         features |= _cameras(info)
     return Source(config, info, selection, interface, features, columns | _counters(selection, info.fps))
@@ -205,36 +210,46 @@ def _recorded(
         if key.startswith(_LEARNT) and feature.dtype not in ("video", "image", "string")
     ]
     if ACTION not in keys:
-        raise HandrailError(f"dataset {str(info.root)!r}: expected a column 'action', got {', '.join(keys)}")
+        raise HandrailError(
+            f"dataset {str(info.root)!r}: expected a column 'action', got {', '.join(keys) or 'none'}"
+        )
     episodes = [read_rows_of(info, dict(row), keys) for row in selection.rows]
     columns = {key: np.concatenate([episode[key] for episode in episodes]) for key in keys}
     columns = {key: v.astype(np.float32) if v.dtype == np.float64 else v for key, v in columns.items()}
     features = {key: _feature(f.dtype, f.shape, f.names) for key in keys for f in (info.features[key],)}
-    if config.policy in _WANT_SCENE and ENVIRONMENT not in columns and not config.images:
-        _check_has_scene(info, columns, config)
+    if config.policy in _READ_SCENE and STATE in columns and not (ENVIRONMENT in columns or _pictured(info)):
         features[ENVIRONMENT], columns[ENVIRONMENT] = features[STATE], columns[STATE]
     return features, columns
 
 
-def _check_has_scene(info: DatasetInfo, columns: Columns, config: TrainConfig) -> None:
-    """Check that the robot's state may stand for the environment's: there are no pictures either."""
-    cameras = [key for key, feature in info.features.items() if feature.dtype in ("video", "image")]
-    if cameras:
+def _check_inputs(config: TrainConfig, info: DatasetInfo, features: Mapping[str, Any]) -> None:
+    """Check that there is what the policy reads, before LeRobot stumbles over what is not there."""
+    numbers = [key for key in features if key.startswith("observation")]
+    dataset, cameras = f"dataset {str(info.root)!r}", _pictured(info)
+    if STATE not in numbers and config.policy in _READ_STATE:
+        beside = " beside pictures (--images)" if cameras else ""
         raise HandrailError(
-            f"--policy {config.policy}: expected --images: the scene is in {', '.join(cameras)} alone"
+            f"{dataset}: expected a column {STATE!r}, which policy {config.policy} needs{beside};"
+            f" got {', '.join((*numbers, *cameras)) or 'no observation'}"
         )
-    if STATE not in columns:
+    blind = not numbers or (config.policy in _READ_SCENE and ENVIRONMENT not in numbers)
+    if blind and cameras and not config.images:
         raise HandrailError(
-            f"--policy {config.policy}: expected a column {STATE!r}, got {', '.join(columns)}"
+            f"{dataset}: expected {ENVIRONMENT!r} or --images for policy {config.policy};"
+            f" there are pictures ({', '.join(cameras)}): say --images"
         )
 
 
-def _cameras(info: DatasetInfo) -> dict[str, dict[str, Any]]:
-    found = {
+def _pictured(info: DatasetInfo) -> dict[str, Feature]:
+    return {
         key: feature
         for key, feature in info.features.items()
         if feature.dtype in ("video", "image") and key.startswith("observation")
     }
+
+
+def _cameras(info: DatasetInfo) -> dict[str, dict[str, Any]]:
+    found = _pictured(info)
     if not found:
         raise HandrailError(f"--images: expected cameras in {str(info.root)!r}, found none")
     return {key: _feature(f.dtype, f.shape, f.names) for key, f in found.items()}
