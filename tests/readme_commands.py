@@ -12,7 +12,7 @@ LESS = {  # flag → the value that it gets where the README gives it
     "handrail-train": {"--episodes": "1", "--minutes": "0.1"},
     "handrail-evaluate": {"--episodes": "2", "--workers": "1"},
     "handrail-trials": {"--episodes": "1"},
-    "handrail-study": {"--preset": "policies/study/presets/quick.toml", "--workers": "2"},
+    "handrail-study": {"--workers": "2"},
     "handrail-benchmark": {"--goals": "2", "--workers": "1"},
     "lerobot-train": {"--steps": "4", "--batch_size": "4", "--num_workers": "0"},
 }
@@ -31,13 +31,8 @@ MORE = {  # what is added where the README leaves it out
         "--layers": "8",
     },
 }
-LESS_STUDY = {
-    "rollouts": "2",
-    "persons": "1",
-    "episodes": "2",
-    "minutes": "0.3",
-    "steps": "4",
-}  # of the design
+INSTEAD = {"quick": "policies/study/presets/quick.toml"}  # where the test has put a smaller design:
+LESS_STUDY = {"rollouts": "2", "persons": "1", "episodes": "2", "minutes": "0.3", "steps": "4"}
 NOT_RUN = {
     "make": "sets up and tests this very clone",
     "pip": "needs the network",
@@ -82,6 +77,7 @@ def takes_minutes(words: list[str]) -> bool:
 def made_small(words: list[str]) -> list[str]:
     """Return a command with fewer episodes, steps and the like."""
     name = words[0]
+    words = [INSTEAD.get(word, word) for word in words]
     for flag, value in {**MORE.get(name, {}), **LESS.get(name, {})}.items():
         there = [index for index, word in enumerate(words) if word.split("=")[0] == flag]
         if there and "=" in words[there[0]]:
