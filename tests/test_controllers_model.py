@@ -65,6 +65,7 @@ def test_home_puts_the_tool_where_the_robot_has_it():
         (("q = [-1.5,", "q = ["), "home of robot ridgeback_ur10: expected 9 numbers, got 8"),
         (('kind = "planar"', 'kind = "legs"'), "base kind 'legs': expected planar or fixed"),
         (('["chassis", "upper_arm"]', '["chassis", "tail"]'), "collision shape 'tail'"),
+        (("[gripper]", '[gripper]\nshape = "paw"'), "collision shape 'paw'"),
         (("box = [0.960, 0.793, 0.28]", "box = [0.960, -1.0, 0.28]"), "expected 3 positive lengths"),
         (('urdf = "example', 'urdf = "no-such'), "URDF no-such-robot-data"),
         (("[home]", "[home"), "not valid TOML"),
