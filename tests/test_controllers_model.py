@@ -67,6 +67,7 @@ def test_home_puts_the_tool_where_the_robot_has_it():
         (("q = [-1.5,", "q = ["), "home: q: expected 9 numbers, one a joint, got 8"),
         (('kind = "planar"', 'kind = "legs"'), "[base]: kind: expected planar or fixed, got 'legs'"),
         (('["chassis", "upper_arm"]', '["chassis", "tail"]'), "collision shape 'tail'"),
+        (("[gripper]", '[gripper]\nshape = "paw"'), "collision shape 'paw'"),
         (
             ("box = [0.960, 0.793, 0.28]", "box = [0.960, -1.0, 0.28]"),
             "chassis of [[collision]]: box: expected three lengths above 0",

@@ -130,7 +130,8 @@ def test_no_column_is_ever_infinite(number):
     bad = np.full(3, number)
     intent = Intent(bad, np.array([True, False, True]), gripper=number, raw=RawInput(bad))
     health = Health(Status.INVALID_STATE, slack=abs(number))
-    moment = Moment(np.zeros(2), np.zeros(1), {}, intent, np.zeros(2), np.zeros(2), health, 0, False, False, 0.0)
+    still = np.zeros(2)
+    moment = Moment(still, np.zeros(1), {}, intent, still, still, health, 0, False, False, 0.0)
     frame = check_frame(moment_row(moment), moment_features("ab", "e", "a", channels))
     numbers = {key: value for key, value in frame.items() if not isinstance(value, str)}
     assert all(np.isfinite(value).all() for value in numbers.values())
