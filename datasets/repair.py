@@ -40,6 +40,7 @@ class RepairReport:
         lost: What was wrong with each episode that was set aside.
         put_back: How many episodes of `.damaged/` are in the dataset again.
         resealed: Files that another tool wrote anew and that are whole; their checksums were renewed.
+        differing: Such files where they were only noticed, as `resume` does.
         removed: Leftovers of an interrupted recording, deleted; paths in the dataset.
         moved: Files set aside in `.damaged/`; the paths that they had.
         restored: Files moved back from there to where they were.
@@ -53,6 +54,7 @@ class RepairReport:
     lost: tuple[str, ...] = ()
     put_back: int = 0
     resealed: tuple[str, ...] = ()
+    differing: tuple[str, ...] = ()
     removed: tuple[str, ...] = ()
     moved: tuple[str, ...] = ()
     restored: tuple[str, ...] = ()
@@ -79,6 +81,7 @@ class RepairReport:
     def _files(self) -> dict[str, tuple[str, ...]]:
         return {
             "taken as another tool wrote them": self.resealed,
+            "whole, but not as they were saved": self.differing,
             "leftovers removed": self.removed,
             "files of no episode moved to .damaged": self.moved,
             "files moved back": self.restored,
@@ -130,11 +133,16 @@ def tidy_locked(layout: Layout, manifest: Manifest, sums: Checksums) -> tuple[Re
     require_whole(layout, found)
     removed, moved = _clear(layout, found)
     rebuilt = _rebuild(layout, manifest, found.totals)
-    totals = found.totals
     report = RepairReport(
-        layout.root, totals.episodes, totals.frames, removed=removed, moved=moved, rebuilt=rebuilt
+        root=layout.root,
+        episodes=found.totals.episodes,
+        frames=found.totals.frames,
+        differing=tuple(name for state in found.rewritten for name in state.rewritten),
+        removed=removed,
+        moved=moved,
+        rebuilt=rebuilt,
     )
-    return report, totals
+    return report, found.totals
 
 
 def require_whole(layout: Layout, found: Survey) -> None:

@@ -244,9 +244,10 @@ def _kill_repeatedly(root: Path, kills: int) -> tuple[int, int]:
         with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as child:
             assert child.stdout is not None
             assert child.stdout.readline() == "ready\n"
-            time.sleep(moments.uniform(0.0, 0.6))
+            lines = [child.stdout.readline() for _ in range(moments.randrange(4))]  # however slow it is
+            time.sleep(moments.uniform(0.0, 0.3))
             child.kill()
-            lines = [line for line in child.stdout.read().splitlines(keepends=True) if line.endswith("\n")]
+            lines += [line for line in child.stdout.read().splitlines(keepends=True) if line.endswith("\n")]
         reported |= {int(line.split()[0]): line.split()[1] for line in lines}
         repairs += not _check_survivors(root, reported)
     return len(reported), repairs
