@@ -7,6 +7,7 @@ from collect_helpers import action, environment, over_cube
 from handrail.collect.build import build_env, build_session
 from handrail.collect.config import SessionConfig
 from handrail.collect.geometry import box_around
+from handrail.collect.operators.pick_place_script import tips_beyond_tool
 from handrail.collect.tasks.task import Episode
 from handrail.controllers.model import load_model
 from handrail.controllers.rotation import matrix_from_rpy
@@ -143,7 +144,6 @@ def test_the_operator_closes_the_gripper_around_the_cube(robot, mode):
     config = SessionConfig(task="pick_place", mode=mode, robot=robot)
     model, edge = load_model(robot), 0.05
     gripper = model.description.gripper
-    frame, tool = (model.pose(model.description.home, name) for name in (gripper.frame, "tool"))
     env, watch = build_env(config, 20), Closing()
     try:
         session = build_session(config, env, [watch])
@@ -152,7 +152,8 @@ def test_the_operator_closes_the_gripper_around_the_cube(robot, mode):
         assert mode == "direct" or not any(outcome.contacts for outcome in outcomes)
     finally:
         env.close()
-    tips = gripper.tip - tool.rotation[:, 2] @ (tool.position - frame.position)  # beyond the tool point
+    tips = {"ridgeback_ur10": 0.015, "ridgeback_panda": 0.0095}[robot]  # beyond the tool point
+    assert tips_beyond_tool(model) == pytest.approx(tips)
     for across, _, along in watch.offsets:
         assert abs(across) < (gripper.stroke - edge) / 2
         assert tips - edge / 2 < along < tips + 0.01

@@ -14,7 +14,7 @@ from handrail.controllers.arrays import FloatArray
 from handrail.controllers.model import Pose, RobotModel
 
 _HELD = 0.05  # a cube this near to the tool point is held [m]
-_GRASP = 0.010  # of the hand above the middle of the cube [m]
+_BELOW = 0.005  # finger tips below the middle of the cube [m]
 _NEAR, _ALIGNED = 0.010, 0.10  # how exactly the hand has to be there to grasp [m, rad]
 _RETREAT = 0.40  # hand behind the table's edge while carrying [m]
 _AHEAD = 0.80  # hand before the base's centre while carrying [m]
@@ -102,11 +102,15 @@ class PickPlaceScript:
         width = float(cube.shape.size[0]) * (np.cos(_ALIGNED) + np.sin(_ALIGNED))
         return _NEAR if gripper is None else max(_NEAR, (gripper.stroke - width) / 2)
 
+    def _height(self) -> float:
+        """Return how high the tool point is above the middle of a cube that the fingers close around [m]."""
+        return round(tips_beyond_tool(self._model) - _BELOW, 6)
+
     def _pick(self, pick: _Place, down: FloatArray, room: float) -> list[Phase]:
         """Go above the cube, down until it is between the fingers, close them, lift."""
         cube, base = pick.thing, self._stand(pick)
         stage = np.array([pick.edge - 0.15, cube[1], cube[2] + 0.30])
-        grasp = _above(cube, _GRASP)
+        grasp = _above(cube, self._height())
 
         def phase(name: str, position: FloatArray, **options: float) -> Phase:
             return Phase(name, Pose(position, down), base, **options)  # type: ignore[arg-type]
@@ -159,6 +163,16 @@ class PickPlaceScript:
 
 def _above(position: FloatArray, height: float) -> FloatArray:
     return position + np.array([0.0, 0.0, height])
+
+
+def tips_beyond_tool(model: RobotModel) -> float:
+    """Return how far the finger tips are beyond the tool point [m]; 0 of a robot without fingers."""
+    gripper, home = model.description.gripper, model.description.home
+    if gripper is None:
+        return 0.0
+    frame, tool = model.pose(home, gripper.frame), model.pose(home)
+    offset = gripper.placement.translation[2] + gripper.tip
+    return float(offset - frame.rotation[:, 2] @ (tool.position - frame.position))
 
 
 def grasp_rotation(tool: FloatArray, cube: FloatArray) -> FloatArray:
