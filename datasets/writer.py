@@ -68,8 +68,7 @@ class EpisodeWriter:
         """Use `create` or `resume` instead; `repaired` says what the latter put in order."""
         self._layout, self._manifest, self._totals = layout, manifest, totals
         self._lock, self._types, self.repaired, self._unusable = lock, types, repaired, ""
-        self._episode = OpenEpisode(layout, manifest)
-        self._encodings = read_encodings(layout.info, manifest)
+        self._episode, self._encodings = OpenEpisode(layout, manifest), read_encodings(layout.info, manifest)
 
     @classmethod
     def create(
@@ -297,6 +296,5 @@ class EpisodeWriter:
 
     def _check_usable(self) -> None:
         if self._unusable:
-            raise HandrailError(
-                f"writer of {str(self.root)!r} {self._unusable}: open the dataset again with --resume"
-            )
+            why = f"{self._unusable}: open the dataset again with --resume"
+            raise HandrailError(f"writer of {str(self.root)!r} {why}")
