@@ -120,7 +120,7 @@ def test_an_evaluation_killed_while_it_writes(tmp_path):
 
 
 def kept_of(study: Path) -> set[str]:
-    """Return what is saved of a study, a text each: notes of what is done, episodes, checkpoints, rollouts."""
+    """Return what is saved of a study, a text each: notes of jobs, episodes, checkpoints, rollouts."""
     found = {f"{path} {path.read_text()}" for path in study.glob("done/**/*.json")}
     for info in study.glob("datasets/*/*/meta/info.json"):
         root = info.parents[1]
