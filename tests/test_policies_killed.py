@@ -1,29 +1,26 @@
 """Train, evaluate and study, killed ten times each while they write: what was saved stays, and they go on."""
 
-import contextlib
 import hashlib
 import json
-import os
-import signal
-import subprocess
-import sys
-import time
 from pathlib import Path
 
 import numpy as np
 import pytest
-from killed_child import killed
+from killed_child import killed, run_command
 from policy_helpers import untrained_act
 from study_helpers import SMALLEST
 from training_helpers import TINY, tiny, weights, write_dataset
 
-from handrail.datasets.reader import read_episodes
+from handrail.datasets.reader import read_episodes, read_frames
 from handrail.policies.imitation.checkpoint import load_policy, read_meta
 from handrail.policies.imitation.curve import read_curve
 from handrail.policies.imitation.evaluate_config import EvaluateConfig
 from handrail.policies.imitation.evaluation import evaluate
 from handrail.policies.imitation.training import train
+from handrail.policies.study.child import do
 from handrail.policies.study.config import StudyConfig
+from handrail.policies.study.jobs import Layout, jobs
+from handrail.policies.study.load import load_design
 from handrail.policies.study.run import run_study
 
 pytestmark = [
@@ -31,6 +28,7 @@ pytestmark = [
     pytest.mark.filterwarnings("ignore:.*(torchcodec|pin_memory|video).*"),
 ]
 KILLS = 10
+NEVER = 10**9
 
 
 def digests(folder: Path) -> dict[str, str]:
@@ -60,7 +58,16 @@ def test_a_training_killed_while_it_writes(tmp_path):
     kept: dict[str, str] = {}
     for kill in range(KILLS):
         change = int(rng.integers(2, 40))
-        died = killed(output, change, "handrail.scripts.train", *flags, "--resume", "--policy_options", *TINY)
+        died = killed(
+            output,
+            change,
+            run_command,
+            "handrail.scripts.train",
+            *flags,
+            "--resume",
+            "--policy_options",
+            *TINY,
+        )
         assert died, f"{kill}: not killed at change {change}"
         now = digests(output)
         assert kept.items() <= now.items()
@@ -98,7 +105,9 @@ def test_an_evaluation_killed_while_it_writes(tmp_path):
     flags = ["--policy", policy, "--episodes", count, "--time_limit", 0.2, "--json", file]
     kept: list[dict] = []
     for _ in range(KILLS):
-        assert killed(tmp_path / ".e.json", int(rng.integers(1, 8)), "handrail.scripts.evaluate", *flags)
+        assert killed(
+            tmp_path / ".e.json", int(rng.integers(1, 8)), run_command, "handrail.scripts.evaluate", *flags
+        )
         rows = rows_of(file)
         assert rows[: len(kept)] == kept
         kept = rows
@@ -110,59 +119,43 @@ def test_an_evaluation_killed_while_it_writes(tmp_path):
     assert without_times(entry["rollouts"]) == without_times(evaluate(asked)["arms"][label][0]["rollouts"])
 
 
-def seen(study: Path) -> dict[str, tuple[int, int]]:
-    """Return size and time of every file that the jobs of a study make."""
-    found = {}
-    made = ("datasets", "policies", "evaluations", "comparisons", "done")
-    for path in (path for folder in made for path in (study / folder).rglob("*")):
-        try:
-            if path.is_file():
-                found[str(path)] = (path.stat().st_size, path.stat().st_mtime_ns)
-        except FileNotFoundError:
-            continue
+def kept_of(study: Path) -> set[str]:
+    """Return what is saved of a study, a text each: notes of jobs, episodes, checkpoints, rollouts."""
+    found = {f"{path} {path.read_text()}" for path in study.glob("done/**/*.json")}
+    for info in study.glob("datasets/*/*/meta/info.json"):
+        root = info.parents[1]
+        for row in read_episodes(root):
+            frames = read_frames(root, row["episode_index"])
+            found.add(
+                f"{root} {row['episode_index']} {hashlib.sha256(frames['action'].tobytes()).hexdigest()}"
+            )
+    for checkpoints in study.glob("policies/**/checkpoints"):
+        found |= {f"{checkpoints} {item}" for item in digests(checkpoints.parent).items()}
+    for file in study.glob("evaluations/**/*.json"):
+        found |= {f"{file} {row}" for row in rows_of(file)}
     return found
 
 
-def killed_study(preset: Path, study: Path, wait: float) -> bool:
-    """Begin a study and kill all its processes while its files change; return whether it was at work."""
-    words = [sys.executable, "-m", "handrail.scripts.study", "--preset", str(preset), "--output", str(study)]
-    before = seen(study)
-    with subprocess.Popen(
-        words, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True
-    ) as process:
-        try:
-            while process.poll() is None:
-                if seen(study).items() - before.items():
-                    time.sleep(wait)
-                    break
-                time.sleep(0.005)
-            alive = process.poll() is None
-        finally:
-            with contextlib.suppress(ProcessLookupError):
-                os.killpg(process.pid, signal.SIGKILL)  # all that it began too, as a power cut does
-    return alive
+def nothing_left(job, design, layout):
+    raise AssertionError(f"{job.name} is not done")
 
 
 def test_a_study_killed_while_it_writes(tmp_path):
-    """Law: notes of jobs that are done and saved episodes stay, and the same command goes on."""
+    """Law: whatever a job has saved stays, and the same job goes on; every job is killed twice."""
     preset, study, rng = tmp_path / "tiny.toml", tmp_path / "study", np.random.default_rng(0)
     preset.write_text(SMALLEST)
-    done: dict[str, dict] = {}
-    episodes: dict[Path, int] = {}
-    deaths = 0
-    for _ in range(KILLS):
-        deaths += killed_study(preset, study, rng.uniform(0.0, 6.0))
-        notes = {path.name: json.loads(path.read_bytes()) for path in study.glob("done/**/*.json")}
-        assert done.items() <= notes.items()
-        done = notes
-        for root in study.glob("datasets/*/*"):
-            count = len(read_episodes(root)) if (root / "meta" / "info.json").is_file() else 0
-            assert count >= episodes.get(root, 0)
-            episodes[root] = count
-        for file in study.glob("evaluations/**/*.json"):
-            assert rows_of(file)
-    assert deaths == KILLS
-    assert run_study(StudyConfig(preset=str(preset), output=str(study), workers=2)) == 0
-    assert episodes, "killed too early to see anything"
-    assert len(list(study.glob("done/**/*.json"))) == 2 + 3 + 1  # datasets, policies, the comparison
+    design, layout, kills = load_design(str(preset)), Layout(study), 0
+    kept: set[str] = set()
+    for job in jobs(design):
+        few, many = (1, 8) if job.task else (5, 60)
+        for change in (*rng.integers(few, many, 2).tolist(), NEVER):
+            if layout.done(job).is_file():
+                break
+            kills += killed(study, change, do, job, design, study)
+            now = kept_of(study)
+            assert kept <= now, job.name
+            kept = now
+        assert layout.done(job).is_file(), job.name
+    assert kills >= KILLS
+    assert run_study(StudyConfig(preset=str(preset), output=str(study), workers=2), start=nothing_left) == 0
     assert (study / "report.html").is_file()
