@@ -45,6 +45,7 @@ MINUTES_TOO = (
     "none,mpc",
     "push:2",
     "minute",
+    "lerobot_act",
     "diffusion",
     "moving",
     "trials",

@@ -60,9 +60,9 @@ def test_rude_intents_in_clutter_with_a_solver_that_fails():
 @pytest.mark.parametrize("robot", robot_names())
 @pytest.mark.parametrize("movers", [0, 1, 2])
 def test_rude_intents_at_length(robot, movers):
-    """Movers stop for nobody and can close in from two sides: met in 1 of 20 runs at most."""
+    """Movers stop for nobody and can close in from two sides: met in 1 of 10 runs at most."""
     _, met = check(range(70), 15.0, movers, robot)
-    assert len(met) <= 3
+    assert len(met) <= 7
 
 
 @pytest.mark.slow

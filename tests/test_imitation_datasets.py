@@ -53,7 +53,7 @@ def test_without_a_scene_the_robot_s_state_stands_for_it(policy, tmp_path):
 def test_a_scene_in_pictures_alone_names_the_flag(tmp_path):
     root = another_tool_s(tmp_path / "set", ("observation", "action"), cameras=True)
     config = dataclasses.replace(tiny(root, tmp_path / "policy", steps=1), actions="recorded")
-    with pytest.raises(HandrailError, match="--policy act: expected --images") as raised:
+    with pytest.raises(HandrailError, match="or --images for policy act") as raised:
         train(config, quiet=True)
     assert "\n" not in str(raised.value)
     blind = another_tool_s(tmp_path / "blind", ("action",))
@@ -89,5 +89,5 @@ def test_an_intent_of_several_modes_is_refused_with_the_flag(modes, said, tmp_pa
 def test_what_a_dataset_lacks_is_not_fetched_from_anywhere(tmp_path):
     root = write_dataset(tmp_path / "set", lengths=(5, 6), cameras=("wrist",))
     sorted(root.rglob("*.mp4"))[0].unlink()
-    with pytest.raises(HandrailError, match="expected all its files, found some missing"):
+    with pytest.raises(HandrailError, match="was copied in part: 1 of 2 episodes"):
         train(tiny(root, tmp_path / "policy", steps=1, images=True), quiet=True)

@@ -58,7 +58,7 @@ def test_contacts_are_those_that_began_in_record_replay_and_inspect(touching):
     assert int(periods) == row["contact_periods"] == np.count_nonzero(counts)
     for name in ("replay", "inspect"):
         shown = command("--dataset.root", root, name=name).stdout
-        assert re.search(rf"│ {begun} +│$", shown, re.MULTILINE)
+        assert re.search(rf"^ *0 .* {begun}( |$)", shown, re.MULTILINE), shown
 
 
 def test_every_setting_is_kept_and_a_replay_uses_it(touching, monkeypatch):
