@@ -170,11 +170,12 @@ def _repair_locked(layout: Layout, manifest: Manifest, set_aside_damaged: bool) 
     found = survey(layout, manifest, sums.of)
     removed, moved = _clear(layout, found)
     resealed = _reseal(layout, found)
+    rebuilt = _rebuild(layout, manifest, found.totals) if found.counted else ()
     lost: list[str] = []
     if set_aside_damaged and not found.whole:
         lost, found = found.faults(), _without_damaged(layout, manifest, found, sums)
     totals, back = put_back(layout, manifest, found.totals) if found.whole else (found.totals, 0)
-    rebuilt = _rebuild(layout, manifest, totals) if found.counted else ()
+    rebuilt += _rebuild(layout, manifest, totals) if found.counted else ()
     sums.remember()
     return RepairReport(
         root=layout.root,
@@ -187,7 +188,7 @@ def _repair_locked(layout: Layout, manifest: Manifest, set_aside_damaged: bool) 
         removed=removed,
         moved=moved,
         restored=tuple(restored),
-        rebuilt=rebuilt,
+        rebuilt=tuple(dict.fromkeys(rebuilt)),
     )
 
 
@@ -197,8 +198,6 @@ def _without_damaged(layout: Layout, manifest: Manifest, found: Survey, sums: Ch
     Lines of metadata go last and from the end: cut short, `restore` undoes this. From when `info.json` counts
     only the episodes that stay, `put_back` finishes it.
     """
-    if found.counted:
-        _rebuild(layout, manifest, found.totals)
     first = found.damaged[0].number if found.damaged else len(found.states)
     streams, rows = [], []
     for number in range(first, len(found.states)):

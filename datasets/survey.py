@@ -69,7 +69,7 @@ def survey(layout: Layout, manifest: Manifest, seal_of: Seals) -> Survey:
     rows, streams = _found(layout, _ROWS), [p for pattern in _STREAMS for p in _found(layout, pattern)]
     saved, counted = _saved_by_lines(rows), _saved_in_info(layout)
     beyond = {number for number in map(episode_of, streams) if number is not None and number >= saved}
-    interrupted = beyond == {saved} and counted <= saved  # what a crash leaves: files of the next episode
+    interrupted = beyond == {saved} and counted is not None and counted <= saved  # a crash: the next one's
     count = saved if interrupted or not beyond else max(beyond) + 1
     if count > 10 * len({*map(episode_of, (*rows, *streams))}) + _GAP:
         raise HandrailError(
@@ -80,7 +80,7 @@ def survey(layout: Layout, manifest: Manifest, seal_of: Seals) -> Survey:
     return Survey(
         states,
         totals,
-        absent=max(0, counted - count),
+        absent=max(0, (counted or 0) - count),
         leftovers=tuple(path for path in streams if interrupted and episode_of(path) == saved),
         strays=tuple(path for path in (*streams, *rows) if episode_of(path) is None),
     )
@@ -88,19 +88,19 @@ def survey(layout: Layout, manifest: Manifest, seal_of: Seals) -> Survey:
 
 def said_to_be_saved(layout: Layout) -> int:
     """Return how many episodes there should be, by their lines of metadata and by `info.json`."""
-    return max(_saved_by_lines(_found(layout, _ROWS)), _saved_in_info(layout))
+    return max(_saved_by_lines(_found(layout, _ROWS)), _saved_in_info(layout) or 0)
 
 
 def _saved_by_lines(rows: list[Path]) -> int:
     return max((number + 1 for number in map(episode_of, rows) if number is not None), default=0)
 
 
-def _saved_in_info(layout: Layout) -> int:
-    """Return how many episodes `info.json` says there are; 0 if it cannot be read."""
+def _saved_in_info(layout: Layout) -> int | None:
+    """Return how many episodes `info.json` says there are; None if it cannot be read, which no crash does."""
     try:
         return int(read_json(layout.info)["total_episodes"])
     except UNREADABLE:
-        return 0
+        return None
 
 
 def _states(

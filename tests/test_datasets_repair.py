@@ -212,6 +212,20 @@ def test_lost_lines_of_metadata_never_cost_data(root, asked):
     assert not report.removed
 
 
+@pytest.mark.parametrize("episodes", [1, 3])
+@pytest.mark.parametrize("info", [None, "{"])
+def test_the_last_line_and_the_count_gone_cost_no_data(tmp_path, episodes, info):
+    """A crash leaves `info.json` whole: without it, the files of the last episode are no leftovers."""
+    root = record(tmp_path / "set", episodes)
+    layout, rows = Layout(root), Layout(root).data(episodes - 1).read_bytes()
+    layout.row(episodes - 1).unlink()
+    layout.info.unlink() if info is None else layout.info.write_text(info)
+    with pytest.raises(HandrailError, match=f"episode {episodes - 1}: meta/.* is missing"):
+        resume(root)
+    assert not repair(root).removed
+    assert layout.data(episodes - 1).read_bytes() == rows
+
+
 def test_the_last_line_gone_is_noticed_by_the_count(root):
     Layout(root).row(3).unlink()
     report = repair(root)
