@@ -59,7 +59,10 @@ def _feature(key: str, value: dict[str, Any]) -> Feature:
     sizes = shape if isinstance(shape, list) else [-1]
     if not all(type(size) is int and size >= 0 for size in sizes) or math.prod(sizes) > _LARGEST:
         raise ValueError(f"feature {key[:60]!r}: expected a shape, got {_shown(shape)}")
-    return Feature(dtype, tuple(sizes), tuple(names) if names else None)
+    fitting = names and (
+        dtype in ("video", "image") or len(names) == sizes[0]
+    )  # else they name something else
+    return Feature(dtype, tuple(sizes), tuple(names) if names and fitting else None)
 
 
 def _shown(value: object) -> str:

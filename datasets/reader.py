@@ -200,8 +200,8 @@ def _to_numpy(column: pa.ChunkedArray, feature: Feature) -> np.ndarray:
     values = column.combine_chunks()
     while isinstance(values, pa.ExtensionArray) or pa.types.is_nested(values.type):
         values = values.storage if isinstance(values, pa.ExtensionArray) else values.flatten()
-    flat = to_numpy(values).astype(feature.dtype)
-    return flat if feature.is_scalar else flat.reshape(-1, *feature.shape)
+    shape = () if feature.is_scalar else feature.shape
+    return to_numpy(values).astype(feature.dtype).reshape(len(column), *shape)
 
 
 def _read_rows(path: Path) -> list[dict[str, Any]]:
@@ -212,9 +212,17 @@ def _read_rows(path: Path) -> list[dict[str, Any]]:
         for row in rows:
             for name in _PLACE:
                 whole_number(row, name, MOST_FRAMES)
+            row["tasks"] = _tasks(row)
         return rows
     except _UNREADABLE as error:
         raise _torn(path, error) from error
+
+
+def _tasks(row: dict[str, Any]) -> list[str]:
+    found = row.get("tasks") or []
+    if not isinstance(found, list) or not all(isinstance(task, str) for task in found):
+        raise ValueError(f"tasks: expected a list of texts, got {str(found)[:60]}")
+    return found
 
 
 def _first_odd(numbers: list[int]) -> str:

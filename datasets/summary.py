@@ -3,6 +3,7 @@
 What a dataset does not hold stays None and is shown as "–", so that any LeRobot dataset can be looked at.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from handrail.datasets.labels import with_success
 from handrail.datasets.metrics import corrections, high_frequency_content, rate_of_change, sparc
 from handrail.datasets.quality.safety import contacts_begun
 from handrail.datasets.reader import DatasetInfo, read_episodes, read_info, read_rows_of
+from handrail.datasets.schema import NUMBERS
 
 UNKNOWN = "–"
 HEADINGS = (
@@ -112,8 +114,8 @@ def summarize(root: str | Path) -> list[EpisodeSummary]:
         HandrailError: There is no dataset, or a file of it cannot be read.
     """
     info = read_info(root)
-    known = (STATE, ACTION, ASKED, OWNED, MODE, DISTANCE, CONTACTS)
-    wanted = [name for name in known if _is_column(info, name)]
+    known = dict.fromkeys((STATE, ACTION, ASKED, OWNED, DISTANCE, CONTACTS), NUMBERS) | {MODE: ("string",)}
+    wanted = [name for name, dtypes in known.items() if _is_column(info, name, dtypes)]
     rows = with_success(info, read_episodes(root))
     return [_summary(info, row, read_rows_of(info, row, wanted)) for row in rows]
 
@@ -124,7 +126,7 @@ def _summary(info: DatasetInfo, row: dict[str, Any], frames: dict[str, np.ndarra
     commands = _commands(info, frames)
     return EpisodeSummary(
         episode=row["episode_index"],
-        task="; ".join(row.get("tasks") or ()),
+        task="; ".join(row["tasks"]),
         mode=_mode(row, frames),
         success=_as_bool(row.get("success")),
         failure_reason=row.get("failure_reason") or None,
@@ -191,8 +193,8 @@ def _finite(values: np.ndarray | None) -> np.ndarray | None:
     return finite if finite is not None and finite.size else None
 
 
-def _is_column(info: DatasetInfo, name: str) -> bool:
-    return name in info.features and info.features[name].dtype not in ("video", "image")
+def _is_column(info: DatasetInfo, name: str, dtypes: Sequence[str]) -> bool:
+    return name in info.features and info.features[name].dtype in dtypes
 
 
 def _as_bool(value: Any) -> bool | None:

@@ -4,16 +4,21 @@ import json
 import os
 import shutil
 
+import numpy as np
 import pytest
 from command_helpers import command
-from datasets_helpers import record
+from datasets_helpers import create, record
 
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.comparison.evaluations import read_evaluations
 from handrail.datasets.layout import Layout
 from handrail.datasets.path_pattern import check_pattern, fill
-from handrail.datasets.reader import read_episodes, read_info
+from handrail.datasets.quality.load import read_demonstrations
+from handrail.datasets.quality.measure import measure
+from handrail.datasets.reader import read_episodes, read_frames, read_info
+from handrail.datasets.schema import Feature
 from handrail.datasets.strict_json import MOST_BYTES, MOST_DEPTH, parse_json, read_json
+from handrail.datasets.summary import summarize
 from handrail.policies.imitation.checkpoint import read_meta
 
 DEEP = b"[" * 100_000 + b"]" * 100_000
@@ -159,6 +164,59 @@ def test_a_line_of_metadata_is_not_trusted(root, column, harm):
     pq.write_table(table, path)
     with pytest.raises(HandrailError, match=r"\A[^\n]{1,500}\Z"):
         read_episodes(root)
+
+
+@pytest.mark.parametrize("tasks", [["go"], [[1, 2]], [[None]]])
+def test_tasks_that_are_no_texts_are_one_line(root, tasks):
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    path = Layout(root).row(1)
+    table = pq.read_table(path)
+    pq.write_table(table.set_column(table.schema.names.index("tasks"), "tasks", pa.array(tasks)), path)
+    with pytest.raises(HandrailError, match=r"\A[^\n]{1,400}tasks: expected a list of texts[^\n]{1,100}\Z"):
+        summarize(root)
+
+
+def test_tasks_may_be_missing(root):
+    import pyarrow.parquet as pq
+
+    pq.write_table(pq.read_table(Layout(root).row(1)).drop_columns(["tasks"]), Layout(root).row(1))
+    assert [row["tasks"] for row in read_episodes(root)][1] == []
+
+
+@pytest.mark.parametrize("names", [["tool.z"], [f"{axis}.pos" for axis in "abcd"] + ["x", "y", "z"]])
+def test_names_of_something_else_are_no_names(root, names):
+    """Half of the readers would look beyond the numbers for the tool."""
+    described = json.loads(Layout(root).info.read_bytes())["features"]
+    described["observation.state"]["names"] = names
+    _spoil(root, {"features": described})
+    assert read_info(root).features["observation.state"].names is None
+    assert len(summarize(root)) == 2
+
+
+@pytest.mark.parametrize("shape", [[1], [2, 2], [100]])
+def test_a_column_of_another_shape_is_one_line(root, shape):
+    described = json.loads(Layout(root).info.read_bytes())["features"]
+    described["observation.state"] |= {"shape": shape, "names": None}
+    _spoil(root, {"features": described})
+    with pytest.raises(HandrailError, match=r"\A[^\n]{1,500}\Z"):
+        read_frames(root, 0)
+
+
+@pytest.mark.parametrize("name", ["safety.contacts", "controller.smallest_distance", "teleop.mode"])
+def test_a_column_of_another_type_is_as_if_missing(tmp_path, name):
+    """Any tool may have named a column so."""
+    kind = Feature("float32", (3,)) if name == "teleop.mode" else Feature("string")
+    with create(tmp_path / "set", features={"action": Feature("float32", (2,)), name: kind}) as writer:
+        for _ in range(8):
+            value = np.zeros(3, np.float32) if name == "teleop.mode" else "near"
+            writer.add_frame({"action": np.zeros(2, np.float32), name: value}, "go")
+        writer.save_episode({"success": True})
+    (seen,) = summarize(tmp_path / "set")
+    assert (seen.contacts, seen.smallest_distance, seen.mode) == (None, None, None)
+    found = measure({"a": read_demonstrations(tmp_path / "set")}, np.random.default_rng(0))
+    assert not found.values["contacts"]["a"].applies
 
 
 def test_a_newer_format_is_refused_on_reading(root):

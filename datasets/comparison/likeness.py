@@ -26,7 +26,7 @@ def _told(names: Sequence[str]) -> str:
 
 
 def _tasks(group: Group) -> tuple[str, ...]:
-    return tuple(sorted({task for episode in group.episodes for task in episode.meta.get("tasks") or ()}))
+    return tuple(sorted({task for episode in group.episodes for task in episode.meta["tasks"]}))
 
 
 def _robot(group: Group) -> tuple[str, ...]:

@@ -66,7 +66,7 @@ def _known(value: float) -> float:
 
 
 def _vector(episode: Demonstration, part: str) -> FloatArray:
-    return episode.column(part).reshape(episode.count, -1)[:, 0].astype(float)
+    return episode.numbers(part)[:, 0]
 
 
 def _switches(episode: Demonstration, pool: Pool) -> float:

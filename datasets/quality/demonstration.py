@@ -181,16 +181,24 @@ class Demonstration:
                 return self.frames[name]
         raise DoesNotApply(f"no column {' or '.join(map(repr, choices))}")
 
+    def numbers(self, part: str) -> FloatArray:
+        """Return the numbers of a part as `(N, d)`, finite or not.
+
+        Raises:
+            DoesNotApply: There is none, or it holds text.
+        """
+        values = self.column(part)
+        if values.dtype.kind not in "fiub" or not values.size:
+            raise DoesNotApply(f"the column of {part} holds no numbers")
+        return _rows(values)
+
     def matrix(self, part: str) -> FloatArray:
         """Return the numbers of a part as `(N, d)`.
 
         Raises:
             DoesNotApply: There is none, it holds text, or a number that is not finite.
         """
-        values = self.column(part)
-        if values.dtype.kind not in "fiub":
-            raise DoesNotApply(f"the column of {part} holds no numbers")
-        rows = _rows(values)
+        rows = self.numbers(part)
         if not np.isfinite(rows).all():
             raise DoesNotApply(f"the column of {part} holds numbers that are not finite")
         return rows
