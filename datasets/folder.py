@@ -136,24 +136,30 @@ def set_aside(layout: Layout, paths: list[Path]) -> list[str]:
 
 
 def _foreign(layout: Layout) -> list[str]:
-    """Return what lies among a dataset's files and is none of them."""
+    """Return what lies among a dataset's files, or among those that were set aside, and is none of them."""
     summaries = {layout.info, layout.stats, layout.tasks, layout.manifest}
-    paths = [path for name in _FOLDERS for path in (layout.root / name, *(layout.root / name).rglob("*"))]
+    places = {path: layout for name in _FOLDERS for path in _all_below(layout.root / name)}
+    for path in _all_below(layout.damaged):
+        parts = path.relative_to(layout.damaged).parts
+        places[path] = Layout(layout.damaged / parts[0]) if len(parts) > 1 else layout
     return sorted(
         layout.relative(path)
-        for path in paths
-        if path.is_symlink() or (path.is_file() and path not in summaries and not _is_numbered(layout, path))
+        for path, owner in places.items()
+        if path.is_symlink() or (path.is_file() and path not in summaries and not _is_numbered(owner, path))
     )
+
+
+def _all_below(folder: Path) -> list[Path]:
+    return [folder, *folder.rglob("*")]
 
 
 def _is_numbered(layout: Layout, path: Path) -> bool:
     """Return whether a path is that of an episode's rows, video or line of metadata."""
-    number = episode_of(path)
-    if number is None:
-        return False
-    first, key = path.relative_to(layout.root).parts[:2]
-    return path in (layout.data(number), layout.row(number)) or (
-        first == "videos" and path == layout.video(key, number)
+    number, camera = episode_of(path), path.parent.parent.name
+    return number is not None and path in (
+        layout.data(number),
+        layout.row(number),
+        layout.video(camera, number),
     )
 
 

@@ -26,6 +26,7 @@ from handrail.controllers.errors import HandrailError
 from handrail.datasets.layout import Layout
 from handrail.datasets.manifest import Manifest
 from handrail.datasets.reader import read_episodes, read_frames, read_info
+from handrail.datasets.repair import repair
 from handrail.datasets.schema import Feature, check_features, check_frame
 from handrail.datasets.writer import EpisodeWriter
 
@@ -58,7 +59,12 @@ def test_an_existing_dataset_is_overwritten_when_asked(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "mine", ["data/notes.txt", "data/chunk-000/mine.parquet", "videos/holiday.mp4", "meta/todo.md"]
+    "mine",
+    [
+        *("data/notes.txt", "data/chunk-000/mine.parquet", "videos/holiday.mp4", "meta/todo.md"),
+        *(".damaged/notes.txt", ".damaged/000/data/chunk-000/mine.parquet"),
+        ".damaged/chunk-000/file-001.mp4",
+    ],
 )
 def test_overwriting_removes_only_what_is_ours(tmp_path, mine):
     root = record(tmp_path / "set", 1)
@@ -72,6 +78,14 @@ def test_overwriting_removes_only_what_is_ours(tmp_path, mine):
     (root / mine).unlink()
     create(root, overwrite=True).close()
     assert (root / "images" / "photo.png").read_text() == "mine too"
+
+
+def test_what_was_set_aside_is_overwritten_with_the_rest(tmp_path):
+    root = record(tmp_path / "set", 3, cameras=True)
+    Layout(root).data(0).write_bytes(b"torn")
+    assert len(repair(root, set_aside_damaged=True).lost) == 1
+    create(root, overwrite=True).close()
+    assert not (root / ".damaged").exists()
 
 
 def test_a_dataset_of_another_tool_is_never_overwritten(tmp_path):
