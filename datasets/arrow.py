@@ -68,3 +68,11 @@ def to_numpy(values: pa.Array) -> np.ndarray:
             np.unpackbits(packed, count=values.offset + len(values), bitorder="little")[values.offset :] != 0
         )
     return np.from_dlpack(values)  # type: ignore[arg-type]
+
+
+def flat_numbers(column: pa.ChunkedArray) -> np.ndarray:
+    """Return the numbers of a column, those of nested lists one after the other."""
+    values = column.combine_chunks()
+    while isinstance(values, pa.ExtensionArray) or pa.types.is_nested(values.type):
+        values = values.storage if isinstance(values, pa.ExtensionArray) else values.flatten()
+    return to_numpy(values)

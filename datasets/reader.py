@@ -13,7 +13,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from handrail.controllers.errors import HandrailError, unknown_name
-from handrail.datasets.arrow import numbers, to_numpy
+from handrail.datasets.arrow import flat_numbers, numbers, to_numpy
 from handrail.datasets.info_fields import MOST_EPISODES, MOST_FRAMES, features, rate, whole_number
 from handrail.datasets.layout import VIDEO_PATH, Layout
 from handrail.datasets.manifest import check_format
@@ -197,11 +197,8 @@ def _may_hold(metadata: pq.FileMetaData, group: int, episode: int) -> bool:
 def _to_numpy(column: pa.ChunkedArray, feature: Feature) -> np.ndarray:
     if feature.dtype == "string":
         return np.array([value or "" for value in column.to_pylist()], dtype=str)
-    values = column.combine_chunks()
-    while isinstance(values, pa.ExtensionArray) or pa.types.is_nested(values.type):
-        values = values.storage if isinstance(values, pa.ExtensionArray) else values.flatten()
     shape = () if feature.is_scalar else feature.shape
-    return to_numpy(values).astype(feature.dtype).reshape(len(column), *shape)
+    return flat_numbers(column).astype(feature.dtype).reshape(len(column), *shape)
 
 
 def _read_rows(path: Path) -> list[dict[str, Any]]:

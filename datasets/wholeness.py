@@ -13,7 +13,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from handrail.controllers.errors import HandrailError
-from handrail.datasets.arrow import to_numpy
+from handrail.datasets.arrow import flat_numbers
 from handrail.datasets.layout import Layout
 from handrail.datasets.manifest import Manifest
 from handrail.datasets.metadata import EpisodeRecord, FileSeal, read_record
@@ -157,10 +157,7 @@ def _rows_fault(path: Path, manifest: Manifest, record: EpisodeRecord) -> str:
 
 def _values(table: pa.Table, name: str) -> np.ndarray:
     """Return a column of numbers, (N,) or (N, d)."""
-    values = table.column(name).combine_chunks()
-    while isinstance(values, pa.ExtensionArray) or pa.types.is_nested(values.type):
-        values = values.storage if isinstance(values, pa.ExtensionArray) else values.flatten()
-    flat = to_numpy(values)
+    flat = flat_numbers(table.column(name))
     return flat if len(flat) == table.num_rows else flat.reshape(table.num_rows, -1)
 
 

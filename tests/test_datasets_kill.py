@@ -157,13 +157,14 @@ def _check_nothing_lost(root: Path, kept: list[bytes]) -> None:
 
 @pytest.mark.parametrize("torn", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_repair_killed_at_every_change(tmp_path, quick_disk, torn):
+    original = record(tmp_path / "original", 4, features=TINY_FEATURES)
+    kept = _damage(original)
+    if torn:
+        Layout(original).info.write_bytes(b"{torn")
     lived, k = False, 0
     while not lived:
         k += 1
-        root = record(tmp_path / str(k), 4, features=TINY_FEATURES)
-        kept = _damage(root)
-        if torn:
-            Layout(root).info.write_bytes(b"{torn")
+        root = shutil.copytree(original, tmp_path / str(k))
         lived = GUILLOTINE.run(root, k, lambda root=root: repair(root, set_aside_damaged=True))
         if k % 2:
             tear_staged_files(root)
