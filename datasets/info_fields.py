@@ -59,10 +59,9 @@ def _feature(key: str, value: dict[str, Any]) -> Feature:
     sizes = shape if isinstance(shape, list) else [-1]
     if not all(type(size) is int and size >= 0 for size in sizes) or math.prod(sizes) > _LARGEST:
         raise ValueError(f"feature {key[:60]!r}: expected a shape, got {_shown(shape)}")
-    fitting = names and (
-        dtype in ("video", "image") or len(names) == sizes[0]
-    )  # else they name something else
-    return Feature(dtype, tuple(sizes), tuple(names) if names and fitting else None)
+    if names and dtype not in ("video", "image") and [len(names)] != sizes[:1]:
+        names = None  # they name something else
+    return Feature(dtype, tuple(sizes), tuple(names) if names else None)
 
 
 def _shown(value: object) -> str:

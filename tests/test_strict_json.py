@@ -195,10 +195,10 @@ def test_names_of_something_else_are_no_names(root, names):
     assert len(summarize(root)) == 2
 
 
-@pytest.mark.parametrize("shape", [[1], [2, 2], [100]])
+@pytest.mark.parametrize("shape", [[], [1], [2, 2], [100]])
 def test_a_column_of_another_shape_is_one_line(root, shape):
     described = json.loads(Layout(root).info.read_bytes())["features"]
-    described["observation.state"] |= {"shape": shape, "names": None}
+    described["observation.state"] |= {"shape": shape, "names": ["a.pos"]}
     _spoil(root, {"features": described})
     with pytest.raises(HandrailError, match=r"\A[^\n]{1,500}\Z"):
         read_frames(root, 0)
