@@ -27,7 +27,7 @@ from handrail.policies.imitation.presets import policy_config, resolved
 from handrail.policies.imitation.refusal import in_one_line
 from handrail.policies.imitation.resume import as_json, check_data, check_settings
 from handrail.policies.imitation.source import Source, read_source
-from handrail.policies.imitation.trust import check_policy_folder
+from handrail.policies.imitation.trust import check_links, check_policy_folder
 
 if TYPE_CHECKING:
     from handrail.policies.imitation.run import Pipeline
@@ -52,6 +52,8 @@ def train(config: TrainConfig, quiet: bool = False) -> Path:
     began = None if checkpoint is None else read_meta(checkpoint / MODEL)[1]
     if checkpoint is not None and began is not None:
         check_settings(config, began)
+        for folder in (checkpoint, checkpoint / "training_state"):
+            check_links(folder)
         check_policy_folder(checkpoint / MODEL, asked=[policy_config(config)])
     source, steps = read_source(config, began), resolved(config).steps
     if began is not None:
@@ -142,7 +144,7 @@ def _foreign(folder: Path) -> list[str]:
 
 
 def _is_checkpoint(path: Path) -> bool:
-    return path.name in ("last", ".last") or path.name.strip(".").removesuffix(".old").isdigit()
+    return path.name in ("last", ".last") or path.name.strip(".").removesuffix(".old").isdecimal()
 
 
 def _meta(source: Source, steps: int) -> PolicyMeta:
