@@ -195,7 +195,7 @@ def _curve(path: Path, steps: int) -> Curve:
     """Return the curve of a checkpoint after so many steps."""
     curve = load_json(path, "the curve of a training run")
     rows = curve if isinstance(curve, list) and all(map(is_amounts, curve)) else []
-    if not rows or any(not _ROW <= row.keys() for row in rows) or rows[-1]["steps"] != steps:
+    if not rows or not all(row.keys() >= _ROW for row in rows) or rows[-1]["steps"] != steps:
         raise HandrailError(
             f"{str(path)!r}: expected the curve of a training run until step {steps}, got {curve!r:.80}"
         )
@@ -203,6 +203,5 @@ def _curve(path: Path, steps: int) -> Curve:
 
 
 def _broken(path: Path, reason: str | Exception) -> HandrailError:
-    return HandrailError(
-        f"{str(path)!r}: expected a checkpoint of this run, got {reason if isinstance(reason, str) else said(reason)}"
-    )
+    found = reason if isinstance(reason, str) else said(reason)
+    return HandrailError(f"{str(path)!r}: expected a checkpoint of this run, got {found}")

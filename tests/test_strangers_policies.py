@@ -207,6 +207,10 @@ def test_a_malformed_file_is_one_line(name, content, policy):
         ("training_seed", True),
         ("trained_on", {"episodes": "many"}),
         ("trained_on", []),
+        ("sizes", {"steps": "many"}),
+        ("sizes", {"options": []}),
+        ("actions", "recorded"),
+        ("actions", "intent"),
         ("nonsense", 1),
         ("interface", []),
         ("interface", {"actions": "realised"}),
@@ -236,3 +240,8 @@ def test_a_training_that_goes_on_runs_no_code_either(tmp_path):
     with pytest.raises(HandrailError, match="expected a registered name, got the class"):
         train(resumed, quiet=True)
     assert not (tmp_path / "marker").exists()
+    state = folder.parent / "training_state"
+    shutil.move(state / "rng_state.safetensors", tmp_path / "outside")
+    (state / "rng_state.safetensors").symlink_to(tmp_path / "outside")
+    with pytest.raises(HandrailError, match=r"rng_state.*found a link out of it"):
+        train(resumed, quiet=True)

@@ -164,7 +164,15 @@ def read_meta(folder: Path) -> tuple[PolicyInterface | None, PolicyMeta]:
     del content["format"]
     interface = content.pop("interface")
     check_meta(content, repr(str(path)))
-    return (None if interface is None else PolicyInterface.from_dict(interface)), PolicyMeta(**content)
+    meta = PolicyMeta(**content)
+    described = None if interface is None else PolicyInterface.from_dict(interface)
+    written = "recorded" if described is None else described.actions
+    if meta.actions != written or (written == "intent" and not meta.mode):
+        raise HandrailError(
+            f"{str(path)!r}: expected actions {written}, as its interface has them, and a mode for an intent;"
+            f" got {meta.actions} of mode {meta.mode!r}"
+        )
+    return described, meta
 
 
 def write_meta(folder: Path, interface: PolicyInterface | None, meta: PolicyMeta) -> None:

@@ -139,7 +139,7 @@ def check_policy(config: TrainConfig) -> None:
         "observation.environment_state": PolicyFeature(FeatureType.ENV, (2,)),
     }
     described.output_features = {"action": PolicyFeature(FeatureType.ACTION, (2,))}
-    with insaid(config):
+    with in_one_line(config):
         get_policy_class(config.policy)(described)
 
 

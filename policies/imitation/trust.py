@@ -33,7 +33,7 @@ def check_links(folder: Path) -> None:
         HandrailError: one is a link to somewhere else.
     """
     home = folder.resolve()
-    for path in sorted(folder.iterdir()):
+    for path in sorted(folder.glob("*")):
         if not path.resolve().is_relative_to(home):
             raise HandrailError(
                 f"{str(path)!r}: expected a file in the folder, found a link out of it; copy it with cp -rL"
@@ -88,8 +88,8 @@ def check_places(path: Path, settings: Any, known: Iterable[str]) -> None:
     for text in set(_texts(settings)).difference(known):
         if "/" in text or "\\" in text or (text and _is_there(text)):
             raise HandrailError(
-                f"{str(path)!r}: expected settings of the policy alone, got {text!r:.80}, which names a file, a"
-                " folder or a repository elsewhere"
+                f"{str(path)!r}: expected settings of the policy alone, got {text!r:.80}, which names a file,"
+                " a folder or a repository elsewhere"
             )
 
 
