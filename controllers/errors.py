@@ -2,12 +2,20 @@
 
 from collections.abc import Iterable
 
+_LONGEST = 300  # characters of what a library says: PyTorch names every tensor that does not fit
+
 
 class HandrailError(Exception):
     """Root of every error that Handrail raises on purpose.
 
     The message names the thing, what was expected, what came, and the choices; it is one line.
     """
+
+
+def said(error: BaseException) -> str:
+    """Return what an exception says, in one line of sane length; its type where it says nothing."""
+    words = " ".join(str(error).split()) or type(error).__name__
+    return words if len(words) <= _LONGEST else f"{words[:_LONGEST]} …"
 
 
 def not_installed(wanted_by: str, module: str, extra: str = "") -> HandrailError:

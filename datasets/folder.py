@@ -127,7 +127,7 @@ def set_aside(layout: Layout, paths: list[Path]) -> list[str]:
     """
     if not paths:
         return []
-    there = [int(path.name) for path in layout.damaged.glob("*") if path.name.isdigit()]
+    there = [int(path.name) for path in layout.damaged.glob("*") if path.name.isdecimal()]
     target = layout.damaged / f"{max(there, default=-1) + 1:03d}"
     make_folder(target)
     for path in paths:

@@ -7,7 +7,7 @@ import stat
 from pathlib import Path
 from typing import Any, NoReturn
 
-from handrail.controllers.errors import HandrailError
+from handrail.controllers.errors import HandrailError, said
 
 MOST_BYTES = 16 * 1024 * 1024
 MOST_DEPTH = 50
@@ -41,8 +41,7 @@ def load_json(path: Path, what: str) -> Any:
     try:
         return read_json(path)
     except (OSError, ValueError) as error:
-        said = " ".join(str(error).split())
-        raise HandrailError(f"{str(path)!r}: expected {what}, got {said}") from error
+        raise HandrailError(f"{str(path)!r}: expected {what}, got {said(error)}") from error
 
 
 def parse_json(data: bytes) -> Any:

@@ -5,6 +5,7 @@ are read here: networks and optimisers from `model.zip`, transitions from `repla
 """
 
 import json
+import re
 import shutil
 from collections.abc import Mapping
 from dataclasses import asdict, fields
@@ -17,15 +18,20 @@ from stable_baselines3 import SAC
 from stable_baselines3.common.buffers import ReplayBuffer
 from stable_baselines3.common.save_util import load_from_zip_file
 
-from handrail.controllers.errors import HandrailError
+from handrail.controllers.entries import is_amounts
+from handrail.controllers.errors import HandrailError, said
 from handrail.datasets.atomic import publish_folder, write_whole
 from handrail.datasets.strict_json import load_json
+from handrail.policies.imitation.trust import check_links
 from handrail.policies.rl_config import TrainRlConfig
+from handrail.policies.rl_figure import PUBLISHED
 from handrail.policies.rl_policy import Actor
 
 Curve = list[dict[str, float]]
 _NETWORKS, _TRANSITIONS, _CURVE = "model.zip", "replay_buffer.npz", "curve.json"
 _ARRAYS = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
+_ROW = {"steps", "updates", "seconds", *PUBLISHED}  # what every row of the curve has
+_STEPS = re.compile(r"\d{8}", re.ASCII)  # name of a checkpoint
 _ENTROPY = "log_ent_coef"
 _WRITTEN = ("config.json", "actor.json", "actor.npz", "curve.png")
 _OURS = {*_WRITTEN, *(f".{name}.partial" for name in _WRITTEN), "checkpoints", "actors", "tensorboard"}
@@ -50,14 +56,13 @@ def begin_run(config: TrainRlConfig) -> None:
     write_whole(settings, (json.dumps(asdict(config), indent=1) + "\n").encode())
 
 
-def check_resumes(config: TrainRlConfig) -> None:
-    """Check that there is a run that goes on with these settings.
+def check_resumes(config: TrainRlConfig) -> Path:
+    """Return the last checkpoint of a run that goes on with these settings.
 
     Raises:
         HandrailError: there is no checkpoint, or the settings differ from those that the run began with.
     """
-    if _last(config.folder) is None:
-        raise HandrailError(f"--resume: expected a run with a checkpoint in {config.folder}, found none")
+    last = _there(config.folder, "--resume")
     path = config.folder / "config.json"
     settings = load_json(path, "settings of a training run")
     names = {entry.name for entry in fields(TrainRlConfig)}
@@ -66,21 +71,20 @@ def check_resumes(config: TrainRlConfig) -> None:
     layers = settings["layers"]
     earlier = {**settings, "layers": tuple(layers) if isinstance(layers, list) else layers}
     config.check_continues(TrainRlConfig(**earlier))
+    return last
 
 
-def resume_run(config: TrainRlConfig, model: SAC) -> Curve:
-    """Give a model all that the last checkpoint has, transitions too; return the curve until then.
+def resume_run(last: Path, model: SAC) -> Curve:
+    """Give a model all that a checkpoint has, transitions too; return the curve until then.
 
     Args:
-        config: of the run.
+        last: checkpoint of the run.
         model: untrained, with the same settings.
 
     Raises:
         HandrailError: the checkpoint is broken, or of another version.
     """
-    last = _last(config.folder)
-    assert last is not None
-    curve = _curve(last / _CURVE)
+    curve = _curve(last / _CURVE, int(last.name))
     parameters, variables = _tensors(last / _NETWORKS)
     try:
         model.set_parameters(dict(parameters), exact_match=True, device="cpu")
@@ -100,9 +104,7 @@ def last_networks(folder: Path) -> Mapping[str, Any]:
     Raises:
         HandrailError: there is no checkpoint, or it is broken.
     """
-    last = _last(folder)
-    if last is None:
-        raise HandrailError(f"--start_from: expected a run with a checkpoint in {folder}, found none")
+    last = _there(folder, "--start_from")
     parameters, _ = _tensors(last / _NETWORKS)
     if "policy" not in parameters:
         raise _broken(last / _NETWORKS, "no policy")
@@ -133,8 +135,21 @@ def evaluated_actors(folder: Path, most: int) -> list[Actor]:
 
 
 def _last(folder: Path) -> Path | None:
-    found = sorted(path for path in (folder / "checkpoints").glob("*") if path.name.isdigit())
+    found = sorted(path for path in (folder / "checkpoints").glob("*") if _STEPS.fullmatch(path.name))
     return found[-1] if found else None
+
+
+def _there(folder: Path, flag: str) -> Path:
+    """Return the last checkpoint of somebody's run.
+
+    Raises:
+        HandrailError: there is none, or a file of it is a link to somewhere else.
+    """
+    last = _last(folder)
+    if last is None:
+        raise HandrailError(f"{flag}: expected a run with a checkpoint in {folder}, found none")
+    check_links(last)
+    return last
 
 
 def _tensors(path: Path) -> tuple[Mapping[str, Any], Mapping[str, torch.Tensor]]:
@@ -176,15 +191,17 @@ def _read_transitions(path: Path, buffer: ReplayBuffer) -> None:
     buffer.pos, buffer.full = place, bool(full)
 
 
-def _curve(path: Path) -> Curve:
+def _curve(path: Path, steps: int) -> Curve:
+    """Return the curve of a checkpoint after so many steps."""
     curve = load_json(path, "the curve of a training run")
-    rows = [row if isinstance(row, dict) else {} for row in curve] if isinstance(curve, list) else []
-    if not rows or not all({"steps", "updates", "seconds"} <= row.keys() for row in rows):
-        raise HandrailError(f"{str(path)!r}: expected the curve of a training run, got {curve!r:.80}")
+    rows = curve if isinstance(curve, list) and all(map(is_amounts, curve)) else []
+    if not rows or not all(row.keys() >= _ROW for row in rows) or rows[-1]["steps"] != steps:
+        raise HandrailError(
+            f"{str(path)!r}: expected the curve of a training run until step {steps}, got {curve!r:.80}"
+        )
     return rows
 
 
-def _broken(path: Path, reason: object) -> HandrailError:
-    return HandrailError(
-        f"{str(path)!r}: expected a checkpoint of this run, got {' '.join(str(reason).split())}"
-    )
+def _broken(path: Path, reason: str | Exception) -> HandrailError:
+    found = reason if isinstance(reason, str) else said(reason)
+    return HandrailError(f"{str(path)!r}: expected a checkpoint of this run, got {found}")

@@ -146,9 +146,9 @@ def _model(config: TrainRlConfig) -> SAC:
 
 
 def _resumed(config: TrainRlConfig) -> tuple[SAC, Curve]:
-    check_resumes(config)
+    last = check_resumes(config)
     model = _model(config)
-    curve = resume_run(config, model)
+    curve = resume_run(last, model)
     model.set_random_seed(config.seed + model.num_timesteps)  # else the same goals would come again
     return model, curve
 

@@ -31,7 +31,7 @@ def _evaluate(config: EvaluateConfig) -> int:
     if config.json:
         console.print(f"Written: {config.json}")
     if config.video:
-        trouble = film(config)
+        trouble = film(config, content)
         console.print(f"Without a video: {trouble}" if trouble else f"Video: {config.video}")
     for reason in reasons:
         print(f"error: {reason}", file=sys.stderr)

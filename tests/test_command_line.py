@@ -27,7 +27,7 @@ SOURCES = [
     for room in ("collect", "controllers", "datasets", "policies", "scripts")
     for path in (ROOT / room).rglob("*.py")
 ]
-STORED = ("inspect", "replay", "train", "record")
+STORED = ("inspect", "repair", "replay", "train", "record")
 LISTS = (Names, Numbers, Words)
 
 

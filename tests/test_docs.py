@@ -39,7 +39,8 @@ from handrail.policies.study.config import StudyConfig
 from handrail.scripts import cli
 
 ROOT = Path(__file__).parent.parent
-DOCUMENTS = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md")
+DOCUMENTS = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "SECURITY.md")
+ROOMS = "controllers|datasets|collect|policies|scripts|tests|docs"
 CONFIGS = {
     "handrail-record": RecordConfig,
     "handrail-replay": ReplayConfig,
@@ -128,6 +129,12 @@ def test_links_lead_somewhere(document):
     links = re.findall(r"\]\(([^)#]+)\)|src=\"([^\"]+)\"", text(document))
     for link in ("".join(pair) for pair in links):
         assert link.startswith(("http", "mailto")) or (ROOT / link).exists(), link
+
+
+@pytest.mark.parametrize("document", DOCUMENTS)
+def test_files_that_are_named_are_there(document):
+    named = re.findall(rf"`((?:{ROOMS})/[\w/.]+)`", text(document))
+    assert [path for path in named if not (ROOT / path).exists()] == []
 
 
 def test_modes_and_tasks_are_all_there():

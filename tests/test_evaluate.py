@@ -255,7 +255,8 @@ def test_a_rollout_can_be_filmed(folder, tmp_path):
     from handrail.policies.imitation.evaluation_video import film
 
     path = tmp_path / "film.mp4"
-    assert film(config(folder, "chase", video=str(path), time_limit=0.5), load) == ""
+    asked = config(folder, "chase", video=str(path), time_limit=0.5, episodes=1)
+    assert film(asked, evaluate(asked, load=load), load) == ""
     with av.open(str(path)) as video:
         pictures = [frame.to_ndarray(format="rgb24") for frame in video.decode(video=0)]
     assert len(pictures) == 10

@@ -15,6 +15,7 @@ from handrail.policies.imitation.checkpoint import NAME
 from handrail.policies.imitation.evaluate_config import EvaluateConfig
 from handrail.policies.imitation.evaluation import UnevaluatedError, evaluate
 from handrail.policies.imitation.evaluation_table import evaluation_table
+from handrail.policies.imitation.evaluation_video import film
 
 FEATURES = {
     "observation.state": {"type": "STATE", "shape": [26]},
@@ -171,6 +172,15 @@ def test_one_bad_policy_is_named_and_the_others_run(workers, folder, tmp_path):
     assert json.loads(file.read_text()) == raised.value.content
     runs = raised.value.content["arms"]["ee intent"]
     assert [(run["training_seed"], len(run["rollouts"])) for run in runs] == [(0, 3), (1, 3)]
+
+
+@pytest.mark.needs_gl
+def test_the_first_policy_that_drove_is_filmed(folder, tmp_path):
+    asked = config(folder / "broken", folder / "good", video=str(tmp_path / "film.mp4"))
+    with pytest.raises(UnevaluatedError) as raised:
+        evaluate(asked, load=unable)
+    assert film(asked, raised.value.content, unable) == ""
+    assert (tmp_path / "film.mp4").stat().st_size > 0
 
 
 def test_the_command_names_the_bad_policy_and_ends_with_1(honest, tmp_path):

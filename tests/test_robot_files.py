@@ -90,6 +90,13 @@ def test_a_urdf_lies_beside_the_description_and_is_one(tmp_path):
         load_description(path)
 
 
+@pytest.mark.parametrize("urdf", [".", "./", "..", "/etc/passwd", "a/../../b.urdf"])
+def test_a_urdf_elsewhere_is_one_line(urdf, tmp_path):
+    with pytest.raises(HandrailError, match="expected a path inside a package, or beside") as raised:
+        load_description(beside(tmp_path, urdf))
+    assert "\n" not in str(raised.value)
+
+
 @pytest.mark.parametrize(
     "content",
     [

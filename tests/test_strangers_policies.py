@@ -3,6 +3,7 @@
 import json
 import os
 import pickle
+import re
 import shutil
 
 import pytest
@@ -13,8 +14,6 @@ from training_helpers import tiny, write_dataset
 
 from handrail.controllers.errors import HandrailError
 from handrail.policies.imitation.checkpoint import load_policy, model_folder
-from handrail.policies.imitation.evaluate_config import EvaluateConfig
-from handrail.policies.imitation.evaluation import evaluate
 from handrail.policies.imitation.training import train
 
 pytestmark = pytest.mark.filterwarnings("ignore:.*(torchcodec|pin_memory|video).*")
@@ -44,14 +43,13 @@ def add_step(file, **entry):
 
 
 def refused(folder, words):
-    """The law: one line for the loader, the evaluation and the command."""
+    """The law: one line for the loader and for the command, which evaluates."""
     with pytest.raises(HandrailError, match=words) as raised:
         load_policy(folder)
     assert "\n" not in str(raised.value)
-    with pytest.raises(HandrailError, match=words):
-        evaluate(EvaluateConfig(policy=(str(folder),), episodes=1, time_limit=0.1))
     done = command("--policy", folder, name="evaluate")
     assert (done.returncode, done.stderr.count("\n")) == (2, 1), done.stderr
+    assert re.search(words, done.stderr)
 
 
 class Touch:
@@ -165,10 +163,25 @@ def test_settings_name_nothing_that_lies_elsewhere(place, policy, tmp_path, monk
     file = policy / PROCESSORS[0]
     before = file.read_text()
     add_step(file, registry_name="action_tokenizer_processor", config=config)
-    refused(policy, "names .*evil.*elsewhere")
+    refused(policy, "evil.*names .*elsewhere")
     file.write_text(before)
     change(policy / "config.json", vision_backbone=name)
-    refused(policy, "names .*evil.*elsewhere")
+    refused(policy, "evil.*names .*elsewhere")
+
+
+def test_a_policy_is_loaded_beside_folders_of_any_name(policy, tmp_path, monkeypatch):
+    """Its kind is `act`, and so may be the folder that it was trained into."""
+    monkeypatch.chdir(tmp_path)
+    for name in ("act", "cpu", "STATE", "ENV", "ACTION", "normalizer_processor"):
+        (tmp_path / name).mkdir()
+    assert load_policy(policy).meta
+
+
+def test_what_pytorch_says_at_length_is_cut(policy):
+    change(policy / "config.json", dim_model=64)
+    with pytest.raises(HandrailError, match=r"size mismatch .* …$") as raised:
+        load_policy(policy)
+    assert len(str(raised.value)) < 600
 
 
 @pytest.mark.parametrize("name", ["config.json", "handrail.json", *PROCESSORS])
@@ -194,6 +207,10 @@ def test_a_malformed_file_is_one_line(name, content, policy):
         ("training_seed", True),
         ("trained_on", {"episodes": "many"}),
         ("trained_on", []),
+        ("sizes", {"steps": "many"}),
+        ("sizes", {"options": []}),
+        ("actions", "recorded"),
+        ("actions", "intent"),
         ("nonsense", 1),
         ("interface", []),
         ("interface", {"actions": "realised"}),
@@ -223,3 +240,8 @@ def test_a_training_that_goes_on_runs_no_code_either(tmp_path):
     with pytest.raises(HandrailError, match="expected a registered name, got the class"):
         train(resumed, quiet=True)
     assert not (tmp_path / "marker").exists()
+    state = folder.parent / "training_state"
+    shutil.move(state / "rng_state.safetensors", tmp_path / "outside")
+    (state / "rng_state.safetensors").symlink_to(tmp_path / "outside")
+    with pytest.raises(HandrailError, match=r"rng_state.*found a link out of it"):
+        train(resumed, quiet=True)

@@ -121,6 +121,30 @@ def test_a_malformed_file_of_a_checkpoint_is_one_line(name, content, run):
     refused(run, name.replace(".", r"\."))
 
 
+@pytest.mark.parametrize(
+    "change",
+    [{"updates": "x"}, {"seconds": {}}, {"success": None}, {"steps": -40}, {"steps": 41}, {"updates": 1e999}],
+)
+def test_a_curve_of_other_things_than_numbers_is_one_line(change, run):
+    file = checkpoint(run) / "curve.json"
+    *rows, last = json.loads(file.read_text())
+    file.write_text(json.dumps([*rows, last | change]))
+    refused(run, r"curve\.json.*expected the curve of a training run")
+
+
+def test_a_checkpoint_of_a_name_that_none_has_is_none(run):
+    checkpoint(run).rename(checkpoint(run).with_name("9" * 30))
+    refused(run, "expected a run with a checkpoint")
+
+
+@pytest.mark.parametrize("name", ["model.zip", "replay_buffer.npz", "curve.json"])
+def test_no_file_is_a_link_out_of_the_checkpoint(name, run, tmp_path):
+    shutil.move(checkpoint(run) / name, tmp_path / "outside")
+    (checkpoint(run) / name).symlink_to(tmp_path / "outside")
+    refused(run, f"{name}.*found a link out of it")
+    refused(other(run, tmp_path), f"{name}.*found a link out of it")
+
+
 @pytest.mark.parametrize("content", ["", "[]", "[" * 200_000, "{}", '{"nonsense": 1}', '{"layers": 3}'])
 def test_malformed_settings_are_one_line(content, run):
     (run.folder / "config.json").write_text(content)
@@ -132,7 +156,7 @@ def test_malformed_settings_are_one_line(content, run):
 def test_a_run_goes_on_with_all_that_it_had(honest):
     """Law: networks, optimisers, temperature, transitions and counters are those of the checkpoint."""
     model = _model(honest)
-    curve = resume_run(honest, model)
+    curve = resume_run(checkpoint(honest), model)
     place = checkpoint(honest)
     from stable_baselines3 import SAC
 

@@ -73,7 +73,7 @@ class RealisedActions:
 
 @dataclass(frozen=True)
 class IntentActions:
-    """The values on the operator's channels, which of them he owns where that changes, and the gripper.
+    """The values on the operator's channels, which of them they own where that changes, and the gripper.
 
     Attributes:
         view: where the robot is in the observation.

@@ -138,7 +138,7 @@ def _plain(place: Path, settings: Mapping[str, Any], config: EvaluateConfig) -> 
         dataset_draw=0,
         trained_on={},
         policy=settings["type"],
-        steps=int(step) if step.isdigit() else 0,
+        steps=int(step) if step.isdecimal() else 0,
     )
 
 

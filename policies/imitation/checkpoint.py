@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray
-from handrail.controllers.errors import HandrailError
+from handrail.controllers.errors import HandrailError, said
 from handrail.datasets.atomic import sync_folder, write_whole
 from handrail.datasets.strict_json import load_json
 from handrail.policies.imitation.interface import PolicyInterface
@@ -121,8 +121,7 @@ class TrainedPolicy:
             with torch.inference_mode():
                 return self.after(self.policy.select_action(self.before(batch)))[0].cpu().numpy()
         except Exception as error:  # of LeRobot and all below it
-            words = " ".join(str(error).split()) or type(error).__name__
-            raise HandrailError(f"policy {self.policy.config.type}: cannot act: {words}") from error
+            raise HandrailError(f"policy {self.policy.config.type}: cannot act: {said(error)}") from error
 
 
 def load_policy(folder: str | Path, device: str = "cpu") -> TrainedPolicy:
@@ -145,7 +144,7 @@ def load_policy(folder: str | Path, device: str = "cpu") -> TrainedPolicy:
         policy = get_policy_class(kind).from_pretrained(place, config=config)
         before, after = make_pre_post_processors(config, str(place), preprocessor_overrides=override)
     except Exception as error:  # of LeRobot and all below it: whatever the files hold, they are refused
-        raise HandrailError(f"policy {str(place)!r}: {' '.join(str(error).split())}") from error
+        raise HandrailError(f"policy {str(place)!r}: {said(error)}") from error
     policy.eval()
     policy.eval = lambda: policy  # LeRobot asks for it twice an action: a third of its time
     return TrainedPolicy(interface, meta, policy, before, after)
@@ -165,7 +164,15 @@ def read_meta(folder: Path) -> tuple[PolicyInterface | None, PolicyMeta]:
     del content["format"]
     interface = content.pop("interface")
     check_meta(content, repr(str(path)))
-    return (None if interface is None else PolicyInterface.from_dict(interface)), PolicyMeta(**content)
+    meta = PolicyMeta(**content)
+    described = None if interface is None else PolicyInterface.from_dict(interface)
+    written = "recorded" if described is None else described.actions
+    if meta.actions != written or (written == "intent" and not meta.mode):
+        raise HandrailError(
+            f"{str(path)!r}: expected actions {written}, as its interface has them, and a mode for an intent;"
+            f" got {meta.actions} of mode {meta.mode!r}"
+        )
+    return described, meta
 
 
 def write_meta(folder: Path, interface: PolicyInterface | None, meta: PolicyMeta) -> None:
@@ -177,7 +184,7 @@ def write_meta(folder: Path, interface: PolicyInterface | None, meta: PolicyMeta
 
 def last_checkpoint(training: Path) -> Path | None:
     """Return the whole checkpoint with the most updates in a training's folder; None if there is none."""
-    found = [path for path in (training / "checkpoints").glob("*") if path.name.isdigit()]
+    found = [path for path in (training / "checkpoints").glob("*") if path.name.isdecimal()]
     return max(found, key=lambda path: int(path.name), default=None)
 
 

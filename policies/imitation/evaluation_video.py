@@ -1,6 +1,8 @@
 """A rollout as a video."""
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from handrail.collect.film import SIZE, Filmer
 from handrail.collect.gl import graphics_trouble
@@ -11,17 +13,21 @@ from handrail.policies.imitation.evaluation import load_trained
 from handrail.policies.imitation.rollout import Load, Rollout, run_rollout
 
 
-def film(config: EvaluateConfig, load: Load = load_trained) -> str:
-    """Film the first rollout of the settings; return why there is no video, empty if there is one.
+def film(config: EvaluateConfig, content: Mapping[str, Any], load: Load = load_trained) -> str:
+    """Film the first rollout of the first policy that drove; return why there is no video, or nothing.
 
     Args:
-        config: what is evaluated.
+        config: what was evaluated.
+        content: of the evaluation file.
         load: reads the policy of a checkpoint folder.
     """
     trouble = graphics_trouble()
     if trouble:
         return trouble
-    arm = arms(config, refused=[])[0]
+    drove = {entry.get("checkpoint") for entries in content["arms"].values() for entry in entries}
+    arm = next((arm for arm in arms(config, refused=[]) if arm.checkpoint.digest in drove), None)
+    if arm is None:
+        return "no policy drove"
     rollout = Rollout(arm, config.seeds[0])
     with Filmer(Path(config.video).expanduser(), arm.checkpoint.meta.fps, arm.label, _words) as filmer:
         run_rollout(rollout, load, (filmer,), SIZE)

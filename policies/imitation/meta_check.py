@@ -26,7 +26,7 @@ _ENTRIES: Mapping[str, Entry] = {
     "steps": _COUNT,
     "training": _SETTINGS,
     "versions": _SETTINGS,
-    "sizes": _SETTINGS,
+    "sizes": Entry("settings by name", lambda value: _sizes(value), needed=False),
     "episodes": Entry(
         "numbers of episodes",
         lambda value: isinstance(value, list) and all(map(is_count, value)),
@@ -34,6 +34,10 @@ _ENTRIES: Mapping[str, Entry] = {
     ),
     "data": Entry("a digest", is_name, needed=False),
 }
+
+
+def _sizes(value: Any) -> bool:
+    return is_table(value) and is_count(value.get("steps", 0)) and is_table(value.get("options", {}))
 
 
 def check_meta(content: Mapping[str, Any], where: str) -> None:

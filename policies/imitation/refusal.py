@@ -4,7 +4,7 @@ import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from handrail.controllers.errors import HandrailError
+from handrail.controllers.errors import HandrailError, said
 from handrail.policies.imitation.config import TrainConfig
 
 _REFUSALS = (ValueError, TypeError, AssertionError, ImportError, RuntimeError)
@@ -20,11 +20,11 @@ def in_one_line(config: TrainConfig) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        raise HandrailError(f"training in {config.output}: {_words(error)}") from error
+        raise HandrailError(f"training in {config.output}: {said(error)}") from error
     except _REFUSALS as error:
         if not _of_lerobot(error):
             raise
-        raise HandrailError(f"policy {config.policy}: {_words(error)}") from error
+        raise HandrailError(f"policy {config.policy}: {said(error)}") from error
 
 
 def _of_lerobot(error: BaseException) -> bool:
@@ -32,7 +32,3 @@ def _of_lerobot(error: BaseException) -> bool:
     modules = [str(frame.f_globals.get("__name__")) for frame, _ in traceback.walk_tb(error.__traceback__)]
     packages = [name.partition(".")[0] for name in modules if name.startswith(("handrail.", "lerobot."))]
     return packages[-1:] == ["lerobot"]
-
-
-def _words(error: BaseException) -> str:
-    return " ".join(str(error).split()) or type(error).__name__

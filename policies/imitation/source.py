@@ -143,10 +143,9 @@ def read_source(config: TrainConfig, began: PolicyMeta | None = None) -> Source:
         _check_one_mode(selection)
     if config.actions == "recorded":
         interface, features, columns = None, *_recorded(info, selection, config)
+        _check_inputs(config, info, features)
     else:
         interface, features, columns = _interpreted(info, selection, config.actions)
-    if config.actions == "recorded":
-        _check_inputs(config, info, features)
     if config.images:
         features |= _cameras(info)
     return Source(config, info, selection, interface, features, columns | _counters(selection, info.fps))

@@ -27,7 +27,7 @@ from handrail.policies.imitation.presets import policy_config, resolved
 from handrail.policies.imitation.refusal import in_one_line
 from handrail.policies.imitation.resume import as_json, check_data, check_settings
 from handrail.policies.imitation.source import Source, read_source
-from handrail.policies.imitation.trust import check_policy_folder
+from handrail.policies.imitation.trust import check_links, check_policy_folder
 
 if TYPE_CHECKING:
     from handrail.policies.imitation.run import Pipeline
@@ -49,10 +49,7 @@ def train(config: TrainConfig, quiet: bool = False) -> Path:
     """
     config.check()
     checkpoint = _begin(config)
-    began = None if checkpoint is None else read_meta(checkpoint / MODEL)[1]
-    if checkpoint is not None and began is not None:
-        check_settings(config, began)
-        check_policy_folder(checkpoint / MODEL, asked=[policy_config(config)])
+    began = None if checkpoint is None else _goes_on(config, checkpoint)
     source, steps = read_source(config, began), resolved(config).steps
     if began is not None:
         check_data(source, began)
@@ -63,6 +60,16 @@ def train(config: TrainConfig, quiet: bool = False) -> Path:
     last = last_checkpoint(config.folder)
     assert last is not None
     return last / MODEL
+
+
+def _goes_on(config: TrainConfig, checkpoint: Path) -> PolicyMeta:
+    """Return what a checkpoint says of itself, once it is sure to do no harm and to fit."""
+    for folder in (checkpoint, checkpoint / "training_state"):
+        check_links(folder)
+    _, began = read_meta(checkpoint / MODEL)
+    check_settings(config, began)
+    check_policy_folder(checkpoint / MODEL, asked=[policy_config(config)])
+    return began
 
 
 def _run(config: TrainConfig, source: Source, steps: int, checkpoint: Path | None, quiet: bool) -> None:
@@ -142,7 +149,7 @@ def _foreign(folder: Path) -> list[str]:
 
 
 def _is_checkpoint(path: Path) -> bool:
-    return path.name in ("last", ".last") or path.name.strip(".").removesuffix(".old").isdigit()
+    return path.name in ("last", ".last") or path.name.strip(".").removesuffix(".old").isdecimal()
 
 
 def _meta(source: Source, steps: int) -> PolicyMeta:

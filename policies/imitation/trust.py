@@ -21,7 +21,9 @@ from handrail.datasets.strict_json import load_json
 CONFIG, WEIGHTS = "config.json", "model.safetensors"
 PROCESSORS = ("policy_preprocessor.json", "policy_postprocessor.json")
 # notes, by which nothing is loaded
-_SAID = ("pretrained_path", "pretrained_revision", "repo_id", "license", "tags")
+_NOTES = ("pretrained_path", "pretrained_revision", "repo_id", "license", "tags")
+# what names no place: kinds are registered names, the device is the user's, a state file is checked by itself
+_NO_PLACE = ("type", "device", "registry_name", "state_file")
 
 
 def check_links(folder: Path) -> None:
@@ -31,7 +33,7 @@ def check_links(folder: Path) -> None:
         HandrailError: one is a link to somewhere else.
     """
     home = folder.resolve()
-    for path in sorted(folder.iterdir()):
+    for path in sorted(folder.glob("*")):
         if not path.resolve().is_relative_to(home):
             raise HandrailError(
                 f"{str(path)!r}: expected a file in the folder, found a link out of it; copy it with cp -rL"
@@ -52,7 +54,7 @@ def policy_settings(folder: Path) -> dict[str, Any]:
     kind = settings.get("type")
     if not isinstance(kind, str) or kind not in kinds:
         raise HandrailError(f"{str(path)!r}: {unknown_name('policy', kind, kinds)}")
-    return {key: value for key, value in settings.items() if key not in _SAID}
+    return {key: value for key, value in settings.items() if key not in _NOTES}
 
 
 def check_policy_folder(folder: Path, asked: Iterable[Any] = ()) -> dict[str, Any]:
@@ -68,16 +70,16 @@ def check_policy_folder(folder: Path, asked: Iterable[Any] = ()) -> dict[str, An
     check_links(folder)
     settings = policy_settings(folder)
     known = {*_texts(_defaults(registered_policies()[settings["type"]])), *_texts(list(asked))}
-    check_names(folder / CONFIG, settings, known)
+    check_places(folder / CONFIG, settings, known)
     for name in PROCESSORS:
         for step in _steps(folder / name, settings["type"]):
-            check_names(folder / name, step, known)
+            check_places(folder / name, step, known)
     if not (folder / WEIGHTS).is_file():
         raise HandrailError(f"policy {str(folder)!r}: expected weights in {WEIGHTS}, found none")
     return settings
 
 
-def check_names(path: Path, settings: Any, known: Iterable[str]) -> None:
+def check_places(path: Path, settings: Any, known: Iterable[str]) -> None:
     """Check that settings name no other place.
 
     Raises:
@@ -86,8 +88,8 @@ def check_names(path: Path, settings: Any, known: Iterable[str]) -> None:
     for text in set(_texts(settings)).difference(known):
         if "/" in text or "\\" in text or (text and _is_there(text)):
             raise HandrailError(
-                f"{str(path)!r}: expected settings of the policy alone, got one that names {text!r:.80},"
-                " which lies elsewhere"
+                f"{str(path)!r}: expected settings of the policy alone, got {text!r:.80}, which names a file,"
+                " a folder or a repository elsewhere"
             )
 
 
@@ -147,13 +149,13 @@ def _defaults(kind: type) -> Iterator[Any]:
 
 
 def _texts(content: Any) -> Iterator[str]:
-    """Yield every text in settings, whatever holds it; not the keys."""
+    """Yield every text in settings that may name a place, whatever holds it; not the keys."""
     if isinstance(content, str):
         yield str.__str__(content)  # the value of an enumeration too
     elif isinstance(content, PurePath):
         yield str(content)
     elif isinstance(content, Mapping):
-        content = content.values()
+        content = [value for key, value in content.items() if key not in _NO_PLACE]
     elif hasattr(content, "__dataclass_fields__"):
         content = vars(content).values()
     if isinstance(content, Iterable) and not isinstance(content, str | bytes):
