@@ -208,7 +208,7 @@ class CollisionModel:
         """Return the model as the obstacles are now: this one; another one when some came, went or changed.
 
         Raises:
-            HandrailError: two obstacles share a name, or one is held by a frame that the robot lacks.
+            HandrailError: two things share a name, or one is held by a frame that the robot lacks.
         """
         if _kept(obstacles) != self._kept:
             return CollisionModel(self._robot, obstacles)
