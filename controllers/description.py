@@ -198,7 +198,7 @@ def _find_urdf(urdf: str, folder: Path) -> tuple[Path, Path]:
     """
     name = PurePosixPath(urdf)
     beside = folder / name
-    if name.is_absolute() or ".." in name.parts or not _inside(beside, folder):
+    if not name.parts or name.is_absolute() or ".." in name.parts or not _inside(beside, folder):
         raise HandrailError(f"URDF {urdf}: expected a path inside a package, or beside the description")
     if beside.is_file():
         return beside, folder

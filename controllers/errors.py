@@ -2,6 +2,8 @@
 
 from collections.abc import Iterable
 
+_LONGEST = 80  # characters of what came that a message shows
+
 
 class HandrailError(Exception):
     """Root of every error that Handrail raises on purpose.
@@ -27,6 +29,15 @@ def not_installed(wanted_by: str, module: str, extra: str = "") -> HandrailError
     )
 
 
+def told(value: object) -> str:
+    """Return what came, in one line of few words; an integer of very many digits has none."""
+    try:
+        text = " ".join(repr(value).split())
+    except ValueError:
+        return "an integer that is too large"
+    return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 1]}…"
+
+
 def unknown_name(thing: str, name: object, choices: Iterable[str]) -> HandrailError:
     """Return the error for a name that is none of the choices."""
-    return HandrailError(f"unknown {thing} {name!r}: expected one of {', '.join(sorted(choices))}")
+    return HandrailError(f"unknown {thing} {told(name)}: expected one of {', '.join(sorted(choices))}")
