@@ -13,6 +13,7 @@ from handrail.collect.env import HandrailEnv
 from handrail.collect.recorded_settings import recorded_settings
 from handrail.collect.video_file import VideoFile
 from handrail.controllers.arrays import FloatArray
+from handrail.controllers.entries import is_count
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.quality.safety import contacts_begun
 from handrail.datasets.reader import read_episodes, read_frames, read_info
@@ -76,6 +77,7 @@ def replay_episode(
     env = build_env(config, info.fps, render=bool(pictures or video))
     with contextlib.ExitStack() as stack:
         stack.callback(env.close)
+        _check_state(frames["observation.state"], env, f"episode {episode} of {root}")
         camera = _Camera(env, _moments(len(frames["action"]), pictures), video, stack)
         states, last = _run(env, row["seed"], frames["action"], camera)
     difference = np.abs(states - frames["observation.state"])
@@ -96,9 +98,19 @@ def _row(root: Path, episode: int) -> dict[str, Any]:
     if not 0 <= episode < len(rows):
         raise HandrailError(f"--episode {episode}: expected one of 0 to {len(rows) - 1} in {root}")
     row = rows[episode]
-    if not isinstance(row.get("seed"), int):
+    if not is_count(row.get("seed")):
         raise HandrailError(f"dataset {root}: expected one that handrail-record made, found no seed")
     return row
+
+
+def _check_state(states: np.ndarray, env: HandrailEnv, where: str) -> None:
+    """Check that recorded states, (T, s), are of the robot that the episode names."""
+    size, numbers = states.shape[1:], len(env.agent_names)
+    if size != (numbers,) or not np.issubdtype(states.dtype, np.floating):
+        raise HandrailError(
+            f"{where}: expected {numbers} numbers as observation.state of {env.model.description.name}, "
+            f"got {size} of {states.dtype}"
+        )
 
 
 def _run(
