@@ -233,16 +233,9 @@ class RepairConfig:
     Exit code 0 only if everything that was saved is in the dataset and whole, else 1.
     """
 
-    folder: tyro.conf.Positional[str] = ""
-    """Folder of the dataset; or say --dataset.root."""
     dataset: StoredConfig = field(default_factory=StoredConfig)
     set_aside: bool = False
     """Move episodes that cannot be mended to .damaged, and those after them up; without, they stay."""
-
-    @property
-    def root(self) -> Path:
-        """The folder of the dataset."""
-        return Path(self.folder).expanduser() if self.folder else self.dataset.folder
 
 
 @dataclass(frozen=True)
@@ -278,7 +271,7 @@ class DemoConfig:
         Raises:
             HandrailError: it is given twice.
         """
-        return Path(only_one(self.place, self.root, "--root") or "outputs/demo")
+        return Path(only_one(self.place, self.root, "--root") or "outputs/demo").expanduser()
 
 
 def check_fps(fps: int) -> None:

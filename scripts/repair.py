@@ -13,7 +13,7 @@ def _repair(config: RepairConfig) -> int:
     """Return 0 only if everything that was saved is in the dataset and whole."""
     from handrail.datasets.repair import repair
 
-    report = repair(config.root, config.set_aside)
+    report = repair(config.dataset.folder, config.set_aside)
     print(report)
     return 0 if report.complete else cli.FAILED
 
