@@ -78,7 +78,8 @@ def replay_episode(
     with contextlib.ExitStack() as stack:
         stack.callback(env.close)
         _check_state(frames["observation.state"], env, f"episode {episode} of {root}")
-        camera = _Camera(env, _moments(len(frames["action"]), pictures), video, stack)
+        film = stack.enter_context(VideoFile(video, env.render_size, env.fps)) if video else None
+        camera = _Camera(env, _moments(len(frames["action"]), pictures), film)
         states, last = _run(env, row["seed"], frames["action"], camera)
     difference = np.abs(states - frames["observation.state"])
     replay = Replay(
@@ -135,23 +136,17 @@ def _moments(frames: int, pictures: int) -> set[int]:
 class _Camera:
     """Takes pictures at some moments, and films all of them if there is a file for it."""
 
-    def __init__(
-        self, env: HandrailEnv, moments: set[int], video: Path | None, stack: contextlib.ExitStack
-    ) -> None:
-        self._env, self._moments, self._video, self._stack = env, moments, video, stack
-        self._film: VideoFile | None = None
+    def __init__(self, env: HandrailEnv, moments: set[int], film: VideoFile | None) -> None:
+        self._env, self._moments, self._film = env, moments, film
         self.taken: list[NDArray[np.uint8]] = []
 
     def look(self, index: int) -> None:
         """Take the picture of this moment, if somebody wants it."""
         wanted = index in self._moments
-        picture = self._env.render() if wanted or self._video else None
+        picture = self._env.render() if wanted or self._film else None
         if picture is None:
             return
         if wanted:
             self.taken.append(picture)
-        if self._video and self._film is None:  # only now: without OpenGL there shall be no file
-            film = VideoFile(self._video, self._env.render_size, self._env.fps)
-            self._film = self._stack.enter_context(film)
         if self._film:
             self._film.add(picture)

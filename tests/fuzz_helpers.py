@@ -22,6 +22,7 @@ from handrail.controllers.model import RobotModel
 from handrail.controllers.mpc import MaskedMpc
 from handrail.controllers.problem import Plan, Problem
 from handrail.controllers.shape import Shape
+from handrail.controllers.slacks import MOVING
 
 PERIOD = 0.05  # [s]
 CLEARANCE = 0.15  # of the robot at the start [m]
@@ -167,7 +168,7 @@ class _Around:
     def told(self, state):
         self._collision.observe(self._scene.obstacles(state.time))
         distances = self._collision.values(state.q[None])[0]
-        still = distances[self._collision.speeds == 0.0].min()
+        still = distances[self._collision.kinds != MOVING].min()
         return f"robot at {np.abs(state.v).max():.2f}, nearest that stands {still:.3f} m"
 
 
