@@ -271,7 +271,7 @@ class DemoConfig:
         Raises:
             HandrailError: it is given twice.
         """
-        return Path(only_one(self.place, self.root, "--root") or "outputs/demo")
+        return Path(only_one(self.place, self.root, "--root") or "outputs/demo").expanduser()
 
 
 def check_fps(fps: int) -> None:

@@ -1,11 +1,14 @@
 """Pictures of an episode, side by side, for people."""
 
+import io
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
+
+from handrail.datasets.atomic import explained, write_whole
 
 
 def contact_sheet(pictures: Sequence[NDArray[np.uint8]], columns: int = 4, gap: int = 6) -> NDArray[np.uint8]:
@@ -27,5 +30,12 @@ def contact_sheet(pictures: Sequence[NDArray[np.uint8]], columns: int = 4, gap: 
 
 
 def save_sheet(pictures: Sequence[NDArray[np.uint8]], path: Path) -> None:
-    """Write a contact sheet as a picture file."""
-    Image.fromarray(contact_sheet(pictures)).save(path)
+    """Write a contact sheet as a .png file.
+
+    Raises:
+        HandrailError: it cannot be written.
+    """
+    stream = io.BytesIO()
+    Image.fromarray(contact_sheet(pictures)).save(stream, format="png")
+    with explained(str(path)):
+        write_whole(path, stream.getvalue())

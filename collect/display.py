@@ -9,7 +9,7 @@ from typing import Any
 from handrail.collect.env import HandrailEnv
 from handrail.collect.rerun_drawing import Drawing
 from handrail.collect.viewer import Viewer
-from handrail.controllers.errors import HandrailError, not_installed, said
+from handrail.controllers.errors import HandrailError, message_of, not_installed
 from handrail.datasets.frames import Moment
 
 _PERIOD = 0.2  # between two transfers to the viewer [s]
@@ -110,7 +110,7 @@ class Display:
             self._complain(error)
 
     def _complain(self, error: Exception) -> None:
-        self._say(f"display: {said(error)}; the recording goes on")
+        self._say(f"display: {message_of(error)}; the recording goes on")
 
     def _read(self) -> bytes:
         return self._stream.read(flush=True, flush_timeout_sec=_PATIENCE) or b""

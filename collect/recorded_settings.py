@@ -1,18 +1,36 @@
 """The settings of a session, as every episode that came of it keeps them."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, fields
 from typing import Any
 
 from handrail.collect.config import SessionConfig
 from handrail.collect.operators.human import HumanSettings
-from handrail.controllers.errors import HandrailError
+from handrail.controllers.entries import Entry, check_entries, is_number, is_table
+from handrail.controllers.errors import HandrailError, shown
 
 COLUMN = "settings"
 _OLDER = {"environment": "task"} | {  # what an episode said before it kept every setting, and its name now
     name: name for name in ("robot", "operator", "mode", "noise", "person", "moving_obstacles")
 }
+_KINDS: Mapping[type, tuple[str, Callable[[Any], bool]]] = {
+    str: ("a text", lambda value: isinstance(value, str)),
+    bool: ("true or false", lambda value: isinstance(value, bool)),
+    int: ("a whole number", lambda value: type(value) is int),
+    float: ("a finite number", is_number),
+    HumanSettings: ("a table", is_table),
+}
+
+
+def _entries(settings: SessionConfig | HumanSettings, needed: tuple[str, ...] = ()) -> dict[str, Entry]:
+    kinds = {entry.name: _KINDS[type(getattr(settings, entry.name))] for entry in fields(settings)}
+    return {name: Entry(*kind, needed=name in needed) for name, kind in kinds.items()}
+
+
+_WHERE = "settings of the episode"
+_ENTRIES = _entries(SessionConfig(), needed=("task", "robot"))
+_HUMAN = _entries(HumanSettings())
 
 
 def settings_json(config: SessionConfig) -> str:
@@ -32,38 +50,22 @@ def recorded_settings(row: Mapping[str, Any]) -> SessionConfig:
         HandrailError: it says no settings of a session, or wrong ones.
     """
     settings = _parsed(row[COLUMN]) if row.get(COLUMN) else _older(row)
-    try:
-        human = HumanSettings(**settings.pop("human", {}))
-        config = SessionConfig(**settings, human=human)
-    except (TypeError, ValueError) as error:
-        raise _wrong(error) from error
-    _check_types(config)
+    check_entries(settings, _ENTRIES, _WHERE)
+    human = settings.pop("human", {})
+    check_entries(human, _HUMAN, f"{_WHERE}: human")
+    config = SessionConfig(**settings, human=HumanSettings(**human))
     config.check()
     return config
 
 
 def _parsed(text: Any) -> dict[str, Any]:
     try:
-        settings = json.loads(text)
+        return json.loads(text)
     except (TypeError, ValueError, RecursionError) as error:
-        raise _wrong(f"expected JSON, got {text!r:.80}") from error
-    if not isinstance(settings, dict) or not {"task", "robot"} <= set(settings):
-        raise _wrong(f"expected a JSON object with task, robot, …, got {text!r:.80}")
-    return settings
+        raise HandrailError(f"{_WHERE}: expected JSON, got {shown(text)}") from error
 
 
 def _older(row: Mapping[str, Any]) -> dict[str, Any]:
     if not row.get("environment"):
-        raise _wrong("found none; handrail-record writes them")
+        raise HandrailError(f"{_WHERE}: found none; handrail-record writes them")
     return {ours: row[theirs] for theirs, ours in _OLDER.items() if row.get(theirs) not in (None, "")}
-
-
-def _check_types(config: SessionConfig) -> None:
-    for entry in fields(SessionConfig):
-        value, kind = getattr(config, entry.name), type(getattr(SessionConfig(), entry.name))
-        if type(value) is not kind and not (kind is float and type(value) is int):
-            raise _wrong(f"expected {entry.name} to be {kind.__name__}, got {value!r:.80}")
-
-
-def _wrong(why: object) -> HandrailError:
-    return HandrailError(f"settings of the episode: {why}")

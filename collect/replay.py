@@ -13,6 +13,7 @@ from handrail.collect.env import HandrailEnv
 from handrail.collect.recorded_settings import recorded_settings
 from handrail.collect.video_file import VideoFile
 from handrail.controllers.arrays import FloatArray
+from handrail.controllers.entries import is_count
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.quality.safety import contacts_begun
 from handrail.datasets.reader import read_episodes, read_frames, read_info
@@ -76,7 +77,9 @@ def replay_episode(
     env = build_env(config, info.fps, render=bool(pictures or video))
     with contextlib.ExitStack() as stack:
         stack.callback(env.close)
-        camera = _Camera(env, _moments(len(frames["action"]), pictures), video, stack)
+        _check_state(frames["observation.state"], env, f"episode {episode} of {root}")
+        film = stack.enter_context(VideoFile(video, env.render_size, env.fps)) if video else None
+        camera = _Camera(env, _moments(len(frames["action"]), pictures), film)
         states, last = _run(env, row["seed"], frames["action"], camera)
     difference = np.abs(states - frames["observation.state"])
     replay = Replay(
@@ -96,9 +99,19 @@ def _row(root: Path, episode: int) -> dict[str, Any]:
     if not 0 <= episode < len(rows):
         raise HandrailError(f"--episode {episode}: expected one of 0 to {len(rows) - 1} in {root}")
     row = rows[episode]
-    if not isinstance(row.get("seed"), int):
+    if not is_count(row.get("seed")):
         raise HandrailError(f"dataset {root}: expected one that handrail-record made, found no seed")
     return row
+
+
+def _check_state(states: np.ndarray, env: HandrailEnv, where: str) -> None:
+    """Check that recorded states, (T, s), are of the robot that the episode names."""
+    size, numbers = states.shape[1:], len(env.agent_names)
+    if size != (numbers,) or not np.issubdtype(states.dtype, np.floating):
+        raise HandrailError(
+            f"{where}: expected {numbers} numbers as observation.state of {env.model.description.name}, "
+            f"got {size} of {states.dtype}"
+        )
 
 
 def _run(
@@ -123,23 +136,17 @@ def _moments(frames: int, pictures: int) -> set[int]:
 class _Camera:
     """Takes pictures at some moments, and films all of them if there is a file for it."""
 
-    def __init__(
-        self, env: HandrailEnv, moments: set[int], video: Path | None, stack: contextlib.ExitStack
-    ) -> None:
-        self._env, self._moments, self._video, self._stack = env, moments, video, stack
-        self._film: VideoFile | None = None
+    def __init__(self, env: HandrailEnv, moments: set[int], film: VideoFile | None) -> None:
+        self._env, self._moments, self._film = env, moments, film
         self.taken: list[NDArray[np.uint8]] = []
 
     def look(self, index: int) -> None:
         """Take the picture of this moment, if somebody wants it."""
         wanted = index in self._moments
-        picture = self._env.render() if wanted or self._video else None
+        picture = self._env.render() if wanted or self._film else None
         if picture is None:
             return
         if wanted:
             self.taken.append(picture)
-        if self._video and self._film is None:  # only now: without OpenGL there shall be no file
-            film = VideoFile(self._video, self._env.render_size, self._env.fps)
-            self._film = self._stack.enter_context(film)
         if self._film:
             self._film.add(picture)

@@ -1,6 +1,8 @@
 """One episode's physics: a robot in a scene, driven by velocities."""
 
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -76,10 +78,11 @@ class Simulation:
         self._step = step
         self.substeps = math.ceil(step / timestep - 1e-9)
         self._shares = np.arange(1, self.substeps + 1) / self.substeps
-        robot = _robot(model, meshes, grips, step / self.substeps)
-        spec = robot.spec.copy()
-        add_scene(spec, scene)
-        self.mujoco_model = spec.compile()
+        with _understood(model):
+            robot = _robot(model, meshes, grips, step / self.substeps)
+            spec = robot.spec.copy()
+            add_scene(spec, scene)
+            self.mujoco_model = spec.compile()
         self.data = mujoco.MjData(self.mujoco_model)
         self._contacts = ContactMonitor(
             self.mujoco_model, robot.contact_geoms, robot.grasp_geoms, [m.name for m in scene.movables]
@@ -247,6 +250,20 @@ def _span(places: list[int]) -> slice | IntArray:
     index = np.array(places)
     together = np.array_equal(index, np.arange(index[0], index[0] + len(index)))
     return slice(int(index[0]), int(index[-1]) + 1) if together else index
+
+
+@contextmanager
+def _understood(model: RobotModel) -> Iterator[None]:
+    """Say in one line what MuJoCo says of a robot or its scene that it does not take, as two of one name.
+
+    Raises:
+        HandrailError: for every ValueError, which is what MuJoCo raises.
+    """
+    try:
+        yield
+    except ValueError as error:
+        said = " ".join(str(error).split())
+        raise HandrailError(f"robot {model.description.name} in its scene: MuJoCo says: {said}") from error
 
 
 @lru_cache(maxsize=8)

@@ -1,7 +1,6 @@
 """The file that trials write, `handrail.trials/1`: one line an episode, there whole after each."""
 
 import json
-import os
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -10,7 +9,7 @@ from typing import Any
 from handrail.collect.build import software_versions
 from handrail.collect.trials_config import TrialsConfig
 from handrail.controllers.errors import HandrailError
-from handrail.datasets.atomic import explained, make_folder, write_synced
+from handrail.datasets.atomic import explained, write_whole
 from handrail.datasets.strict_json import read_json
 
 FORMAT = "handrail.trials/1"
@@ -31,7 +30,7 @@ class Trial:
         failure_reason: why not.
         seconds: simulated time [s].
         frames: control periods.
-        contacts: forbidden contacts that began.
+        contacts: forbidden contacts that began; in files that name no robot, control periods with one.
         smallest_distance: signed, tool against work surfaces left out [m].
         brakes: updates in which the controller braked the robot.
         switches: how often the operator changed to other channels.
@@ -108,11 +107,8 @@ class TrialsFile:
         head = {"format": FORMAT, **self._settings, "versions": software_versions()}
         rows = ",\n".join(json.dumps(_rounded(trial)) for _, trial in sorted(self._trials.items()))
         text = f'{json.dumps(head)[:-1]}, "trials": [\n{rows}\n]}}\n'
-        staged = self._path.with_suffix(".part")
         with explained(f"--json {self._path}"):
-            make_folder(self._path.parent)
-            write_synced(staged, text.encode())
-            os.replace(staged, self._path)
+            write_whole(self._path, text.encode())
 
 
 def _rounded(trial: Trial) -> dict[str, Any]:

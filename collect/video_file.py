@@ -1,5 +1,6 @@
-"""An h264 video file that takes one picture after another."""
+"""An h264 video file that takes one picture after another, and is there whole or not at all."""
 
+import os
 from fractions import Fraction
 from pathlib import Path
 from types import TracebackType
@@ -8,18 +9,24 @@ import av
 import numpy as np
 from numpy.typing import NDArray
 
+from handrail.datasets.atomic import explained, sync_file, sync_folder
+
 
 class VideoFile:
-    """Encodes pictures; a context that closes the file.
+    """Encodes pictures; a context that gives the file its name at the end, unless something went wrong.
 
     Args:
         path: of the file, .mp4.
         size: height and width of the pictures [px]; both even, as h264 wants.
         fps: pictures a second.
+
+    Raises:
+        HandrailError: it cannot be written, at any time.
     """
 
     def __init__(self, path: Path, size: tuple[int, int], fps: int | Fraction) -> None:
-        self._container = av.open(str(path), "w", format="mp4")
+        self._path, self._partial = path, path.with_name(f".{path.name}.partial")
+        self._container = av.open(str(self._partial), "w", format="mp4")
         rate = Fraction(fps)
         self._stream = self._container.add_stream(
             "libx264", rate=rate, options={"crf": "20", "preset": "medium", "x264-params": "log=-1"}
@@ -36,13 +43,23 @@ class VideoFile:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Write what the encoder still holds and close the file."""
-        self._container.mux(self._stream.encode(None))
-        self._container.close()
+        """Write what the encoder still holds and close the file; after an error remove it."""
+        try:
+            with explained(str(self._path)):
+                if error is None:
+                    self._container.mux(self._stream.encode(None))
+                self._container.close()
+                if error is None:
+                    sync_file(self._partial)
+                    os.replace(self._partial, self._path)
+                    sync_folder(self._path.parent)
+        finally:
+            self._partial.unlink(missing_ok=True)
 
     def add(self, picture: NDArray[np.uint8]) -> None:
         """Add a picture, (height, width, 3)."""
         frame = av.VideoFrame.from_ndarray(picture, format="rgb24")
         frame.pts, frame.time_base = self._count, self._tick
-        self._container.mux(self._stream.encode(frame))
+        with explained(str(self._path)):
+            self._container.mux(self._stream.encode(frame))
         self._count += 1

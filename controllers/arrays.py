@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from handrail.controllers.errors import HandrailError
+from handrail.controllers.errors import HandrailError, shown
 
 FloatArray = NDArray[np.floating]
 BoolArray = NDArray[np.bool_]
@@ -54,14 +54,5 @@ def _checked(values: ArrayLike, kind: str, what: str) -> NDArray[Any]:
     except (ValueError, OverflowError) as error:
         raise HandrailError(f"{what}: expected {_WORDS[kind]} in rows of equal length: {error}") from error
     if array.size and array.dtype.kind not in _KINDS[kind]:
-        raise HandrailError(f"{what}: expected {_WORDS[kind]}, got {_told(values)}")
+        raise HandrailError(f"{what}: expected {_WORDS[kind]}, got {shown(values)}")
     return array
-
-
-def _told(values: Any) -> str:
-    """Return values in few words; an integer of many digits has no short ones."""
-    try:
-        text = " ".join(repr(values).split())
-    except ValueError:
-        return "an integer that is too large"
-    return text if len(text) <= 60 else f"{text[:57]}..."

@@ -10,6 +10,7 @@ from handrail.controllers.description import Limits
 from handrail.controllers.jit import jit
 from handrail.controllers.limiter import Limiter
 from handrail.controllers.margins import Margins
+from handrail.controllers.slacks import MOVING
 
 _SAMPLES = np.array([0.25, 0.5, 0.75, 1.0])  # of the time that a stop takes, or that the robot waits after it
 _ERROR = 1e-3  # of signed distances, that is no loss [m]
@@ -97,17 +98,17 @@ class StopCertificate:
         floors = self._floor * self._margins.values
         distances = self._collision.values(path, times, now, floors)
         bounds = self._limits.position_lower, self._limits.position_upper
-        return _shortfalls(path, distances, *now, floors, self._collision.speeds, *bounds)
+        return _shortfalls(path, distances, *now, floors, self._collision.kinds, *bounds)
 
 
 @jit
-def _shortfalls(path, distances, start, now, floors, speeds, lower, upper):
+def _shortfalls(path, distances, start, now, floors, kinds, lower, upper):
     short = np.zeros((len(path), 2))
     for k in range(len(path)):
         for p in range(len(floors)):
             distance = distances[k, p]
             short[k, 1] = max(short[k, 1], min(floors[p], now[p] - _ERROR) - distance)
-            if speeds[p] == 0.0:
+            if kinds[p] != MOVING:
                 short[k, 0] = max(short[k, 0], min(_HARD * floors[p], now[p] - _HARD_ERROR) - distance)
         for j in range(len(start)):
             room = min(path[k, j] - lower[j], upper[j] - path[k, j]) + _BEYOND

@@ -43,7 +43,6 @@ class CollisionModel:
         work: which pairs are a tool shape against a work surface, (P,).
         largest_margin: the largest margin that a pair can keep [m], (P,).
         held: rows of the pairs with something that the hand holds, (H,).
-        speeds: of the obstacle of each pair, 0 of what stands still or is held, (P,) [m/s].
         kinds: whether a pair is OWN, STANDING or MOVING (slacks.py), (P,).
     """
 
@@ -107,7 +106,7 @@ class CollisionModel:
             measured(witnesses[first], self._every, values[first])
             ahead = times[stretch] - times[begin]
             bounds, close = lower_bounds(
-                values[begin], q[begin], q[stretch], ahead, self._levers, self.speeds, reaches
+                values[begin], q[begin], q[stretch], ahead, self._levers, self._speeds, reaches
             )
             if self._last is not None and self._last[0].shape == q.shape:
                 there, known = self._last[0][stretch], self._last[1][stretch]
@@ -146,7 +145,7 @@ class CollisionModel:
         else:
             data, (start, there) = self._after, now
             reach = self._far if reach is None else reach
-            values, close = lower_bounds(there, start, q, times, self._levers, self.speeds, reach)
+            values, close = lower_bounds(there, start, q, times, self._levers, self._speeds, reach)
             if not close.any():
                 return values
             chosen = data.select(close)
@@ -200,15 +199,15 @@ class CollisionModel:
         self._shapes.observe(obstacles)
         self._moving = [obstacle for obstacle in obstacles if obstacle.velocity.any()]
         speeds = {obstacle.name: float(np.linalg.norm(obstacle.velocity)) for obstacle in obstacles}
-        self.speeds = np.array([speeds.get(second, 0.0) for _, second in self.pairs])
-        self.kinds = np.where(self.speeds > 0.0, MOVING, STANDING)
+        self._speeds = np.array([speeds.get(second, 0.0) for _, second in self.pairs])
+        self.kinds = np.where(self._speeds > 0.0, MOVING, STANDING)
         self.kinds[: len(self._robot.description.self_pairs)] = OWN
 
     def among(self, obstacles: tuple[Obstacle, ...]) -> "CollisionModel":
         """Return the model as the obstacles are now: this one; another one when some came, went or changed.
 
         Raises:
-            HandrailError: two obstacles share a name, or one is held by a frame that the robot lacks.
+            HandrailError: two things share a name, or one is held by a frame that the robot lacks.
         """
         if _kept(obstacles) != self._kept:
             return CollisionModel(self._robot, obstacles)

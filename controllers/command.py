@@ -17,7 +17,7 @@ class Status(StrEnum):
     CLIPPED = "clipped"  # a direct command that the limits cut
     INVALID_INTENT = "invalid_intent"  # wrong size, NaN or infinite, in an unknown frame, from the future
     INVALID_STATE = "invalid_state"  # the same, or its clock does not advance
-    INVALID_SCENE = "invalid_scene"  # two obstacles of one name, or one held by a frame that the robot lacks
+    INVALID_SCENE = "invalid_scene"  # two things of one name, or one held by a frame that the robot lacks
     STALE_INTENT = "stale_intent"
     SOLVER_FAILED = "solver_failed"  # the stored backup is followed
     BACKUP = "backup"  # the plan leaves no safe way out: the stored backup is followed

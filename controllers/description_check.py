@@ -13,7 +13,7 @@ from handrail.controllers.entries import (
     is_text,
     lists,
 )
-from handrail.controllers.errors import HandrailError
+from handrail.controllers.errors import HandrailError, shown
 
 _BASE_SIZES = {"planar": 3, "fixed": 0}
 _SHAPES: Mapping[str, tuple[str, Callable[[Any], bool]]] = {
@@ -195,7 +195,7 @@ def _check_names(content: Mapping[str, Any], where: str) -> None:
     for name in _used(content):
         if name not in names:
             raise HandrailError(
-                f"{where}: collision shape {name!r:.80}: expected one of {', '.join(sorted(names))}"
+                f"{where}: collision shape {shown(name)}: expected one of {', '.join(sorted(names))}"
             )
 
 

@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, TypeGuard
 
-from handrail.controllers.errors import HandrailError
+from handrail.controllers.errors import HandrailError, shown
 
 _LARGEST = 1e6  # of a number in a file [SI units]; what is larger is a slip, or meant ill
 _LONGEST = 200  # characters of a text
@@ -38,16 +38,18 @@ def check_entries(content: Any, entries: Mapping[str, Entry], where: str) -> Non
         HandrailError: an entry is missing, unknown, or not what it should be.
     """
     if not isinstance(content, Mapping):
-        raise HandrailError(f"{where}: expected a table of {', '.join(entries)}, got {content!r:.80}")
+        raise HandrailError(f"{where}: expected a table of {', '.join(entries)}, got {shown(content)}")
     for name in content:
         if name not in entries:
-            raise HandrailError(f"{where}: unknown entry {name!r:.80}; expected some of {', '.join(entries)}")
+            raise HandrailError(
+                f"{where}: unknown entry {shown(name)}; expected some of {', '.join(entries)}"
+            )
     for name, entry in entries.items():
         if name not in content:
             if entry.needed:
                 raise HandrailError(f"{where}: expected an entry {name!r} ({entry.expected}), found none")
         elif not entry.fits(content[name]):
-            raise HandrailError(f"{where}: {name}: expected {entry.expected}, got {content[name]!r:.80}")
+            raise HandrailError(f"{where}: {name}: expected {entry.expected}, got {shown(content[name])}")
 
 
 def is_number(value: Any) -> bool:

@@ -2,7 +2,8 @@
 
 from collections.abc import Iterable
 
-_LONGEST = 300  # characters of what a library says: PyTorch names every tensor that does not fit
+_LONGEST_MESSAGE = 300  # characters of what a library says: PyTorch names every tensor that does not fit
+_LONGEST_VALUE = 80  # characters of what came that a message shows
 
 
 class HandrailError(Exception):
@@ -12,10 +13,10 @@ class HandrailError(Exception):
     """
 
 
-def said(error: BaseException) -> str:
+def message_of(error: BaseException) -> str:
     """Return what an exception says, in one line of sane length; its type where it says nothing."""
     words = " ".join(str(error).split()) or type(error).__name__
-    return words if len(words) <= _LONGEST else f"{words[:_LONGEST]} …"
+    return words if len(words) <= _LONGEST_MESSAGE else f"{words[:_LONGEST_MESSAGE]} …"
 
 
 def not_installed(wanted_by: str, module: str, extra: str = "") -> HandrailError:
@@ -35,6 +36,15 @@ def not_installed(wanted_by: str, module: str, extra: str = "") -> HandrailError
     )
 
 
+def shown(value: object) -> str:
+    """Return what came, in one line of few words; an integer of very many digits has none."""
+    try:
+        text = " ".join(repr(value).split())
+    except ValueError:
+        return "an integer that is too large"
+    return text if len(text) <= _LONGEST_VALUE else f"{text[: _LONGEST_VALUE - 1]}…"
+
+
 def unknown_name(thing: str, name: object, choices: Iterable[str]) -> HandrailError:
     """Return the error for a name that is none of the choices."""
-    return HandrailError(f"unknown {thing} {name!r}: expected one of {', '.join(sorted(choices))}")
+    return HandrailError(f"unknown {thing} {shown(name)}: expected one of {', '.join(sorted(choices))}")

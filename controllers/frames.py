@@ -27,7 +27,7 @@ class Frames:
 
     def __post_init__(self) -> None:
         """Copy the array and make it read-only."""
-        object.__setattr__(self, "point", frozen(self.point))
+        object.__setattr__(self, "point", frozen(self.point, what="tool point of an intent"))
 
     def check(self) -> None:
         """Check the names and the point.

@@ -18,7 +18,8 @@ class InputGuard:
     An intent is new if its stamp is later than all before. With t the state's time, t_s the stamp and t_a the
     time at which it came first, its age is `max(t - t_s, t - t_a)`: an operator whose clock is ahead grows
     stale like any other. The state's clock must advance; one that stands still or jumps back is a fault, for
-    then nobody knows how old anything is.
+    then nobody knows how old anything is. After it jumped back a stamp that differs from the last one is new
+    too: those of before may lie ahead now; what was there before the jump grows older all the same.
 
     Args:
         channels: of the robot.
@@ -33,7 +34,7 @@ class InputGuard:
     def reset(self) -> None:
         """Forget what came."""
         self._time = self._stamp = -math.inf
-        self._age = 0.0
+        self._age, self._jumped = 0.0, False
 
     def check(self, state: State, intent: Intent, surroundings: Surroundings) -> Status:
         """Return `ok`, or why the robot must brake."""
@@ -49,8 +50,8 @@ class InputGuard:
             return Status.INVALID_INTENT
         if not (intent.is_finite and intent.frames.are_known) or intent.time > state.time + _LEAD:
             return Status.INVALID_INTENT
-        if intent.time > self._stamp:
-            self._stamp, self._age = intent.time, 0.0
+        if intent.time > self._stamp or (self._jumped and intent.time < self._stamp):
+            self._stamp, self._age, self._jumped = intent.time, 0.0, False
         return Status.STALE_INTENT if max(state.time - intent.time, self._age) > self._timeout else Status.OK
 
     def _advances(self, time: float) -> bool:
@@ -58,7 +59,6 @@ class InputGuard:
         if not math.isfinite(time):
             return False
         passed, self._time = time - self._time, time
-        if passed < 0.0:
-            self._stamp = -math.inf  # stamps of before are in the future now, and those of now would be old
+        self._jumped |= passed < 0.0
         self._age += max(passed, 0.0)
         return passed > _TICK

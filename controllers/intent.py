@@ -20,7 +20,7 @@ class RawInput:
         values: deflection of each input from −1 to 1, or a leader arm's joint angles [rad], by channel, (m,);
             (0,) if it is not known.
         axes: how many inputs the operator moves now.
-        switches: how often he changed to other inputs in this episode so far.
+        switches: how often they changed to other inputs in this episode so far.
     """
 
     values: FloatArray = field(default_factory=lambda: np.zeros(0))
@@ -29,7 +29,7 @@ class RawInput:
 
     def __post_init__(self) -> None:
         """Copy the array and make it read-only."""
-        object.__setattr__(self, "values", frozen(self.values))
+        object.__setattr__(self, "values", frozen(self.values, what="raw input of an intent"))
 
 
 _UNKNOWN = RawInput()

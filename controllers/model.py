@@ -12,7 +12,7 @@ import pinocchio as pin
 
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.description import Placement, RobotDescription, load_description
-from handrail.controllers.errors import HandrailError, said
+from handrail.controllers.errors import HandrailError, message_of
 
 _BASE_JOINTS = {"x": pin.JointModelPX, "y": pin.JointModelPY, "theta": pin.JointModelRZ}
 
@@ -96,7 +96,7 @@ def _arm(description: RobotDescription) -> pin.Model:
         with _without_words():
             model = pin.buildModelFromUrdf(str(description.urdf))
     except (ValueError, RuntimeError) as error:
-        raise HandrailError(f"URDF {description.urdf}: {said(error)}") from error
+        raise HandrailError(f"URDF {description.urdf}: {message_of(error)}") from error
     missing = set(description.arm_joints) - set(model.names)
     if missing:
         raise HandrailError(

@@ -1,6 +1,5 @@
 """The masked model predictive controller: the operator steers a part, the optimum completes the rest."""
 
-import math
 from time import perf_counter
 
 import numpy as np
@@ -37,6 +36,7 @@ from handrail.controllers.trajectory import Trajectory
 from handrail.controllers.witnesses import smallest_distances
 
 _SOLVER_ERRORS = (HandrailError, ArithmeticError, RuntimeError, ValueError)  # of ours, numpy, CasADi, coal
+_UNHEARD = (Status.INVALID_STATE, Status.INVALID_SCENE, Status.INVALID_INTENT, Status.STALE_INTENT)
 
 
 class MaskedMpc:
@@ -133,7 +133,7 @@ class MaskedMpc:
         if plan is not None and not planned:
             status = Status.BACKUP
         health = self._health(status, plan, distances, start)
-        command = Command(motion.velocities, motion.dt, self._gripper(intent), health, motion.elapsed)
+        command = Command(motion.velocities, motion.dt, self._gripper(intent, status), health, motion.elapsed)
         self._plan = plan if planned else None
         self._followed = following(self._followed, command, state.time, self.settings.dt)
         return command
@@ -199,8 +199,8 @@ class MaskedMpc:
         if distances is None:
             return self._backup.brake(sent), False
         elapsed = 0.0 if self._followed is None else self._followed.elapsed(state.time)
-        halt = status not in (Status.OK, Status.SOLVER_FAILED)
-        way = self._backup.choose(Situation(state.q, sent, distances, elapsed), plan, halt)
+        situation = Situation(state.q, sent, distances, elapsed)
+        way = self._backup.choose(situation, plan, halt=status in _UNHEARD)
         if plan is not None and way.planned:
             dt = self.settings.dt
             return Trajectory(self._limiter.to_rest(plan.v, dt), dt), True
@@ -223,11 +223,11 @@ class MaskedMpc:
             return self._followed.accelerations(time, horizon)
         return Trajectory(self._plan.v, self.settings.dt).accelerations(horizon, self._followed.elapsed(time))
 
-    def _gripper(self, intent: Intent) -> float:
-        """Return how far the gripper is closed: as asked, or as before where that is no number."""
-        last = 0.0 if self._followed is None else self._followed.command.gripper
-        asked = float(intent.gripper) if math.isfinite(intent.gripper) else last
-        return min(max(asked, 0.0), 1.0)
+    def _gripper(self, intent: Intent, status: Status) -> float:
+        """Return how far the gripper is closed: as asked; as before where nobody is listened to."""
+        if status in _UNHEARD:
+            return 0.0 if self._followed is None else self._followed.command.gripper
+        return min(max(intent.gripper, 0.0), 1.0)
 
     def _distances(self, state: State, plan: Plan | None) -> FloatArray | None:
         """Return the signed distances now, (P,); None where nobody knows where the robot is."""

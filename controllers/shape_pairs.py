@@ -38,15 +38,15 @@ class ShapePairs:
         levers: how far a unit of each coordinate can bring a pair together at most, (n, P) [m].
 
     Raises:
-        HandrailError: two obstacles share a name, or one is held by a frame that the robot lacks.
+        HandrailError: two things share a name, or one is held by a frame that the robot lacks.
     """
 
     def __init__(self, model: RobotModel, obstacles: tuple[Obstacle, ...]) -> None:
-        _check_names(obstacles)
         self._model = model
         self.geometry = pin.GeometryModel()
         description = model.description
         placed = (*description.collision, *map(_placed, obstacles))
+        _check_names([thing.name for thing in placed])
         self._index = {thing.name: self._add(thing) for thing in placed} | {FLOOR: self._add_floor()}
         tools = {thing.name for thing in description.collision if thing.tool}
         surfaces = {obstacle.name for obstacle in obstacles if obstacle.work_surface}
@@ -133,10 +133,12 @@ class ShapePairs:
             self.levers[:, row] = (self.moves[row, 0] != self.moves[row, 1]) * np.maximum(first, second)
 
 
-def _check_names(obstacles: tuple[Obstacle, ...]) -> None:
-    names = [obstacle.name for obstacle in obstacles]
-    if len(set(names)) != len(names) or FLOOR in names:
-        raise HandrailError(f"obstacle names: expected distinct names other than {FLOOR!r}, got {names}")
+def _check_names(names: list[str]) -> None:
+    """Check that nothing has the name of something else: of a thing, a shape of the robot, the floor."""
+    if twice := {name for name in names if names.count(name) > 1 or name == FLOOR}:
+        raise HandrailError(
+            f"names of obstacles and shapes: expected each once and none {FLOOR!r}, got {sorted(twice)} again"
+        )
 
 
 def _placed(obstacle: Obstacle) -> PlacedShape:

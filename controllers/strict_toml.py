@@ -4,7 +4,7 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-from handrail.controllers.errors import HandrailError, said
+from handrail.controllers.errors import HandrailError, message_of
 
 MOST_BYTES = 2**20
 
@@ -26,4 +26,4 @@ def read_toml(path: Path, what: str) -> dict[str, Any]:
     except RecursionError as error:
         raise HandrailError(f"{what} {path}: not valid TOML: nested too deeply") from error
     except (OSError, ValueError) as error:
-        raise HandrailError(f"{what} {path}: not valid TOML: {said(error)}") from error
+        raise HandrailError(f"{what} {path}: not valid TOML: {message_of(error)}") from error

@@ -18,7 +18,7 @@ class Surroundings:
         make_sense: whether what was seen last does; else the robot has to brake.
 
     Raises:
-        HandrailError: two obstacles share a name, or one is held by a frame that the robot lacks.
+        HandrailError: two things share a name, or one is held by a frame that the robot lacks.
     """
 
     def __init__(self, model: RobotModel, obstacles: tuple[Obstacle, ...] = ()) -> None:

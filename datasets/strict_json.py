@@ -7,7 +7,7 @@ import stat
 from pathlib import Path
 from typing import Any, NoReturn
 
-from handrail.controllers.errors import HandrailError, said
+from handrail.controllers.errors import HandrailError, message_of
 
 MOST_BYTES = 16 * 1024 * 1024
 MOST_DEPTH = 50
@@ -41,7 +41,7 @@ def load_json(path: Path, what: str) -> Any:
     try:
         return read_json(path)
     except (OSError, ValueError) as error:
-        raise HandrailError(f"{str(path)!r}: expected {what}, got {said(error)}") from error
+        raise HandrailError(f"{str(path)!r}: expected {what}, got {message_of(error)}") from error
 
 
 def parse_json(data: bytes) -> Any:

@@ -19,7 +19,7 @@ from stable_baselines3.common.buffers import ReplayBuffer
 from stable_baselines3.common.save_util import load_from_zip_file
 
 from handrail.controllers.entries import is_amounts
-from handrail.controllers.errors import HandrailError, said
+from handrail.controllers.errors import HandrailError, message_of
 from handrail.datasets.atomic import publish_folder, write_whole
 from handrail.datasets.strict_json import load_json
 from handrail.policies.imitation.trust import check_links
@@ -203,5 +203,5 @@ def _curve(path: Path, steps: int) -> Curve:
 
 
 def _broken(path: Path, reason: str | Exception) -> HandrailError:
-    found = reason if isinstance(reason, str) else said(reason)
+    found = reason if isinstance(reason, str) else message_of(reason)
     return HandrailError(f"{str(path)!r}: expected a checkpoint of this run, got {found}")

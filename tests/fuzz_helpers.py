@@ -3,6 +3,7 @@
 The robot is MuJoCo's, driven without the environment's limiter; contacts and distances are MuJoCo's too.
 """
 
+import itertools
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -11,6 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from handrail.collect.gl import mujoco
+from handrail.collect.robot import FINGERS
 from handrail.collect.scene import Scene, SceneObject, View
 from handrail.collect.simulation import Simulation
 from handrail.collect.tasks.moving import sample_movers
@@ -22,6 +24,7 @@ from handrail.controllers.model import RobotModel
 from handrail.controllers.mpc import MaskedMpc
 from handrail.controllers.problem import Plan, Problem
 from handrail.controllers.shape import Shape
+from handrail.controllers.slacks import MOVING
 
 PERIOD = 0.05  # [s]
 CLEARANCE = 0.15  # of the robot at the start [m]
@@ -144,12 +147,13 @@ class OwnDistances:
     """MuJoCo's distances between the robot's own geoms, those pairs that it may touch itself with."""
 
     def __init__(self, model, compiled):
-        names = {compiled.geom(index).name for index in range(compiled.ngeom)}
-        self._model = compiled
+        self._model, gripper = compiled, model.description.gripper
+        geoms = {shape.name: (shape.name,) for shape in model.description.collision}
+        geoms[gripper.shape] = FINGERS  # stand in for the shape around them
         self._pairs = [
             (compiled.geom(first).id, compiled.geom(second).id)
-            for first, second in model.description.self_pairs
-            if first in names and second in names
+            for pair in model.description.self_pairs
+            for first, second in itertools.product(*(geoms[name] for name in pair))
         ]
 
     def smallest(self, data):
@@ -167,7 +171,7 @@ class _Around:
     def told(self, state):
         self._collision.observe(self._scene.obstacles(state.time))
         distances = self._collision.values(state.q[None])[0]
-        still = distances[self._collision.speeds == 0.0].min()
+        still = distances[self._collision.kinds != MOVING].min()
         return f"robot at {np.abs(state.v).max():.2f}, nearest that stands {still:.3f} m"
 
 

@@ -69,6 +69,7 @@ def test_the_demo_s_folder_is_given_either_way():
     config = CONFIGS["handrail-demo"]
     folders = [cli.parse(config, "demo", words).folder for words in ([], ["a"], ["--root", "a"])]
     assert folders == [Path("outputs/demo"), Path("a"), Path("a")]
+    assert cli.parse(config, "demo", ["~/a"]).folder == Path.home() / "a"
     done = command("a", "--root", "b", name="demo")
     assert (done.returncode, done.stderr.count("\n")) == (2, 1), done.stderr
 

@@ -142,7 +142,8 @@ def test_work_pairs_are_tools_at_work_surfaces():
     assert work == {("fingers", "table")}
 
 
-def test_obstacles_have_distinct_names():
-    twin = Obstacle("a", Shape("sphere", [0.1]), [1, 0, 0])
-    with pytest.raises(HandrailError, match="distinct names"):
-        CollisionModel(MODEL, (twin, twin))
+@pytest.mark.parametrize("names", [("a", "a"), ("floor",), ("palm",)])
+def test_things_have_names_of_their_own(names):
+    things = [Obstacle(name, Shape("sphere", [0.1]), [1, 0, 0]) for name in names]
+    with pytest.raises(HandrailError, match=f"expected each once .*, got \\['{names[0]}'\\] again"):
+        CollisionModel(MODEL, tuple(things))

@@ -82,10 +82,21 @@ def test_a_state_clock_that_does_not_advance_is_a_fault(name, clock):
 
     assert_braked(robot, trouble, Status.INVALID_STATE)
     now = robot.time if clock is not JUMPED else stuck - 10.0
-    for k in range(3):  # and from when it runs on, all is well again
+    for k in range(8):  # and from when it runs on, all is well again, for as long as new intents come
         time = now + k * PERIOD
         command = robot.update(ask(time), replace(robot.state, time=time))
     assert not command.health.status.brakes
+
+
+@pytest.mark.parametrize("name", CONTROLLERS)
+def test_a_clock_that_keeps_jumping_back_does_not_keep_an_intent_fresh(name):
+    """Two periods on, one jump back, and so on, with a dead link."""
+    robot, ask = driven(name)
+    last, start = ask(robot.time), robot.time
+    for k in range(24):
+        command = robot.update(last, replace(robot.state, time=start + 0.1 * ((k % 3) - 1)))
+    assert command.health.status.brakes
+    np.testing.assert_allclose(robot.v, 0.0, atol=1e-12)
 
 
 @pytest.mark.parametrize("name", CONTROLLERS)
@@ -97,6 +108,18 @@ def test_a_clock_that_leaps_makes_an_intent_old(name):
         return last, replace(robot.state, time=1e6 + robot.time, commanded=robot.v)
 
     assert_braked(robot, trouble, Status.STALE_INTENT)
+
+
+@pytest.mark.parametrize("name", CONTROLLERS)
+def test_who_is_not_listened_to_does_not_open_the_hand(name):
+    robot, ask = driven(name)
+    robot.update(replace(ask(robot.time), gripper=1.0))
+    for stamp in (robot.time + 10.0, robot.time - 10.0):
+        assert robot.update(ask(stamp)).gripper == 1.0
+    robot.controller.observe((WALL, WALL))
+    assert robot.controller.update(robot.state, ask(robot.time)).gripper == 1.0
+    robot.time += PERIOD
+    assert robot.update(ask(robot.time)).gripper == 0.0
 
 
 @pytest.mark.parametrize("name", CONTROLLERS)
@@ -122,6 +145,7 @@ def test_obstacles_come_and_go_and_nothing_is_forgotten(name):
 def test_a_scene_that_makes_no_sense_brakes(name):
     robot, ask = driven(name)
     bad = [(WALL, WALL), (replace(WALL, frame="nowhere"),), (replace(WALL, name="floor"),)]
+    bad.append((replace(WALL, name="fingers"),))  # as a shape of the robot is called
     for scene in bad:
         robot.controller.observe(scene)
         before, command = robot.v, robot.controller.update(robot.state, ask(robot.time))

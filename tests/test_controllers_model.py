@@ -102,6 +102,7 @@ def test_home_puts_the_tool_where_the_robot_has_it():
         (('urdf = "example', 'urdf = "/example'), "expected a path inside a package, or beside"),
         (('urdf = "example', 'urdf = "robot.urdf" #'), "URDF robot.urdf: expected it beside"),
         (('urdf = "example', 'urdf = "" #'), "urdf: expected a path"),
+        (('urdf = "example', 'urdf = "." #'), "expected a path inside a package, or beside"),
         (('"shoulder_pan_joint"', '"shoulder_lift_joint"'), "joints: expected names, each once"),
     ],
 )

@@ -15,6 +15,7 @@ from handrail.collect import viewer
 from handrail.collect.build import build_env, build_session
 from handrail.collect.config import SessionConfig
 from handrail.collect.display import Display
+from handrail.collect.rerun_drawing import Drawing
 from handrail.datasets.reader import read_info
 
 pytest.importorskip("rerun")
@@ -82,12 +83,16 @@ def test_a_viewer_that_dies_or_stalls_never_stops_a_recording(trouble, tmp_path,
         honest(self, data * (1 if len(sent) < 4 else 40))
 
     monkeypatch.setattr(viewer.Viewer, "send", troubled)
+    draw, drawn = Drawing.see, []
+    monkeypatch.setattr(Drawing, "see", lambda self, moment: (drawn.append(moment), draw(self, moment)))
     saved = tmp_path / "seen.rrd"
     done = command(*REACH, "--display_web", "--display_save", saved, tmp_path / "set")
     assert done.returncode == 0, done.stderr
-    assert read_info(tmp_path / "set").episodes == 1
     assert done.stderr.count("the recording goes on") == 1
-    assert saved.stat().st_size > 2**17  # the file has the rest too
+    info = read_info(tmp_path / "set")
+    assert info.episodes == 1
+    assert len(drawn) == info.frames  # the file has the rest too
+    assert saved.stat().st_size > 2**17
 
 
 def test_what_goes_wrong_in_drawing_is_said_once_and_no_more(monkeypatch):

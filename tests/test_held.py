@@ -12,6 +12,7 @@ from handrail.controllers.controller import State
 from handrail.controllers.direct import DirectController
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.intent import Intent
+from handrail.controllers.margins import Margins
 from handrail.controllers.model import load_model
 from handrail.controllers.mpc import MaskedMpc
 from handrail.controllers.rotation import matrix_from_rpy
@@ -71,6 +72,18 @@ def test_gradients_and_bounds_of_held_things():
     assert len(errors) > 100
     assert np.median(errors) < 1e-3
     assert np.quantile(errors, 0.98) < 2e-2
+
+
+def test_what_is_held_does_not_come_nearer_because_other_things_come():
+    """What it keeps once it keeps on; to what came while it was held, what there was then."""
+    other = replace(POST, name="other")
+    first, second = (CollisionModel(MODEL, things) for things in ((POST, BOX), (POST, other, BOX)))
+    before = Margins(first, 0.1, 0.008)
+    before.see(np.full(first.size, 1.0))
+    margins = Margins(second, 0.1, 0.008, before)
+    margins.see(np.full(second.size, 0.02))
+    for row in held_rows(second):
+        assert margins.values[row] == (0.02 if "other" in second.pairs[row] else 0.1)
 
 
 def test_things_come_and_go_and_change():

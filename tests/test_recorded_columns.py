@@ -104,6 +104,21 @@ def test_a_setting_that_is_wrong_is_one_line(name, value):
     refused(json.dumps(WHOLE | {name: value}))
 
 
+def test_an_unknown_setting_of_many_lines_is_one_line():
+    refused(json.dumps(WHOLE | {"x\ny": 1}))
+
+
+@pytest.mark.parametrize(("name", "value"), [("seed", -1), ("robot", "ridgeback_panda")])
+def test_an_episode_that_cannot_have_been_recorded_so_is_one_line(name, value, masked, monkeypatch):
+    """No seed of a scene; a robot that has more joints than were recorded."""
+    (row, _), said = read_episodes(masked), {"seed": value}
+    if name != "seed":
+        said = {"settings": json.dumps(json.loads(row["settings"]) | {name: value})}
+    monkeypatch.setattr(replay, "read_episodes", lambda root: [row | said])
+    with pytest.raises(HandrailError, match=r"seed|28 numbers as observation\.state of ridgeback_panda"):
+        replay.replay_episode(masked, 0)
+
+
 def refused(settings):
     with pytest.raises(HandrailError) as error:
         recorded_settings({"settings": settings})

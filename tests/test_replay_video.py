@@ -28,6 +28,17 @@ def test_a_replay_is_filmed_from_beginning_to_end(recorded, tmp_path):
     assert np.any(pictures[0] != pictures[-1])
 
 
+@pytest.mark.needs_gl
+def test_a_film_or_sheet_that_cannot_be_written_is_one_line(recorded, tmp_path):
+    """And nothing lies about afterwards."""
+    for flag, ending in (("--video", "mp4"), ("--sheet", "png")):
+        (folder := tmp_path / f"folder.{ending}").mkdir()
+        done = command(recorded, "--episode", 0, flag, folder, name="replay")
+        assert (done.returncode, done.stderr.count("\n")) == (2, 1), done.stderr
+        assert str(folder) in done.stderr
+    assert len(list(tmp_path.rglob("*"))) == 2
+
+
 @pytest.mark.parametrize(
     "words", ["--video a.mp4", "--video a.gif --episode 0", "--video no/a.mp4 --episode 0"]
 )

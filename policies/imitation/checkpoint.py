@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray
-from handrail.controllers.errors import HandrailError, said
+from handrail.controllers.errors import HandrailError, message_of
 from handrail.datasets.atomic import sync_folder, write_whole
 from handrail.datasets.strict_json import load_json
 from handrail.policies.imitation.interface import PolicyInterface
@@ -121,7 +121,9 @@ class TrainedPolicy:
             with torch.inference_mode():
                 return self.after(self.policy.select_action(self.before(batch)))[0].cpu().numpy()
         except Exception as error:  # of LeRobot and all below it
-            raise HandrailError(f"policy {self.policy.config.type}: cannot act: {said(error)}") from error
+            raise HandrailError(
+                f"policy {self.policy.config.type}: cannot act: {message_of(error)}"
+            ) from error
 
 
 def load_policy(folder: str | Path, device: str = "cpu") -> TrainedPolicy:
@@ -144,7 +146,7 @@ def load_policy(folder: str | Path, device: str = "cpu") -> TrainedPolicy:
         policy = get_policy_class(kind).from_pretrained(place, config=config)
         before, after = make_pre_post_processors(config, str(place), preprocessor_overrides=override)
     except Exception as error:  # of LeRobot and all below it: whatever the files hold, they are refused
-        raise HandrailError(f"policy {str(place)!r}: {said(error)}") from error
+        raise HandrailError(f"policy {str(place)!r}: {message_of(error)}") from error
     policy.eval()
     policy.eval = lambda: policy  # LeRobot asks for it twice an action: a third of its time
     return TrainedPolicy(interface, meta, policy, before, after)

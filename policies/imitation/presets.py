@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, Any
 
-from handrail.controllers.errors import HandrailError, said, unknown_name
+from handrail.controllers.errors import HandrailError, message_of, unknown_name
 from handrail.datasets.strict_json import parse_json
 from handrail.policies.imitation.config import TrainConfig
 from handrail.policies.imitation.refusal import in_one_line
@@ -111,9 +111,9 @@ def policy_config(config: TrainConfig) -> "PreTrainedConfig":
     try:
         policy: Any = draccus.decode(kind, settings)
     except draccus.utils.DecodingError as error:
-        raise HandrailError(f"policy {config.policy}: {said(error)}") from error
+        raise HandrailError(f"policy {config.policy}: {message_of(error)}") from error
     except (draccus.utils.ParsingError, ValueError, TypeError, NotImplementedError) as error:
-        raise HandrailError(f"policy {config.policy}: {said(error.__cause__ or error)}") from error
+        raise HandrailError(f"policy {config.policy}: {message_of(error.__cause__ or error)}") from error
     mapping = policy.normalization_mapping
     if "STATE" in mapping and "ENV" not in mapping:
         policy.normalization_mapping = mapping | {"ENV": mapping["STATE"]}

@@ -4,7 +4,7 @@ import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from handrail.controllers.errors import HandrailError, said
+from handrail.controllers.errors import HandrailError, message_of
 from handrail.policies.imitation.config import TrainConfig
 
 _REFUSALS = (ValueError, TypeError, AssertionError, ImportError, RuntimeError)
@@ -20,11 +20,11 @@ def in_one_line(config: TrainConfig) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        raise HandrailError(f"training in {config.output}: {said(error)}") from error
+        raise HandrailError(f"training in {config.output}: {message_of(error)}") from error
     except _REFUSALS as error:
         if not _of_lerobot(error):
             raise
-        raise HandrailError(f"policy {config.policy}: {said(error)}") from error
+        raise HandrailError(f"policy {config.policy}: {message_of(error)}") from error
 
 
 def _of_lerobot(error: BaseException) -> bool:

@@ -5,7 +5,7 @@ from typing import Any
 
 import draccus
 
-from handrail.controllers.errors import HandrailError, said, unknown_name
+from handrail.controllers.errors import HandrailError, message_of, unknown_name
 from handrail.controllers.strict_toml import read_toml
 from handrail.policies.study.design import StudyDesign
 from handrail.policies.study.design_check import check_design
@@ -42,4 +42,4 @@ def _design(name: str, content: dict[str, Any]) -> StudyDesign:
     try:
         return draccus.decode(StudyDesign, {"name": name, **content})
     except (DecodingError, ParsingError, TypeError, ValueError) as error:
-        raise HandrailError(f"study {name}: {said(error)}") from error
+        raise HandrailError(f"study {name}: {message_of(error)}") from error
