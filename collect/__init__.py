@@ -15,5 +15,5 @@ TASKS = {
 
 for _name, _entry in TASKS.items():
     gymnasium.register(
-        f"handrail/{_name}-v0", entry_point="handrail.collect.env:HandrailEnv", kwargs={"task": _entry}
+        f"handrail/{_name}-v0", entry_point="handrail.collect.envs.env:HandrailEnv", kwargs={"task": _entry}
     )

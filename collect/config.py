@@ -8,7 +8,7 @@ from typing import Annotated
 import tyro
 
 from handrail.collect.flags import only_one
-from handrail.collect.operators.human import HumanSettings
+from handrail.collect.operators.human.human import HumanSettings
 from handrail.controllers.errors import HandrailError, unknown_name
 from handrail.datasets.lists import Names
 

@@ -6,4 +6,4 @@ it is made.
 
 import gymnasium
 
-gymnasium.register("handrail/GoalReaching-v0", entry_point="handrail.policies.rl_env:GoalReachingEnv")
+gymnasium.register("handrail/GoalReaching-v0", entry_point="handrail.policies.rl.env:GoalReachingEnv")

@@ -1,6 +1,6 @@
 """`handrail-benchmark`: the paper's goal-reaching benchmark, every controller on the same goals."""
 
-from handrail.collect.benchmark_config import BenchmarkConfig
+from handrail.collect.experiments.benchmark.config import BenchmarkConfig
 from handrail.scripts import cli
 
 
@@ -13,10 +13,10 @@ def _benchmark(config: BenchmarkConfig) -> int:
     config.check()
     from rich.console import Console
 
-    from handrail.collect.benchmark import benchmark
-    from handrail.collect.benchmark_contenders import CONTENDERS
-    from handrail.collect.benchmark_tables import benchmark_tables
-    from handrail.policies.rl_contender import RL_CONTENDERS
+    from handrail.collect.experiments.benchmark.baselines import CONTENDERS
+    from handrail.collect.experiments.benchmark.benchmark import benchmark
+    from handrail.collect.experiments.benchmark.tables import benchmark_tables
+    from handrail.policies.rl.baseline import RL_CONTENDERS
 
     console = Console()
     results = benchmark(config, {**CONTENDERS, **RL_CONTENDERS}, console)

@@ -15,7 +15,7 @@ def _compare(config: CompareConfig) -> int:
 
     from handrail.datasets.comparison.compare import compare
     from handrail.datasets.comparison.findings import findings
-    from handrail.datasets.comparison.report import write_report
+    from handrail.datasets.comparison.report.report import write_report
 
     comparison = compare(config)
     files = write_report(comparison)

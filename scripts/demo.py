@@ -10,7 +10,7 @@ def main() -> None:
 
 
 def _demo(config: DemoConfig) -> int:
-    from handrail.collect.demo import demo
+    from handrail.collect.commands.demo import demo
 
     return demo(config)
 

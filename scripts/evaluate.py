@@ -2,8 +2,8 @@
 
 import sys
 
-from handrail.policies.imitation.evaluate_config import EvaluateConfig
-from handrail.policies.imitation.installed import check_installed
+from handrail.policies.imitation.evaluation.config import EvaluateConfig
+from handrail.policies.imitation.training.installed import check_installed
 from handrail.scripts import cli
 
 
@@ -17,9 +17,9 @@ def _evaluate(config: EvaluateConfig) -> int:
     check_installed("handrail-evaluate", ("torch",))
     from rich.console import Console
 
-    from handrail.policies.imitation.evaluation import UnevaluatedError, evaluate
-    from handrail.policies.imitation.evaluation_table import evaluation_table
-    from handrail.policies.imitation.evaluation_video import film
+    from handrail.policies.imitation.evaluation.evaluation import UnevaluatedError, evaluate
+    from handrail.policies.imitation.evaluation.table import evaluation_table
+    from handrail.policies.imitation.evaluation.video import film
 
     reasons: tuple[str, ...] = ()
     try:

@@ -12,9 +12,9 @@ def main() -> None:
 def _inspect(config: InspectConfig) -> int:
     from rich.console import Console
 
-    from handrail.collect.tables import quality_table, summary_table
-    from handrail.datasets.check import check_report
-    from handrail.datasets.repair import repair
+    from handrail.collect.commands.tables import quality_table, summary_table
+    from handrail.datasets.reading.check import check_report
+    from handrail.datasets.recording.repair import repair
 
     console = Console()
     faults: list[str] = []

@@ -1,6 +1,6 @@
 """`handrail-profile`: time the controller's update against IPOPT, FATROP and mink."""
 
-from handrail.collect.profile_config import ProfileConfig
+from handrail.collect.experiments.profiling.config import ProfileConfig
 from handrail.scripts import cli
 
 
@@ -13,8 +13,8 @@ def _profile(config: ProfileConfig) -> int:
     config.check()
     from rich.console import Console
 
-    from handrail.collect.profile import Profile, save
-    from handrail.collect.profile_tables import profile_tables
+    from handrail.collect.experiments.profiling.profiling import Profile, save
+    from handrail.collect.experiments.profiling.tables import profile_tables
 
     results = Profile(config).run()
     if config.json:

@@ -11,7 +11,9 @@ def main() -> None:
 
 def _record(config: RecordConfig) -> int:
     config.check()
-    from handrail.collect.record import record  # loads the simulator: only once the settings are right
+    from handrail.collect.commands.record import (
+        record,  # loads the simulator: only once the settings are right
+    )
 
     return record(config)
 

@@ -11,7 +11,7 @@ def main() -> None:
 
 def _repair(config: RepairConfig) -> int:
     """Return 0 only if everything that was saved is in the dataset and whole."""
-    from handrail.datasets.repair import repair
+    from handrail.datasets.recording.repair import repair
 
     report = repair(config.dataset.folder, config.set_aside)
     print(report)

@@ -7,7 +7,7 @@ from handrail.collect.config import ReplayConfig
 from handrail.scripts import cli
 
 if TYPE_CHECKING:
-    from handrail.collect.replay import Replay
+    from handrail.collect.commands.replay import Replay
 
 _PICTURES = 8
 _HEADINGS = ("episode", "largest deviation", "of", "tool at end [m]", "success", "recorded", "contacts begun")
@@ -22,10 +22,10 @@ def _replay(config: ReplayConfig) -> int:
     config.check()
     from rich.console import Console
 
-    from handrail.collect.contact_sheet import save_sheet
-    from handrail.collect.plain_table import PlainTable
-    from handrail.collect.replay import replay_episode
-    from handrail.datasets.reader import read_episodes
+    from handrail.collect.commands.replay import replay_episode
+    from handrail.collect.session.contact_sheet import save_sheet
+    from handrail.datasets.presentation.plain_table import PlainTable
+    from handrail.datasets.reading.reader import read_episodes
 
     root = config.dataset.folder
     episodes = range(len(read_episodes(root))) if config.episode < 0 else [config.episode]

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from handrail.collect.showcase_config import ShowcaseConfig
+from handrail.collect.experiments.showcase.config import ShowcaseConfig
 from handrail.scripts import cli
 
 
@@ -15,7 +15,7 @@ def _showcase(config: ShowcaseConfig) -> int:
     config.check()
     from rich.console import Console
 
-    from handrail.collect.showcase import showcase
+    from handrail.collect.experiments.showcase.showcase import showcase
 
     console = Console(highlight=False, soft_wrap=True)
     console.print(f"Running case {config.case.upper()} …")

@@ -11,7 +11,7 @@ def main() -> None:
 
 def _study(config: StudyConfig) -> int:
     config.check()
-    from handrail.policies.study.run import run_study
+    from handrail.policies.study.execution.run import run_study
 
     return run_study(config)
 

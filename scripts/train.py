@@ -1,7 +1,7 @@
 """`handrail-train`: train an imitation policy with LeRobot's own training."""
 
 from handrail.policies.imitation.config import TrainConfig
-from handrail.policies.imitation.installed import check_installed
+from handrail.policies.imitation.training.installed import check_installed
 from handrail.scripts import cli
 
 
@@ -13,7 +13,7 @@ def main() -> None:
 def _train(config: TrainConfig) -> int:
     config.check()
     check_installed("handrail-train", ("torch", "accelerate"), config.policy)
-    from handrail.policies.imitation.training import train
+    from handrail.policies.imitation.training.training import train
 
     print(f"written: {train(config)}")
     return 0

@@ -1,7 +1,7 @@
 """`handrail-train-rl`: train the reinforcement-learning baseline."""
 
-from handrail.policies.imitation.installed import check_installed
-from handrail.policies.rl_config import TrainRlConfig
+from handrail.policies.imitation.training.installed import check_installed
+from handrail.policies.rl.config import TrainRlConfig
 from handrail.scripts import cli
 
 
@@ -13,7 +13,7 @@ def main() -> None:
 def _train(config: TrainRlConfig) -> int:
     config.check()
     check_installed("handrail-train-rl", ("stable_baselines3", "tensorboard"), extra="rl")
-    from handrail.policies.rl_train import train
+    from handrail.policies.rl.train import train
 
     record = train(config)
     score = {name: values["mean"] for name, values in record["final"].items()}

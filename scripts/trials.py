@@ -1,6 +1,6 @@
 """`handrail-trials`: let the scripted operators do every task in every mode, and count how it went."""
 
-from handrail.collect.trials_config import TrialsConfig
+from handrail.collect.experiments.trials.config import TrialsConfig
 from handrail.scripts import cli
 
 
@@ -13,9 +13,9 @@ def _trials(config: TrialsConfig) -> int:
     config.check()
     from rich.console import Console
 
-    from handrail.collect.plain_table import PlainTable
-    from handrail.collect.trials import run_trials
-    from handrail.collect.trials_table import trials_table, write_page
+    from handrail.collect.experiments.trials.table import trials_table, write_page
+    from handrail.collect.experiments.trials.trials import run_trials
+    from handrail.datasets.presentation.plain_table import PlainTable
 
     console = Console(highlight=False, markup=False, soft_wrap=True)
     trials = run_trials(

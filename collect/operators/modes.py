@@ -4,10 +4,10 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
-from handrail.collect.operators.steering import Gains
-from handrail.collect.operators.wish import Focus
-from handrail.controllers.channels import TOOL
+from handrail.collect.operators.human.motion_goal import Focus
+from handrail.collect.operators.human.steering import Gains
 from handrail.controllers.errors import unknown_name
+from handrail.controllers.interface.channels import TOOL
 
 Completion = Literal["mpc", "direct", "filter", "cbf", "split"]
 Device = Literal["sticks", "single_axis", "leader_arm"]

@@ -7,9 +7,9 @@ from typing import Any, Protocol
 import numpy as np
 
 from handrail.collect.tasks.task import TaskState
-from handrail.controllers.controller import State
-from handrail.controllers.intent import Intent
-from handrail.controllers.model import Pose
+from handrail.controllers.interface.controller import State
+from handrail.controllers.interface.intent import Intent
+from handrail.controllers.robot.model import Pose
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from handrail.controllers.model import RobotModel
+from handrail.controllers.robot.model import RobotModel
 
 _LAID_OUT = 1.49  # of the tool ahead of the base's centre at home [m]
 

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from handrail.collect.scene import Colour, Part, SceneObject, box
-from handrail.collect.slide import Slide
+from handrail.collect.simulation.scene import Colour, Part, SceneObject, box
+from handrail.collect.simulation.slide import Slide
 from handrail.controllers.arrays import FloatArray
-from handrail.controllers.rotation import matrix_from_rpy
+from handrail.controllers.numerics.rotation import matrix_from_rpy
 
 _BODY: Colour = (0.87, 0.86, 0.83, 1.0)
 _FRONT: Colour = (0.72, 0.56, 0.40, 1.0)

@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from handrail.collect.scene import Scene, SceneObject
+from handrail.collect.simulation.scene import Scene, SceneObject
 from handrail.collect.tasks.furniture import crate, footprint, pillar
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import HandrailError
-from handrail.controllers.model import RobotModel
+from handrail.controllers.robot.model import RobotModel
 
 MOST_OBSTACLES = 3
 _PREFIX = "obstacle"

@@ -4,11 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from handrail.collect.scene import Scene, View
+from handrail.collect.simulation.scene import Scene, View
 from handrail.collect.tasks.cabinet import HANDLE, cabinet, drawer, inward
 from handrail.collect.tasks.task import Episode, Outcome, TaskState
 from handrail.controllers.arrays import FloatArray
-from handrail.controllers.model import RobotModel
+from handrail.controllers.robot.model import RobotModel
 
 _VIEW = View(position=(-0.9, -2.7, 1.9), target=(-0.1, 0.1, 0.6), fovy=52.0)
 

@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from handrail.collect.patrol import Patrol
-from handrail.collect.scene import Scene, SceneObject
+from handrail.collect.simulation.patrol import Patrol
+from handrail.collect.simulation.scene import Scene, SceneObject
 from handrail.collect.tasks.furniture import footprint
 from handrail.controllers.arrays import FloatArray
-from handrail.controllers.model import RobotModel
-from handrail.controllers.shape import Shape
+from handrail.controllers.robot.model import RobotModel
+from handrail.controllers.robot.shape import Shape
 
 FASTEST = 0.5  # [m/s]
 _SLOWEST = 0.2  # [m/s]

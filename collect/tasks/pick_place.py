@@ -4,13 +4,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from handrail.collect.scene import Scene, SceneObject, View
+from handrail.collect.simulation.scene import Scene, SceneObject, View
 from handrail.collect.tasks.clutter import obstacle_features, obstacle_names, sample_obstacles
 from handrail.collect.tasks.furniture import cube, open_bin, table
 from handrail.collect.tasks.task import Episode, Outcome, TaskState
 from handrail.controllers.arrays import FloatArray
-from handrail.controllers.model import RobotModel
-from handrail.controllers.rotation import quaternion_from_matrix
+from handrail.controllers.numerics.rotation import quaternion_from_matrix
+from handrail.controllers.robot.model import RobotModel
 
 _EDGE, _MASS = 0.05, 0.1  # of the cube [m], [kg]
 _BIN_HEIGHT = 0.10

@@ -4,14 +4,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from handrail.collect.goal_reaching import ORIENTATION_TOLERANCE, POSITION_TOLERANCE, sample_goal
-from handrail.collect.scene import Part, Scene, SceneObject, View
+from handrail.collect.simulation.scene import Part, Scene, SceneObject, View
+from handrail.collect.tasks.goal_reaching import ORIENTATION_TOLERANCE, POSITION_TOLERANCE, sample_goal
 from handrail.collect.tasks.moving import mover_features, mover_names, sample_movers
 from handrail.collect.tasks.task import Episode, Outcome, TaskState
 from handrail.controllers.arrays import FloatArray
-from handrail.controllers.model import Pose, RobotModel
-from handrail.controllers.rotation import matrix_to_axis, orientation_error, quaternion_from_matrix
-from handrail.controllers.shape import Shape
+from handrail.controllers.numerics.rotation import matrix_to_axis, orientation_error, quaternion_from_matrix
+from handrail.controllers.robot.model import Pose, RobotModel
+from handrail.controllers.robot.shape import Shape
 
 _COLOURS = ((0.85, 0.15, 0.15, 1.0), (0.15, 0.7, 0.2, 1.0), (0.15, 0.3, 0.9, 1.0))
 _ARROW = 0.18  # length of the marker's axes [m]

@@ -6,12 +6,12 @@ from typing import Protocol
 
 import numpy as np
 
-from handrail.collect.scene import Scene, SceneObject
-from handrail.collect.simulation import Twist
+from handrail.collect.simulation.scene import Scene, SceneObject
+from handrail.collect.simulation.simulation import Twist
 from handrail.controllers.arrays import FloatArray, frozen
 from handrail.controllers.errors import unknown_name
-from handrail.controllers.model import Pose, RobotModel
-from handrail.controllers.shape import Obstacle
+from handrail.controllers.robot.model import Pose, RobotModel
+from handrail.controllers.robot.shape import Obstacle
 
 
 @dataclass(frozen=True)

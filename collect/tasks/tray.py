@@ -4,16 +4,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from handrail.collect.scene import Scene, SceneObject, View
+from handrail.collect.simulation.scene import Scene, SceneObject, View
 from handrail.collect.tasks.arm_reach import reach_share
 from handrail.collect.tasks.clutter import obstacle_features, obstacle_names, sample_obstacles
 from handrail.collect.tasks.furniture import TRAY_BAR, can, table, tray
 from handrail.collect.tasks.task import Episode, Outcome, TaskState
-from handrail.controllers.arm_pose import arm_configuration
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import HandrailError
-from handrail.controllers.model import Pose, RobotModel
-from handrail.controllers.rotation import quaternion_from_matrix
+from handrail.controllers.numerics.rotation import quaternion_from_matrix
+from handrail.controllers.robot.inverse_kinematics import arm_configuration
+from handrail.controllers.robot.model import Pose, RobotModel
 
 _SIZE = (0.26, 0.32, 0.20)  # of the tray: length, width, handle above the plate [m]
 _TRAY_MASS, _CAN_MASS = 0.35, 0.20  # [kg]

@@ -4,9 +4,9 @@ import casadi as ca
 import numpy as np
 
 from handrail.controllers.arrays import BoolArray, FloatArray
-from handrail.controllers.channels import Channels
 from handrail.controllers.errors import HandrailError
-from handrail.controllers.objective import Objective, Stage
+from handrail.controllers.interface.channels import Channels
+from handrail.controllers.objectives.objective import Objective, Stage
 from handrail.controllers.objectives.ownership import commanded_joints, leaves_freedom
 from handrail.controllers.objectives.smooth import bounded_pull
 

@@ -4,11 +4,11 @@ import casadi as ca
 import numpy as np
 
 from handrail.controllers.arrays import BoolArray, FloatArray
-from handrail.controllers.channels import Channels
-from handrail.controllers.model import Pose
-from handrail.controllers.objective import Objective, Stage
+from handrail.controllers.interface.channels import Channels
+from handrail.controllers.objectives.objective import Objective, Stage
 from handrail.controllers.objectives.ownership import leaves_freedom
 from handrail.controllers.objectives.smooth import bounded_pull
+from handrail.controllers.robot.model import Pose
 
 _TINY = 1e-9
 

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 
 from handrail.controllers.arrays import BoolArray, FloatArray
-from handrail.controllers.channels import Channels
-from handrail.controllers.description import Limits
-from handrail.controllers.objective import Objective
+from handrail.controllers.interface.channels import Channels
+from handrail.controllers.objectives.objective import Objective
 from handrail.controllers.objectives.ownership import commanded_joints, leaves_freedom
+from handrail.controllers.robot.description import Limits
 
 
 def limit_centring(

@@ -4,12 +4,12 @@ import casadi as ca
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray
-from handrail.controllers.channels import Channels
-from handrail.controllers.model import RobotModel
-from handrail.controllers.objective import Objective, Stage
+from handrail.controllers.interface.channels import Channels
+from handrail.controllers.objectives.objective import Objective, Stage
 from handrail.controllers.objectives.ownership import leaves_arm
 from handrail.controllers.objectives.smooth import hinge
-from handrail.controllers.symbolic import symbolic_pose
+from handrail.controllers.robot.model import RobotModel
+from handrail.controllers.robot.symbolic import symbolic_pose
 
 _WIDTH = 0.02  # of the smooth hinge
 _DAMPING = 1e-6  # keeps the logarithm finite at a singularity

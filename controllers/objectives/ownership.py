@@ -3,7 +3,7 @@
 import numpy as np
 
 from handrail.controllers.arrays import BoolArray
-from handrail.controllers.channels import Channels
+from handrail.controllers.interface.channels import Channels
 
 
 def commanded_joints(channels: Channels, mask: BoolArray) -> BoolArray:

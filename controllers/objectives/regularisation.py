@@ -3,8 +3,8 @@
 import numpy as np
 
 from handrail.controllers.arrays import BoolArray, FloatArray
-from handrail.controllers.channels import Channels
-from handrail.controllers.objective import Objective
+from handrail.controllers.interface.channels import Channels
+from handrail.controllers.objectives.objective import Objective
 from handrail.controllers.objectives.ownership import commanded_joints
 
 

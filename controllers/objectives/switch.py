@@ -6,7 +6,7 @@ import casadi as ca
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray
-from handrail.controllers.objective import Objective, Stage
+from handrail.controllers.objectives.objective import Objective, Stage
 
 
 def switchable(objective: Objective, on: bool = False) -> Objective:

@@ -4,9 +4,9 @@ import casadi as ca
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray
-from handrail.controllers.channels import Channels
-from handrail.controllers.frames import Frames
-from handrail.controllers.objective import Objective, Stage
+from handrail.controllers.interface.channels import Channels
+from handrail.controllers.interface.frames import Frames
+from handrail.controllers.objectives.objective import Objective, Stage
 
 
 def tracking(channels: Channels, weights: FloatArray) -> Objective:

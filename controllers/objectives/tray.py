@@ -4,8 +4,8 @@ import casadi as ca
 import numpy as np
 
 from handrail.controllers.arrays import BoolArray, FloatArray
-from handrail.controllers.channels import Channels
-from handrail.controllers.objective import Objective, Stage
+from handrail.controllers.interface.channels import Channels
+from handrail.controllers.objectives.objective import Objective, Stage
 from handrail.controllers.objectives.ownership import leaves_freedom, leaves_hand
 from handrail.controllers.objectives.smooth import hinge, norm
 

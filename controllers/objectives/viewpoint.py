@@ -4,11 +4,11 @@ import casadi as ca
 import numpy as np
 
 from handrail.controllers.arrays import BoolArray
-from handrail.controllers.channels import Channels
-from handrail.controllers.description import Placement
-from handrail.controllers.objective import Objective, Stage
+from handrail.controllers.interface.channels import Channels
+from handrail.controllers.objectives.objective import Objective, Stage
 from handrail.controllers.objectives.ownership import commanded_joints, leaves_freedom, leaves_hand
 from handrail.controllers.objectives.smooth import hinge, norm
+from handrail.controllers.robot.description import Placement
 
 _WIDTH = 0.02  # of the smooth hinge [rad]
 _TINY = 1e-3  # of the smooth length [m]

@@ -5,9 +5,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from handrail.datasets.comparison.groups import Group
-from handrail.datasets.comparison.proportions import ShareDifference, paired_shares, unpaired_shares
-from handrail.datasets.comparison.resampling import Interval
-from handrail.datasets.paired import wilson
+from handrail.datasets.statistics.paired import wilson
+from handrail.datasets.statistics.proportions import ShareDifference, paired_shares, unpaired_shares
+from handrail.datasets.statistics.resampling import Interval
 
 
 @dataclass(frozen=True)

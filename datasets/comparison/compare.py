@@ -6,7 +6,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from handrail.controllers.errors import HandrailError
-from handrail.datasets.check import check_whole
 from handrail.datasets.comparison.collection import (
     Collected,
     collected,
@@ -22,9 +21,10 @@ from handrail.datasets.comparison.likeness import unlike
 from handrail.datasets.comparison.means import Means, means
 from handrail.datasets.comparison.outcomes import LIKE_FOR_LIKE, Outcomes, Pair, judge_pairs
 from handrail.datasets.comparison.productivity import RateRatio, rate_interval, rate_ratio
-from handrail.datasets.comparison.proportions import ShareDifference
-from handrail.datasets.comparison.resampling import Interval
 from handrail.datasets.quality.measure import Measurements, measure
+from handrail.datasets.reading.check import check_whole
+from handrail.datasets.statistics.proportions import ShareDifference
+from handrail.datasets.statistics.resampling import Interval
 
 MIXED = "mixed"  # family of policies that differ in more than their data
 _SAME_NUMBER = "the same number of episodes"

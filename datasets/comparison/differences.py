@@ -9,16 +9,16 @@ from scipy import stats
 from handrail.controllers.arrays import FloatArray
 from handrail.datasets.comparison.collection import shared_seeds
 from handrail.datasets.comparison.groups import Group
-from handrail.datasets.comparison.proportions import LEVEL, holm
-from handrail.datasets.comparison.resampling import (
+from handrail.datasets.quality.catalogue import METRICS, Metric
+from handrail.datasets.quality.measure import Measured, Measurements
+from handrail.datasets.statistics.proportions import LEVEL, holm
+from handrail.datasets.statistics.resampling import (
     FEWEST,
     RESAMPLES,
     Interval,
     p_of_difference,
     percentiles,
 )
-from handrail.datasets.quality.catalogue import METRICS, Metric
-from handrail.datasets.quality.measure import Measured, Measurements
 
 FOLLOWS = 0.5  # |Spearman's ρ| with length from which a metric counts as following it
 _NO_SPREAD = 1e-9  # of a value: a standard deviation below is rounding

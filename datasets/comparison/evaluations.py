@@ -27,8 +27,8 @@ from typing import Any
 import numpy as np
 
 from handrail.controllers.errors import HandrailError
-from handrail.datasets.comparison.resampling import Run
-from handrail.datasets.strict_json import read_json
+from handrail.datasets.statistics.resampling import Run
+from handrail.datasets.storage.strict_json import read_json
 
 FORMAT = "handrail.evaluations/1"
 SUCCESS = "success"

@@ -11,9 +11,9 @@ from handrail.datasets.comparison.compare import Comparison
 from handrail.datasets.comparison.finding import Finding
 from handrail.datasets.comparison.outcome_findings import outcome_findings
 from handrail.datasets.comparison.productivity import RateRatio
-from handrail.datasets.comparison.proportions import ShareDifference, holm
 from handrail.datasets.comparison.quality_findings import quality_findings
-from handrail.datasets.comparison.wording import duration, number, p_value, percent, points_span, span
+from handrail.datasets.presentation.wording import duration, number, p_value, percent, points_span, span
+from handrail.datasets.statistics.proportions import ShareDifference, holm
 
 
 def findings(comparison: Comparison) -> list[Finding]:

@@ -10,7 +10,7 @@ from handrail.controllers.errors import HandrailError, unknown_name
 from handrail.datasets.quality.columns import ColumnNames
 from handrail.datasets.quality.demonstration import Demonstration
 from handrail.datasets.quality.load import read_demonstrations
-from handrail.datasets.reader import DatasetInfo, read_info
+from handrail.datasets.reading.reader import DatasetInfo, read_info
 
 FEWEST, MOST = 2, 8
 

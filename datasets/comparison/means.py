@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from handrail.datasets.comparison.resampling import Interval, mean_interval
 from handrail.datasets.quality.catalogue import METRICS
 from handrail.datasets.quality.measure import Measurements
+from handrail.datasets.statistics.resampling import Interval, mean_interval
 
 
 @dataclass(frozen=True)

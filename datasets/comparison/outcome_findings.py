@@ -4,8 +4,8 @@ from collections.abc import Iterator
 
 from handrail.datasets.comparison.finding import Finding
 from handrail.datasets.comparison.outcomes import ArmOutcome, OutcomeDifference, Outcomes
-from handrail.datasets.comparison.resampling import Interval
-from handrail.datasets.comparison.wording import counted, p_value, percent, percent_span, points_span
+from handrail.datasets.presentation.wording import counted, p_value, percent, percent_span, points_span
+from handrail.datasets.statistics.resampling import Interval
 
 
 def outcome_findings(outcomes: Outcomes) -> Iterator[Finding]:

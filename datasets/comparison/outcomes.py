@@ -7,7 +7,8 @@ import numpy as np
 
 from handrail.controllers.arrays import FloatArray
 from handrail.datasets.comparison.evaluations import SUCCESS, Arm
-from handrail.datasets.comparison.proportions import (
+from handrail.datasets.statistics.paired import wilson
+from handrail.datasets.statistics.proportions import (
     ShareDifference,
     holm,
     independent_trials,
@@ -15,7 +16,7 @@ from handrail.datasets.comparison.proportions import (
     reach,
     unpaired_shares,
 )
-from handrail.datasets.comparison.replicates import (
+from handrail.datasets.statistics.replicates import (
     chance_of_means,
     replicates,
     standard_error,
@@ -23,8 +24,7 @@ from handrail.datasets.comparison.replicates import (
     welch_p,
     wider,
 )
-from handrail.datasets.comparison.resampling import Interval, Run, percentiles, resample_runs
-from handrail.datasets.paired import wilson
+from handrail.datasets.statistics.resampling import Interval, Run, percentiles, resample_runs
 
 LIKE_FOR_LIKE = "like-for-like"
 

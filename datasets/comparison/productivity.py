@@ -8,7 +8,7 @@ import numpy as np
 from handrail.controllers.arrays import FloatArray
 from handrail.datasets.comparison.collection import shared_seeds
 from handrail.datasets.comparison.groups import Group
-from handrail.datasets.comparison.resampling import FEWEST, RESAMPLES, Interval, percentiles
+from handrail.datasets.statistics.resampling import FEWEST, RESAMPLES, Interval, percentiles
 
 HOUR = 3600.0
 

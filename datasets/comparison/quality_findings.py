@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from handrail.datasets.comparison.compare import Comparison
 from handrail.datasets.comparison.differences import Difference
 from handrail.datasets.comparison.finding import Finding
-from handrail.datasets.comparison.wording import number, p_value, signed, span, unit
+from handrail.datasets.presentation.wording import number, p_value, signed, span, unit
 
 _SHOWN = 6  # metrics in words; the table has all
 

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray
-from handrail.datasets.metrics import ldlj, sparc
 from handrail.datasets.quality import consistency, effort, idle, path, safety, tracking
 from handrail.datasets.quality.demonstration import Demonstration
 from handrail.datasets.quality.information import information
+from handrail.datasets.quality.metrics import ldlj, sparc
 from handrail.datasets.quality.missing import DoesNotApply
 from handrail.datasets.quality.neighbours import cloud, frames_of, mean_of_each
 from handrail.datasets.quality.pool import Pool

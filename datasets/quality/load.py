@@ -3,10 +3,10 @@
 from pathlib import Path
 
 from handrail.controllers.errors import HandrailError
-from handrail.datasets.labels import with_success
 from handrail.datasets.quality.columns import ColumnNames
 from handrail.datasets.quality.demonstration import Demonstration, Source
-from handrail.datasets.reader import DatasetInfo, read_episodes, read_info, read_rows_of
+from handrail.datasets.reading.labels import with_success
+from handrail.datasets.reading.reader import DatasetInfo, read_episodes, read_info, read_rows_of
 
 
 def read_demonstrations(root: str | Path, columns: ColumnNames | None = None) -> list[Demonstration]:

@@ -3,8 +3,8 @@
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray, IntArray
-from handrail.datasets.metrics import path_length
 from handrail.datasets.quality.demonstration import Demonstration
+from handrail.datasets.quality.metrics import path_length
 from handrail.datasets.quality.missing import DoesNotApply
 
 _LOW, _HIGH = 0.25, 0.75  # of the gripper's range: where it counts as closed and as open again

@@ -1,0 +1,66 @@
+"""The demo: a few demonstrations, a table, a picture, and what to try next."""
+
+import shutil
+import sys
+from pathlib import Path
+
+from rich.console import Console
+
+from handrail.collect.commands.record import PLAIN, record
+from handrail.collect.commands.replay import replay_episode
+from handrail.collect.commands.tables import summary_table
+from handrail.collect.config import DatasetConfig, DemoConfig, RecordConfig
+from handrail.collect.session.contact_sheet import save_sheet
+from handrail.collect.simulation.gl import graphics_trouble
+from handrail.controllers.errors import HandrailError
+
+_REPO = "handrail/demo"
+_NEXT = """Next:
+  {bin}handrail-inspect {root}
+  {bin}handrail-replay {root}
+  {bin}handrail-record {root} --resume --dataset.num_episodes 5 --mode switching{cameras}
+  {bin}lerobot-dataset-viz --repo-id {repo} --root {root} --episode-index 0 \
+      --save 1 --output-dir {folder}    # extra: display; without --save it needs a screen
+  {bin}handrail-record --help"""
+
+
+def demo(config: DemoConfig) -> int:
+    """Record, then print a table, the dataset's path, a picture's path, and commands to try.
+
+    Raises:
+        HandrailError: a setting is wrong, or the folder is taken.
+    """
+    console = Console()
+    if config.episodes < 1:
+        raise HandrailError(f"--episodes {config.episodes}: expected 1 or more")
+    trouble = graphics_trouble()
+    if trouble:
+        console.print(f"Without pictures: {trouble}", **PLAIN)
+    cameras = "" if trouble else "wrist,scene"
+    root = config.folder / "dataset"
+    dataset = DatasetConfig(repo_id=_REPO, root=str(root), num_episodes=config.episodes)
+    console.print(f"Recording {config.episodes} episodes: the operator steers the hand, the MPC the rest …")
+    code = record(RecordConfig(dataset=dataset, cameras=cameras, overwrite=config.overwrite))
+    if code:
+        return code
+    console.print(summary_table(root))
+    if not trouble:
+        sheet = config.folder / "episode_0.png"
+        save_sheet(replay_episode(root, 0, pictures=8)[1], sheet)
+        console.print(f"Picture: {sheet}", **PLAIN)
+    console.print(f"Dataset: {root}", **PLAIN)
+    flags = f" --cameras {cameras}" if cameras else ""
+    console.print(
+        _NEXT.format(root=root, folder=config.folder, repo=_REPO, cameras=flags, bin=_command_prefix()),
+        **PLAIN,
+    )
+    return 0
+
+
+def _command_prefix() -> str:
+    """Return what to write before a command: nothing where the shell finds it, else the folder it is in."""
+    if shutil.which("handrail-record"):
+        return ""
+    folder = Path(sys.executable).parent
+    here = Path.cwd()
+    return f"{folder.relative_to(here) if folder.is_relative_to(here) else folder}/"

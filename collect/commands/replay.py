@@ -1,0 +1,152 @@
+"""Replays a recorded episode's commands and reports how far the motion deviates."""
+
+import contextlib
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from handrail.collect.envs.env import HandrailEnv
+from handrail.collect.session.build import build_env
+from handrail.collect.session.recorded_settings import recorded_settings
+from handrail.collect.session.video_file import VideoFile
+from handrail.controllers.arrays import FloatArray
+from handrail.controllers.entries import is_count
+from handrail.controllers.errors import HandrailError
+from handrail.datasets.quality.safety import contacts_begun
+from handrail.datasets.reading.reader import read_episodes, read_frames, read_info
+
+
+@dataclass(frozen=True)
+class Replay:
+    """What came out of a replay.
+
+    Attributes:
+        episode: its number.
+        names: of the observed state.
+        deviations: largest deviation of each number of the observed state over the episode, (s,).
+        final: deviation of each number at the end, (s,).
+        recorded_success: what the dataset says.
+        success: what happened now.
+        contacts: forbidden contacts that began now.
+    """
+
+    episode: int
+    names: tuple[str, ...]
+    deviations: FloatArray
+    final: FloatArray
+    recorded_success: bool
+    success: bool
+    contacts: int
+
+    @property
+    def largest(self) -> float:
+        """Largest deviation of any number, in its own unit."""
+        return float(np.max(self.deviations, initial=0.0))
+
+    @property
+    def tool_at_end(self) -> float:
+        """Distance of the tool from where it was recorded, at the end [m]."""
+        tool = [index for index, name in enumerate(self.names) if name in ("tool.x", "tool.y", "tool.z")]
+        return float(np.linalg.norm(self.final[tool]))
+
+
+def replay_episode(
+    root: Path, episode: int, pictures: int = 0, video: Path | None = None
+) -> tuple[Replay, list[NDArray[np.uint8]]]:
+    """Run the recorded commands of an episode in its environment, from the same seed.
+
+    Args:
+        root: folder of the dataset.
+        episode: its number.
+        pictures: how many pictures to take, evenly over the episode.
+        video: also film the whole episode to this .mp4 file.
+
+    Returns:
+        What came out, and the pictures, (height, width, 3) each.
+
+    Raises:
+        HandrailError: no such dataset or episode, or one that Handrail did not record.
+    """
+    info = read_info(root)
+    row = _row(root, episode)
+    config = replace(recorded_settings(row), cameras="")
+    frames = read_frames(root, episode, ["action", "observation.state"])
+    env = build_env(config, info.fps, render=bool(pictures or video))
+    with contextlib.ExitStack() as stack:
+        stack.callback(env.close)
+        _check_state(frames["observation.state"], env, f"episode {episode} of {root}")
+        film = stack.enter_context(VideoFile(video, env.render_size, env.fps)) if video else None
+        camera = _Camera(env, _moments(len(frames["action"]), pictures), film)
+        states, last = _run(env, row["seed"], frames["action"], camera)
+    difference = np.abs(states - frames["observation.state"])
+    replay = Replay(
+        episode=episode,
+        names=env.agent_names,
+        deviations=difference.max(axis=0),
+        final=difference[-1],
+        recorded_success=bool(row.get("success")),
+        success=bool(last["is_success"]),
+        contacts=last["contacts_begun"],
+    )
+    return replay, camera.taken
+
+
+def _row(root: Path, episode: int) -> dict[str, Any]:
+    rows = read_episodes(root)
+    if not 0 <= episode < len(rows):
+        raise HandrailError(f"--episode {episode}: expected one of 0 to {len(rows) - 1} in {root}")
+    row = rows[episode]
+    if not is_count(row.get("seed")):
+        raise HandrailError(f"dataset {root}: expected one that handrail-record made, found no seed")
+    return row
+
+
+def _check_state(states: np.ndarray, env: HandrailEnv, where: str) -> None:
+    """Check that recorded states, (T, s), are of the robot that the episode names."""
+    size, numbers = states.shape[1:], len(env.agent_names)
+    if size != (numbers,) or not np.issubdtype(states.dtype, np.floating):
+        raise HandrailError(
+            f"{where}: expected {numbers} numbers as observation.state of {env.model.description.name}, "
+            f"got {size} of {states.dtype}"
+        )
+
+
+def _run(
+    env: HandrailEnv, seed: int, actions: np.ndarray, camera: "_Camera"
+) -> tuple[np.ndarray, dict[str, Any]]:
+    """Return the observed states before each action, (T, s), and the last info."""
+    observation, info = env.reset(seed=seed)
+    states, contacts = [], []
+    for index, action in enumerate(actions):
+        states.append(observation["agent_pos"])
+        observation, _, _, _, info = env.step(action)
+        contacts.append(info["contacts"])
+        camera.look(index)
+    return np.array(states), info | {"contacts_begun": int(contacts_begun(contacts))}
+
+
+def _moments(frames: int, pictures: int) -> set[int]:
+    """Return the frames of which pictures are taken, evenly over the episode."""
+    return set(np.linspace(0, frames - 1, pictures).round().astype(int).tolist())
+
+
+class _Camera:
+    """Takes pictures at some moments, and films all of them if there is a file for it."""
+
+    def __init__(self, env: HandrailEnv, moments: set[int], film: VideoFile | None) -> None:
+        self._env, self._moments, self._film = env, moments, film
+        self.taken: list[NDArray[np.uint8]] = []
+
+    def look(self, index: int) -> None:
+        """Take the picture of this moment, if somebody wants it."""
+        wanted = index in self._moments
+        picture = self._env.render() if wanted or self._film else None
+        if picture is None:
+            return
+        if wanted:
+            self.taken.append(picture)
+        if self._film:
+            self._film.add(picture)

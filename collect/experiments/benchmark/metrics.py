@@ -1,0 +1,116 @@
+"""The benchmark's measures of an episode, from the simulated joint velocities, as the protocol has them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from handrail.collect.tasks.goal_reaching import STEP, reached
+from handrail.controllers.arrays import FloatArray
+from handrail.controllers.collision.model import CollisionModel
+from handrail.controllers.interface.command import Status
+from handrail.datasets.quality.metrics import path_length
+
+METRICS = (
+    "success",
+    "final_position_error",
+    "final_orientation_error",
+    "length",
+    "arm_effort",
+    "base_path",
+    "jerkiness",
+    "wall_time_s",
+)
+"""Those of the paper's Table I, in its order."""
+
+COST_METRICS = ("cpu_time_s", "update_ms_median", "updates_per_s")
+"""What a controller costs: of an episode, of an update (median of the episode's), updates a second of it."""
+
+SAFETY_METRICS = ("contacts", "smallest_distance", "brakes")
+SETTLED_METRICS = ("planned_position_error", "planned_orientation_error")
+"""Errors right after the planner's last step; only of episodes that got there."""
+AIM = 0.01  # position error within which a planner that sees the hand was to bring it [m]
+
+
+@dataclass(frozen=True)
+class Trace:
+    """What happened in an episode of T steps.
+
+    Attributes:
+        q: positions before the first and after every step, (T + 1, n).
+        v: the simulated joint velocities after every step, (T, n).
+        errors: (d_p [m], d_r) after every step, (T, 2).
+        hand: the tool's positions before the first and after every step [m], (T + 1, 3).
+        contacts: names of the forbidden contacts of every step, T tuples.
+        statuses: of the controller's updates.
+        solve_times: of the controller's updates [s].
+        end: first step from which on nothing but rest arrives from the planner.
+        wall_time: of the episode, controller, physics and collision checking together [s].
+        cpu_time: of the process in that time [s]; other programs do not lengthen it.
+    """
+
+    q: FloatArray
+    v: FloatArray
+    errors: FloatArray
+    hand: FloatArray
+    contacts: Sequence[tuple[str, ...]]
+    statuses: Sequence[Status]
+    solve_times: Sequence[float]
+    end: int
+    wall_time: float
+    cpu_time: float
+
+
+def measure(trace: Trace, collision: CollisionModel, base: int) -> dict[str, Any]:
+    """Return the row of an episode.
+
+    Args:
+        trace: what happened.
+        collision: the pairs whose distance is looked at, contacts or not.
+        base: number of base coordinates, which come first.
+    """
+    d_p, d_r = trace.errors[-1].tolist()
+    names = sorted({name for step in trace.contacts for name in step})
+    row = {
+        "success": reached(d_p, d_r),
+        "final_position_error": d_p,
+        "final_orientation_error": d_r,
+        "length": len(trace.v),
+        "arm_effort": arm_effort(trace.v[:, base:]),
+        "base_path": path_length(trace.q[:, :2]) if base else 0.0,
+        "jerkiness": jerkiness(trace.v),
+        "wall_time_s": trace.wall_time,
+        "cpu_time_s": trace.cpu_time,
+        "contacts": sum(map(bool, trace.contacts)),
+        "contact_names": names,
+        "smallest_distance": float(collision.values(trace.q).min(initial=np.inf)),
+        "brakes": sum(status.brakes for status in trace.statuses),
+        "updates": len(trace.statuses),
+        "update_ms_median": 1e3 * float(np.median(trace.solve_times)),
+        "updates_per_s": len(trace.statuses) / (len(trace.v) * STEP),
+    }
+    row.update(dict(zip(SETTLED_METRICS, _planned(trace), strict=True)))
+    return row
+
+
+def arm_effort(velocities: FloatArray) -> float:
+    """Return the arm control effort `Σ_t ‖q̇_arm‖²` (without a time step), of (T, arm) [rad²/s²]."""
+    return float(np.sum(velocities**2))
+
+
+def jerkiness(velocities: FloatArray) -> float:
+    """Return the full-command jerkiness `mean_t ‖q̇_{t+1} − q̇_t‖ / h`, of (T, n); a mean acceleration.
+
+    NaN where there are fewer than two samples.
+    """
+    changes = np.linalg.norm(np.diff(velocities, axis=0), axis=1)
+    return float(changes.mean() / STEP) if len(changes) else float("nan")
+
+
+def _planned(trace: Trace) -> tuple[float | None, float | None]:
+    """Return the errors after the planner's last step, None for an episode that ended before."""
+    if not 0 < trace.end <= len(trace.errors):
+        return None, None
+    d_p, d_r = trace.errors[trace.end - 1].tolist()
+    return d_p, d_r

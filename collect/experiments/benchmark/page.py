@@ -1,0 +1,86 @@
+"""The benchmark's part of a Markdown page: tables and figures between two marks; what a repository keeps."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from handrail.collect.experiments.benchmark.config import BenchmarkConfig
+from handrail.collect.experiments.benchmark.format import (
+    COMPARED,
+    main_table,
+    paired_table,
+    profile_table,
+    safety_table,
+    settles,
+    settling_table,
+)
+from handrail.collect.experiments.benchmark.metrics import COST_METRICS, METRICS, SETTLED_METRICS
+from handrail.collect.experiments.benchmark.results import save_json
+from handrail.datasets.presentation.markdown import markdown_table, with_part
+from handrail.datasets.storage.atomic import write_whole
+
+_PAIRED = (
+    "Paired differences: mean, 95 % bootstrap interval, p of Wilcoxon's test, for success of McNemar's; every"
+    " p is for itself, not corrected for how many there are."
+)
+
+
+def write_page(
+    results: Mapping[str, Any], pictures: Mapping[str, bytes], page: Path, config: BenchmarkConfig
+) -> None:
+    """Put tables and figures into a page, between the marks of this kind of run; other text stays.
+
+    Figures and the summaries as JSON go beside the page, named `<page>_<label>…`.
+
+    Args:
+        results: as summarised.
+        pictures: PNG by name.
+        page: the Markdown file, made if it is not there.
+        config: what was run.
+    """
+    stem = f"{page.stem}_{config.label}"
+    for name, data in pictures.items():
+        write_whole(page.parent / f"{stem}_{name}.png", data)
+    save_json({k: v for k, v in results.items() if k != "episodes"}, page.parent / f"{stem}.json")
+    body = "\n\n".join(_parts(results, pictures, stem))
+    text = page.read_text(encoding="utf-8") if page.exists() else "# Goal reaching\n"
+    write_whole(page, with_part(text, config.label, body).encode())
+
+
+def _parts(results: Mapping[str, Any], pictures: Mapping[str, bytes], stem: str) -> list[str]:
+    parts = [f"`{_command(results)}` wrote this. {_how(results)}"]
+    profiles = list(results["profiles"])
+    for profile in profiles:
+        parts += [f"**Profile {profile}**"] if len(profiles) > 1 else []
+        parts.append(markdown_table(main_table(results, METRICS, profile)))
+        parts.append(markdown_table(main_table(results, COST_METRICS, profile)))
+        if settles(results):
+            parts.append(markdown_table(settling_table(results, profile)))
+        if not results["config"]["early_stop"]:
+            parts.append(markdown_table(main_table(results, SETTLED_METRICS, profile)))
+        parts.append(markdown_table(safety_table(results, profile)))
+        if results["paired"][profile]:
+            parts.append(markdown_table(paired_table(results, COMPARED, profile)))
+    if len(profiles) > 1:
+        parts.append(markdown_table(profile_table(results)))
+    parts += [f"![{name}]({stem}_{name}.png)" for name in pictures]
+    return parts + [f"Left out: {name} ({reason})." for name, reason in results["skipped"].items()]
+
+
+def _how(results: Mapping[str, Any]) -> str:
+    """Return how the numbers are to be read, those that depend on the machine above all."""
+    machine, workers = results["machine"], results["config"]["workers"]
+    said = (
+        "Mean ± SD (min, max) over the episodes. Update ms: the median over an episode's updates, without the"
+        f" distances that rivals only report. {machine['cores']} cores; load at the end"
+        f" {machine['load']:.1f}, of which {workers} by this run: times are longer where others computed too."
+    )
+    return f"{said} {_PAIRED}" if any(results["paired"].values()) else said
+
+
+def _command(results: Mapping[str, Any]) -> str:
+    config = results["config"]
+    flags = [f"--{name} {config[name]}" for name in ("controllers", "goals", "seed", "profile", "workers")]
+    flags += [f"--{name}" for name in ("clutter", "closed_loop") if config[name]]
+    flags += [f"--no_{name}" for name in ("physics", "early_stop") if not config[name]]
+    return " ".join(["handrail-benchmark", *flags])

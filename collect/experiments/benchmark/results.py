@@ -1,0 +1,131 @@
+"""What the benchmark measured, as one dictionary: summaries, paired comparisons, every episode's row."""
+
+import json
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from handrail.collect.experiments.benchmark.baselines import (
+    TAKE_UP,
+    TAKE_UP_TURN,
+    Contender,
+    goal_reaching_settings,
+    paper_settings,
+)
+from handrail.collect.experiments.benchmark.config import BenchmarkConfig
+from handrail.collect.experiments.benchmark.metrics import (
+    AIM,
+    COST_METRICS,
+    METRICS,
+    SAFETY_METRICS,
+    SETTLED_METRICS,
+)
+from handrail.collect.experiments.benchmark.plants import PHYSICS
+from handrail.datasets.statistics.paired import paired_difference, paired_success, wilson
+from handrail.datasets.storage.atomic import write_whole
+
+Row = Mapping[str, Any]
+_COMPARED = (*(name for name in METRICS if name != "success"), "update_ms_median")
+_PLACES = ("json", "report", "page")  # settings that say where results are written on a machine
+_VERSIONED = ("casadi", "coal", "daqp", "mujoco", "numpy", "pin", "scipy")
+
+
+def summarise(
+    rows: Sequence[Row], config: BenchmarkConfig, contenders: Sequence[Contender], skipped: Mapping[str, str]
+) -> dict[str, Any]:
+    """Return the results of a run.
+
+    `controllers` holds the first profile's summaries, `profiles` every profile's; each measure has mean, std,
+    min, max over its episodes. `paired` compares the first controller with every other on the same goals.
+
+    Args:
+        rows: one an episode.
+        config: what was run.
+        contenders: who took part.
+        skipped: who did not, and why.
+    """
+    names, profiles = [contender.name for contender in contenders], config.profile_names
+    by_profile = {
+        profile: {name: _summary(_of(rows, profile, name)) for name in names} for profile in profiles
+    }
+    return {
+        "controllers": by_profile[profiles[0]],
+        "profiles": by_profile,
+        "paired": {profile: _paired(rows, profile, names, config.seed) for profile in profiles},
+        "titles": {contender.name: contender.title for contender in contenders},
+        "skipped": dict(skipped),
+        "config": {name: value for name, value in asdict(config).items() if name not in _PLACES},
+        "mpc_settings": asdict(goal_reaching_settings()) | {"take_up": TAKE_UP, "take_up_turn": TAKE_UP_TURN},
+        "mpc_paper_settings": asdict(paper_settings()),
+        "physics": dict(PHYSICS) if config.physics else {},
+        "machine": {"cores": os.cpu_count(), "load": os.getloadavg()[0]},
+        "versions": {name: metadata.version(name) for name in _VERSIONED},
+        "episodes": [dict(row) for row in rows],
+    }
+
+
+def save_json(results: Mapping[str, Any], path: Path) -> None:
+    """Write the results; what is no number becomes null."""
+    write_whole(path, (json.dumps(_finite(results), indent=1, allow_nan=False) + "\n").encode())
+
+
+def _of(rows: Sequence[Row], profile: str, name: str) -> list[Row]:
+    """Return the rows of a controller under a profile, by goal."""
+    own = [row for row in rows if row["profile"] == profile and row["controller"] == name]
+    return sorted(own, key=lambda row: row["goal"])
+
+
+def _column(rows: Sequence[Row], metric: str) -> np.ndarray:
+    return np.array([np.nan if row[metric] is None else float(row[metric]) for row in rows])
+
+
+def _summary(rows: Sequence[Row]) -> dict[str, Any]:
+    summary: dict[str, Any] = {"episodes": len(rows)}
+    for metric in (*METRICS, *COST_METRICS, *SAFETY_METRICS, *SETTLED_METRICS):
+        values = _column(rows, metric)
+        values = values[np.isfinite(values)]
+        if len(values):
+            summary[metric] = {
+                "mean": float(values.mean()),
+                "std": float(values.std(ddof=1)) if len(values) > 1 else 0.0,
+                "min": float(values.min()),
+                "max": float(values.max()),
+            }
+    successes = int(sum(bool(row["success"]) for row in rows))
+    summary["success"]["interval"] = list(wilson(successes, len(rows)))
+    summary["episodes_with_contact"] = int(sum(row["contacts"] > 0 for row in rows))
+    errors = "planned_position_error", "final_position_error"
+    summary["beyond_aim"] = {name: int(np.sum(_column(rows, name) > AIM)) for name in errors}
+    return summary
+
+
+def _paired(rows: Sequence[Row], profile: str, names: Sequence[str], seed: int) -> dict[str, Any]:
+    """Return the first controller against every other, first minus other."""
+    rng = np.random.default_rng([seed, 99])
+    first = _of(rows, profile, names[0])
+    if len(first) < 2:
+        return {}
+    return {name: _against(first, _of(rows, profile, name), rng) for name in names[1:]}
+
+
+def _against(first: Sequence[Row], other: Sequence[Row], rng: np.random.Generator) -> dict[str, Any]:
+    success = paired_success(_column(first, "success"), _column(other, "success"))
+    result: dict[str, Any] = {"success": asdict(success)}
+    for metric in _COMPARED:
+        result[metric] = asdict(paired_difference(_column(first, metric), _column(other, metric), rng))
+    return result
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {key: _finite(entry) for key, entry in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(entry) for entry in value]
+    if isinstance(value, float) and not np.isfinite(value):
+        return None
+    return value

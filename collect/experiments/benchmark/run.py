@@ -1,0 +1,165 @@
+"""Runs the benchmark: every controller on every goal under every profile, goal by goal, in some processes."""
+
+import multiprocessing
+from collections.abc import Iterator, Mapping
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from handrail.collect.experiments.benchmark.baselines import Contender
+from handrail.collect.experiments.benchmark.config import BenchmarkConfig
+from handrail.collect.experiments.benchmark.episode import Conditions, run_episode
+from handrail.collect.experiments.benchmark.metrics import Trace, measure
+from handrail.collect.experiments.benchmark.scenes import cluttered_floor, empty_floor
+from handrail.collect.simulation.scene import Scene
+from handrail.collect.tasks.goal_reaching import Goal, sample_goal
+from handrail.controllers.arrays import FloatArray
+from handrail.controllers.collision.model import CollisionModel
+from handrail.controllers.errors import HandrailError
+from handrail.controllers.interface.controller import Controller
+from handrail.controllers.numerics.threads import single_threaded
+from handrail.controllers.robot.model import load_model
+
+_PATHS = 12  # goals whose paths are kept, for drawing
+_EVERY = 5  # steps between two points of a path
+
+
+@dataclass(frozen=True)
+class Job:
+    """One goal under one profile, for all controllers one after the other, so that noise hits all alike."""
+
+    index: int
+    profile: str
+    config: BenchmarkConfig
+    contenders: tuple[Contender, ...]
+
+
+@dataclass(frozen=True)
+class Episode:
+    """The row of an episode, and for some goals the paths of base and hand seen from above, (k, 2) each."""
+
+    row: dict[str, Any]
+    base: FloatArray | None = None
+    hand: FloatArray | None = None
+
+
+def goals(config: BenchmarkConfig) -> list[Goal]:
+    """Return the goals of a seed; the first ones do not depend on how many there are."""
+    rng = np.random.default_rng(config.seed)
+    return [sample_goal(rng) for _ in range(config.goals)]
+
+
+def conditions(config: BenchmarkConfig, index: int, profile: str) -> Conditions:
+    """Return what a goal's episodes are run under: goal, obstacles and command noise of the seed."""
+    goal = goals(config)[index]
+    scene = empty_floor()
+    if config.clutter:
+        scene = cluttered_floor(load_model(), goal, np.random.default_rng([config.seed, index, 1]))
+    return Conditions(
+        goal=goal,
+        scene=scene,
+        profile=profile,
+        seed=(config.seed, index, 2),
+        physics=config.physics,
+        early_stop=config.early_stop,
+        closed_loop=config.closed_loop,
+    )
+
+
+def available(
+    contenders: Mapping[str, Contender], config: BenchmarkConfig
+) -> tuple[tuple[Contender, ...], dict[str, str]]:
+    """Return who can take part, and why the others cannot: with `all`, what is not installed is left out.
+
+    Args:
+        contenders: all that there are, by name.
+        config: who was asked for.
+
+    Raises:
+        HandrailError: one that was asked for by name cannot take part, or nobody can.
+    """
+    present, skipped = [], {}
+    for name in config.controller_names:
+        try:
+            _controller(contenders[name])
+            present.append(contenders[name])
+        except HandrailError as error:
+            if config.controllers.strip() != "all":
+                raise
+            skipped[name] = str(error)
+    if not present:
+        raise HandrailError(f"controllers: none can take part: {skipped}")
+    return tuple(present), skipped
+
+
+def run(config: BenchmarkConfig, contenders: tuple[Contender, ...]) -> Iterator[list[Episode]]:
+    """Run everything; yield the episodes of a goal under a profile as they are done, in any order.
+
+    Args:
+        config: what to run.
+        contenders: who takes part.
+    """
+    jobs = [
+        Job(index, profile, config, contenders)
+        for index in range(config.goals)
+        for profile in config.profile_names
+    ]
+    if config.workers == 1:
+        yield from map(run_job, jobs)
+        return
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(config.workers, context) as pool:
+        try:
+            for done in as_completed([pool.submit(run_job, job) for job in jobs]):
+                yield done.result()
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+
+
+def run_job(job: Job) -> list[Episode]:
+    """Run all controllers on one goal under one profile."""
+    model = load_model()
+    given = conditions(job.config, job.index, job.profile)
+    _warm_up(job.contenders, given.physics)
+    collision = CollisionModel(model, given.scene.obstacles())
+    episodes = []
+    with single_threaded():
+        for contender in job.contenders:
+            trace = run_episode(model, contender, _controller(contender), given)
+            row = {"goal": job.index, "profile": job.profile, "controller": contender.name}
+            row |= measure(trace, collision, len(model.description.base_joints))
+            episodes.append(Episode(row, *_paths(trace, job.index)))
+    return episodes
+
+
+def trace_of(config: BenchmarkConfig, contender: Contender, index: int) -> tuple[Conditions, Trace]:
+    """Return what a controller does on one goal under the first profile, for a closer look."""
+    given = conditions(config, index, config.profile_names[0])
+    with single_threaded():
+        return given, run_episode(load_model(), contender, _controller(contender), given)
+
+
+@lru_cache(maxsize=32)
+def _controller(contender: Contender) -> Controller:
+    """Return a contender's controller, built once a process."""
+    return contender.build(load_model())
+
+
+@lru_cache(maxsize=32)
+def _warm_up(contenders: tuple[Contender, ...], physics: bool) -> None:
+    """Let everything that is built at its first use be built, outside of any measured time."""
+    model = load_model()
+    here = model.pose(model.description.home)
+    at_home = Conditions(Goal(here.position, here.rotation), Scene(), physics=physics)
+    for contender in contenders:
+        run_episode(model, contender, _controller(contender), at_home)
+
+
+def _paths(trace: Trace, index: int) -> tuple[FloatArray | None, FloatArray | None]:
+    if index >= _PATHS:
+        return None, None
+    return trace.q[::_EVERY, :2], trace.hand[::_EVERY, :2]

@@ -1,1 +1,0 @@
-"""Operators: observation in, intent out; scripted ones with a human-like hand."""

@@ -1,0 +1,150 @@
+"""Input maps: how a wish becomes values on the channels of a mode; nothing else differs between modes."""
+
+from typing import Protocol
+
+import numpy as np
+
+from handrail.collect.operators.devices.large_turn import LargeTurn
+from handrail.collect.operators.human.human import HumanSettings
+from handrail.collect.operators.human.motion_goal import Focus, Wish
+from handrail.collect.operators.human.steering import Gains
+from handrail.collect.operators.modes import TeleopMode
+from handrail.collect.operators.operator import View
+from handrail.controllers.arrays import BoolArray, FloatArray
+from handrail.controllers.interface.channels import Channels
+from handrail.controllers.interface.controller import State
+from handrail.controllers.robot.model import RobotModel
+
+_DAMPING = 0.03
+_BASE_WEIGHT = 0.15
+_POSTURE = 0.1  # weight of the arm's posture at home, so that it does not fold the wrong way
+_LARGE = 2.0  # turn of the hand from which on the expert thinks of where the arm's joints belong [rad]
+_RETURN = 0.5  # how fast it would go back there [1/s]
+
+
+class InputMap(Protocol):
+    """What lies between a wish and an intent.
+
+    Attributes:
+        channels: of the robot.
+    """
+
+    channels: Channels
+
+    @property
+    def full(self) -> FloatArray:
+        """Full deflection of every input, (m,)."""
+        ...
+
+    def reset(self, view: View, settings: HumanSettings, rng: np.random.Generator) -> None:
+        """Begin an episode with a person."""
+        ...
+
+    def wanted(self, wish: Wish, state: State) -> tuple[BoolArray, FloatArray]:
+        """Return the channels that the operator owns now, (m,), and how far he wants each input, (m,)."""
+        ...
+
+    def sent(self, moved: FloatArray, state: State) -> FloatArray:
+        """Return what the device makes of where the inputs are, (m,)."""
+        ...
+
+    def raw(self, moved: FloatArray) -> FloatArray:
+        """Return what the device reads: deflections from −1 to 1, a leader arm's angles [rad], (m,)."""
+        ...
+
+
+class StickMap:
+    """Velocity sticks on all channels of a mode at once.
+
+    Where the mode has joint channels, the operator solves for them himself, as an expert would, with the
+    arm's angles as he imagines them, q + δ:
+    `min ‖J(q + δ) v - hand‖² + w_b ‖v_base - base‖² + w_p ‖v_arm - k (q_home - q)‖² + λ ‖v / v_max‖²`.
+    A large turn would fold the arm into itself that way; there he brings the arm's joints straight to where
+    they belong (`LargeTurn`), while the base drives.
+
+    Args:
+        model: of the robot.
+        mode: the teleop mode.
+        gains: full stick of hand and base.
+    """
+
+    def __init__(self, model: RobotModel, mode: TeleopMode, gains: Gains) -> None:
+        self.mode = mode
+        self.channels = Channels.of(model.description)
+        self._model = model
+        self._gains = gains
+        self._imagined = np.zeros(model.size)
+        self._turn = LargeTurn(model, gains, _LARGE)
+
+    @property
+    def full(self) -> FloatArray:
+        """Full stick of every channel, (m,)."""
+        return full_stick(self._model, self._gains)
+
+    def reset(self, view: View, settings: HumanSettings, rng: np.random.Generator) -> None:
+        """Draw the error of the arm's angles as this operator imagines them."""
+        self._imagined = settings.inner_error * rng.standard_normal(self._model.size)
+        self._imagined[: len(self.channels.base)] = 0.0
+        if self.mask("hand")[self.channels.joint_slice].any():
+            self._turn.reset(view, settings.misjudgement, rng)
+
+    def mask(self, focus: Focus) -> BoolArray:
+        """Return the channels that the operator owns, (m,)."""
+        return self.channels.mask(*self.mode.groups(focus))
+
+    def wanted(self, wish: Wish, state: State) -> tuple[BoolArray, FloatArray]:
+        """Return the mask, and the wish on every channel of the mode, within full stick, (m,)."""
+        mask = self.mask(wish.focus)
+        values = np.zeros(self.channels.size)
+        values[self.channels.base_slice] = wish.base[: len(self.channels.base)]
+        values[self.channels.tool_slice] = wish.hand
+        if mask[self.channels.joint_slice].any():
+            values[self.channels.joint_slice] = self._joint_velocities(wish, state.q)
+        return mask, np.clip(np.where(mask, values, 0.0), -self.full, self.full)
+
+    def sent(self, moved: FloatArray, state: State) -> FloatArray:
+        """Return the velocities that the sticks are pushed to."""
+        return moved
+
+    def raw(self, moved: FloatArray) -> FloatArray:
+        """Return the deflections."""
+        return moved / self.full
+
+    def _joint_velocities(self, wish: Wish, q: FloatArray) -> FloatArray:
+        """Return what the expert makes of a wish on all joints, (n,), within full stick."""
+        if wish.target is not None and self._turn.is_ahead(wish.target, q):
+            base = wish.target.base[: len(self.channels.base)]
+            arm = self._turn.arm_velocity(wish.target, q, base)
+            return np.concatenate([self._base_world(wish, q), arm])
+        return self._inner_kinematics(wish, q)
+
+    def _inner_kinematics(self, wish: Wish, q: FloatArray) -> FloatArray:
+        """Return the expert's inner inverse kinematics, (n,): the hand first, the base when it can."""
+        jacobian = self._model.jacobian(q + self._imagined)
+        base = self._base_world(wish, q)
+        weights = np.full(self._model.size, _DAMPING) / self._model.description.limits.velocity
+        home = self._model.description.home - q
+        home[: len(self.channels.base)] = 0.0
+        posture = _POSTURE * np.any(wish.hand) * np.eye(self._model.size)[len(self.channels.base) :]
+        rows = [jacobian, np.diag(weights), posture]
+        targets = [wish.hand, np.zeros(self._model.size), posture @ (_RETURN * home)]
+        if len(base):
+            rows.append(_BASE_WEIGHT * np.eye(len(base), self._model.size))
+            targets.append(_BASE_WEIGHT * base)
+        solution: FloatArray = np.linalg.lstsq(np.vstack(rows), np.concatenate(targets), rcond=None)[0]
+        return solution / max(1.0, float(np.max(np.abs(solution) / self.full[self.channels.joint_slice])))
+
+    def _base_world(self, wish: Wish, q: FloatArray) -> FloatArray:
+        if not self.channels.base:
+            return np.zeros(0)
+        c, s = np.cos(q[2]), np.sin(q[2])
+        vx, vy, wz = wish.base
+        return np.array([c * vx - s * vy, s * vx + c * vy, wz])
+
+
+def full_stick(model: RobotModel, gains: Gains) -> FloatArray:
+    """Return the full stick of every channel, (m,) [m/s, rad/s]."""
+    base = gains.full[6:][: len(model.description.base_joints)]
+    joints = np.full(model.size, gains.joint_rate)
+    joints[: len(base)] = base
+    return np.concatenate([base, gains.full[:6], joints])

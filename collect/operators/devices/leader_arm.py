@@ -1,0 +1,94 @@
+"""A leader arm: the operator moves a small copy of the arm; the robot's joints go where its joints are."""
+
+import numpy as np
+
+from handrail.collect.operators.devices.input_map import full_stick
+from handrail.collect.operators.devices.large_turn import LargeTurn
+from handrail.collect.operators.human.human import HumanSettings
+from handrail.collect.operators.human.motion_goal import Wish
+from handrail.collect.operators.human.steering import Gains
+from handrail.collect.operators.human.wander import Wander
+from handrail.collect.operators.operator import View
+from handrail.controllers.arrays import BoolArray, FloatArray
+from handrail.controllers.baselines.arm_completion import ArmCompletion
+from handrail.controllers.interface.channels import Channels
+from handrail.controllers.interface.controller import State
+from handrail.controllers.robot.model import RobotModel
+
+_LARGE = (
+    0.6  # turn of the hand from which on the operator brings the leader's joints there, not its hand [rad]
+)
+_FOLLOW = 6.0  # of the joints towards the leader's [1/s]
+
+
+class LeaderArmMap:
+    """Absolute joint targets from one hand, a stick for the base in the other; nothing to switch.
+
+    The hand takes the leader along, whose joints q_L follow by its mechanics: `q̇_L = J⁺ hand`. A large turn
+    would fold the arm on the way; there the operator brings all joints at once to where he thinks they
+    belong (`LargeTurn`). The robot is sent `q̇ = q̇_L + k (q_L + tremor − q)`. The leader starts where the arm
+    is, so that nothing jumps.
+
+    Args:
+        model: of the robot.
+        gains: full stick of hand and base.
+    """
+
+    def __init__(self, model: RobotModel, gains: Gains) -> None:
+        self.channels = Channels.of(model.description)
+        self._model = model
+        self._gains = gains
+        self._base = len(model.description.base_joints)
+        self._arm = slice(self.channels.joint_slice.start + self._base, self.channels.size)
+        self._mechanics = ArmCompletion(model)
+        self._turn = LargeTurn(model, gains, _LARGE)
+
+    @property
+    def full(self) -> FloatArray:
+        """Full stick of the base, fastest motion of the leader's joints, (m,)."""
+        return full_stick(self._model, self._gains)
+
+    def reset(self, view: View, settings: HumanSettings, rng: np.random.Generator) -> None:
+        """Take hold of the leader, which stands as the arm does."""
+        size = self._model.size - self._base
+        self._turn.reset(view, settings.misjudgement, rng)
+        self._leader = view.state.q[self._base :].copy()
+        self._tremor = settings.tremor
+        self._wander = Wander((size,), settings.correlation, rng)
+        self._still = self._wander.at(view.state.time).copy()  # the tremor counts from how the hand took hold
+        self._time = view.state.time
+
+    def wanted(self, wish: Wish, state: State) -> tuple[BoolArray, FloatArray]:
+        """Return the mask, base stick and arm together, and how fast the leader shall be moved."""
+        values = np.zeros(self.channels.size)
+        if wish.focus == "base":
+            values[self.channels.base_slice] = wish.base[: self._base]
+        else:
+            values[self._arm] = self._taken_along(wish, state.q)
+        return self.channels.mask(*(("base",) if self._base else ()), "arm"), values
+
+    def sent(self, moved: FloatArray, state: State) -> FloatArray:
+        """Return the base's stick, and the velocity that takes the arm's joints to the leader's."""
+        elapsed, self._time = state.time - self._time, state.time
+        lower, upper = self._limits()
+        self._leader = np.clip(self._leader + elapsed * moved[self._arm], lower, upper)
+        trembling = self._tremor * (self._wander.at(state.time) - self._still)
+        sent = moved.copy()
+        sent[self._arm] += _FOLLOW * (self._leader + trembling - state.q[self._base :])
+        return sent
+
+    def raw(self, moved: FloatArray) -> FloatArray:
+        """Return the base's deflection and the leader's joint angles [rad]."""
+        raw = moved / self.full
+        raw[self._arm] = self._leader
+        return raw
+
+    def _taken_along(self, wish: Wish, q: FloatArray) -> FloatArray:
+        """Return how fast the operator moves the leader's joints, (n − b,) [rad/s]."""
+        if wish.target is not None and self._turn.is_ahead(wish.target, q):
+            return self._turn.arm_velocity(wish.target, q, q[: self._base])
+        return self._mechanics.arm_velocity(q, np.zeros(self._base), wish.hand)
+
+    def _limits(self) -> tuple[FloatArray, FloatArray]:
+        limits = self._model.description.limits
+        return limits.position_lower[self._base :], limits.position_upper[self._base :]

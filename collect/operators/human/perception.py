@@ -1,0 +1,43 @@
+"""Perception: people misjudge how far it is, more the farther it is."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from handrail.collect.operators.human.human import HumanSettings
+from handrail.collect.operators.human.motion_goal import Wish
+from handrail.collect.operators.human.wander import Wander
+from handrail.controllers.arrays import FloatArray
+from handrail.controllers.robot.model import Pose
+
+
+class Perception:
+    """Adds `σ ‖x‖ a` to each distance to go x, where a is an Ornstein–Uhlenbeck process (Weber's law).
+
+    It is the same in every teleop mode: what is misjudged is the task, not the input.
+
+    Args:
+        settings: of the person.
+        rng: of the episode.
+    """
+
+    def __init__(self, settings: HumanSettings, rng: np.random.Generator) -> None:
+        self._share = settings.misjudgement
+        self._wander = Wander((9,), settings.correlation, rng)
+
+    def see(self, wish: Wish, tool: Pose, time: float) -> Wish:
+        """Return the wish as it comes out of what is seen at a time [s]."""
+        wander = self._share * self._wander.at(time)
+        if not self._share:
+            return wish
+        hand = np.concatenate([_off(wish.hand[:3], wander[:3]), _off(wish.hand[3:], wander[3:6])])
+        base = np.concatenate([_off(wish.base[:2], wander[6:8]), _off(wish.base[2:], wander[8:])])
+        target = wish.target
+        if target is not None:
+            away = _off(target.hand.position - tool.position, wander[:3])
+            target = replace(target, hand=Pose(tool.position + away, target.hand.rotation))
+        return replace(wish, hand=hand, base=base, target=target)
+
+
+def _off(vector: FloatArray, share: FloatArray) -> FloatArray:
+    return vector + np.linalg.norm(vector) * share

@@ -1,0 +1,73 @@
+"""Where an operator pushes the stick: towards a pose, slower when near."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from handrail.controllers.arrays import FloatArray
+from handrail.controllers.numerics.rotation import rotation_vector
+from handrail.controllers.robot.model import Pose
+
+
+@dataclass(frozen=True)
+class Gains:
+    """How briskly an operator steers.
+
+    Pushing the stick in proportion to the distance to go, `v = gain · e`, obeys Fitts' law: from D to W it
+    takes `ln(D / W) / gain`, a throughput of `gain / ln 2`. In people it is 1.6–2.6 bit/s with a velocity
+    stick, 3.7–4.9 with a mouse: gains of 1.1–1.8 and 2.6–3.4.
+
+    Attributes:
+        gain: of the distance to go [1/s].
+        hand_speed: full stick of the hand's translation [m/s].
+        hand_rate: full stick of the hand's rotation [rad/s].
+        base_speed: full stick of the base's translation [m/s].
+        base_rate: full stick of the base's rotation [rad/s].
+        joint_rate: full stick of one joint [rad/s].
+        patience: how much longer than with a stick for the hand he tries before he goes on.
+    """
+
+    gain: float = 1.2
+    hand_speed: float = 0.35
+    hand_rate: float = 0.6
+    base_speed: float = 0.5
+    base_rate: float = 0.3
+    joint_rate: float = 0.8
+    patience: float = 1.0
+
+    @property
+    def full(self) -> FloatArray:
+        """Full deflection of hand twist and base twist, (9,)."""
+        hand = [self.hand_speed] * 3 + [self.hand_rate] * 3
+        return np.array([*hand, self.base_speed, self.base_speed, self.base_rate])
+
+
+def saturated(vector: FloatArray, largest: float) -> FloatArray:
+    """Return the vector, shortened to the largest norm."""
+    norm = float(np.linalg.norm(vector))
+    return vector * (largest / norm) if norm > largest else vector
+
+
+def hand_twist(tool: Pose, goal: Pose, gains: Gains, pace: float = 1.0) -> FloatArray:
+    """Return the twist that steers the hand to a goal, world-aligned at the tool point, (6,).
+
+    `v = sat(gain (p_goal - p))`, `ω = sat(gain log(R_goal Rᵀ))`; `pace` scales the largest speeds.
+    """
+    linear = saturated(gains.gain * (goal.position - tool.position), pace * gains.hand_speed)
+    turn = rotation_vector(goal.rotation @ tool.rotation.T)
+    return np.concatenate([linear, saturated(gains.gain * turn, pace * gains.hand_rate)])
+
+
+def base_twist(q: FloatArray, goal: FloatArray, gains: Gains) -> FloatArray:
+    """Return the twist that drives the base to (x, y, θ), in the base frame, (3,)."""
+    c, s = np.cos(q[2]), np.sin(q[2])
+    world = saturated(gains.gain * (goal[:2] - q[:2]), gains.base_speed)
+    turn = np.arctan2(np.sin(goal[2] - q[2]), np.cos(goal[2] - q[2]))
+    rate = np.clip(gains.gain * turn, -gains.base_rate, gains.base_rate)
+    return np.array([c * world[0] + s * world[1], -s * world[0] + c * world[1], rate])
+
+
+def pose_errors(tool: Pose, goal: Pose) -> tuple[float, float]:
+    """Return distance [m] and angle [rad] between two poses."""
+    distance = float(np.linalg.norm(goal.position - tool.position))
+    return distance, float(np.linalg.norm(rotation_vector(goal.rotation @ tool.rotation.T)))

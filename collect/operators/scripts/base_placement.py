@@ -1,0 +1,85 @@
+"""Where a person would park the base to work at a place."""
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from handrail.controllers.arrays import FloatArray
+from handrail.controllers.collision.model import CollisionModel
+from handrail.controllers.robot.inverse_kinematics import arm_configuration
+from handrail.controllers.robot.model import Pose, RobotModel
+
+_COMFORT = 0.85  # of the reach at home
+_YAWS = (0.0, 0.5, -0.5, 1.0, -1.0, 1.5, -1.5)  # in which a person would try to stand [rad]
+_FARTHER = (_COMFORT, 0.95, 1.05, 1.1, 1.15, 0.75)  # shares of it to try, the first that will do
+_ABOUT = 0.05  # error of the hand's pose there that a person puts up with [m, rad]
+_CLEAR = 0.08  # of the arm to itself that is enough [m]
+
+
+def standing_point(
+    model: RobotModel, place: ArrayLike, yaw: float = 0.0, comfort: float = _COMFORT
+) -> FloatArray:
+    """Return the base pose (x, y, θ) that has a place as far ahead as the tool is at home, a little nearer.
+
+    The tool's offset from the base at home, turned by the yaw and shortened, is taken from the place; the
+    result stays inside the position limits. A robot with a fixed base stands where it stands: (0, 0, 0).
+    """
+    description = model.description
+    if not description.base_joints:
+        return np.zeros(3)
+    x, y, theta = description.home[:3]
+    tool = model.pose(description.home).position[:2] - [x, y]
+    offset = _rotation(yaw - theta) @ tool
+    spot = np.asarray(place, dtype=float)[:2] - comfort * offset
+    lower, upper = description.limits.position_lower[:2], description.limits.position_upper[:2]
+    return np.array([*np.clip(spot, lower, upper), yaw])
+
+
+def standing_within_reach(model: RobotModel, q: FloatArray, goal: Pose, yaw: float) -> FloatArray:
+    """Return a base pose (x, y, θ) with a heading from which the arm gets the hand to a pose.
+
+    At the comfortable distance if the arm reaches it there, else farther or nearer; the comfortable one if it
+    reaches it from none.
+
+    Args:
+        model: of the robot.
+        q: now, (n,).
+        goal: of the tool.
+        yaw: heading of the base [rad].
+    """
+    stands = [standing_point(model, goal.position, yaw, comfort) for comfort in _FARTHER]
+    if not model.description.base_joints:
+        return stands[0]
+    for stand in stands:
+        if arm_configuration(model, np.concatenate([stand, q[3:]]), goal)[1] <= _ABOUT:
+            return stand
+    return stands[0]
+
+
+def standing_pose(model: RobotModel, q: FloatArray, goal: Pose) -> FloatArray:
+    """Return where a person would park the base to bring the hand to a pose, (x, y, θ).
+
+    The first heading at `standing_point` from which the arm, as it is now, gets there without coming near
+    itself; the one that comes nearest to that if none does.
+
+    Args:
+        model: of the robot.
+        q: now, (n,).
+        goal: of the tool.
+    """
+    if not model.description.base_joints:
+        return np.zeros(3)
+    collision, best, fewest = CollisionModel(model), standing_point(model, goal.position), np.inf
+    for yaw in _YAWS:
+        stand = standing_point(model, goal.position, yaw)
+        there, error = arm_configuration(model, np.concatenate([stand, q[3:]]), goal)
+        lack = max(_CLEAR - float(np.min(collision.values(there[None, :]))), 0.0) + 10.0 * (error > 0.01)
+        if lack < fewest:
+            best, fewest = stand, lack
+        if not lack:
+            break
+    return best
+
+
+def _rotation(angle: float) -> FloatArray:
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, -s], [s, c]])

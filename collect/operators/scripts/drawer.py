@@ -1,0 +1,106 @@
+"""How an operator pulls a drawer open."""
+
+import numpy as np
+
+from handrail.collect.operators.human.motion_goal import Wish
+from handrail.collect.operators.human.steering import Gains
+from handrail.collect.operators.operator import View
+from handrail.collect.operators.scripts.base_placement import standing_within_reach
+from handrail.collect.operators.scripts.phases import Phase, PhaseRunner
+from handrail.collect.tasks.cabinet import inward
+from handrail.collect.tasks.drawer import handle, opened
+from handrail.controllers.arrays import FloatArray
+from handrail.controllers.numerics.rotation import matrix_from_rpy
+from handrail.controllers.robot.model import Pose, RobotModel
+
+_PULL = 0.26  # how far the operator means to open it [m]
+_ENOUGH = 0.21  # [m]
+_BACK = 0.16  # hand before the handle at the beginning and at the end [m]
+_AWAY = 0.10  # from it that is far enough to leave it alone [m]
+
+
+class DrawerScript:
+    """Approach, grasp, pull, let go for `handrail/Drawer-v0`; a script.
+
+    Who drives the base by itself turns the hand first, where there is room, and drives up to the handle then.
+
+    Args:
+        model: of the robot.
+        gains: of the operator.
+        drives: whether the operator drives the base by itself first.
+    """
+
+    def __init__(self, model: RobotModel, gains: Gains, drives: bool) -> None:
+        self._model = model
+        self._drives = drives
+        self._runner = PhaseRunner(gains, self._redo)
+
+    def reset(self, view: View) -> None:
+        """Look at the scene and plan."""
+        self._runner.start(self._phases(view), view.state.time)
+
+    def wish(self, view: View) -> Wish:
+        """Return what is wanted now."""
+        return self._runner.wish(view)
+
+    def _redo(self, view: View, name: str) -> int | None:
+        """Begin again at the handle when the drawer did not come along; leave it as long as it is near."""
+        if name == "release" and opened(view.task) <= _ENOUGH:
+            phases = self._phases(view)
+            index = next(i for i, phase in enumerate(phases) if phase.name == "stage")
+            self._runner.start(phases, view.state.time, index)
+            return index
+        away = np.linalg.norm(view.tool.position - handle(view.task))
+        if name == "release" or (name == "leave" and away < _AWAY):
+            self._runner.start([self._leave(view)], view.state.time)
+            return 0
+        return None
+
+    def _leave(self, view: View) -> Phase:
+        """Return the phase that backs off from where the handle is now, the base where it is."""
+        into = inward(view.task.object("cabinet").rotation)
+        back = Pose(handle(view.task) - _BACK * into, handle_rotation(view.tool.rotation, into))
+        base = view.state.q[:3] if self._model.description.base_joints else np.zeros(3)
+        return Phase("leave", back, base, distance=0.03, angle=3.2, pace=0.5, patience=5.0)
+
+    def _phases(self, view: View) -> list[Phase]:
+        into = inward(view.task.object("cabinet").rotation)
+        bar, grasp = handle(view.task), handle_rotation(view.tool.rotation, into)
+        pull = max(_PULL - opened(view.task), 0.05)
+        yaw = float(np.arctan2(into[1], into[0]))
+        base = standing_within_reach(self._model, view.state.q, Pose(bar, grasp), yaw)
+
+        def phase(name: str, back: float, **options: float) -> Phase:
+            stand = base - np.array([pull * into[0], pull * into[1], 0.0]) * (name in ("pull", "release"))
+            return Phase(name, Pose(bar - back * into, grasp), stand, **options)  # type: ignore[arg-type]
+
+        phases = [
+            phase("stage", _BACK, distance=0.02, angle=0.10),
+            phase("approach", 0.0, distance=0.010, angle=0.10, pace=0.4, patience=8.0),
+            phase("grasp", 0.0, distance=1.0, angle=3.2, gripper=1.0, dwell=1.2),
+            phase("pull", pull, distance=0.03, angle=3.2, gripper=1.0, pace=0.5, patience=15.0),
+            phase("release", pull, distance=1.0, angle=3.2, dwell=0.8),
+        ]
+        if self._drives:
+            hand, now = phases[0].hand, view.state.q[:3]
+            ready = Phase("ready", before_driving(hand, base, now), now, distance=0.05, angle=0.15)
+            phases = [ready, Phase("drive", hand, base, focus="base", distance=0.08, angle=0.08), *phases]
+        return phases
+
+
+def before_driving(hand: Pose, base: FloatArray, now: FloatArray) -> Pose:
+    """Return where the hand is to be while the base is at `now`, so that driving to `base` brings it along.
+
+    `p = p_now + R_z(θ_now − θ) (p_hand − p_base)`, and the rotation likewise.
+    """
+    turn = matrix_from_rpy([0.0, 0.0, now[2] - base[2]])
+    away = hand.position - [base[0], base[1], 0.0]
+    return Pose(turn @ away + [now[0], now[1], 0.0], turn @ hand.rotation)
+
+
+def handle_rotation(tool: FloatArray, into: FloatArray) -> FloatArray:
+    """Return the rotation nearest to the tool's that points it into the cabinet, fingers above and below."""
+    candidates = [
+        np.column_stack([up, np.cross(into, up), into]) for up in ([0.0, 0.0, 1.0], [0.0, 0.0, -1.0])
+    ]
+    return max(candidates, key=lambda rotation: float(np.trace(rotation.T @ tool)))

@@ -1,0 +1,188 @@
+"""How an operator carries a cube from one table to a bin on another."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from handrail.collect.operators.human.motion_goal import Wish
+from handrail.collect.operators.human.steering import Gains, pose_errors
+from handrail.collect.operators.operator import View
+from handrail.collect.operators.scripts.phases import Phase, PhaseRunner
+from handrail.collect.operators.scripts.route import Route, front_edge
+from handrail.collect.simulation.scene import SceneObject
+from handrail.controllers.arrays import FloatArray
+from handrail.controllers.robot.model import Pose, RobotModel
+
+_HELD = 0.05  # a cube this near to the tool point is held [m]
+_BELOW = 0.005  # finger tips below the middle of the cube [m]
+_NEAR, _ALIGNED = 0.010, 0.10  # how exactly the hand has to be there to grasp [m, rad]
+_RETREAT = 0.40  # hand behind the table's edge while carrying [m]
+_AHEAD = 0.80  # hand before the base's centre while carrying [m]
+
+
+@dataclass(frozen=True)
+class _Place:
+    """What matters of a table: the near edge's x, the height, and the thing on it."""
+
+    edge: float
+    thing: FloatArray
+
+
+class PickPlaceScript:
+    """Approach, grasp, lift, carry, place for `handrail/PickPlace-v0`; a script.
+
+    Args:
+        model: of the robot.
+        gains: of the operator.
+        drives: whether the operator drives the base by itself between the places (switching).
+    """
+
+    def __init__(self, model: RobotModel, gains: Gains, drives: bool) -> None:
+        self._model = model
+        self._gains = gains
+        self._drives = drives
+        self._runner = PhaseRunner(gains, self._redo)
+
+    def reset(self, view: View) -> None:
+        """Look at the scene and plan."""
+        self._runner.start(self._phases(view), view.state.time)
+
+    def wish(self, view: View) -> Wish:
+        """Return what is wanted now."""
+        return self._runner.wish(view)
+
+    def _redo(self, view: View, name: str) -> int | None:
+        """Grasp again when the cube stayed behind."""
+        cube = view.task.pose("cube").position
+        if name != "lift" or np.linalg.norm(cube - view.tool.position) < _HELD:
+            return None
+        phases = self._phases(view)
+        index = next(i for i, phase in enumerate(phases) if phase.name == "above")
+        self._runner.start(phases, view.state.time, index)
+        return index
+
+    def _phases(self, view: View) -> list[Phase]:
+        task = view.task
+        self._route = Route(self._model, task)
+        cube = task.pose("cube")
+        pick = _Place(front_edge(task, "cube_table"), cube.position)
+        place = _Place(front_edge(task, "bin_table"), task.pose("bin").position)
+        down = grasp_rotation(view.tool.rotation, cube.rotation)
+        rim = task.object("bin").top - place.thing[2]
+        phases = self._pick(pick, down, self._room(task.object("cube")))
+        phases += self._carry(pick, place, down)
+        phases += self._place(place, down, rim)
+        lane = self._route.lane
+        if self._drives:
+            *across, up = self._route.drive(view.state.q[:3], self._stand(pick), phases[0].hand, 0.0)
+            phases = [
+                *across,
+                self._ready(across[-1].base if across else view.state.q, pick, down),
+                up,
+                *phases,
+            ]
+        elif self._route.blocked(view.state.q[:2], self._stand(pick)[:2]):
+            height = cube.position[2] + 0.30
+            around = Pose(np.array([lane + _AHEAD, cube.position[1], height]), down)
+            base = np.array([lane, cube.position[1], 0.0])
+            phases.insert(0, Phase("approach", around, base, distance=0.15, angle=0.5))
+        return phases
+
+    def _ready(self, base: FloatArray, pick: _Place, down: FloatArray) -> Phase:
+        """Return the phase that folds the arm before it is driven up to the table, from where the base is."""
+        hand = np.array([base[0] + _AHEAD, base[1], pick.thing[2] + 0.30])
+        return Phase("ready", Pose(hand, down), base, distance=0.15, angle=0.5)
+
+    def _room(self, cube: SceneObject) -> float:
+        """Return how far beside the cube the hand may be for the open fingers to close around it [m].
+
+        `(stroke − w (cos a + sin a)) / 2` for a cube of width w that is turned by a; as much either way.
+        """
+        gripper = self._model.description.gripper
+        width = float(cube.shape.size[0]) * (np.cos(_ALIGNED) + np.sin(_ALIGNED))
+        return _NEAR if gripper is None else max(_NEAR, (gripper.stroke - width) / 2)
+
+    def _height(self) -> float:
+        """Return how high the tool point is above the middle of a cube that the fingers close around [m]."""
+        return round(tips_beyond_tool(self._model) - _BELOW, 6)
+
+    def _pick(self, pick: _Place, down: FloatArray, room: float) -> list[Phase]:
+        """Go above the cube, down until it is between the fingers, close them, lift."""
+        cube, base = pick.thing, self._stand(pick)
+        stage = np.array([pick.edge - 0.15, cube[1], cube[2] + 0.30])
+        grasp = _above(cube, self._height())
+
+        def phase(name: str, position: FloatArray, **options: float) -> Phase:
+            return Phase(name, Pose(position, down), base, **options)  # type: ignore[arg-type]
+
+        return [
+            phase("stage", stage, distance=0.10, angle=0.30),
+            phase("above", _above(cube, 0.14), distance=0.02, angle=0.10),
+            phase("descend", grasp, distance=_NEAR, beside=room, angle=_ALIGNED, pace=0.4, patience=8.0),
+            phase("grasp", grasp, distance=1.0, angle=3.2, gripper=1.0, dwell=1.2),
+            phase("lift", _above(cube, 0.22), distance=0.04, angle=0.3, gripper=1.0, pace=0.6),
+        ]
+
+    def _carry(self, pick: _Place, place: _Place, down: FloatArray) -> list[Phase]:
+        """Pull back until the base is behind the floor obstacles, cross, and go up to the other table."""
+        height = max(pick.thing[2], place.thing[2]) + 0.30
+        lane = self._route.lane
+        hand_lane = lane + _AHEAD
+
+        def phase(name: str, x: float, at: _Place, base: FloatArray) -> Phase:
+            hand = Pose(np.array([x, at.thing[1], height]), down)
+            return Phase(name, hand, base, gripper=1.0, distance=0.12, angle=0.4)
+
+        if self._drives:
+            retreat = phase("retreat", self._stand(pick)[0] + _AHEAD, pick, self._stand(pick))
+            front = phase("front", self._stand(place)[0] + _AHEAD, place, self._stand(place))
+            return [retreat, *self._route.drive(self._stand(pick), self._stand(place), front.hand, 1.0)]
+        return [
+            phase("retreat", hand_lane, pick, np.array([lane, pick.thing[1], 0.0])),
+            phase("cross", hand_lane, place, np.array([lane, place.thing[1], 0.0])),
+            phase("front", place.edge - _RETREAT, place, self._stand(place)),
+        ]
+
+    def _place(self, place: _Place, down: FloatArray, height: float) -> list[Phase]:
+        rim = _above(place.thing, height)
+        base = self._stand(place)
+
+        def phase(name: str, rise: float, **options: float) -> Phase:
+            return Phase(name, Pose(_above(rim, rise), down), base, **options)  # type: ignore[arg-type]
+
+        return [
+            phase("over", 0.18, gripper=1.0, distance=0.03, angle=0.3),
+            phase("lower", 0.045, gripper=1.0, distance=0.025, angle=0.3, pace=0.4),
+            phase("release", 0.045, distance=1.0, angle=3.2, dwell=0.8),
+            phase("rise", 0.25, distance=0.05, angle=0.5),
+        ]
+
+    def _stand(self, place: _Place) -> FloatArray:
+        return self._route.stand(place.thing, place.edge)
+
+
+def _above(position: FloatArray, height: float) -> FloatArray:
+    return position + np.array([0.0, 0.0, height])
+
+
+def tips_beyond_tool(model: RobotModel) -> float:
+    """Return how far the finger tips are beyond the tool point [m]; 0 of a robot without fingers."""
+    gripper, home = model.description.gripper, model.description.home
+    if gripper is None:
+        return 0.0
+    frame, tool = model.pose(home, gripper.frame), model.pose(home)
+    offset = gripper.placement.translation[2] + gripper.tip
+    return float(offset - frame.rotation[:, 2] @ (tool.position - frame.position))
+
+
+def grasp_rotation(tool: FloatArray, cube: FloatArray) -> FloatArray:
+    """Return the rotation nearest to the tool's that points it down, fingers square to the cube, (3, 3)."""
+    yaw = np.arctan2(cube[1, 0], cube[0, 0])
+    candidates = []
+    for angle in yaw + np.pi / 2 * np.arange(4):
+        x = np.array([np.cos(angle), np.sin(angle), 0.0])
+        z = np.array([0.0, 0.0, -1.0])
+        candidates.append(np.column_stack([x, np.cross(z, x), z]))
+    origin = np.zeros(3)
+    turns = [pose_errors(Pose(origin, tool), Pose(origin, rotation))[1] for rotation in candidates]
+    return candidates[int(np.argmin(turns))]

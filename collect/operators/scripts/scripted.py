@@ -1,0 +1,92 @@
+"""The scripted operator: a script that knows what it wants, seen and steered as a person would."""
+
+from dataclasses import replace
+from typing import Protocol
+
+import numpy as np
+
+from handrail.collect.operators.devices.devices import input_map
+from handrail.collect.operators.human.hand import HumanHand
+from handrail.collect.operators.human.human import HumanSettings
+from handrail.collect.operators.human.motion_goal import Wish
+from handrail.collect.operators.human.perception import Perception
+from handrail.collect.operators.modes import TeleopMode
+from handrail.collect.operators.operator import View
+from handrail.controllers.arrays import BoolArray
+from handrail.controllers.interface.intent import Intent, RawInput
+from handrail.controllers.robot.model import RobotModel
+
+
+class Script(Protocol):
+    """What to do for a task, moment by moment."""
+
+    def reset(self, view: View) -> None:
+        """Look at the scene and make up the mind."""
+        ...
+
+    def wish(self, view: View) -> Wish:
+        """Return what is wanted now."""
+        ...
+
+
+class ScriptedOperator:
+    """Follows a script in a teleop mode; an operator.
+
+    ```
+    script ─ wish ─▶ perception ─▶ input map ─ wanted ─▶ hand ─▶ input map ─ sent ─▶ intent
+                     (misjudges)   (of the mode)         (late, intermittent, noisy)
+    ```
+    Only the input map differs between modes.
+
+    Args:
+        model: of the robot.
+        script: of the task.
+        mode: the teleop mode.
+        human: who steers.
+    """
+
+    def __init__(self, model: RobotModel, script: Script, mode: TeleopMode, human: HumanSettings) -> None:
+        self._script = script
+        self._mode = mode
+        self._map = input_map(model, mode)
+        self._human = replace(human, refractory=human.refractory * mode.refractory)
+
+    @property
+    def name(self) -> str:
+        """What the dataset says of who steered."""
+        return "scripted"
+
+    @property
+    def free_at(self) -> float:
+        """When the hand is back on the input after the last change to other channels [s]; −∞ before any."""
+        return self._free_at
+
+    def reset(self, view: View, rng: np.random.Generator) -> None:
+        """Begin an episode; how the person is today is drawn first."""
+        self._settings = self._human.episode(rng)
+        self._script.reset(view)
+        self._perception = Perception(self._settings, rng)
+        self._hand = HumanHand(self._settings, self._map.full, rng)
+        self._map.reset(view, self._settings, rng)
+        self._mask: BoolArray | None = None
+        self._switches = 0
+        self._free_at = -np.inf
+
+    def act(self, view: View) -> Intent:
+        """Return the intent now: the wish in this mode's channels, as the hand manages it."""
+        time = view.state.time
+        wish = self._perception.see(self._script.wish(view), view.tool, time)
+        mask, wanted = self._map.wanted(wish, view.state)
+        self._switch(mask, time)
+        moved = self._hand.move(np.zeros_like(wanted) if time < self._free_at else wanted, time)
+        moved = np.where(mask, moved, 0.0)
+        values = np.where(mask, self._map.sent(moved, view.state), 0.0)
+        raw = RawInput(self._map.raw(moved), int(np.count_nonzero(moved)), self._switches)
+        return Intent(values, mask, wish.gripper, self._mode.name, time, raw=raw)
+
+    def _switch(self, mask: BoolArray, time: float) -> None:
+        """Take the hand off the input for a moment when it acts on other channels from now on."""
+        if self._mask is not None and not np.array_equal(mask, self._mask):
+            self._switches += 1
+            self._free_at = time + self._settings.switch_time
+        self._mask = mask

@@ -1,0 +1,65 @@
+"""The video of an episode: the scene camera's pictures with a caption."""
+
+from collections.abc import Callable
+from pathlib import Path
+from types import TracebackType
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, ImageDraw, ImageFont
+
+from handrail.collect.envs.env import HandrailEnv
+from handrail.collect.session.video_file import VideoFile
+from handrail.datasets.recording.frames import Moment
+
+SIZE = (540, 960)  # height, width [px]
+_BAR = 64  # height of the caption [px]; both even, as h264 wants
+
+
+class Filmer:
+    """Encodes one picture a control period; an observer, and a context that closes the file.
+
+    The environment renders pictures of `SIZE`.
+
+    Args:
+        path: of the file, .mp4.
+        fps: pictures a second.
+        title: first line of the caption.
+        words: second line, at a moment.
+    """
+
+    def __init__(self, path: Path, fps: int, title: str, words: Callable[[Moment], str]) -> None:
+        self._title, self._words = title, words
+        self._file = VideoFile(path, (SIZE[0] + _BAR, SIZE[1]), fps)
+        self._large, self._small = (ImageFont.load_default(size) for size in (20, 16))
+
+    def __enter__(self) -> "Filmer":
+        """Begin."""
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Close the file."""
+        self._file.__exit__(kind, error, trace)
+
+    def begin(self, env: HandrailEnv, seed: int) -> None:
+        """Take note of the environment."""
+        self._env = env
+
+    def see(self, moment: Moment) -> None:
+        """Add the picture of this moment."""
+        picture = self._env.render()
+        if picture is not None:
+            self._file.add(self._captioned(picture, moment))
+
+    def _captioned(self, picture: NDArray[np.uint8], moment: Moment) -> NDArray[np.uint8]:
+        """Return the picture on top of a bar with the caption."""
+        height, width = picture.shape[:2]
+        image = Image.new("RGB", (width, height + _BAR), (24, 26, 30))
+        image.paste(Image.fromarray(picture))
+        draw = ImageDraw.Draw(image)
+        draw.text((16, height + 9), self._title, font=self._large, fill=(245, 245, 245))
+        words = self._words(moment)
+        draw.text((16, height + 37), words, font=self._small, fill=(190, 195, 205))
+        return np.array(image)

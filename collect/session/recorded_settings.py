@@ -1,0 +1,71 @@
+"""The settings of a session, as every episode that came of it keeps them."""
+
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, fields
+from typing import Any
+
+from handrail.collect.config import SessionConfig
+from handrail.collect.operators.human.human import HumanSettings
+from handrail.controllers.entries import Entry, check_entries, is_number, is_table
+from handrail.controllers.errors import HandrailError, shown
+
+COLUMN = "settings"
+_OLDER = {"environment": "task"} | {  # what an episode said before it kept every setting, and its name now
+    name: name for name in ("robot", "operator", "mode", "noise", "person", "moving_obstacles")
+}
+_KINDS: Mapping[type, tuple[str, Callable[[Any], bool]]] = {
+    str: ("a text", lambda value: isinstance(value, str)),
+    bool: ("true or false", lambda value: isinstance(value, bool)),
+    int: ("a whole number", lambda value: type(value) is int),
+    float: ("a finite number", is_number),
+    HumanSettings: ("a table", is_table),
+}
+
+
+def _entries(settings: SessionConfig | HumanSettings, needed: tuple[str, ...] = ()) -> dict[str, Entry]:
+    kinds = {entry.name: _KINDS[type(getattr(settings, entry.name))] for entry in fields(settings)}
+    return {name: Entry(*kind, needed=name in needed) for name, kind in kinds.items()}
+
+
+_WHERE = "settings of the episode"
+_ENTRIES = _entries(SessionConfig(), needed=("task", "robot"))
+_HUMAN = _entries(HumanSettings())
+
+
+def settings_json(config: SessionConfig) -> str:
+    """Return every setting of a session as JSON: who replays or reads its episodes needs no other source."""
+    everything = asdict(config)
+    return json.dumps({entry.name: everything[entry.name] for entry in fields(SessionConfig)})
+
+
+def recorded_settings(row: Mapping[str, Any]) -> SessionConfig:
+    """Return the settings with which an episode was recorded.
+
+    Args:
+        row: the episode's line of metadata. An older one says only its task, its robot and a few more: the
+            rest is as by default.
+
+    Raises:
+        HandrailError: it says no settings of a session, or wrong ones.
+    """
+    settings = _parsed(row[COLUMN]) if row.get(COLUMN) else _older(row)
+    check_entries(settings, _ENTRIES, _WHERE)
+    human = settings.pop("human", {})
+    check_entries(human, _HUMAN, f"{_WHERE}: human")
+    config = SessionConfig(**settings, human=HumanSettings(**human))
+    config.check()
+    return config
+
+
+def _parsed(text: Any) -> dict[str, Any]:
+    try:
+        return json.loads(text)
+    except (TypeError, ValueError, RecursionError) as error:
+        raise HandrailError(f"{_WHERE}: expected JSON, got {shown(text)}") from error
+
+
+def _older(row: Mapping[str, Any]) -> dict[str, Any]:
+    if not row.get("environment"):
+        raise HandrailError(f"{_WHERE}: found none; handrail-record writes them")
+    return {ours: row[theirs] for theirs, ours in _OLDER.items() if row.get(theirs) not in (None, "")}

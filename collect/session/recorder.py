@@ -1,0 +1,53 @@
+"""Writes what a session shows into a dataset, episode by episode."""
+
+from collections.abc import Mapping
+
+from handrail.collect.envs.env import HandrailEnv
+from handrail.collect.session.session import Outcome
+from handrail.datasets.recording.frames import Moment, moment_row
+from handrail.datasets.recording.writer import EpisodeWriter, Scalar
+
+
+class Recorder:
+    """Records moments as frames; an observer of a session.
+
+    Args:
+        writer: of the dataset.
+        task: what is being done, in words.
+        columns: what every episode's metadata says of the session (operator, mode, …).
+    """
+
+    def __init__(self, writer: EpisodeWriter, task: str, columns: Mapping[str, Scalar]) -> None:
+        self._writer = writer
+        self._task = task
+        self._columns = dict(columns)
+
+    def begin(self, env: HandrailEnv, seed: int) -> None:
+        """Drop what an episode that ended early left open."""
+        if self._writer.open_frames:
+            self._writer.discard_episode()
+
+    def see(self, moment: Moment) -> None:
+        """Add a frame."""
+        self._writer.add_frame(moment_row(moment), self._task)
+
+    def save(self, outcome: Outcome) -> int:
+        """Save the episode with how it went; return its number.
+
+        Raises:
+            HandrailError: the disk or an encoder failed; the saved episodes are whole.
+        """
+        return self._writer.save_episode(
+            self._columns
+            | {
+                "success": outcome.success,
+                "failure_reason": outcome.failure_reason,
+                "seed": outcome.seed,
+                "started": outcome.started,
+                "wall_time": outcome.wall_time,
+                "brakes": outcome.brakes,
+                "late": outcome.late,
+                "contact_onsets": outcome.contacts,
+                "contact_periods": outcome.contact_periods,
+            }
+        )

@@ -1,0 +1,105 @@
+"""Draws a session in rerun: robot, scene, cameras, intent against motion, distances."""
+
+from typing import Any
+
+import numpy as np
+
+from handrail.collect.envs.env import HandrailEnv
+from handrail.controllers.interface.channels import Channels
+from handrail.controllers.robot.shape import Obstacle
+from handrail.datasets.recording.frames import Moment
+
+_ROBOT = (235, 190, 40)
+_SCENE = (150, 160, 170)
+
+
+class Drawing:
+    """Logs every moment of a session.
+
+    Args:
+        rr: the module `rerun`.
+    """
+
+    def __init__(self, rr: Any) -> None:
+        self._rr = rr
+        self._episode, self._frame = -1, 0
+
+    def begin(self, env: HandrailEnv) -> None:
+        """Draw the scene of a new episode."""
+        self._model = env.model
+        self._channels = Channels.of(env.model.description)
+        self._period = 1.0 / env.fps
+        self._episode += 1
+        self._frame = 0
+        rr = self._rr
+        rr.set_time("episode", sequence=self._episode)
+        rr.set_time("time", duration=0.0)
+        rr.log("world", rr.Clear(recursive=True))
+        rr.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP)
+        self._movers = env.episode.scene.movers
+        for obstacle in env.episode.scene.obstacles():
+            self._log_shape(f"world/scene/{obstacle.name}", obstacle)
+
+    def see(self, moment: Moment) -> None:
+        """Log one moment."""
+        rr = self._rr
+        time = self._frame * self._period
+        rr.set_time("time", duration=time)
+        self._frame += 1
+        for mover in self._movers:
+            self._log_shape(f"world/scene/{mover.name}", mover.obstacle(time))
+        q = moment.state[: self._model.size].astype(float)
+        v = moment.state[self._model.size : 2 * self._model.size].astype(float)
+        self._log_robot(q)
+        self._log_tracking(moment, q, v)
+        for name, image in moment.images.items():
+            rr.log(f"camera/{name}", rr.Image(image))
+        health = moment.health
+        rr.log("distance/smallest", rr.Scalars(_finite(health.smallest_distance)))
+        rr.log("distance/work", rr.Scalars(_finite(health.work_distance)))
+        rr.log("controller/solve_time_ms", rr.Scalars(1e3 * health.solve_time))
+        rr.log("controller/slack", rr.Scalars(health.slack))
+        rr.log("controller/status", rr.TextLog(f"{moment.intent.mode}: {health.status.value}"))
+
+    def _log_robot(self, q: np.ndarray) -> None:
+        """Draw the robot's collision shapes where they are."""
+        for placed in self._model.description.collision:
+            pose = self._model.pose(q, placed.frame)
+            position = pose.position + pose.rotation @ placed.placement.translation
+            rotation = pose.rotation @ placed.placement.rotation
+            shape = Obstacle(placed.name, placed.shape, position, rotation)
+            self._log_shape(f"world/robot/{placed.name}", shape, _ROBOT)
+
+    def _log_tracking(self, moment: Moment, q: np.ndarray, v: np.ndarray) -> None:
+        """Plot what is asked on each owned channel against what happens."""
+        rr, channels = self._rr, self._channels
+        realised = np.concatenate([self._base_twist(q, v), self._model.jacobian(q) @ v, v])
+        for name, asked, owned, real in zip(
+            channels.names, moment.intent.values, moment.intent.mask, realised, strict=True
+        ):
+            rr.log(f"motion/{name}/realised", rr.Scalars(real))
+            if owned and np.isfinite(asked):
+                rr.log(f"motion/{name}/asked", rr.Scalars(asked))
+
+    def _base_twist(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        if not self._channels.base:
+            return np.zeros(0)
+        c, s = np.cos(q[2]), np.sin(q[2])
+        return np.array([c * v[0] + s * v[1], -s * v[0] + c * v[1], v[2]])
+
+    def _log_shape(self, path: str, thing: Obstacle, colour: tuple[int, int, int] = _SCENE) -> None:
+        rr, size = self._rr, thing.shape.size
+        self._rr.log(path, rr.Transform3D(translation=thing.position, mat3x3=thing.rotation))
+        shapes = {
+            "box": lambda: rr.Boxes3D(half_sizes=[size / 2], colors=[colour]),
+            "capsule": lambda: rr.Capsules3D(
+                radii=[size[0]], lengths=[size[-1]], translations=[[0, 0, -size[-1] / 2]], colors=[colour]
+            ),
+            "cylinder": lambda: rr.Cylinders3D(radii=[size[0]], lengths=[size[-1]], colors=[colour]),
+            "sphere": lambda: rr.Ellipsoids3D(half_sizes=[[size[0]] * 3], colors=[colour]),
+        }
+        rr.log(path, shapes[thing.shape.kind]())
+
+
+def _finite(value: float) -> float:
+    return value if np.isfinite(value) else np.nan

@@ -1,0 +1,38 @@
+"""Base and arm apart: a stick drives the base, or the arm alone moves the hand; nothing is coordinated."""
+
+import numpy as np
+
+from handrail.controllers.arrays import FloatArray
+from handrail.controllers.baselines.arm_completion import ArmCompletion
+from handrail.controllers.baselines.reactive import ReactiveController
+from handrail.controllers.baselines.twist_completion import base_velocity, tool_twist
+from handrail.controllers.interface.channels import Channels
+from handrail.controllers.interface.controller import State
+from handrail.controllers.interface.intent import Intent
+from handrail.controllers.robot.model import RobotModel
+
+
+def split_controller(
+    model: RobotModel, period: float = 0.05, intent_timeout: float = 0.25
+) -> ReactiveController:
+    """Return the controller that sends the base where its stick says, and the hand by the arm's joints alone.
+
+    v_base as commanded; `q̇_arm = (JᵀJ + λW²)⁻¹ Jᵀ (twist − J_b v_base)` while the hand is, else 0.
+    It looks neither ahead nor at obstacles; single joints make it brake.
+
+    Args:
+        model: of the robot.
+        period: of the control loop [s].
+        intent_timeout: age from which an intent is stale [s].
+    """
+    channels, arm = Channels.of(model.description), ArmCompletion(model)
+    understood = channels.mask(*(("base",) if channels.base else ()), "ee")
+
+    def ask(state: State, intent: Intent, previous: FloatArray) -> FloatArray:
+        base = base_velocity(intent, channels, state.q)
+        if not intent.mask[channels.tool_slice].any():
+            return np.concatenate([base, np.zeros(model.size - len(base))])
+        twist = tool_twist(intent, channels, model.pose(state.q))
+        return arm.velocity(state.q, previous, base, twist, period)
+
+    return ReactiveController(model, ask, period, intent_timeout, understood)

@@ -1,0 +1,69 @@
+"""Completions: rules that turn a twist of the tool into a whole-body velocity, without looking ahead."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from handrail.controllers.arrays import FloatArray
+from handrail.controllers.baselines.reactive import ReactiveController
+from handrail.controllers.interface.channels import Channels
+from handrail.controllers.interface.controller import State
+from handrail.controllers.interface.intent import Intent
+from handrail.controllers.robot.model import Pose, RobotModel
+
+Completion = Callable[[FloatArray, FloatArray, FloatArray, float], FloatArray]
+"""q (n,), velocity commanded last (n,), twist (6,), period [s] → velocity wanted (n,) [m/s, rad/s].
+
+The twist is (v, ω), world-aligned at the tool point.
+"""
+
+
+def twist_controller(
+    model: RobotModel, complete: Completion, period: float = 0.05, intent_timeout: float = 0.25
+) -> ReactiveController:
+    """Return the controller that completes the tool's twist by a rule; other channels make it brake.
+
+    Axes of the tool that nobody commands are kept still; with none commanded the robot rests.
+
+    Args:
+        model: of the robot.
+        complete: the rule.
+        period: of the control loop [s].
+        intent_timeout: age from which an intent is stale [s].
+    """
+    channels = Channels.of(model.description)
+
+    def ask(state: State, intent: Intent, previous: FloatArray) -> FloatArray:
+        if not intent.mask.any():
+            return np.zeros(model.size)
+        twist = tool_twist(intent, channels, model.pose(state.q))
+        return complete(state.q, previous, twist, period)
+
+    return ReactiveController(model, ask, period, intent_timeout, channels.mask("ee"))
+
+
+def base_velocity(intent: Intent, channels: Channels, q: FloatArray) -> FloatArray:
+    """Return the commanded base twist as the base's joint velocities in the world, (3,), or (0,)."""
+    if not channels.base:
+        return np.zeros(0)
+    vx, vy, wz = np.where(intent.mask, intent.values, 0.0)[channels.base_slice]
+    c, s = (1.0, 0.0) if intent.frames.base == "world" else (np.cos(q[2]), np.sin(q[2]))
+    return np.array([c * vx - s * vy, s * vx + c * vy, wz])
+
+
+def tool_twist(intent: Intent, channels: Channels, tool: Pose) -> FloatArray:
+    """Return the commanded twist (v, ω), world-aligned at the tool point of the robot, (6,) [m/s, rad/s].
+
+    A twist in the tool frame is turned by R; one for a point p of the tool loses `ω × R p`.
+
+    Args:
+        intent: whose frames say what its twist means.
+        channels: of the robot.
+        tool: its pose.
+    """
+    twist = np.where(intent.mask, intent.values, 0.0)[channels.tool_slice]
+    if intent.frames.tool == "tool":
+        twist = np.concatenate([tool.rotation @ twist[:3], tool.rotation @ twist[3:]])
+    if intent.frames.point.any():
+        twist[:3] -= np.cross(twist[3:], tool.rotation @ intent.frames.point)
+    return twist

@@ -1,0 +1,50 @@
+"""A completion that protects nothing: what is asked for, by damped least squares, clipped to limits."""
+
+import numpy as np
+
+from handrail.controllers.arrays import FloatArray
+from handrail.controllers.baselines.reactive import ReactiveController
+from handrail.controllers.baselines.twist_completion import base_velocity, tool_twist
+from handrail.controllers.interface.channels import Channels
+from handrail.controllers.interface.controller import State
+from handrail.controllers.interface.intent import Intent
+from handrail.controllers.mpc.masked_mpc import channel_matrix
+from handrail.controllers.robot.model import RobotModel
+
+_DAMPING = 0.01  # λ, as in WholeBodyCompletion
+
+
+def unprotected_controller(
+    model: RobotModel, period: float = 0.05, intent_timeout: float = 0.25
+) -> ReactiveController:
+    """Return the controller for any mask that looks neither ahead nor at obstacles.
+
+    `v = argmin ‖M (C v − u)‖² + λ ‖W v‖²`, C the channels' matrix, M the mask, `W = diag(1 / v_max)`: what a
+    partial command comes to where nothing but the joints' limits is kept.
+
+    Args:
+        model: of the robot.
+        period: of the control loop [s].
+        intent_timeout: age from which an intent is stale [s].
+    """
+    channels = Channels.of(model.description)
+    inverse = model.description.limits.velocity**2 / _DAMPING  # of λ W², (n,)
+
+    def ask(state: State, intent: Intent, previous: FloatArray) -> FloatArray:
+        matrix = channel_matrix(model, channels, state.q)[intent.mask]  # (c, n)
+        asked = _world_values(model, channels, state, intent)[intent.mask]
+        scaled = inverse[:, None] * matrix.T  # (n, c)
+        return scaled @ np.linalg.solve(matrix @ scaled + np.eye(len(asked)), asked)
+
+    return ReactiveController(model, ask, period, intent_timeout)
+
+
+def _world_values(model: RobotModel, channels: Channels, state: State, intent: Intent) -> FloatArray:
+    """Return the values in the frames of the channels' matrix, (m,)."""
+    values = intent.values.copy()
+    values[channels.tool_slice] = tool_twist(intent, channels, model.pose(state.q))
+    if channels.base and intent.frames.base == "world":
+        vx, vy, wz = base_velocity(intent, channels, state.q)
+        c, s = np.cos(state.q[2]), np.sin(state.q[2])
+        values[channels.base_slice] = (c * vx + s * vy, c * vy - s * vx, wz)
+    return values

@@ -1,0 +1,225 @@
+"""Signed distances and their gradients: coal's shapes on pinocchio's model."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+
+from handrail.controllers.arrays import FloatArray, IntArray
+from handrail.controllers.collision.distance_kernels import gradients, lower_bounds, measured, raise_bounds
+from handrail.controllers.collision.pair_data import PairData
+from handrail.controllers.collision.shape_pairs import ShapePairs
+from handrail.controllers.collision.slacks import MOVING, OWN, STANDING
+from handrail.controllers.errors import HandrailError
+from handrail.controllers.robot.model import RobotModel
+from handrail.controllers.robot.shape import Kept, Obstacle
+
+_STRETCH = 13  # configurations after which all pairs are measured again
+_FAR = 0.15  # a pair that stays farther apart than this need not be measured exactly [m]
+
+
+@dataclass(frozen=True)
+class Distances:
+    """Signed distances of P pairs at K configurations, and the gradients of those that are near.
+
+    Attributes:
+        values: signed distances [m], negative when they overlap, (K, P).
+        near: indices (node, pair) of the R entries whose gradient is given, (R, 2).
+        gradients: derivatives of those entries by q, (R, n).
+    """
+
+    values: FloatArray
+    near: IntArray
+    gradients: FloatArray
+
+
+class CollisionModel:
+    """Measures the pairs that must keep apart.
+
+    See shape_pairs.py for which these are, and witnesses.py for the distance of a pair and its gradient.
+
+    Attributes:
+        pairs: names of the two shapes of each pair, (P,) of (str, str).
+        work: which pairs are a tool shape against a work surface, (P,).
+        largest_margin: the largest margin that a pair can keep [m], (P,).
+        held: rows of the pairs with something that the hand holds, (H,).
+        kinds: whether a pair is OWN, STANDING or MOVING (slacks.py), (P,).
+    """
+
+    def __init__(self, model: RobotModel, obstacles: tuple[Obstacle, ...] = ()) -> None:
+        self._robot = model
+        self._model = model.pinocchio
+        self._shapes = ShapePairs(model, obstacles)
+        self._geometry = self._shapes.geometry
+        self._kept = _kept(obstacles)
+        self._moving: list[Obstacle] = []
+        self.pairs = self._shapes.names
+        self.work = self._shapes.work
+        self.largest_margin = self._shapes.largest_margin
+        self.held = self._shapes.held
+        self._moves = self._shapes.moves  # (P, 2, n)
+        self._levers = self._shapes.levers  # (n, P), which `observe` brings up to date
+        self._data = self._model.createData()
+        self._every = np.arange(len(self.pairs))
+        self._far = np.full(len(self.pairs), _FAR)
+        neutral = pin.neutral(self._model)
+        self._all, self._along, self._after = (
+            PairData(self._model, self._data, self._geometry, neutral) for _ in range(3)
+        )
+        self.observe(obstacles)
+
+    @property
+    def size(self) -> int:
+        """Number of pairs P."""
+        return len(self.pairs)
+
+    @property
+    def moves(self) -> bool:
+        """Whether any obstacle moves."""
+        return bool(self._moving)
+
+    def distances(
+        self, q: FloatArray, reach: FloatArray | float = np.inf, times: FloatArray | None = None
+    ) -> Distances:
+        """Return the signed distances along a trajectory, and gradients of those below `reach`.
+
+        On every stretch of the way a pair that cannot come below its reach is measured at the beginning only;
+        after that its value is a lower bound: `d(q_k) ≥ d(q_0) - Σ_j L_j |q_k - q_0|_j - |v_obstacle| t_k`,
+        or what the last trajectory's distances leave of it: the next one is seldom far from it.
+
+        Args:
+            q: configurations, (K, n).
+            reach: the largest distance whose gradient is wanted, for all pairs or each, (P,) [m].
+            times: of the configurations from now on, (K,) [s]; moving obstacles are where they will be then.
+        """
+        if not self.size:
+            return _nothing(len(q), self._model.nv)
+        times = np.zeros(len(q)) if times is None else times
+        reaches = reach if isinstance(reach, np.ndarray) else np.full(self.size, float(reach))
+        witnesses = np.empty((len(q), self.size, 9))
+        jacobians = np.empty((len(q), 6, self._model.nv))
+        values = np.empty((len(q), self.size))
+        for begin in range(0, len(q), _STRETCH):
+            stretch = slice(begin, begin + _STRETCH)
+            first = slice(begin, begin + 1)
+            self._measure(self._all, q[first], times[first], witnesses[first], jacobians[first])
+            measured(witnesses[first], self._every, values[first])
+            ahead = times[stretch] - times[begin]
+            bounds, close = lower_bounds(
+                values[begin], q[begin], q[stretch], ahead, self._levers, self._speeds, reaches
+            )
+            if self._last is not None and self._last[0].shape == q.shape:
+                there, known = self._last[0][stretch], self._last[1][stretch]
+                close = raise_bounds(bounds, q[stretch], known, there, self._levers, reaches)
+            chosen = self._along.select(close)
+            if len(chosen):
+                after = slice(begin + 1, begin + len(bounds))
+                self._measure(self._along, q[after], times[after], witnesses[after], jacobians[after])
+            measured(witnesses[stretch], chosen, bounds)
+            values[stretch] = bounds
+        self._last = None if self._moving else (q.copy(), values)
+        near, rows = gradients(witnesses, jacobians, self._moves, values, reaches)
+        return Distances(values, near, rows)
+
+    def values(
+        self,
+        q: FloatArray,
+        times: FloatArray | None = None,
+        now: tuple[FloatArray, FloatArray] | None = None,
+        reach: FloatArray | None = None,
+    ) -> FloatArray:
+        """Return the signed distances at configurations (K, n) and times (K,), (K, P) [m].
+
+        Args:
+            q: configurations.
+            times: from now on [s].
+            now: a configuration, (n,), and its distances, (P,), if they are known: pairs that cannot come
+                below their reach then get a lower bound instead, infinitely cheaper.
+            reach: distance below which a pair's own value is wanted, (P,) [m]; 0.15 m when None.
+        """
+        if not self.size:
+            return np.empty((len(q), 0))
+        times = np.zeros(len(q)) if times is None else times
+        if now is None:
+            data, chosen, values = self._all, self._every, np.empty((len(q), self.size))
+        else:
+            data, (start, there) = self._after, now
+            reach = self._far if reach is None else reach
+            values, close = lower_bounds(there, start, q, times, self._levers, self._speeds, reach)
+            if not close.any():
+                return values
+            chosen = data.select(close)
+        witnesses = np.empty((len(q), self.size, 9))
+        self._measure(data, q, times, witnesses)
+        measured(witnesses, chosen, values)
+        return values
+
+    def _measure(
+        self,
+        data: "PairData",
+        q: FloatArray,
+        times: FloatArray,
+        witnesses: FloatArray,
+        jacobians: FloatArray | None = None,
+    ) -> None:
+        """Let coal compute some pairs at configurations, with moving obstacles where they are then.
+
+        Args:
+            data: of the pairs.
+            q: configurations, (K, n).
+            times: of them from now on, (K,) [s].
+            witnesses: filled with normals and nearest points, (K, P, 9).
+            jacobians: filled with the joints' spatial Jacobians, if wanted, (K, 6, n).
+        """
+        model, kinematics, geometry = self._model, self._data, self._geometry
+        pairs, results = data.geometry, data.results
+        for k in range(len(q)):
+            if self._moving:
+                self._move_obstacles(times[k])
+            pin.computeDistances(model, kinematics, geometry, pairs, q[k])
+            witnesses[k] = results.read()
+            if jacobians is not None:
+                jacobians[k] = pin.computeJointJacobians(model, kinematics)
+
+    def _move_obstacles(self, time: float) -> None:
+        """Put moving obstacles where they are after a time."""
+        for obstacle in self._moving:
+            self._shapes.place(obstacle, time)
+
+    def observe(self, obstacles: tuple[Obstacle, ...]) -> None:
+        """Take where the obstacles are now and how fast they move.
+
+        Raises:
+            HandrailError: they are not the obstacles that the model was built with.
+        """
+        if _kept(obstacles) != self._kept:
+            expected, got = (", ".join(kept.name for kept in kind) for kind in (self._kept, _kept(obstacles)))
+            raise HandrailError(f"obstacles: expected {expected} as they were, got {got}")
+        self._last: tuple[FloatArray, FloatArray] | None = None
+        self._shapes.observe(obstacles)
+        self._moving = [obstacle for obstacle in obstacles if obstacle.velocity.any()]
+        speeds = {obstacle.name: float(np.linalg.norm(obstacle.velocity)) for obstacle in obstacles}
+        self._speeds = np.array([speeds.get(second, 0.0) for _, second in self.pairs])
+        self.kinds = np.where(self._speeds > 0.0, MOVING, STANDING)
+        self.kinds[: len(self._robot.description.self_pairs)] = OWN
+
+    def among(self, obstacles: tuple[Obstacle, ...]) -> "CollisionModel":
+        """Return the model as the obstacles are now: this one; another one when some came, went or changed.
+
+        Raises:
+            HandrailError: two things share a name, or one is held by a frame that the robot lacks.
+        """
+        if _kept(obstacles) != self._kept:
+            return CollisionModel(self._robot, obstacles)
+        self.observe(obstacles)
+        return self
+
+
+def _kept(obstacles: tuple[Obstacle, ...]) -> tuple[Kept, ...]:
+    """Return what of every obstacle stays the same while it moves."""
+    return tuple(obstacle.kept for obstacle in obstacles)
+
+
+def _nothing(count: int, size: int) -> Distances:
+    """Return the distances of no pairs at all at `count` configurations."""
+    return Distances(np.zeros((count, 0)), np.zeros((0, 2), dtype=int), np.zeros((0, size)))

@@ -1,0 +1,75 @@
+"""The one protocol behind which every controller stands."""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from handrail.controllers.arrays import FloatArray, frozen, real
+from handrail.controllers.interface.command import Command
+from handrail.controllers.interface.intent import Intent
+from handrail.controllers.numerics.jit import exact_jit
+from handrail.controllers.robot.shape import Obstacle
+
+
+@dataclass(frozen=True)
+class State:
+    """What is known of the robot at a time.
+
+    Attributes:
+        q: measured positions, (n,) [m, rad].
+        v: measured velocities, dq/dt, (n,) [m/s, rad/s].
+        time: on the robot's clock [s]; later at every update.
+        commanded: the velocity that the robot was sent last, (n,). It alone knows, for what is asked may be
+            limited on the way. None where it does not say; then it was sent what was asked.
+    """
+
+    q: FloatArray
+    v: FloatArray
+    time: float = 0.0
+    commanded: FloatArray | None = None
+
+    def __post_init__(self) -> None:
+        """Copy the arrays and make them read-only.
+
+        Raises:
+            HandrailError: one of them is not made of real numbers.
+        """
+        for name in ("q", "v", "commanded"):
+            if getattr(self, name) is not None:
+                object.__setattr__(self, name, frozen(getattr(self, name), what=f"{name} of a state"))
+        object.__setattr__(self, "time", real(self.time, "time of a state"))
+
+    def is_of(self, size: int) -> bool:
+        """Whether all of it but the time are finite numbers for a robot with `size` coordinates."""
+        known = self.commanded is None or (self.commanded.shape == (size,) and _finite(self.commanded))
+        return known and self.q.shape == self.v.shape == (size,) and _finite(self.q) and _finite(self.v)
+
+
+@exact_jit
+def _finite(values):
+    """Whether all values are numbers, whatever their shape."""
+    finite = True
+    for value in values.flat:
+        finite &= np.isfinite(value)
+    return finite
+
+
+class Controller(Protocol):
+    """Completes a partial command: state, intent → command. Never raises because of an intent."""
+
+    def reset(self, obstacles: tuple[Obstacle, ...] = ()) -> None:
+        """Forget the past (warm start, last command) and take the scene of a new episode."""
+        ...
+
+    def observe(self, obstacles: tuple[Obstacle, ...]) -> None:
+        """Take what stands around now, where, how fast it moves, and what the hand holds.
+
+        Things may appear and vanish; what was commanded is not forgotten. Where the scene makes no sense (two
+        things of one name, a frame that the robot lacks) updates brake until one is seen that does.
+        """
+        ...
+
+    def update(self, state: State, intent: Intent) -> Command:
+        """Return the command from `state.time` on."""
+        ...

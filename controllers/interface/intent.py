@@ -1,0 +1,105 @@
+"""What the operator asks for: values on channels, and a mask of those that are commanded."""
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from handrail.controllers.arrays import BoolArray, FloatArray, frozen, real
+from handrail.controllers.errors import HandrailError
+from handrail.controllers.interface.channels import Channels
+from handrail.controllers.interface.frames import USUAL, Frames
+from handrail.controllers.numerics.jit import exact_jit
+
+
+@dataclass(frozen=True)
+class RawInput:
+    """What the input device read, before it became a command.
+
+    Attributes:
+        values: deflection of each input from −1 to 1, or a leader arm's joint angles [rad], by channel, (m,);
+            (0,) if it is not known.
+        axes: how many inputs the operator moves now.
+        switches: how often they changed to other inputs in this episode so far.
+    """
+
+    values: FloatArray = field(default_factory=lambda: np.zeros(0))
+    axes: int = 0
+    switches: int = 0
+
+    def __post_init__(self) -> None:
+        """Copy the array and make it read-only."""
+        object.__setattr__(self, "values", frozen(self.values, what="raw input of an intent"))
+
+
+_UNKNOWN = RawInput()
+
+
+@dataclass(frozen=True)
+class Intent:
+    """A partial command.
+
+    Attributes:
+        values: one number a channel, in the order of `Channels.names`, (m,); where the mask is
+            false they mean nothing.
+        mask: which channels the operator owns now, (m,).
+        gripper: 0 open, 1 closed.
+        mode: name of the teleop mode that made it.
+        time: when the operator asked [s], on the clock of the state; every new intent has a later one.
+        frames: in which frames the twists are meant, and for which point of the tool.
+        raw: what the input device read.
+    """
+
+    values: FloatArray
+    mask: BoolArray
+    gripper: float = 0.0
+    mode: str = ""
+    time: float = 0.0
+    frames: Frames = USUAL
+    raw: RawInput = _UNKNOWN
+
+    def __post_init__(self) -> None:
+        """Copy the arrays and make them read-only.
+
+        Raises:
+            HandrailError: values, gripper or time are no real numbers, or the mask is not bool.
+        """
+        object.__setattr__(self, "values", frozen(self.values, what="values of an intent"))
+        object.__setattr__(self, "mask", frozen(self.mask, bool, "mask of an intent"))
+        for name in ("gripper", "time"):
+            object.__setattr__(self, name, real(getattr(self, name), f"{name} of an intent"))
+
+    @classmethod
+    def idle(cls, channels: Channels, time: float = 0.0) -> "Intent":
+        """Return the intent of an operator who touches nothing."""
+        return cls(np.zeros(channels.size), np.zeros(channels.size, dtype=bool), time=time)
+
+    def check(self, channels: Channels) -> None:
+        """Check the shapes against the robot's channels.
+
+        Raises:
+            HandrailError: values or mask have the wrong size.
+        """
+        for name in ("values", "mask"):
+            shape = getattr(self, name).shape
+            if shape != (channels.size,):
+                raise HandrailError(
+                    f"{name} of an intent: expected {channels.size} channels "
+                    f"({channels.names[0]} … {channels.names[-1]}), got shape {shape}"
+                )
+
+    @property
+    def is_finite(self) -> bool:
+        """Whether every commanded value, the gripper and the time are numbers, and each value has a mask."""
+        scalars = math.isfinite(self.gripper) and math.isfinite(self.time)
+        scalars = scalars and self.values.ndim == 1 and self.values.shape == self.mask.shape
+        return scalars and _commanded_finite(self.values, self.mask)
+
+
+@exact_jit
+def _commanded_finite(values, mask):
+    """Whether all values that a mask picks are numbers, (m,)."""
+    finite = True
+    for channel in range(len(values)):
+        finite &= np.isfinite(values[channel]) or not mask[channel]
+    return finite

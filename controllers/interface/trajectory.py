@@ -1,0 +1,108 @@
+"""A velocity trajectory, linear between knots: what the robot is sent, and where that leads."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from handrail.controllers.arrays import FloatArray, frozen
+from handrail.controllers.numerics.jit import exact_jit, jit
+
+_ROUNDING = 1e-5  # of a time, relative: no later than the last knot
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """Velocities that are linear between knots.
+
+    Attributes:
+        velocities: at the knots, (k, n) with k ≥ 2 [m/s, rad/s].
+        dt: time between knots [s].
+        elapsed: time that has passed since the first knot [s].
+    """
+
+    velocities: FloatArray
+    dt: float
+    elapsed: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Copy the array and make it read-only."""
+        object.__setattr__(self, "velocities", frozen(self.velocities))
+
+    def velocity(self, time: float) -> FloatArray:
+        """Return the velocity `time` [s] from now, (n,); zero after the last knot."""
+        knot = (max(time, 0.0) + self.elapsed) / self.dt
+        index, last = int(knot), len(self.velocities) - 1
+        if index >= last:
+            return np.zeros_like(self.velocities[0]) if self.is_over(time) else self.velocities[-1]
+        weight = knot - index
+        return (1.0 - weight) * self.velocities[index] + weight * self.velocities[index + 1]
+
+    def is_over(self, time: float) -> bool:
+        """Whether the last knot lies in the past `time` [s] from now, by more than rounding."""
+        last = len(self.velocities) - 1
+        return (max(time, 0.0) + self.elapsed) / self.dt - last > _ROUNDING * last
+
+    def after(self, time: float) -> "Trajectory":
+        """Return what is left of it `time` [s] from now: the same curve, without knots long past."""
+        whole, elapsed = self._past(time)
+        return Trajectory(self.velocities[whole:], self.dt, elapsed)
+
+    def accelerations(self, count: int, time: float = 0.0) -> FloatArray:
+        """Return the mean accelerations over intervals dt, (count, n); zero after the end.
+
+        Args:
+            count: of intervals.
+            time: when the first one begins, from now [s].
+        """
+        whole, elapsed = self._past(time)
+        return _accelerations(self.velocities[whole:], self.dt, elapsed, count)
+
+    def path(self, q: FloatArray, samples: int = 1) -> tuple[FloatArray, FloatArray]:
+        """Return where it leads from q: positions, (K, n), and their times from now, (K,) [s].
+
+        Args:
+            q: where it begins now, (n,).
+            samples: in every interval between knots; the first is now.
+        """
+        step = self.dt / samples
+        ahead = step * np.arange(samples * (len(self.velocities) - 1) + 1) - self.elapsed
+        times = np.append(0.0, ahead[ahead > 0.0])
+        velocities = self._held(times)
+        moves = 0.5 * np.diff(times)[:, None] * (velocities[:-1] + velocities[1:])
+        return np.vstack([q, q + np.cumsum(moves, axis=0)]), times
+
+    def _past(self, time: float) -> tuple[int, float]:
+        """Return how many intervals are over `time` [s] from now, and how much of the next one [s]."""
+        passed = self.elapsed + max(time, 0.0)
+        whole = min(int(passed / self.dt), len(self.velocities) - 2)
+        return whole, passed - whole * self.dt
+
+    def _held(self, times: FloatArray) -> FloatArray:
+        """Return the velocities at times from now, (K,), the last one held after the end, (K, n)."""
+        return _held(self.velocities, (times + self.elapsed) / self.dt)
+
+
+@jit
+def _held(velocities, knots):
+    last, n = len(velocities) - 1, velocities.shape[1]
+    result = np.empty((len(knots), n))
+    for k in range(len(knots)):
+        knot = min(knots[k], float(last))
+        index = min(int(knot), last - 1)
+        weight = knot - index
+        for j in range(n):
+            result[k, j] = (1.0 - weight) * velocities[index, j] + weight * velocities[index + 1, j]
+    return result
+
+
+@exact_jit
+def _accelerations(velocities, dt, elapsed, count):
+    knots = np.empty(count + 1)
+    for k in range(count + 1):
+        knots[k] = (dt * k + elapsed) / dt
+    held = _held(velocities, knots)
+    result = np.empty((count, velocities.shape[1]))
+    for k in range(count):
+        for j in range(velocities.shape[1]):
+            result[k, j] = (held[k + 1, j] - held[k, j]) / dt
+    return result

@@ -1,1 +1,0 @@
-"""Objectives: what the robot does with the freedom that the operator leaves."""

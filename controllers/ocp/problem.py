@@ -1,0 +1,130 @@
+"""The masked optimal control problem of one update (the paper's equation 6), as a value."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from handrail.controllers.arrays import FloatArray, frozen
+from handrail.controllers.collision.model import CollisionModel
+from handrail.controllers.ocp.motion import approach, cumulated, is_motion, largest_share, rollout
+from handrail.controllers.robot.description import Limits
+
+
+@dataclass(frozen=True)
+class Problem:
+    """`min Σ_k ½ ‖r(q_k, v_k, u_k; p) - ref_k‖²_W_k + Σ_i (ρ₁ σ_i + ½ ρ₂ σ_i²)` over N stages.
+
+    Dynamics: `v_k = v_{k-1} + dt u_k`, `q_k = q_{k-1} + dt v_{k-1} + ½ dt² u_k`. Hard: `|u| ≤ a_max`.
+    Soft, each kind with a slack of its own (slacks.py): velocity and position limits, and for every pair
+    `d_p(q_k) ≥ margin_p`. The terminal set X_f asks the same of the stop from the last node:
+    `q_N + ½ v_N |v_N| / a_max`, half way and at rest.
+
+    Attributes:
+        q: position now, (n,).
+        v: velocity now, (n,).
+        dt: length of a stage [s].
+        reference: of every residual row, (N, r).
+        weights: of every residual row, (N, r).
+        parameters: p of the objectives, (k,).
+        channels: number of channels m; their rows come first.
+        limits: of the robot.
+        collision: the pairs that keep apart.
+        margins: smallest distance wanted of each pair [m], (P,).
+        reach: distance beyond the margin at which a pair enters the problem [m].
+        slack_linear: ρ₁.
+        slack_quadratic: ρ₂.
+    """
+
+    q: FloatArray
+    v: FloatArray
+    dt: float
+    reference: FloatArray
+    weights: FloatArray
+    parameters: FloatArray
+    channels: int
+    limits: Limits
+    collision: CollisionModel
+    margins: FloatArray
+    reach: float
+    slack_linear: float
+    slack_quadratic: float
+
+    @property
+    def horizon(self) -> int:
+        """Number of stages N."""
+        return len(self.reference)
+
+    def rollout(self, u: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return positions and velocities at the N + 1 nodes under accelerations u, (N, n)."""
+        shape = (len(u) + 1, len(self.v))
+        q, v = np.empty(shape), np.empty(shape)
+        rollout(self.q, self.v, self.dt, u, q, v)
+        return q, v
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A solution: trajectories, slack, and how the solver fared.
+
+    Attributes:
+        q: positions at the nodes, (N + 1, n).
+        v: velocities at the nodes, (N + 1, n).
+        u: accelerations of the stages, (N, n).
+        collision_slack: largest shortfall of a distance against its margin in the plan [m].
+        limit_slack: largest excess over a position limit, relative to half its range; velocity limits share
+            it with a thousandth of its size.
+        distances: signed distances now, (P,).
+        solved: whether the solver reports a solution.
+        iterations: of the solver.
+        tracking_error: norm of the commanded channels' error at the last tracked stage.
+        rows: inequality rows of the last QP, bounds left out.
+        phases: where the time went: `residuals`, `distances`, `solve` [s].
+    """
+
+    q: FloatArray
+    v: FloatArray
+    u: FloatArray
+    collision_slack: float
+    limit_slack: float
+    distances: FloatArray
+    solved: bool
+    iterations: int
+    tracking_error: float = 0.0
+    rows: int = 0
+    phases: tuple[tuple[str, float], ...] = ()
+
+    def __post_init__(self) -> None:
+        """Make the arrays read-only copies."""
+        for name in ("q", "v", "u", "distances"):
+            object.__setattr__(self, name, frozen(getattr(self, name)))
+
+    def within(self, problem: Problem) -> "Plan":
+        """Return the plan with velocities cut to their limits; accelerations and positions follow.
+
+        Cutting is monotone, so that no acceleration becomes larger.
+        """
+        limit = problem.limits.velocity
+        if largest_share(self.v[1:], limit) <= 1.0:
+            return self
+        v = np.vstack([self.v[0], np.minimum(np.maximum(self.v[1:], -limit), limit)])
+        u = np.diff(v, axis=0) / problem.dt
+        q, v = problem.rollout(u)
+        return replace(self, q=q, v=v, u=u)
+
+    def taken_up(self, problem: Problem, velocity: FloatArray) -> "Plan":
+        """Return the plan as taken up by a robot that is being sent another velocity than its first, (n,).
+
+        `v_0 = velocity`, `v_k ← clip(v_k, v_{k-1} ± dt a_max)`: so consecutive commands keep the limit too.
+        """
+        if np.array_equal(velocity, self.v[0]):
+            return self
+        v = np.vstack([velocity, self.v[1:]])
+        approach(v, problem.dt * problem.limits.acceleration)
+        u = np.diff(v, axis=0) / problem.dt
+        return replace(self, q=problem.q + cumulated(v, problem.dt), v=v, u=u)
+
+    def is_solution(self, problem: Problem, tolerance: float = 1e-6) -> bool:
+        """Whether the plan is finite, obeys the dynamics from the state and the hard acceleration limits."""
+        limit = problem.limits.acceleration
+        motion = problem.q, problem.v, problem.dt, self.u, self.q, self.v
+        return self.solved and is_motion(*motion, limit, tolerance)

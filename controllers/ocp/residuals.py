@@ -1,0 +1,155 @@
+"""All objectives' residuals at all stages: constant rows kept as matrices, the others compiled by CasADi."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+
+from handrail.controllers.arrays import BoolArray, FloatArray, IntArray
+from handrail.controllers.errors import HandrailError
+from handrail.controllers.numerics.compiled import compiled
+from handrail.controllers.objectives.objective import Objective, Stage
+from handrail.controllers.robot.model import RobotModel
+
+
+@dataclass(frozen=True)
+class AffineRows:
+    """Rows `r = J z + c` of z = (q, v, u) whose Jacobian never changes.
+
+    Attributes:
+        index: where they lie among all rows, (a,).
+        jacobian: J, (a, 3n).
+        offset: c, (a,).
+    """
+
+    index: IntArray
+    jacobian: FloatArray
+    offset: FloatArray
+
+
+class StageResiduals:
+    """The stacked residual r(z; p) of one stage, z = (q, v, u), evaluated at N stages.
+
+    Attributes:
+        objectives: in the order of the rows.
+        size: number of rows r.
+        reference: stacked references, (r,).
+        affine: the rows with a constant Jacobian.
+        curved: where the other rows lie, (c,).
+        expression: the residual of one stage as a CasADi function of (z, p).
+    """
+
+    def __init__(self, model: RobotModel, objectives: tuple[Objective, ...], horizon: int) -> None:
+        names = [objective.name for objective in objectives]
+        if len(set(names)) != len(names):
+            raise HandrailError(f"objectives: expected distinct names, got {', '.join(names)}")
+        n = model.size
+        self.objectives = objectives
+        self._slices = _parameter_slices(objectives)
+        z = ca.SX.sym("z", 3 * n)
+        p = ca.SX.sym("p", sum(len(objective.parameters) for objective in objectives))
+        stage = Stage(model, z[:n], z[n : 2 * n], z[2 * n :])
+        parts = [objective.residual(stage, p[self._slices[objective.name]]) for objective in objectives]
+        residual = ca.vertcat(*parts)
+        _check_rows(objectives, parts)
+        self.size = residual.shape[0]
+        self.reference = np.concatenate([objective.reference for objective in objectives])
+        self.expression = ca.Function("residual", [z, p], [residual])
+        self.affine, self.curved = _split(residual, z, p)
+        self._buffers: dict[str, object] = {}  # they own what the compiled functions read and write
+        self._compile(residual, z, p, horizon, n)
+
+    @property
+    def parameters(self) -> FloatArray:
+        """Every objective's parameters as they were at the beginning, (k,)."""
+        return np.concatenate([objective.parameters for objective in self.objectives])
+
+    def parameter_slice(self, name: str) -> slice:
+        """Return where an objective's parameters lie."""
+        return self._slices[name]
+
+    def weights(self, mask: BoolArray) -> FloatArray:
+        """Return the weight of every row under a mask, (r,)."""
+        return np.concatenate([objective.weights(mask) for objective in self.objectives])
+
+    def evaluate(
+        self, q: FloatArray, v: FloatArray, u: FloatArray, parameters: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return z (N, 3n), and the curved rows' residuals (N, c) and Jacobians by z, (N, 3n, c); views.
+
+        Args:
+            q: positions after the stages, (N, n).
+            v: velocities after them, (N, n).
+            u: accelerations during them, (N, n).
+            parameters: of all objectives, (k,).
+        """
+        self._take(q, v, u, parameters)
+        self._evaluate_all()
+        return self._z, self._values, self._jacobians
+
+    def values(
+        self, q: FloatArray, v: FloatArray, u: FloatArray, parameters: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return z (N, 3n) and the curved rows' residuals (N, c), as views; arguments as for `evaluate`."""
+        self._take(q, v, u, parameters)
+        self._evaluate_values()
+        return self._z, self._values
+
+    def _take(self, q: FloatArray, v: FloatArray, u: FloatArray, parameters: FloatArray) -> None:
+        for part, given in zip(self._parts, (q, v, u), strict=True):
+            part[:] = given
+        self._p[:] = parameters
+
+    def _compile(self, residual: ca.SX, z: ca.SX, p: ca.SX, horizon: int, n: int) -> None:
+        curved = ca.densify(residual[self.curved.tolist()])
+        self._z = np.zeros((horizon, 3 * n))
+        self._parts = self._z[:, :n], self._z[:, n : 2 * n], self._z[:, 2 * n :]
+        self._p = np.zeros((horizon, p.shape[0]))
+        self._values = np.zeros((horizon, len(self.curved)))
+        self._jacobians = np.zeros((horizon, 3 * n, len(self.curved)))  # column-major in CasADi
+        jacobian = ca.densify(ca.jacobian(curved, z))
+        self._evaluate_values = self._bound("values", [z, p], [curved])
+        self._evaluate_all = self._bound("stage", [z, p], [curved, jacobian])
+
+    def _bound(self, name: str, inputs: list[ca.SX], outputs: list[ca.SX]) -> Callable[[], None]:
+        """Return a function of all stages, compiled, that reads and writes this object's arrays."""
+        function = compiled(ca.Function(name, inputs, outputs)).map(len(self._z))
+        buffer, evaluate = function.buffer()
+        buffer.set_arg(0, memoryview(self._z))
+        buffer.set_arg(1, memoryview(self._p))
+        for index, result in enumerate((self._values, self._jacobians)[: len(outputs)]):
+            buffer.set_res(index, memoryview(result))
+        self._buffers[name] = buffer
+        return evaluate
+
+
+def _parameter_slices(objectives: tuple[Objective, ...]) -> dict[str, slice]:
+    ends = np.cumsum([len(objective.parameters) for objective in objectives])
+    return {
+        o.name: slice(int(end) - len(o.parameters), int(end)) for o, end in zip(objectives, ends, strict=True)
+    }
+
+
+def _check_rows(objectives: tuple[Objective, ...], parts: list[ca.SX]) -> None:
+    for objective, part in zip(objectives, parts, strict=True):
+        if part.shape != (len(objective.reference), 1):
+            raise HandrailError(
+                f"objective {objective.name}: expected a residual of {len(objective.reference)} rows "
+                f"like its reference, got shape {part.shape}"
+            )
+
+
+def _split(residual: ca.SX, z: ca.SX, p: ca.SX) -> tuple[AffineRows, IntArray]:
+    """Return the rows that are affine in z and free of p, and the indices of the others."""
+    jacobian = ca.jacobian(residual, z)
+    varying = np.zeros(residual.shape[0], dtype=bool)
+    everything = ca.vertcat(z, p)
+    varying |= np.array(ca.which_depends(residual, everything, 2, True), dtype=bool)
+    if p.shape[0]:
+        varying |= np.array(ca.which_depends(residual, p, 1, True), dtype=bool)
+    index = np.flatnonzero(~varying)
+    zero = np.zeros(z.shape[0]), np.zeros(p.shape[0])
+    matrix = np.array(ca.Function("J", [z, p], [ca.densify(jacobian)])(*zero))
+    offset = np.array(ca.Function("r", [z, p], [ca.densify(residual)])(*zero)).ravel()
+    return AffineRows(index, matrix[index], offset[index]), np.flatnonzero(varying)

@@ -1,0 +1,221 @@
+"""A robot is data: the description file that MuJoCo, pinocchio and CasADi are all built from."""
+
+from dataclasses import dataclass
+from importlib import metadata
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+import numpy as np
+
+from handrail.controllers.arrays import FloatArray, frozen
+from handrail.controllers.errors import HandrailError
+from handrail.controllers.numerics.rotation import matrix_from_rpy, matrix_to_axis
+from handrail.controllers.robot.description_check import check_description
+from handrail.controllers.robot.shape import Shape, ShapeKind
+from handrail.controllers.strict_toml import read_toml
+
+_FOLDER = Path(__file__).parent / "robots"
+_PLANAR = ("x", "y", "theta")
+_SIMPLE: tuple[ShapeKind, ...] = ("box", "sphere", "cylinder")
+
+
+@dataclass(frozen=True)
+class Placement:
+    """A rigid transform: `p_parent = rotation @ p + translation` [m]."""
+
+    translation: FloatArray  # (3,)
+    rotation: FloatArray  # (3, 3)
+
+
+@dataclass(frozen=True)
+class PlacedShape:
+    """A shape on a frame of the robot; `tool` shapes may work close to work surfaces."""
+
+    name: str
+    frame: str
+    shape: Shape
+    placement: Placement
+    tool: bool = False
+    rgba: tuple[float, ...] = (0.5, 0.5, 0.5, 1.0)
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Box limits of the generalised coordinates, each (n,), in [m] or [rad] and seconds."""
+
+    position_lower: FloatArray
+    position_upper: FloatArray
+    velocity: FloatArray
+    acceleration: FloatArray
+    effort: FloatArray
+    servo: FloatArray
+
+
+@dataclass(frozen=True)
+class Gripper:
+    """Two fingers that slide along the x axis of a placement on a frame; lengths [m], force [N], speed [m/s].
+
+    `shape` is the collision shape that encloses the fingers, open or closed: real ones stand in for it.
+    """
+
+    frame: str
+    placement: Placement
+    mass: float
+    finger_mass: float
+    finger_size: tuple[float, float, float]
+    stroke: float
+    tip: float
+    force: float
+    speed: float
+    friction: float
+    camera: tuple[float, float, float]
+    camera_tilt: float
+    shape: str = "fingers"
+
+
+@dataclass(frozen=True)
+class RobotDescription:
+    """Everything that Handrail knows of a robot; see `robots/ridgeback_ur10.toml` for the format."""
+
+    name: str
+    base_kind: str
+    base_mass: float
+    base_height: float
+    base_size: tuple[float, float]
+    urdf: Path
+    mesh_root: Path
+    mount: Placement
+    arm_joints: tuple[str, ...]
+    tool_frame: str
+    tool_placement: Placement
+    home: FloatArray
+    limits: Limits
+    gripper: Gripper | None
+    collision: tuple[PlacedShape, ...]
+    self_pairs: tuple[tuple[str, str], ...]
+    self_margins: FloatArray  # largest margin that each self pair can keep [m]
+    visual: tuple[PlacedShape, ...]
+
+    @property
+    def base_joints(self) -> tuple[str, ...]:
+        """Names of the base coordinates; none on a fixed base."""
+        return _PLANAR if self.base_kind == "planar" else ()
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Names of all generalised coordinates, base first."""
+        return self.base_joints + self.arm_joints
+
+
+def robot_names() -> list[str]:
+    """Return the robots that come with Handrail."""
+    return sorted(path.stem for path in _FOLDER.glob("*.toml"))
+
+
+def load_description(robot: str | Path) -> RobotDescription:
+    """Read a robot by name, or from a description file.
+
+    Raises:
+        HandrailError: no such robot, or the file cannot be one's.
+    """
+    path = Path(robot) if str(robot).endswith(".toml") else _FOLDER / f"{robot}.toml"
+    if not path.is_file():
+        raise HandrailError(
+            f"unknown robot {str(robot)!r}: expected a .toml file or one of {', '.join(robot_names())}"
+        )
+    content = read_toml(path, "robot description")
+    check_description(content, f"robot description {path}")
+    return _parse(content, path.parent)
+
+
+def _parse(data: dict[str, Any], folder: Path) -> RobotDescription:
+    urdf, mesh_root = _find_urdf(data["arm"]["urdf"], folder)
+    gripper = data.get("gripper")
+    self_collision = data["self_collision"]
+    return RobotDescription(
+        name=data["name"],
+        base_kind=data["base"]["kind"],
+        base_mass=data["base"]["mass"],
+        base_height=data["base"]["height"],
+        base_size=tuple(data["base"]["size"]),
+        urdf=urdf,
+        mesh_root=mesh_root,
+        mount=_placement(data["arm"]),
+        arm_joints=tuple(data["arm"]["joints"]),
+        tool_frame=data["tool"]["frame"],
+        tool_placement=_placement(data["tool"]),
+        home=frozen(data["home"]["q"]),
+        limits=Limits(**{name: frozen(values) for name, values in data["limits"].items()}),
+        gripper=_gripper(gripper) if gripper else None,
+        collision=tuple(_placed_shape(entry) for entry in data["collision"]),
+        self_pairs=tuple((first, second) for first, second, *_ in self_collision["pairs"]),
+        self_margins=frozen([(*pair, np.inf)[2] for pair in self_collision["pairs"]]),
+        visual=tuple(_placed_shape(entry) for entry in data.get("visual", [])),
+    )
+
+
+def _gripper(data: dict[str, Any]) -> Gripper:
+    placed = ("translation", "rpy")
+    values: dict[str, Any] = {
+        k: tuple(v) if isinstance(v, list) else v for k, v in data.items() if k not in placed
+    }
+    return Gripper(placement=_placement(data), **values)
+
+
+def _placement(data: dict[str, Any], key: str = "translation") -> Placement:
+    rotation = matrix_from_rpy(np.array(data.get("rpy", [0.0, 0.0, 0.0])))
+    return Placement(frozen(data.get(key, [0.0, 0.0, 0.0])), frozen(rotation))
+
+
+def _placed_shape(data: dict[str, Any]) -> PlacedShape:
+    if "capsule" in data:
+        shape, placement = _capsule(data)
+    else:
+        kind: ShapeKind = next(kind for kind in _SIMPLE if kind in data)
+        shape, placement = Shape(kind, np.atleast_1d(data[kind])), _placement(data, "at")
+    return PlacedShape(
+        name=data.get("name", ""),
+        frame=data["frame"],
+        shape=shape,
+        placement=placement,
+        tool=data.get("tool", False),
+        rgba=tuple(data.get("rgba", (0.5, 0.5, 0.5, 1.0))),
+    )
+
+
+def _capsule(data: dict[str, Any]) -> tuple[Shape, Placement]:
+    a, b = np.array(data["a"], dtype=float), np.array(data["b"], dtype=float)
+    length = float(np.linalg.norm(b - a))
+    placement = Placement(frozen((a + b) / 2), frozen(matrix_to_axis((b - a) / length)))
+    return Shape("capsule", np.array([data["capsule"], length])), placement
+
+
+def _find_urdf(urdf: str, folder: Path) -> tuple[Path, Path]:
+    """Return the URDF and the folder that its `package://` paths start from.
+
+    Raises:
+        HandrailError: it is nowhere, or neither in the description's folder nor in a package.
+    """
+    name = PurePosixPath(urdf)
+    beside = folder / name
+    if not name.parts or name.is_absolute() or ".." in name.parts or not _inside(beside, folder):
+        raise HandrailError(f"URDF {urdf}: expected a path inside a package, or beside the description")
+    if beside.is_file():
+        return beside, folder
+    distribution = name.parts[0]
+    try:
+        files = metadata.files(distribution) or []
+    except metadata.PackageNotFoundError:
+        files = []
+    for file in files:
+        if PurePosixPath(file).parts[-len(name.parts) :] == name.parts:
+            path = Path(str(file.locate())).resolve()
+            return path, path.parents[len(name.parts) - 1]
+    raise HandrailError(
+        f"URDF {urdf}: expected it beside the description or in an installed package {distribution}, "
+        "found it in neither"
+    )
+
+
+def _inside(path: Path, folder: Path) -> bool:
+    return path.resolve().is_relative_to(folder.resolve())

@@ -1,0 +1,45 @@
+"""Inverse kinematics of the arm, the base standing still: which joints put the tool where it shall be."""
+
+import numpy as np
+
+from handrail.controllers.arrays import FloatArray
+from handrail.controllers.numerics.rotation import rotation_vector
+from handrail.controllers.robot.model import Pose, RobotModel
+
+_DAMPING = 1e-4
+_LARGEST_STEP = 0.1  # [rad]
+_STEPS = 200
+
+
+def arm_configuration(
+    model: RobotModel, q: FloatArray, goal: Pose, tolerance: float = 1e-4
+) -> tuple[FloatArray, float]:
+    """Return the configuration near q whose arm has the tool at the goal, (n,), and the error that is left.
+
+    Damped Gauss–Newton: `Δq = sat(Jᵀ (J Jᵀ + λ I)⁻¹ e)`, e = (p_goal − p, log(R_goal Rᵀ)), joints inside
+    their limits. Out of reach it ends as near as it comes.
+
+    Args:
+        model: of the robot.
+        q: to begin with, (n,).
+        goal: of the tool.
+        tolerance: largest entry of e that is good enough [m, rad].
+    """
+    q, arm = np.array(q, dtype=float), slice(len(model.description.base_joints), model.size)
+    limits = model.description.limits
+    error = pose_error(model.pose(q), goal)
+    for _ in range(_STEPS):
+        if np.max(np.abs(error)) < tolerance:
+            break
+        jacobian = model.jacobian(q)[:, arm]
+        step = jacobian.T @ np.linalg.solve(jacobian @ jacobian.T + _DAMPING * np.eye(6), error)
+        moved = q[arm] + np.clip(step, -_LARGEST_STEP, _LARGEST_STEP)
+        q[arm] = np.clip(moved, limits.position_lower[arm], limits.position_upper[arm])
+        error = pose_error(model.pose(q), goal)
+    return q, float(np.max(np.abs(error)))
+
+
+def pose_error(tool: Pose, goal: Pose) -> FloatArray:
+    """Return the twist that takes a pose to a goal in a second, world-aligned, (6,) [m, rad]."""
+    turn = rotation_vector(goal.rotation @ tool.rotation.T)
+    return np.concatenate([goal.position - tool.position, turn])

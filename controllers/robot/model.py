@@ -1,0 +1,140 @@
+"""The kinematic model of a robot: pinocchio's, built from the description."""
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+
+from handrail.controllers.arrays import FloatArray
+from handrail.controllers.errors import HandrailError, message_of
+from handrail.controllers.robot.description import Placement, RobotDescription, load_description
+
+_BASE_JOINTS = {"x": pin.JointModelPX, "y": pin.JointModelPY, "theta": pin.JointModelRZ}
+
+
+@dataclass(frozen=True)
+class Pose:
+    """Position [m], (3,), and rotation world from frame, (3, 3)."""
+
+    position: FloatArray
+    rotation: FloatArray
+
+
+class RobotModel:
+    """Forward kinematics and Jacobians, `q = (base, arm)`, `v = dq/dt`.
+
+    Attributes:
+        description: the data it was built from.
+        pinocchio: the pinocchio model; never changed after construction.
+        size: number of generalised coordinates n.
+    """
+
+    def __init__(self, description: RobotDescription) -> None:
+        self.description = description
+        self.pinocchio = _build(description)
+        self.size = self.pinocchio.nv
+        self._data = self.pinocchio.createData()
+        self._tool = self.frame_id("tool")
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Names of the generalised coordinates."""
+        return self.description.joints
+
+    def frame_id(self, frame: str) -> int:
+        """Return pinocchio's index of a frame.
+
+        Raises:
+            HandrailError: the robot has no such frame.
+        """
+        if not self.pinocchio.existFrame(frame):
+            names = ", ".join(f.name for f in self.pinocchio.frames)
+            raise HandrailError(f"frame {frame!r} of robot {self.description.name}: expected one of {names}")
+        return self.pinocchio.getFrameId(frame)
+
+    def pose(self, q: FloatArray, frame: str = "tool") -> Pose:
+        """Return the pose of a frame at q, (n,)."""
+        pin.forwardKinematics(self.pinocchio, self._data, q)
+        placement = pin.updateFramePlacement(self.pinocchio, self._data, self.frame_id(frame))
+        return Pose(placement.translation.copy(), placement.rotation.copy())
+
+    def jacobian(self, q: FloatArray, frame: str = "tool") -> FloatArray:
+        """Return J with twist = J v, world-aligned at the frame's origin, linear rows first, (6, n)."""
+        return pin.computeFrameJacobian(
+            self.pinocchio, self._data, q, self.frame_id(frame), pin.LOCAL_WORLD_ALIGNED
+        ).copy()
+
+
+@lru_cache(maxsize=8)
+def load_model(robot: str | Path = "ridgeback_ur10") -> RobotModel:
+    """Build the model of a robot by name or description file."""
+    return RobotModel(load_description(robot))
+
+
+def _build(description: RobotDescription) -> pin.Model:
+    base = pin.Model()
+    base.name = description.name
+    joint = 0
+    for name in description.base_joints:
+        joint = base.addJoint(joint, _BASE_JOINTS[name](), pin.SE3.Identity(), name)
+    base.addFrame(pin.Frame("planar_base", joint, 0, pin.SE3.Identity(), pin.FrameType.BODY))
+    model = pin.appendModel(base, _arm(description), base.getFrameId("planar_base"), _se3(description.mount))
+    if tuple(model.names[1:]) != description.joints:
+        raise HandrailError(f"joints of robot {description.name}: expected {description.joints}")
+    _add_tool(model, description)
+    return model
+
+
+def _arm(description: RobotDescription) -> pin.Model:
+    """Return the arm with every joint that the description does not list locked at zero."""
+    try:
+        with _without_words():
+            model = pin.buildModelFromUrdf(str(description.urdf))
+    except (ValueError, RuntimeError) as error:
+        raise HandrailError(f"URDF {description.urdf}: {message_of(error)}") from error
+    missing = set(description.arm_joints) - set(model.names)
+    if missing:
+        raise HandrailError(
+            f"arm joints {sorted(missing)} of robot {description.name}: "
+            f"expected some of {', '.join(list(model.names)[1:])}"
+        )
+    locked = [model.getJointId(name) for name in list(model.names)[1:] if name not in description.arm_joints]
+    arm = pin.buildReducedModel(model, locked, pin.neutral(model)) if locked else model
+    if arm.nq != arm.nv or arm.nv != len(description.arm_joints):
+        raise HandrailError(
+            f"arm of robot {description.name}: expected revolute or prismatic joints in its URDF"
+        )
+    return arm
+
+
+@contextmanager
+def _without_words() -> Iterator[None]:
+    """Silence what is written past Python: the reader of URDF prints its error, and raises it too."""
+    before, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, 2)
+    try:
+        yield
+    finally:
+        os.dup2(before, 2)
+        os.close(before)
+        os.close(nowhere)
+
+
+def _add_tool(model: pin.Model, description: RobotDescription) -> None:
+    if not model.existFrame(description.tool_frame):
+        raise HandrailError(
+            f"tool frame {description.tool_frame!r} of robot {description.name}: not in the URDF"
+        )
+    parent_id = model.getFrameId(description.tool_frame)
+    parent = model.frames[parent_id]
+    placement = parent.placement * _se3(description.tool_placement)
+    model.addFrame(pin.Frame("tool", parent.parentJoint, parent_id, placement, pin.FrameType.OP_FRAME))
+
+
+def _se3(placement: Placement) -> pin.SE3:
+    return pin.SE3(np.array(placement.rotation), np.array(placement.translation))

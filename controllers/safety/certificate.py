@@ -1,0 +1,119 @@
+"""The certificate that a motion is safe: no pair comes below its floor, no joint beyond its range."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from handrail.controllers.arrays import FloatArray
+from handrail.controllers.collision.margins import Margins
+from handrail.controllers.collision.model import CollisionModel
+from handrail.controllers.collision.slacks import MOVING
+from handrail.controllers.numerics.jit import jit
+from handrail.controllers.robot.description import Limits
+from handrail.controllers.safety.limiter import Limiter
+
+_SAMPLES = np.array([0.25, 0.5, 0.75, 1.0])  # of the time that a stop takes, or that the robot waits after it
+_ERROR = 1e-3  # of signed distances, that is no loss [m]
+_HARD_ERROR = 1e-4  # the same where a thing that stands still is nearer than its hard floor [m]
+_HARD = 0.5  # hard floor of the robot with itself and with what stands still, as a share of the floor
+_BEYOND = 0.01  # of its range that a joint may come to rest [m, rad]
+
+
+class Shortfall(NamedTuple):
+    """How far a motion falls short of safety; of two the smaller is safer. 0 when it is safe [m, rad].
+
+    Attributes:
+        hard: of the hard floors of the robot with itself and with what stands still, and of the joints'
+            range. Nobody else moves these: what was safe once stays safe, and nothing is worth giving it up.
+        all: of all floors.
+    """
+
+    hard: float
+    all: float
+
+
+class StopCertificate:
+    """Measures motions by exact distances; moving obstacles go on at constant velocity.
+
+    A motion is safe when no pair comes below its floor and no joint leaves its range, or, where one is
+    beyond already, no farther than now.
+
+    Args:
+        limiter: knows the full stop.
+        collision: the pairs.
+        margins: of the pairs.
+        floor: of each pair, as a share of its margin.
+        limits: of the joints.
+        span: time for which the robot has to be safe, where obstacles move [s].
+    """
+
+    def __init__(
+        self,
+        limiter: Limiter,
+        collision: CollisionModel,
+        margins: Margins,
+        floor: float,
+        limits: Limits,
+        span: float,
+    ) -> None:
+        self._limiter = limiter
+        self._collision = collision
+        self._margins = margins
+        self._floor = floor
+        self._limits = limits
+        self._span = span
+
+    def shortfall(
+        self, q: FloatArray, v: FloatArray, now: tuple[FloatArray, FloatArray], delay: float = 0.0
+    ) -> Shortfall:
+        """Return how far the full stop from (q, v) falls short of safety.
+
+        At full deceleration of every joint: `q_j(t) = q_j + v_j t - ½ sign(v_j) a_j t²` until `|v_j| / a_j`.
+
+        Args:
+            q: where it begins, (n,).
+            v: how fast, (n,).
+            now: the position now, (n,), and its distances, (P,).
+            delay: time until it begins [s].
+        """
+        path, times = self._limiter.stop(q, v, _SAMPLES)
+        return self.until_rest(path, delay + times, now)
+
+    def until_rest(
+        self, path: FloatArray, times: FloatArray, now: tuple[FloatArray, FloatArray]
+    ) -> Shortfall:
+        """Return the same of a motion that ends at rest, through positions (K, n) at times from now, (K,).
+
+        Where obstacles move, the robot has to be safe for some time, moving or waiting.
+        """
+        left = self._span - times[-1]
+        if self._collision.moves and left > 0.0:
+            path = np.vstack([path, np.broadcast_to(path[-1], (len(_SAMPLES), path.shape[1]))])
+            times = np.append(times, times[-1] + left * _SAMPLES)
+        hard, all_floors = self.along(path, times, now).max(axis=0).tolist()
+        return Shortfall(hard, all_floors)
+
+    def along(self, path: FloatArray, times: FloatArray, now: tuple[FloatArray, FloatArray]) -> FloatArray:
+        """Return the same at every point of a motion, hard and of all floors, (K, 2)."""
+        floors = self._floor * self._margins.values
+        distances = self._collision.values(path, times, now, floors)
+        bounds = self._limits.position_lower, self._limits.position_upper
+        return _shortfalls(path, distances, *now, floors, self._collision.kinds, *bounds)
+
+
+@jit
+def _shortfalls(path, distances, start, now, floors, kinds, lower, upper):
+    short = np.zeros((len(path), 2))
+    for k in range(len(path)):
+        for p in range(len(floors)):
+            distance = distances[k, p]
+            short[k, 1] = max(short[k, 1], min(floors[p], now[p] - _ERROR) - distance)
+            if kinds[p] != MOVING:
+                short[k, 0] = max(short[k, 0], min(_HARD * floors[p], now[p] - _HARD_ERROR) - distance)
+        for j in range(len(start)):
+            room = min(path[k, j] - lower[j], upper[j] - path[k, j]) + _BEYOND
+            if room < 0.0:
+                before = min(0.0, start[j] - lower[j], upper[j] - start[j])
+                short[k, 0] = max(short[k, 0], before - room)
+        short[k, 1] = max(short[k, 0], short[k, 1])
+    return short

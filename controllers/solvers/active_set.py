@@ -1,0 +1,132 @@
+"""A dual active-set method for the banded QP of one update.
+
+    min ½ sᵀ H s + gᵀ s + Σ_i (ρ₁ σ_i + ½ ρ₂ σ_i²)   subject to   c_pᵀ s - a_p σ_i(p) ≤ b_p,  σ ≥ 0
+
+with `H = L Lᵀ` banded and slacks σ. In `y = (Lᵀ s, √ρ₂ σ)` the objective is `½ ‖y + f‖²`, so that the
+solution is the nearest point to `-f` within the rows `m_p = (L⁻¹ c_p, -a_p / √ρ₂)`. Rows become active one by
+one, the most violated first, while all multipliers stay ≥ 0 (D. Goldfarb, A. Idnani, Mathematical Programming
+27, 1983). Only rows that are met are ever transformed: one that is far from binding costs a comparison. Begun
+with the rows that were active in the last update, it needs few changes.
+"""
+
+import numpy as np
+
+from handrail.controllers.collision.slacks import SLACKS
+from handrail.controllers.numerics.jit import copy, jit
+from handrail.controllers.solvers.active_rows import append, drop, project, settle
+from handrail.controllers.solvers.banded import backward, forward
+from handrail.controllers.solvers.basis import to_motion
+from handrail.controllers.solvers.constraints import most_violated, write_row
+
+_DEPENDENT = 1e-12  # squared sine to the active rows, below which a row is a combination of them
+
+
+@jit
+def solve(band, gradient, penalty, rows, warm, limit, held, motion):
+    """Solve the QP; return σ (4,), `gᵀ s + ½ sᵀ H s`, whether that is the solution, changes, active rows.
+
+    Args:
+        band: L, (N n, 3n); see banded.py.
+        gradient: g, (N n,).
+        penalty: ρ₁ and ρ₂.
+        rows: the constraints.
+        warm: keys of rows to begin with, (k,).
+        limit: of the number of changes.
+        held: room; the active rows' keys and multipliers are left in it.
+        motion: filled with the changes of (q, v, u) after every stage, (N, 3, n).
+    """
+    size = len(gradient)
+    root = penalty[1] ** 0.5
+    free = np.empty(size + SLACKS)
+    copy(gradient, size, free)
+    forward(band, free, 0)
+    for index in range(SLACKS):
+        free[size + index] = penalty[0] / root
+    y, new, normal = np.empty_like(free), np.empty_like(free), np.empty_like(free)
+    along, shares = np.empty_like(free), np.empty_like(free)
+    s, slack = np.empty(size), np.empty(SLACKS)
+    count = _begin(band, root, rows, warm, free, held, y, new, along, shares, normal)
+    changes, settled = 0, 0
+    while True:
+        copy(y, size, s)
+        backward(band, s)
+        for index in range(SLACKS):
+            slack[index] = y[size + index] / root
+        to_motion(rows.matrix, s, motion)
+        key = most_violated(rows, s, motion, slack, held.keys[:count])
+        if key < 0:
+            if settled == changes:
+                return slack, _descent(gradient, s, y), True, changes, count
+            settled = changes  # without the rounding errors of the changes
+            settle(held, count, free, shares, y)
+            continue
+        upper = _transform(band, root, rows, key, new)
+        multiplier = 0.0
+        while True:
+            changes += 1
+            square = project(held, count, new, along, shares, normal)
+            step, blocking = _step(held, count, new, upper, shares, square, y)
+            if step == np.inf or changes > limit:
+                return slack, 0.0, False, changes, count
+            for i in range(count):
+                held.multipliers[i] -= step * shares[i]
+            multiplier += step
+            if square > _DEPENDENT * np.dot(new, new):
+                for t in range(len(y)):
+                    y[t] -= step * normal[t]
+            if blocking < 0:
+                upper += np.dot(new, free)
+                count = append(held, count, along, normal, square, key, upper, multiplier)
+                break
+            count = drop(held, count, blocking)
+
+
+@jit
+def _begin(band, root, rows, warm, free, held, y, new, along, shares, normal):
+    """Make the warm rows active, less those with a negative multiplier; write y; return their number."""
+    count = 0
+    for index in range(len(warm)):
+        upper = _transform(band, root, rows, warm[index], new) + np.dot(new, free)
+        square = project(held, count, new, along, shares, normal)
+        if square > _DEPENDENT * np.dot(new, new):
+            count = append(held, count, along, normal, square, warm[index], upper, 0.0)
+    while True:
+        settle(held, count, free, shares, y)
+        worst = -1
+        for i in range(count):
+            if held.multipliers[i] < (held.multipliers[worst] if worst >= 0 else 0.0):
+                worst = i
+        if worst < 0:
+            return count
+        count = drop(held, count, worst)
+
+
+@jit
+def _transform(band, root, rows, key, new):
+    """Write m_p of a row; return its right-hand side."""
+    upper, first = write_row(rows, key, new)
+    forward(band, new, first)
+    for index in range(len(band), len(new)):
+        new[index] /= root
+    return upper
+
+
+@jit
+def _step(held, count, new, upper, shares, square, y):
+    """Return how far the new row's multiplier grows, and the active row that stops it; -1 if none."""
+    step, blocking = np.inf, -1
+    if square > _DEPENDENT * np.dot(new, new):
+        step = max(np.dot(new, y) - upper, 0.0) / square
+    for i in range(count):
+        if shares[i] > 0.0 and held.multipliers[i] < step * shares[i]:
+            step, blocking = max(held.multipliers[i], 0.0) / shares[i], i
+    return step, blocking
+
+
+@jit
+def _descent(gradient, s, y):
+    """Return `gᵀ s + ½ sᵀ H s`."""
+    total = 0.0
+    for t in range(len(s)):
+        total += gradient[t] * s[t] + 0.5 * y[t] * y[t]
+    return total

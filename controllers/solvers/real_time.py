@@ -1,0 +1,224 @@
+"""The real-time solver: Gauss-Newton steps, each a banded QP solved by a warm-started active-set method."""
+
+from time import perf_counter
+from typing import NamedTuple
+
+import numpy as np
+
+from handrail.controllers.arrays import FloatArray
+from handrail.controllers.collision.distance_kernels import depth
+from handrail.controllers.collision.model import Distances
+from handrail.controllers.collision.slacks import LIMITS, SLACKS
+from handrail.controllers.ocp.motion import changed, largest_share
+from handrail.controllers.ocp.nodes import Nodes
+from handrail.controllers.ocp.problem import Plan, Problem
+from handrail.controllers.ocp.residuals import StageResiduals
+from handrail.controllers.solvers import active_set
+from handrail.controllers.solvers.active_rows import active_rows
+from handrail.controllers.solvers.banded import factor
+from handrail.controllers.solvers.rows import Rows, rows_around
+from handrail.controllers.solvers.stage_cost import Quadratic, StageCost
+
+_PHASES = ("distances", "residuals", "solve")
+_MORE_STEPS = 2  # at most, in one update
+_LARGE = 0.2  # change of an acceleration near obstacles that asks for another step, relative to its limit
+_COARSE = 0.01  # share of the promised descent by which a linearised cost may be wrong,
+_SMALL = 0.1  # or of a descent that is this share of the cost
+_SMALLEST_SHARE = 1.0 / 16.0  # of a step that makes the cost rise
+_CHANGES = 10  # of the active rows, for each variable: an answer that takes more is none
+_NOTHING_ACTIVE = np.arange(SLACKS)  # but that no slack is negative
+
+
+class _Guess(NamedTuple):
+    """What a step is taken from: positions and velocities at the nodes, accelerations, distances."""
+
+    q: FloatArray
+    v: FloatArray
+    u: FloatArray
+    nodes: Nodes
+    distances: Distances
+    depth: float  # by which pairs overlap that do not now, or not as much [m]
+
+
+class RealTimeSolver:
+    """Gauss-Newton steps around a guess, usually one.
+
+    The QP's variables have local support (basis.py), so that its Hessian is banded and the cost of an update
+    grows linearly with the horizon; see active_set.py for the method.
+    """
+
+    def __init__(self, residuals: StageResiduals, horizon: int, size: int, dt: float) -> None:
+        self.cost = StageCost(residuals, horizon, size, dt)
+        self._held = active_rows(horizon, size)
+        self._motion = np.zeros((horizon, 3, size))
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget which rows were active."""
+        self._active = _NOTHING_ACTIVE
+
+    def solve(self, problem: Problem, guess: FloatArray) -> Plan:
+        """Return the plan after one step from the accelerations `guess`, (N, n).
+
+        Right after the intent or the scene has jumped, the guess is far off; a step that is still large, and
+        did not lead where its linearisation said, is followed by another.
+        """
+        spent = [0.0] * len(_PHASES)
+        for _ in range(1 + _MORE_STEPS):
+            step = self._step(problem, guess, spent)
+            if not step.again:
+                break
+            guess = step.moved.u
+        slack = step.answer.slack
+        return Plan(
+            q=step.moved.q,
+            v=step.moved.v,
+            u=step.moved.u,
+            collision_slack=float(slack[:LIMITS].max()),
+            limit_slack=float(slack[LIMITS]),
+            distances=step.distances,
+            solved=step.answer.solved,
+            iterations=step.answer.changes,
+            tracking_error=self.cost.tracking_error(problem),
+            rows=step.rows,
+            phases=tuple(zip(_PHASES, spent, strict=True)),
+        )
+
+    def _step(self, problem: Problem, guess: FloatArray, spent: list[float]) -> "_Step":
+        """Take one step; add the time that its phases take."""
+        start = perf_counter()
+        begin = self._linearisation(problem, guess)
+        rows = rows_around(problem, begin[:3], begin.nodes, begin.distances, self.cost.matrix)
+        measured = perf_counter()
+        quadratic = self.cost.expand(problem, *begin[:3])
+        built = perf_counter()
+        answer = self._solve(problem, quadratic, rows)
+        moved = self._damped(problem, begin.u, quadratic.value, answer.slack, rows.needed)
+        again = answer.solved and self._is_far(problem, quadratic.value, answer, moved)
+        spent[0] += measured - start
+        spent[1] += built - measured
+        spent[2] += perf_counter() - built
+        return _Step(answer, moved, begin.distances.values[0], len(rows.names), again)
+
+    def _is_far(self, problem: Problem, before: float, answer: "_Answer", moved: "_Moved") -> bool:
+        """Whether a step's linearisation was too coarse: of the cost, or of distances after a large step."""
+        wrong = abs(moved.cost - before - answer.descent)
+        if wrong > _COARSE * max(abs(answer.descent), _SMALL * moved.cost):
+            return True
+        return answer.near and largest_share(moved.change, problem.limits.acceleration) > _LARGE
+
+    def _linearisation(self, problem: Problem, guess: FloatArray) -> _Guess:
+        """Return what to linearise around: the guess, or a full stop where the guess runs into something.
+
+        Inside an obstacle the nearest way out may be the far side, so a colliding guess would be pulled
+        through; the stop is free of collision, since the last update made sure that it is. Where an obstacle
+        comes at the robot neither may be, and the one is taken that runs into it less.
+        """
+        begin = _measured(problem, *_rolled_out(problem, guess, np.zeros_like(guess)))
+        if begin.depth <= 0.0:
+            return begin
+        stop = _stop(problem)
+        stopped = _measured(problem, *_rolled_out(problem, stop, np.zeros_like(stop)))
+        return stopped if stopped.depth <= begin.depth else begin
+
+    def _solve(self, problem: Problem, quadratic: Quadratic, rows: Rows) -> "_Answer":
+        """Solve the QP; its step is left in `_motion`."""
+        changes = 0
+        if factor(quadratic.band):
+            penalty = (problem.slack_linear, problem.slack_quadratic)
+            limit = _CHANGES * len(quadratic.gradient)
+            for warm in (rows.keys(self._active), _NOTHING_ACTIVE):
+                slack, descent, solved, changes, count = active_set.solve(
+                    quadratic.band,
+                    quadratic.gradient,
+                    penalty,
+                    rows.constraints,
+                    warm,
+                    limit,
+                    self._held,
+                    self._motion,
+                )
+                if solved:
+                    keys = self._held.keys[:count]
+                    self._active = rows.named(keys)
+                    return _Answer(True, slack, descent, changes, rows.any_distance(keys))
+        self.reset()
+        return _Answer(False, np.zeros(SLACKS), 0.0, changes, False)
+
+    def _damped(
+        self, problem: Problem, guess: FloatArray, allowed: float, slack: FloatArray, needed: FloatArray
+    ) -> "_Moved":
+        """Take the step, halved until the cost itself falls: Gauss-Newton alone may go round in circles.
+
+        The QP's constraints are convex, so that from a guess within them a share α of the change needs no
+        more slack than α times that of the whole; a guess that breaks a limit is left behind whole.
+
+        Args:
+            problem: of this update.
+            guess: accelerations, (N, n).
+            allowed: cost of the guess.
+            slack: of the QP's solution, (4,).
+            needed: by the guess, (4,).
+        """
+        change, share = self._motion[:, 2].copy(), 1.0
+        while True:
+            q, v, u = _rolled_out(problem, guess, change)
+            cost = self.cost.value(problem, q, v, u)
+            lower = cost + _penalty(problem, share * slack) <= allowed
+            if lower or needed.any() or share <= _SMALLEST_SHARE:
+                return _Moved(q, v, u, change, cost)
+            change *= 0.5
+            share *= 0.5
+
+
+class _Answer(NamedTuple):
+    """Of the QP: whether it was solved, slacks, change of the cost, changes of rows, distances active."""
+
+    solved: bool
+    slack: FloatArray
+    descent: float
+    changes: int
+    near: bool
+
+
+class _Step(NamedTuple):
+    """A step, the distances now, (P,), the number of distance rows, and whether to take another."""
+
+    answer: _Answer
+    moved: "_Moved"
+    distances: FloatArray
+    rows: int
+    again: bool
+
+
+class _Moved(NamedTuple):
+    """A step taken: the motion after it, the change of the accelerations, the cost."""
+
+    q: FloatArray
+    v: FloatArray
+    u: FloatArray
+    change: FloatArray
+    cost: float
+
+
+def _rolled_out(problem: Problem, guess: FloatArray, change: FloatArray) -> tuple[FloatArray, ...]:
+    """Return positions and velocities at the nodes, and accelerations within their limits."""
+    return changed(problem.q, problem.v, problem.dt, guess, change, problem.limits.acceleration)
+
+
+def _measured(problem: Problem, q: FloatArray, v: FloatArray, u: FloatArray) -> _Guess:
+    nodes = Nodes(problem, q, v)
+    distances = problem.collision.distances(nodes.q, problem.margins + problem.reach, nodes.times)
+    return _Guess(q, v, u, nodes, distances, depth(distances.values))
+
+
+def _penalty(problem: Problem, slack: FloatArray) -> float:
+    return float(problem.slack_linear * slack.sum() + 0.5 * problem.slack_quadratic * (slack @ slack))
+
+
+def _stop(problem: Problem) -> FloatArray:
+    """Return the accelerations of the fastest stop, (N, n)."""
+    limit = problem.limits.acceleration * problem.dt
+    stages = np.arange(problem.horizon)[:, None]
+    left = np.maximum(np.abs(problem.v) - stages * limit, 0.0)
+    return -np.sign(problem.v) * np.minimum(left, limit) / problem.dt

@@ -1,0 +1,207 @@
+"""The tables of the page."""
+
+from collections.abc import Sequence
+
+from handrail.datasets.comparison.collection import Collected
+from handrail.datasets.comparison.compare import Comparison, View
+from handrail.datasets.comparison.differences import FOLLOWS, Difference
+from handrail.datasets.comparison.means import Mean
+from handrail.datasets.comparison.outcomes import ArmOutcome, Outcomes
+from handrail.datasets.presentation.markup import Cell, table
+from handrail.datasets.presentation.wording import (
+    DASH,
+    THESE_POLICIES,
+    WITH_TRAINING,
+    counted,
+    duration,
+    number,
+    p_value,
+    percent,
+    percent_span,
+    points,
+    points_span,
+    signed,
+    span,
+)
+from handrail.datasets.quality.catalogue import METRICS, Metric
+
+_UNTESTED = "described, not tested: episodes share neighbours"
+
+
+def collection_table(collected: Sequence[Collected]) -> str:
+    """Return what each group consists of."""
+    headings = (
+        "",
+        "episodes",
+        "success",
+        "95 %",
+        "failures",
+        "operator time",
+        "successes / h",
+        "why not",
+    )
+    return table(headings, [_collected(each) for each in collected])
+
+
+def _collected(each: Collected) -> list[str]:
+    reasons = ", ".join(f"{reason} ({count})" for reason, count in each.reasons.items())
+    return [
+        each.label,
+        str(each.episodes),
+        percent(each.success),
+        percent_span(each.success_interval),
+        percent(each.failure_share),
+        duration(each.operator_time),
+        number(each.successes_an_hour),
+        reasons or DASH,
+    ]
+
+
+def matched_table(views: Sequence[View]) -> str:
+    """Return how much of each group the views take."""
+    headings = ("view", "", "episodes", "operator time", "successes", "frames")
+    rows = [
+        [
+            view.title if place == 0 else "",
+            each.label,
+            str(each.episodes),
+            duration(each.operator_time),
+            DASH if each.successes is None else str(each.successes),
+            str(each.frames),
+        ]
+        for view in views
+        for place, each in enumerate(view.collected)
+    ]
+    return table(headings, rows)
+
+
+def arms_table(outcomes: Outcomes) -> str:
+    """Return how each arm's policies fared."""
+    names = list(dict.fromkeys(name for arm in outcomes.arms for name in arm.means))
+    headings = (
+        "trained on",
+        "success",
+        THESE_POLICIES,
+        WITH_TRAINING,
+        "each training seed",
+        "data",
+        *map(_heading, names),
+    )
+    rows = [
+        [
+            arm.label,
+            f"{arm.successes} of {arm.rollouts}: {percent(arm.share)}",
+            percent_span(arm.wilson),
+            percent_span(arm.nested),
+            ", ".join(percent(share) for share in arm.seeds),
+            ", ".join(f"{name} {number(value)}" for name, value in arm.trained_on.items()) or DASH,
+            *(_outcome(arm, name) for name in names),
+        ]
+        for arm in outcomes.arms
+    ]
+    return table(headings, rows)
+
+
+def _heading(name: str) -> str:
+    return f"{name} / 100 rollouts" if name == "contacts" else name
+
+
+def _outcome(arm: ArmOutcome, name: str) -> Cell | str:
+    if name not in arm.means:
+        return Cell(DASH, "quiet", "not every rollout has it")
+    mean, (low, high) = arm.means[name]
+    factor = 100.0 if name == "contacts" else 1.0
+    return Cell(number(factor * mean), below=span((factor * low, factor * high)))
+
+
+def outcome_differences_table(outcomes: Outcomes) -> str:
+    """Return how arms differ in success."""
+    headings = ("", "difference", THESE_POLICIES, WITH_TRAINING, "test", "p after Holm", "detectable")
+    rows = [
+        [
+            f"{each.label} − {each.baseline}",
+            Cell(f"{points(each.rollouts.estimate)} points", "detected" if each.detected else ""),
+            points_span(each.rollouts.interval),
+            points_span(each.nested) if each.nested else DASH,
+            ("McNemar" if each.rollouts.paired else "Boschloo")
+            + (" by scene, bootstrap, Welch" if each.nested else ""),
+            Cell(p_value(each.p_adjusted), below=f"over {counted(each.tests, each.family)}"),
+            f"{100 * each.detectable:.0f} points",
+        ]
+        for each in outcomes.differences
+    ]
+    return table(headings, rows)
+
+
+def metrics_table(comparison: Comparison, label: str) -> str:
+    """Return every metric of a group and the baseline, and how they differ in each view."""
+    headings = ("metric", comparison.baseline, label)
+    headings += ("difference", "same number", "same time", "same length", "p, Holm")
+    rows = [row for metric in METRICS if (row := _metric(comparison, metric, label))]
+    return table(headings, rows)
+
+
+def _metric(comparison: Comparison, metric: Metric, label: str) -> list[Cell | str]:
+    means = comparison.everything.means[metric.name]
+    one, other = means[label], means[comparison.baseline]
+    if one.mean is None and other.mean is None:
+        return []
+    every, number_, time = (_of(view, metric, label) for view in comparison.views)
+    reason = Cell(DASH, "quiet", every.reason or _UNTESTED)
+    untested = bool(every.reason) or not every.tested
+    follows = abs(every.follows_length) >= FOLLOWS and metric.name != "length"
+    name = metric.title + (" ↔" if follows else "")
+    return [
+        Cell(name, "", metric.meaning, _below(metric, ranked=not comparison.unlike)),
+        _mean(other),
+        _mean(one),
+        *([_estimate(each) for each in (every, number_, time)]),
+        reason if untested or metric.name == "length" else _at_length(every),
+        reason if untested else p_value(every.p_adjusted).removeprefix("p = ").removeprefix("p "),
+    ]
+
+
+def _below(metric: Metric, ranked: bool) -> str:
+    judged = f"{metric.good} is better" if metric.good and ranked else ""
+    return " · ".join(part for part in (metric.unit, judged) if part)
+
+
+def _at_length(each: Difference) -> Cell:
+    look = "detected" if each.at_equal_length else ""
+    return Cell(signed(each.at_length), look, below=span(each.at_length_interval))
+
+
+def _of(view: View, metric: Metric, label: str) -> Difference:
+    (found,) = [each for each in view.differences if each.metric is metric and each.label == label]
+    return found
+
+
+def _mean(mean: Mean) -> Cell:
+    if mean.mean is None:
+        return Cell("does not apply", "quiet", mean.reason)
+    return Cell(number(mean.mean), below=span(mean.interval) if mean.interval else "")
+
+
+def _estimate(each: Difference) -> Cell:
+    if each.reason:
+        return Cell("not comparable" if each.incomparable else DASH, "quiet", each.reason)
+    if not each.tested:
+        return Cell(signed(each.estimate), "", _UNTESTED)
+    look = "detected" if each.detected else ""
+    return Cell(signed(each.estimate), look, below=span(each.interval))
+
+
+def not_applicable_table(comparison: Comparison) -> str:
+    """Return which metrics do not apply or are not comparable, to whom, and why; "" where all do and are."""
+    rows = []
+    for metric in METRICS:
+        reasons: dict[str, list[str]] = {}
+        for label, mean in comparison.everything.means[metric.name].items():
+            if mean.reason:
+                who = label if mean.mean is None else f"{label} (some episodes)"
+                reasons.setdefault(mean.reason, []).append(who)
+        for each in comparison.everything.differences:
+            if each.metric is metric and each.incomparable:
+                reasons.setdefault(each.reason, []).append(f"{each.label} against {each.baseline}")
+        rows += [[metric.title, ", ".join(labels), reason] for reason, labels in reasons.items()]
+    return table(("metric", "whose", "why"), rows) if rows else ""

@@ -1,0 +1,91 @@
+"""The parquet files of a dataset as bytes: rows of an episode, its line of metadata, the tasks."""
+
+import json
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from handrail.datasets.format.arrow import fixed_lists, numbers, strings
+from handrail.datasets.format.schema import AUTOMATIC, Feature
+
+_PANDAS_TASKS = {
+    "index_columns": ["task"],
+    "column_indexes": [
+        {
+            "name": None,
+            "field_name": None,
+            "pandas_type": "unicode",
+            "numpy_type": "object",
+            "metadata": {"encoding": "UTF-8"},
+        }
+    ],
+    "columns": [
+        {
+            "name": name,
+            "field_name": name,
+            "pandas_type": kind,
+            "numpy_type": numpy_kind,
+            "metadata": None,
+        }
+        for name, kind, numpy_kind in (("task_index", "int64", "int64"), ("task", "unicode", "object"))
+    ],
+}
+
+
+def stored_features(features: Mapping[str, Feature]) -> dict[str, Feature]:
+    """Return the features that have a column in the data files: all but the cameras, and LeRobot's own."""
+    return {key: feature for key, feature in features.items() if not feature.is_video} | AUTOMATIC
+
+
+def arrow_type(feature: Feature) -> pa.DataType:
+    """Return the Arrow type of a feature's column."""
+    value_type = pa.string() if feature.dtype == "string" else pa.from_numpy_dtype(np.dtype(feature.dtype))
+    return value_type if feature.is_scalar else pa.list_(value_type, feature.shape[0])
+
+
+def data_schema(features: Mapping[str, Feature]) -> pa.Schema:
+    """Return the Arrow schema of the data files, with the description that Hugging Face reads."""
+    stored = stored_features(features)
+    description = {"info": {"features": {key: _hf_feature(feature) for key, feature in stored.items()}}}
+    fields = [pa.field(key, arrow_type(feature)) for key, feature in stored.items()]
+    return pa.schema(fields, metadata={"huggingface": json.dumps(description)})
+
+
+def data_bytes(features: Mapping[str, Feature], columns: Mapping[str, Any]) -> bytes:
+    """Return the data file of one episode.
+
+    Args:
+        features: The schema.
+        columns: For each stored feature `(N,)` or `(N, d)` values, or a list of N strings.
+    """
+    schema = data_schema(features)
+    arrays = [_arrow_array(columns[field.name], field.type) for field in schema]
+    return parquet_bytes(pa.Table.from_arrays(arrays, schema=schema))
+
+
+def tasks_bytes(tasks: Sequence[str]) -> bytes:
+    """Return `meta/tasks.parquet`: a pandas table whose index is the sentence."""
+    arrays = [numbers(np.arange(len(tasks)), pa.int64()), strings(tasks)]
+    table = pa.Table.from_arrays(arrays, names=["task_index", "task"])
+    return parquet_bytes(table.replace_schema_metadata({"pandas": json.dumps(_PANDAS_TASKS)}))
+
+
+def parquet_bytes(table: pa.Table, statistics: bool = True) -> bytes:
+    """Return a table as the bytes of a parquet file."""
+    sink = pa.BufferOutputStream()
+    pq.write_table(table, sink, compression="snappy", use_dictionary=statistics, write_statistics=statistics)
+    return sink.getvalue().to_pybytes()
+
+
+def _hf_feature(feature: Feature) -> dict[str, Any]:
+    value = {"dtype": feature.dtype, "_type": "Value"}
+    return value if feature.is_scalar else {"feature": value, "length": feature.shape[0], "_type": "List"}
+
+
+def _arrow_array(values: Any, kind: pa.DataType) -> pa.Array:
+    if kind == pa.string():
+        return strings(values)
+    return fixed_lists(values, kind) if pa.types.is_fixed_size_list(kind) else numbers(values, kind)

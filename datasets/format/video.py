@@ -1,0 +1,184 @@
+"""One camera's mp4, encoded in a thread of its own while the episode is recorded.
+
+The queue to the thread is bounded and `add` waits for room: a picture is never dropped. After an error the
+thread goes on emptying the queue, so that the recording is never stuck; `finish` raises what happened.
+"""
+
+import queue
+import threading
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import av
+import av.error
+import numpy as np
+
+from handrail.controllers.errors import HandrailError
+from handrail.datasets.format.schema import Feature
+from handrail.datasets.format.stats import image_levels, image_stats
+from handrail.datasets.storage.atomic import sync_file
+
+QUEUE_LENGTH = 64  # pictures; 3 MB at 128 x 128, 59 MB at 640 x 480
+GROUP, QUALITY, PRESET = 2, 23, "ultrafast"  # key frame every second picture: random access stays cheap
+
+
+def video_info(feature: Feature, fps: int) -> dict[str, Any]:
+    """Return what LeRobot keeps about a camera's videos in `info.json`."""
+    return {
+        "video.height": feature.shape[0],
+        "video.width": feature.shape[1],
+        "video.codec": "h264",
+        "video.pix_fmt": "yuv420p",
+        "video.fps": fps,
+        "video.channels": 3,
+        "has_audio": False,
+        "video.g": GROUP,
+        "video.crf": QUALITY,
+        "video.preset": PRESET,
+        "video.fast_decode": 0,
+        "video.video_backend": "pyav",
+        "video.extra_options": {},
+        "is_depth_map": False,
+    }
+
+
+def count_frames(path: Path) -> int:
+    """Return how many pictures an mp4 really holds; every packet is read.
+
+    Raises:
+        HandrailError: The file is not there or not a whole mp4.
+    """
+    try:
+        with av.open(str(path)) as container:
+            sizes = [packet.size for packet in container.demux(video=0)]
+        return sum(size > 0 for size in sizes)
+    except (av.error.FFmpegError, IndexError, ValueError) as error:  # ValueError: text that is none
+        raise HandrailError(f"video {str(path)!r}: expected a whole mp4, got {error}") from error
+
+
+def decoded_stats(path: Path, frames: int, height: int, width: int) -> dict[str, np.ndarray]:
+    """Decode every picture of an mp4 and return their statistics.
+
+    Raises:
+        HandrailError: It does not decode to so many pictures of one size.
+        OSError: The file cannot be read.
+    """
+    levels: list[np.ndarray] = []
+    try:
+        with av.open(str(path)) as container:
+            stream = container.streams.video[0]
+            if stream.codec_context is None:
+                raise ValueError("a codec that nobody knows")
+            stream.codec_context.options = {"err_detect": "explode"}
+            for frame in container.decode(stream):
+                if frame.is_corrupt or (frame.height, frame.width) != (height, width):
+                    raise ValueError(f"a broken picture {len(levels)}, or one of another size")
+                levels.append(image_levels(frame.to_ndarray(format="rgb24")))
+    except (av.error.FFmpegError, IndexError, ValueError) as error:  # ValueError: also text that is none
+        raise HandrailError(f"expected a whole mp4, got {error}".partition("\n")[0]) from error
+    if len(levels) != frames:
+        raise HandrailError(f"expected {frames} pictures, got {len(levels)}")
+    return image_stats(levels)
+
+
+class VideoEncoder:
+    """Writes the pictures of one camera and one episode, in order, into one mp4."""
+
+    def __init__(self, path: Path, fps: int, feature: Feature):
+        """Start the thread; the file appears with the first picture.
+
+        Args:
+            path: Where the mp4 goes (a temporary name).
+            fps: Pictures a second [Hz].
+            feature: The camera.
+        """
+        self._path, self._fps, self._feature = path, fps, feature
+        self._queue: queue.Queue[np.ndarray | None] = queue.Queue(maxsize=QUEUE_LENGTH)
+        self._levels: list[np.ndarray] = []
+        self._error: Exception | None = None
+        self._cancelled = self._ended = False
+        self._thread = threading.Thread(target=self._run, name=f"encode {path.name}", daemon=True)
+        self._thread.start()
+
+    def add(self, image: np.ndarray) -> None:
+        """Hand over a copy of a picture, `(height, width, 3)` uint8; waits while the queue is full."""
+        self._queue.put(np.array(image, order="C"))
+
+    def finish(self, expected: int) -> dict[str, np.ndarray]:
+        """Wait for the last picture, sync the file and check it.
+
+        Args:
+            expected: How many pictures the file must hold.
+
+        Returns:
+            The statistics of the pictures.
+
+        Raises:
+            HandrailError: The encoder failed, or the count is not the expected one.
+        """
+        self._stop()
+        if self._error is not None:
+            raise HandrailError(f"encoder of {self._path.name}: {self._error}") from self._error
+        found = count_frames(self._path)
+        if found != expected:
+            raise HandrailError(f"encoder of {self._path.name}: expected {expected} pictures, got {found}")
+        sync_file(self._path)
+        return image_stats(self._levels)
+
+    def cancel(self) -> None:
+        """Stop without finishing; the caller removes the file. Safe to call at any time."""
+        self._cancelled = True
+        self._stop()
+
+    def _stop(self) -> None:
+        if self._thread.is_alive():
+            self._queue.put(None)
+            self._thread.join()
+
+    def _run(self) -> None:
+        try:
+            self._encode()
+        except Exception as error:  # whatever it is, `finish` raises it in the recorder's thread
+            self._error = error
+            while not self._ended:
+                self._next()
+
+    def _encode(self) -> None:
+        image = self._next()
+        if image is None:
+            return
+        with av.open(str(self._path), "w", format="mp4") as container:
+            stream = _open_stream(container, self._fps, self._feature)
+            while image is not None:
+                if not self._cancelled:
+                    self._encode_one(container, stream, image)
+                image = self._next()
+            container.mux(stream.encode(None))
+
+    def _next(self) -> np.ndarray | None:
+        """Wait for the next picture; None at the end of the episode."""
+        image = self._queue.get()
+        self._ended = image is None
+        return image
+
+    def _encode_one(self, container: Any, stream: Any, image: np.ndarray) -> None:
+        frame = av.VideoFrame.from_ndarray(image, format="rgb24")
+        frame.pts, frame.time_base = len(self._levels), Fraction(1, self._fps)
+        container.mux(stream.encode(frame))
+        self._levels.append(image_levels(image))
+
+
+def _open_stream(container: Any, fps: int, feature: Feature) -> Any:
+    """Return an h264 stream; one thread, since pictures are small and cameras run side by side."""
+    options = {
+        "preset": PRESET,
+        "crf": str(QUALITY),
+        "g": str(GROUP),
+        "threads": "1",
+        "x264-params": "log=-1",
+    }
+    stream = container.add_stream("libx264", rate=fps, options=options)
+    stream.height, stream.width = feature.shape[:2]
+    stream.pix_fmt, stream.time_base = "yuv420p", Fraction(1, fps)
+    return stream

@@ -1,0 +1,63 @@
+"""SHA-256 of a dataset's files, remembered from one time to the next by size and time of change.
+
+Hashing takes a second a gigabyte, so it is done once: before training and comparison nothing is read that has
+not changed since. A disk that rots changes neither size nor time; `anew` reads every byte.
+"""
+
+import contextlib
+import hashlib
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+from handrail.datasets.format.metadata import FileSeal
+from handrail.datasets.storage.atomic import write_whole
+from handrail.datasets.storage.strict_json import read_json
+
+
+class Checksums:
+    """Seals of files below one folder.
+
+    Args:
+        root: The folder.
+        anew: Read every file, whatever is remembered.
+    """
+
+    def __init__(self, root: Path, anew: bool = False):
+        """See the class."""
+        self._root = root
+        self._memory = _folder() / f"{hashlib.sha256(str(root.resolve()).encode()).hexdigest()[:24]}.json"
+        self._known: dict[str, Any] = {} if anew else self._remembered()
+        self._used: dict[str, Any] = {}
+
+    def of(self, path: Path) -> FileSeal:
+        """Return the seal of a file, read only where it has changed.
+
+        Raises:
+            OSError: It is not there or cannot be read.
+        """
+        name, found = str(path.relative_to(self._root)), path.stat()
+        state = [found.st_size, found.st_mtime_ns, found.st_ctime_ns]
+        known = self._known.get(name)
+        if not (isinstance(known, list) and known[:-1] == state and isinstance(known[-1], str)):
+            known = [*state, FileSeal.of(path).sha256]
+        self._used[name] = known
+        return FileSeal(found.st_size, known[-1])
+
+    def remember(self) -> None:
+        """Keep what was found for the next time; a full disk or a read-only home is no error."""
+        with contextlib.suppress(OSError):
+            write_whole(self._memory, json.dumps(self._used).encode())
+
+    def _remembered(self) -> dict[str, Any]:
+        try:
+            content = read_json(self._memory)
+        except (OSError, ValueError):
+            return {}
+        return content if isinstance(content, dict) else {}
+
+
+def _folder() -> Path:
+    cache = Path(os.environ.get("XDG_CACHE_HOME", "~/.cache")).expanduser()
+    return cache / "handrail" / "checksums"

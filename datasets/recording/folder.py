@@ -1,0 +1,186 @@
+"""Whether a folder may become a dataset, and emptying one that the user gave up."""
+
+import os
+from pathlib import Path
+
+from handrail.controllers.errors import HandrailError
+from handrail.datasets.format.layout import DAMAGED, STAGING, Layout, episode_of
+from handrail.datasets.storage.atomic import make_folder, move, remove
+from handrail.datasets.storage.lock import LOCK_NAME
+
+_GIVEN_UP = "episodes"  # the lines of a dataset that is being cleared, in the staging folder
+_FOLDERS = ("data", "videos", "meta")  # of a dataset; what else lies beside them is not touched
+
+
+def check_target(layout: Layout, overwrite: bool) -> None:
+    """Check that a new dataset may be written to a folder; changes nothing.
+
+    Args:
+        layout: The dataset to be.
+        overwrite: Whether a dataset that Handrail recorded there may go.
+
+    Raises:
+        HandrailError: The path is no folder or cannot be written, or something else is there.
+    """
+    root = layout.root
+    _check_writable(root)
+    if not root.is_dir() or not _contents(root):
+        return
+    if not is_dataset(layout):
+        raise HandrailError(
+            f"{str(root)!r}: expected a missing or empty folder, found {_listed(root)}; this is no LeRobot"
+            " dataset (no meta/info.json) and is never removed: choose another folder"
+        )
+    if not overwrite:
+        raise HandrailError(
+            f"dataset {str(root)!r} exists already: --resume adds to it, --overwrite removes it;"
+            " or choose another folder"
+        )
+    if not layout.manifest.is_file():
+        raise HandrailError(
+            f"dataset {str(root)!r} was not recorded by Handrail (no meta/handrail.json): never removed;"
+            " choose another root"
+        )
+    check_folders(layout)
+    foreign = _foreign(layout)
+    if foreign:
+        raise HandrailError(
+            f"dataset {str(root)!r}: found what Handrail did not write, {', '.join(foreign[:3])}; --overwrite"
+            " removes only its own files: move this away, or choose another root"
+        )
+
+
+def check_folders(layout: Layout) -> None:
+    """Check that a dataset's folders are its own before anything in them is moved or removed.
+
+    Raises:
+        HandrailError: One is a link to another place.
+    """
+    for name in (STAGING, DAMAGED, *_FOLDERS):
+        top = layout.root / name
+        within = [Path(folder) / each for folder, folders, _ in os.walk(top) for each in folders]
+        linked = next((path for path in (top, *within) if path.is_symlink()), None)
+        if linked is not None:
+            raise HandrailError(
+                f"dataset {str(layout.root)!r}: expected a folder, found a link at {layout.relative(linked)};"
+                " nothing is written through it"
+            )
+
+
+def is_dataset(layout: Layout) -> bool:
+    """Return whether a folder holds a LeRobot dataset, whole or not."""
+    return layout.info.is_file() or layout.manifest.is_file()
+
+
+def clear_dataset(layout: Layout) -> None:
+    """Remove a dataset that `check_target` lets go, the lock excepted; what lies beside it stays.
+
+    The lines of metadata go first and at once, into the staging folder: whenever this is cut short later,
+    `finish_clearing` goes on, and what is left is an empty dataset, which may be overwritten and resumed.
+
+    Raises:
+        OSError: Something cannot be removed.
+    """
+    clear_staging(layout)
+    episodes = layout.root / "meta" / "episodes"
+    if episodes.exists():
+        os.replace(episodes, layout.staging / _GIVEN_UP)
+    _clear_given_up(layout)
+
+
+def finish_clearing(layout: Layout) -> None:
+    """Go on with a `clear_dataset` that was cut short, if there was one.
+
+    Raises:
+        OSError: Something cannot be removed.
+    """
+    if (layout.staging / _GIVEN_UP).exists() and not (layout.root / "meta" / "episodes").exists():
+        _clear_given_up(layout)
+
+
+def _clear_given_up(layout: Layout) -> None:
+    """Remove the files of a dataset whose lines of metadata are in the staging folder; these go last."""
+    for name in ("data", "videos", DAMAGED):
+        remove(layout.root / name)
+    for path in (layout.tasks, layout.stats, layout.info, layout.staging / _GIVEN_UP):
+        remove(path)
+
+
+def clear_staging(layout: Layout) -> list[str]:
+    """Remove everything in the staging folder but the lock, and return the names."""
+    if not layout.staging.is_dir():
+        return []
+    leftovers = sorted(path for path in layout.staging.iterdir() if path.name != LOCK_NAME)
+    for path in leftovers:
+        remove(path)
+    return [layout.relative(path) for path in leftovers]
+
+
+def set_aside(layout: Layout, paths: list[Path]) -> list[str]:
+    """Move files into a new numbered folder below `.damaged`, at the same place in it.
+
+    Returns:
+        The paths in the dataset that they had.
+
+    Raises:
+        OSError: A file cannot be moved.
+    """
+    if not paths:
+        return []
+    there = [int(path.name) for path in layout.damaged.glob("*") if path.name.isdecimal()]
+    target = layout.damaged / f"{max(there, default=-1) + 1:03d}"
+    make_folder(target)
+    for path in paths:
+        move(path, target / layout.relative(path))
+    return [layout.relative(path) for path in paths]
+
+
+def _foreign(layout: Layout) -> list[str]:
+    """Return what lies among a dataset's files, or among those that were set aside, and is none of them."""
+    summaries = {layout.info, layout.stats, layout.tasks, layout.manifest}
+    places = {path: layout for name in _FOLDERS for path in _all_below(layout.root / name)}
+    for path in _all_below(layout.damaged):
+        parts = path.relative_to(layout.damaged).parts
+        places[path] = Layout(layout.damaged / parts[0]) if len(parts) > 1 else layout
+    return sorted(
+        layout.relative(path)
+        for path, owner in places.items()
+        if path.is_symlink() or (path.is_file() and path not in summaries and not _is_numbered(owner, path))
+    )
+
+
+def _all_below(folder: Path) -> list[Path]:
+    return [folder, *folder.rglob("*")]
+
+
+def _is_numbered(layout: Layout, path: Path) -> bool:
+    """Return whether a path is that of an episode's rows, video or line of metadata."""
+    number, camera = episode_of(path), path.parent.parent.name
+    return number is not None and path in (
+        layout.data(number),
+        layout.row(number),
+        layout.video(camera, number),
+    )
+
+
+def _contents(root: Path) -> list[str]:
+    """Return the names in a folder, but for the staging folder and folders that are empty."""
+    paths = [path for path in root.iterdir() if path.name != STAGING]
+    return sorted(path.name for path in paths if not path.is_dir() or any(path.iterdir()))
+
+
+def _listed(root: Path) -> str:
+    names = _contents(root)
+    return ", ".join(names[:3]) + (" …" if len(names) > 3 else "")
+
+
+def _check_writable(root: Path) -> None:
+    existing = root
+    while not existing.exists() and existing != existing.parent:
+        existing = existing.parent
+    if not existing.is_dir():
+        raise HandrailError(f"{str(root)!r}: expected a folder, but {str(existing)!r} is a file")
+    if not os.access(existing, os.W_OK | os.X_OK):
+        raise HandrailError(
+            f"{str(root)!r}: expected a folder that can be written, but {str(existing)!r} cannot"
+        )

@@ -1,0 +1,136 @@
+"""What Handrail records of every moment: the columns of a frame."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from handrail.controllers.arrays import FloatArray
+from handrail.controllers.interface.command import Health
+from handrail.controllers.interface.intent import Intent
+from handrail.datasets.format.schema import Feature
+
+FARTHEST = 10.0  # [m] what a distance is cut to: nothing is nearer, there is nothing to measure, or no state
+MOST = 1e6  # [m/s, rad/s, …] what any other number is cut to
+
+
+@dataclass(frozen=True)
+class Moment:
+    """One control period: what was observed, asked, commanded, and how the controller fared.
+
+    Attributes:
+        state: the robot as observed, (s,); `observation.state`.
+        environment: the task as observed, (e,); `observation.environment_state`.
+        images: pictures by camera, (height, width, 3) uint8 each.
+        intent: what the operator asked for.
+        action: what was sent to the robot: velocities at the end of the period and the gripper, (n + 1,).
+        command: what the controller asked for, (n + 1,); the robot's own limits may have cut it.
+        health: of the controller.
+        contacts: forbidden contacts in the period.
+        success: whether the task is done at the end of the period.
+        done: whether the episode ends with it.
+        wall_clock: wall time since the episode began [s].
+    """
+
+    state: FloatArray
+    environment: FloatArray
+    images: dict[str, np.ndarray]
+    intent: Intent
+    action: FloatArray
+    command: FloatArray
+    health: Health
+    contacts: int
+    success: bool
+    done: bool
+    wall_clock: float
+
+
+def moment_features(
+    state: Sequence[str],
+    environment: Sequence[str],
+    joints: Sequence[str],
+    channels: Sequence[str],
+    cameras: Sequence[str] = (),
+    image_size: tuple[int, int] = (128, 128),
+) -> dict[str, Feature]:
+    """Return the columns of a robot, a task and its cameras.
+
+    Policy inputs are under `observation.*`, the policy output is `action`; the rest is beside them, so that
+    LeRobot's policies do not read it.
+
+    Args:
+        state: names of the observed robot state.
+        environment: names of the observed task state.
+        joints: names of the generalised coordinates.
+        channels: names of the command channels.
+        cameras: names of the cameras.
+        image_size: height and width [pixels].
+    """
+    scalar = Feature("float32")
+    asked = (*channels, "gripper")
+    pictures = {f"observation.images.{name}": Feature("video", (*image_size, 3)) for name in cameras}
+    velocities = (*(f"v_{name}" for name in joints), "gripper")
+    return {
+        "observation.state": Feature("float32", (len(state),), tuple(state)),
+        "observation.environment_state": Feature("float32", (len(environment),), tuple(environment)),
+        **pictures,
+        "action": Feature("float32", (len(velocities),), velocities),
+        "teleop.values": Feature("float32", (len(asked),), asked),
+        "teleop.mask": Feature("bool", (len(asked),), asked),
+        "teleop.mode": Feature("string"),
+        "teleop.raw": Feature("float32", (len(channels),), tuple(channels)),
+        "teleop.axes": Feature("int64"),
+        "teleop.switches": Feature("int64"),
+        "controller.command": Feature("float32", (len(velocities),), velocities),
+        "controller.solve_time": scalar,
+        "controller.status": Feature("string"),
+        "controller.slack": scalar,
+        "controller.smallest_distance": scalar,
+        "controller.work_distance": scalar,
+        "safety.contacts": Feature("int64"),
+        "next.success": Feature("bool"),
+        "next.done": Feature("bool"),
+        "wall_clock": Feature("float64"),
+    }
+
+
+def moment_row(moment: Moment) -> dict[str, Any]:
+    """Return a moment as a frame of `moment_features`.
+
+    What stands beside a policy's inputs and outputs is finite too: no tool's statistics may become NaN.
+    """
+    intent, raw, health = moment.intent, moment.intent.raw.values, moment.health
+    pictures = {f"observation.images.{name}": image for name, image in moment.images.items()}
+    return {
+        "observation.state": moment.state,
+        "observation.environment_state": moment.environment,
+        **pictures,
+        "action": moment.action,
+        "teleop.values": _finite(np.append(np.where(intent.mask, intent.values, 0.0), intent.gripper)),
+        "teleop.mask": np.append(intent.mask, True),
+        "teleop.mode": intent.mode,
+        "teleop.raw": _finite(raw if raw.size else np.zeros(len(intent.values))),
+        "teleop.axes": intent.raw.axes,
+        "teleop.switches": intent.raw.switches,
+        "controller.command": moment.command,
+        "controller.solve_time": health.solve_time,
+        "controller.status": health.status.value,
+        "controller.slack": _finite(health.slack),
+        "controller.smallest_distance": _distance(health.smallest_distance),
+        "controller.work_distance": _distance(health.work_distance),
+        "safety.contacts": moment.contacts,
+        "next.success": moment.success,
+        "next.done": moment.done,
+        "wall_clock": moment.wall_clock,
+    }
+
+
+def _finite(numbers: FloatArray | float) -> FloatArray:
+    """Return numbers cut to ±`MOST`; what is none becomes 0."""
+    return np.clip(np.nan_to_num(numbers, nan=0.0), -MOST, MOST)
+
+
+def _distance(distance: float) -> float:
+    """Return a distance cut to `FARTHEST`, which also stands for one that nobody knows [m]."""
+    return min(distance, FARTHEST) if np.isfinite(distance) else FARTHEST

@@ -1,0 +1,233 @@
+"""Putting back what lies in `.damaged/`: files where they were, whole episodes at the dataset's end.
+
+An episode that is put back gets the next number, and a mark of the line that it had: cut short at any moment,
+this is done again without an episode coming twice. What was set aside is removed only after it is back.
+"""
+
+import hashlib
+import os
+import shutil
+from dataclasses import replace as changed
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from handrail.controllers.errors import HandrailError
+from handrail.datasets.format.arrow import numbers
+from handrail.datasets.format.columns import Scalar, fit_columns
+from handrail.datasets.format.layout import Layout, episode_of
+from handrail.datasets.format.manifest import Manifest
+from handrail.datasets.format.metadata import (
+    EpisodeRecord,
+    FileSeal,
+    Totals,
+    read_column_types,
+    read_origin,
+    read_record,
+    row_bytes,
+)
+from handrail.datasets.format.schema import video_keys
+from handrail.datasets.format.stats import column_stats
+from handrail.datasets.format.tables import parquet_bytes
+from handrail.datasets.recording.wholeness import UNREADABLE, EpisodeState, examine
+from handrail.datasets.storage.atomic import move, remove, sync_file, sync_folder, write_synced
+
+
+def folders(layout: Layout) -> list[Layout]:
+    """Return the folders below `.damaged/`, the newest first; each holds files as a dataset does."""
+    found = layout.damaged.iterdir() if layout.damaged.is_dir() else ()
+    return [Layout(path) for path in sorted(found, reverse=True) if path.is_dir()]
+
+
+def restore(layout: Layout, counted: int) -> list[str]:
+    """Undo a setting aside that was cut short: move files back to where their episode's line expects them.
+
+    Args:
+        layout: The dataset.
+        counted: How many episodes it should have.
+
+    Returns:
+        The paths in the dataset of what was moved back.
+    """
+    restored: list[str] = []
+    start = 0
+    for number in range(counted if folders(layout) else 0):
+        row = layout.row(number)
+        place = row if row.exists() else _line_set_aside(layout, number, start)
+        record = None if place is None else _readable(place)
+        if place is None or record is None:
+            break
+        start = record.start + record.length
+        for name, seal in record.files.items():
+            if not (layout.root / name).exists() and (source := _set_aside(layout, name, seal)):
+                move(source, layout.root / name)
+                restored.append(name)
+        if place != row:
+            move(place, row)
+            restored.append(layout.relative(row))
+    return restored
+
+
+def put_back(layout: Layout, manifest: Manifest, totals: Totals) -> tuple[Totals, int]:
+    """Append every whole episode of `.damaged/` that fits the dataset.
+
+    Args:
+        layout: The dataset; all of its episodes are whole.
+        manifest: Its schema.
+        totals: What its episodes add up to.
+
+    Returns:
+        What they add up to then, and how many were put back.
+    """
+    before = totals.episodes
+    known = {read_origin(layout.row(number)) for number in range(totals.episodes)}
+    for folder in folders(layout):
+        for row in sorted(folder.root.glob("meta/episodes/*/*.parquet")):
+            state = _candidate(layout, folder, manifest, row)
+            if state is None:
+                continue
+            origin = hashlib.sha256(row.read_bytes()).hexdigest()
+            if origin not in known:
+                try:
+                    totals = totals.grown(_append(layout, folder, manifest, state, totals, origin))
+                except (HandrailError, ValueError):
+                    continue  # columns that this dataset does not have, or tasks that do not add up
+                known.add(origin)
+            _forget(layout, folder, row, state)
+    _remove_empty(layout.damaged)
+    return totals, totals.episodes - before
+
+
+def _candidate(layout: Layout, folder: Layout, manifest: Manifest, row: Path) -> EpisodeState | None:
+    """Return an episode that was set aside, if it is whole."""
+    number = episode_of(row)
+    if number is None:
+        return None
+    try:
+        state = examine(
+            folder, manifest, number, None, FileSeal.of, lambda name: _place(layout, folder, row, name)
+        )
+    except HandrailError:
+        return None
+    return None if state.fault else state
+
+
+def _place(layout: Layout, folder: Layout, row: Path, name: str) -> Path:
+    """Return where a file of an episode that was set aside lies: beside its line, or in another folder."""
+    own = folder.root / name
+    if own.is_file():
+        return own
+    return _set_aside(layout, name, read_record(row, with_stats=False).files[name]) or own
+
+
+def _set_aside(layout: Layout, name: str, seal: FileSeal) -> Path | None:
+    """Return the file of `.damaged/` with a path and a seal."""
+    places = (folder.root / name for folder in folders(layout))
+    return next((path for path in places if path.is_file() and FileSeal.of(path) == seal), None)
+
+
+def _line_set_aside(layout: Layout, number: int, start: int) -> Path | None:
+    """Return the line of an episode that was set aside, if all of the episode's files are to be had."""
+    for folder in folders(layout):
+        record = _readable(folder.row(number))
+        if record and (record.episode, record.start) == (number, start):
+            files = record.files.items()
+            if all(_has(layout.root / name, seal) or _set_aside(layout, name, seal) for name, seal in files):
+                return folder.row(number)
+    return None
+
+
+def _has(path: Path, seal: FileSeal) -> bool:
+    return path.is_file() and FileSeal.of(path) == seal
+
+
+def _readable(row: Path) -> EpisodeRecord | None:
+    try:
+        return read_record(row, with_stats=False)
+    except (HandrailError, *UNREADABLE):
+        return None
+
+
+def _append(
+    layout: Layout, folder: Layout, manifest: Manifest, state: EpisodeState, totals: Totals, origin: str
+) -> EpisodeRecord:
+    """Save a copy of an episode under the next number, in the order in which the writer saves one."""
+    old = state.record
+    assert old is not None
+    row = folder.row(state.number)
+    types = read_column_types(layout.row(totals.episodes - 1) if totals.episodes else row)
+    columns: dict[str, Scalar] = {name: value for name, value in old.columns.items() if value is not None}
+    extras = fit_columns(columns, types)
+    number, staging = totals.episodes, layout.staging
+    sources = {
+        layout.video(key, number): folder.video(key, state.number) for key in video_keys(manifest.features)
+    }
+    streams = {path: staging / f"{place}.mp4" for place, path in enumerate(sources)}
+    for path, source in sources.items():
+        _copy(_place(layout, folder, row, folder.relative(source)), streams[path])
+    data = _place(layout, folder, row, folder.relative(folder.data(state.number)))
+    table, stats = _renumbered(data, old, totals)
+    streams[layout.data(number)] = staging / "data.parquet"
+    write_synced(staging / "data.parquet", parquet_bytes(table))
+    seals = {layout.relative(path): FileSeal.of(staged) for path, staged in streams.items()}
+    record = changed(
+        old,
+        episode=number,
+        start=totals.frames,
+        stats={**(old.stats or {}), **stats},
+        columns=extras,
+        files=seals,
+    )
+    write_synced(staging / "row.parquet", row_bytes(manifest, record, types, origin))
+    for path, staged in streams.items():
+        move(staged, path)
+    move(staging / "row.parquet", layout.row(number))  # the commit
+    return record
+
+
+def _renumbered(data: Path, old: EpisodeRecord, totals: Totals) -> tuple[pa.Table, dict[str, Any]]:
+    """Return an episode's rows with the counters of its new place, and the statistics of these."""
+    with pq.ParquetFile(data) as file:
+        table = file.read(use_threads=False)
+    tasks = table.column("task_index").to_pylist()
+    places = {task: place for place, task in enumerate(totals.with_tasks(old.tasks))}
+    new = {task: places[name] for task, name in zip(dict.fromkeys(tasks), old.tasks, strict=True)}
+    counters = {
+        "episode_index": np.full(old.length, totals.episodes),
+        "index": np.arange(old.length) + totals.frames,
+        "task_index": np.array([new[task] for task in tasks]),
+    }
+    for name, values in counters.items():
+        place = table.schema.get_field_index(name)
+        table = table.set_column(place, table.schema.field(place), numbers(values, pa.int64()))
+    return table, {name: column_stats(values) for name, values in counters.items()}
+
+
+def _copy(source: Path, target: Path) -> None:
+    """Give a file a second name, or copy it where the file system has no such thing."""
+    remove(target)
+    try:
+        os.link(source, target)
+    except OSError:
+        shutil.copyfile(source, target)
+    sync_file(target)
+
+
+def _forget(layout: Layout, folder: Layout, row: Path, state: EpisodeState) -> None:
+    """Remove an episode from `.damaged/` that is in the dataset again; its line goes last."""
+    assert state.record is not None
+    for path in (*(_place(layout, folder, row, name) for name in state.record.files), row):
+        remove(path)
+        sync_folder(path.parent) if path.parent.is_dir() else None
+
+
+def _remove_empty(folder: Path) -> None:
+    """Remove folders that hold nothing."""
+    for path in sorted(folder.rglob("*"), reverse=True) if folder.is_dir() else ():
+        if path.is_dir() and not any(path.iterdir()):
+            path.rmdir()
+    if folder.is_dir() and not any(folder.iterdir()):
+        folder.rmdir()

@@ -1,0 +1,255 @@
+"""Bringing a dataset that Handrail wrote into order, without losing an episode that was saved.
+
+Whatever was saved stays where it is: an episode that is not whole is named, and set aside only when asked
+(`set_aside`), whereupon those after it move up. What a crash leaves behind (staged files, the published files
+of the one episode that was never saved) is removed. `info.json`, `stats.json` and `tasks.parquet` are rebuilt
+if they are not, to the byte, what the episodes say.
+
+    handrail-repair path/to/dataset
+"""
+
+from dataclasses import dataclass
+from dataclasses import replace as replaced
+from pathlib import Path
+
+from handrail.controllers.errors import HandrailError
+from handrail.datasets.format.layout import Layout
+from handrail.datasets.format.manifest import Manifest, read_manifest
+from handrail.datasets.format.metadata import Totals, info_bytes, read_encodings, resealed_bytes, stats_bytes
+from handrail.datasets.format.schema import video_keys
+from handrail.datasets.format.tables import tasks_bytes
+from handrail.datasets.recording.checksums import Checksums
+from handrail.datasets.recording.folder import check_folders, clear_staging, finish_clearing, set_aside
+from handrail.datasets.recording.put_back import put_back, restore
+from handrail.datasets.recording.survey import Survey, said_to_be_saved, survey
+from handrail.datasets.storage.atomic import explained, remove, replace, sync_folder
+from handrail.datasets.storage.lock import DatasetLock
+
+_SHOWN = 3  # faults in one line
+
+
+@dataclass(frozen=True)
+class RepairReport:
+    """What a repair found and did; printing it gives one line.
+
+    Attributes:
+        root: The dataset.
+        episodes: Number of episodes in it now.
+        frames: Number of their frames.
+        damage: What is wrong with each episode that is not whole and still in its place.
+        lost: What was wrong with each episode that was set aside.
+        put_back: How many episodes of `.damaged/` are in the dataset again.
+        resealed: Files that another tool wrote anew and that are whole; their checksums were renewed.
+        differing: Such files where they were only noticed, as `resume` does.
+        removed: Leftovers of an interrupted recording, deleted; paths in the dataset.
+        moved: Files set aside in `.damaged/`; the paths that they had.
+        restored: Files moved back from there to where they were.
+        rebuilt: Summary files written anew.
+    """
+
+    root: Path
+    episodes: int
+    frames: int
+    damage: tuple[str, ...] = ()
+    lost: tuple[str, ...] = ()
+    put_back: int = 0
+    resealed: tuple[str, ...] = ()
+    differing: tuple[str, ...] = ()
+    removed: tuple[str, ...] = ()
+    moved: tuple[str, ...] = ()
+    restored: tuple[str, ...] = ()
+    rebuilt: tuple[str, ...] = ()
+
+    @property
+    def clean(self) -> bool:
+        """Whether there was nothing to do."""
+        return not (self.damage or self.lost or self.put_back or any(self._files().values()))
+
+    @property
+    def complete(self) -> bool:
+        """Whether everything that was saved is in the dataset and whole."""
+        return not (self.damage or self.lost)
+
+    def __str__(self) -> str:
+        said = [f"dataset {str(self.root)!r}: {self.episodes} episodes"]
+        said += [f"{len(self.damage)} damaged ({shortened(self.damage)})"] if self.damage else []
+        said += [f"{len(self.lost)} set aside in .damaged ({shortened(self.lost)})"] if self.lost else []
+        said += [f"{self.put_back} put back"] if self.put_back else []
+        said += [f"{what}: {shortened(paths, ', ')}" for what, paths in self._files().items() if paths]
+        return "; ".join(said if not self.clean else [*said, "nothing to repair"])
+
+    def _files(self) -> dict[str, tuple[str, ...]]:
+        return {
+            "taken as another tool wrote them": self.resealed,
+            "whole, but not as they were saved": self.differing,
+            "leftovers removed": self.removed,
+            "files of no episode moved to .damaged": self.moved,
+            "files moved back": self.restored,
+            "written anew": self.rebuilt,
+        }
+
+
+def shortened(texts: tuple[str, ...] | list[str], comma: str = "; ") -> str:
+    """Return the first few of many texts, and how many more there are."""
+    more = f" and {len(texts) - _SHOWN} more" if len(texts) > _SHOWN else ""
+    return comma.join(texts[:_SHOWN]) + more
+
+
+def repair(root: str | Path, set_aside_damaged: bool = False) -> RepairReport:
+    """Repair a dataset; doing it twice changes nothing more. Every byte is read.
+
+    Args:
+        root: The dataset's folder.
+        set_aside_damaged: Whether to set episodes aside that are not whole; without, they stay and are named.
+
+    Raises:
+        HandrailError: No dataset, another tool's, one that another tool has appended to, or one being
+            written. Nothing has been changed then.
+    """
+    layout = Layout(Path(root).expanduser().absolute())
+    manifest = read_manifest(layout)
+    check_folders(layout)
+    with explained(f"cannot repair dataset {str(layout.root)!r}"):
+        lock = DatasetLock(layout.staging)
+        try:
+            return _repair_locked(layout, manifest, set_aside_damaged)
+        finally:
+            lock.release()
+
+
+def tidy_locked(layout: Layout, manifest: Manifest, sums: Checksums) -> tuple[RepairReport, Totals]:
+    """Clear what a crash left in a dataset whose episodes are whole and whose lock the caller holds.
+
+    Returns:
+        What was done, and what the episodes add up to.
+
+    Raises:
+        HandrailError: An episode is not whole, or another tool has added some. Nothing has been changed then.
+        OSError: A file cannot be moved, removed or written.
+    """
+    finish_clearing(layout)
+    found = survey(layout, manifest, sums.of)
+    sums.remember()
+    require_whole(layout, found)
+    removed, moved = _clear(layout, found)
+    rebuilt = _rebuild(layout, manifest, found.totals)
+    report = RepairReport(
+        root=layout.root,
+        episodes=found.totals.episodes,
+        frames=found.totals.frames,
+        differing=tuple(name for state in found.rewritten for name in state.rewritten),
+        removed=removed,
+        moved=moved,
+        rebuilt=rebuilt,
+    )
+    return report, found.totals
+
+
+def require_whole(layout: Layout, found: Survey) -> None:
+    """Check that no episode is damaged.
+
+    Raises:
+        HandrailError: One is; the line says which, why, and what to do.
+    """
+    if found.whole:
+        return
+    faults, count = found.faults(), len(found.states) + found.absent
+    lacking = found.absent or all("missing" in state.fault for state in found.damaged)
+    what = "was copied in part" if lacking else "is damaged"
+    raise HandrailError(
+        f"dataset {str(layout.root)!r} {what}: {len(found.damaged) + found.absent} of {count} episodes are"
+        f" not whole ({shortened(faults)}); nothing has been changed; copy it again, see what"
+        f" handrail-repair {layout.root} can mend, or go on without them with its --set_aside"
+    )
+
+
+def _repair_locked(layout: Layout, manifest: Manifest, set_aside_damaged: bool) -> RepairReport:
+    finish_clearing(layout)
+    sums = Checksums(layout.root, anew=True)
+    restored = restore(layout, said_to_be_saved(layout))
+    found = survey(layout, manifest, sums.of)
+    removed, moved = _clear(layout, found)
+    resealed = _reseal(layout, found)
+    rebuilt = _rebuild(layout, manifest, found.totals) if found.counted else ()
+    lost: list[str] = []
+    if set_aside_damaged and not found.whole:
+        lost, found = found.faults(), _without_damaged(layout, manifest, found, sums)
+    totals, back = put_back(layout, manifest, found.totals) if found.whole else (found.totals, 0)
+    rebuilt += _rebuild(layout, manifest, totals) if found.counted else ()
+    sums.remember()
+    return RepairReport(
+        root=layout.root,
+        episodes=max(totals.episodes, len(found.states) + found.absent),
+        frames=totals.frames,
+        damage=tuple(found.faults()),
+        lost=tuple(lost),
+        put_back=back,
+        resealed=resealed,
+        removed=removed,
+        moved=moved,
+        restored=tuple(restored),
+        rebuilt=tuple(dict.fromkeys(rebuilt)),
+    )
+
+
+def _without_damaged(layout: Layout, manifest: Manifest, found: Survey, sums: Checksums) -> Survey:
+    """Set aside every episode from the first that is not whole on; `put_back` brings the whole ones back.
+
+    Lines of metadata go last and from the end: cut short, `restore` undoes this. From when `info.json` counts
+    only the episodes that stay, `put_back` finishes it.
+    """
+    first = found.damaged[0].number if found.damaged else len(found.states)
+    streams, rows = [], []
+    for number in range(first, len(found.states)):
+        videos = [layout.video(key, number) for key in video_keys(manifest.features)]
+        streams += [path for path in (*videos, layout.data(number)) if path.exists()]
+        rows += [layout.row(number)] if layout.row(number).exists() else []
+    set_aside(layout, streams + rows[::-1])
+    left = survey(layout, manifest, sums.of)
+    _rebuild(layout, manifest, left.totals)
+    return replaced(left, absent=0)
+
+
+def _clear(layout: Layout, found: Survey) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Remove what a crash left and set aside what nobody can explain; return both."""
+    for path in found.leftovers:
+        remove(path)
+    for folder in {path.parent for path in found.leftovers}:
+        sync_folder(folder)
+    removed = [*clear_staging(layout), *map(layout.relative, found.leftovers)]
+    return tuple(removed), tuple(set_aside(layout, list(found.strays)))
+
+
+def _reseal(layout: Layout, found: Survey) -> tuple[str, ...]:
+    """Renew the checksums of files that another tool wrote anew and that are whole."""
+    names: list[str] = []
+    for state in found.rewritten:
+        assert state.record is not None
+        row, files = layout.row(state.number), {**state.record.files, **state.rewritten}
+        replace(row, resealed_bytes(row, files), layout.staging)
+        names += state.rewritten
+    return tuple(names)
+
+
+def _rebuild(layout: Layout, manifest: Manifest, totals: Totals) -> tuple[str, ...]:
+    """Write the summary files that are not what the episodes say."""
+    encodings = read_encodings(layout.info, manifest)
+    wanted = {
+        layout.tasks: tasks_bytes(totals.tasks) if totals.tasks else None,
+        layout.stats: stats_bytes(totals.stats) if totals.stats else None,
+        layout.info: info_bytes(manifest, totals, encodings),
+    }
+    return tuple(layout.relative(path) for path, data in wanted.items() if _settle(layout, path, data))
+
+
+def _settle(layout: Layout, path: Path, data: bytes | None) -> bool:
+    """Make a file's content be `data`, or the file not be there; return whether that was work."""
+    current = path.read_bytes() if path.is_file() else None
+    if current == data:
+        return False
+    if data is None:
+        remove(path)
+        sync_folder(path.parent)
+    else:
+        replace(path, data, layout.staging)
+    return True

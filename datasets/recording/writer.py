@@ -1,0 +1,300 @@
+"""Writing a LeRobot v3.0 dataset so that a crash loses at most the episode being recorded.
+
+Every file of an episode is written in `.handrail/` inside the dataset and synced; only when all are whole
+are they renamed into place: videos, data, tasks, then **the episode's line of metadata, which is the
+commit**, then `info.json` and `stats.json`. A disk that fills up is noticed before the first rename.
+
+    with EpisodeWriter.create(root, "me/cups", 50, features, "handrail") as writer:
+        writer.add_frame({"observation.state": state, "action": action}, task="lift the cup")
+        writer.save_episode({"success": True, "operator": "ada"})
+"""
+
+import contextlib
+import json
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Self
+
+from handrail.controllers.errors import HandrailError
+from handrail.datasets.format.columns import ColumnTypes, Scalar, column_types, fit_columns, plain_columns
+from handrail.datasets.format.layout import Layout
+from handrail.datasets.format.manifest import Manifest, read_manifest
+from handrail.datasets.format.metadata import (
+    EpisodeRecord,
+    FileSeal,
+    Totals,
+    info_bytes,
+    read_column_types,
+    read_encodings,
+    row_bytes,
+    stats_bytes,
+)
+from handrail.datasets.format.schema import Feature, video_keys
+from handrail.datasets.format.tables import data_bytes, tasks_bytes
+from handrail.datasets.recording.checksums import Checksums
+from handrail.datasets.recording.episode import OpenEpisode, numeric_stats
+from handrail.datasets.recording.folder import check_folders, check_target, clear_dataset, clear_staging
+from handrail.datasets.recording.repair import RepairReport, tidy_locked
+from handrail.datasets.storage.atomic import (
+    explained,
+    make_folder,
+    move,
+    reason,
+    remove,
+    replace,
+    sync_folder,
+    write_synced,
+)
+from handrail.datasets.storage.lock import DatasetLock
+
+
+class EpisodeWriter:
+    """Adds episodes to one dataset; get one from `create` or `resume`, close it, or use it in a `with`.
+
+    Every error is a `HandrailError` with one line. After an error in `add_frame` the frame is not in; after
+    one in `save_episode` the episode is gone, the saved ones are whole, and the next may be recorded.
+    """
+
+    def __init__(
+        self,
+        layout: Layout,
+        manifest: Manifest,
+        totals: Totals,
+        lock: DatasetLock,
+        types: ColumnTypes | None,
+        repaired: RepairReport | None = None,
+    ):
+        """Use `create` or `resume` instead; `repaired` says what the latter put in order."""
+        self._layout, self._manifest, self._totals = layout, manifest, totals
+        self._lock, self._types, self.repaired, self._unusable = lock, types, repaired, ""
+        self._episode, self._encodings = OpenEpisode(layout, manifest), read_encodings(layout.info, manifest)
+
+    @classmethod
+    def create(
+        cls,
+        root: str | Path,
+        repo_id: str,
+        fps: int,
+        features: Mapping[str, Feature],
+        robot_type: str,
+        versions: Mapping[str, str] | None = None,
+        overwrite: bool = False,
+    ) -> Self:
+        """Start a new dataset.
+
+        Args:
+            root: Its folder; must be missing or empty.
+            repo_id: Its name, `owner/name`.
+            fps: Frames a second [Hz].
+            features: The columns; LeRobot's own (timestamp, indices) are added.
+            robot_type: The robot.
+            versions: Software versions, kept with the dataset and with each episode.
+            overwrite: Remove the dataset that Handrail recorded there. Anything else is never removed.
+
+        Raises:
+            HandrailError: A wrong argument, or a folder taken or not to be written; unchanged then.
+        """
+        layout = Layout(Path(root).expanduser().absolute())
+        manifest = Manifest(repo_id, fps, robot_type, dict(features), dict(versions or {}))
+        manifest.check()
+        check_target(layout, overwrite)
+        with explained(f"cannot create dataset {str(layout.root)!r}"):
+            lock = DatasetLock(layout.staging)
+            with lock.released_on_error():
+                check_target(layout, overwrite)  # again: another recorder may have been faster
+                clear_dataset(layout)
+                replace(layout.manifest, manifest.to_bytes(), layout.staging)
+                replace(layout.info, info_bytes(manifest, Totals()), layout.staging)
+        return cls(layout, manifest, Totals(), lock, None)
+
+    @classmethod
+    def resume(
+        cls,
+        root: str | Path,
+        repo_id: str,
+        fps: int,
+        features: Mapping[str, Feature],
+        robot_type: str,
+        versions: Mapping[str, str] | None = None,
+        verify: bool = False,
+    ) -> Self:
+        """Go on with a dataset that Handrail wrote; what a crash left is cleared first, see `repaired`.
+
+        Args:
+            root: Its folder.
+            repo_id: Its name; a dataset may have been renamed since.
+            fps: Frames a second [Hz]; like features and robot_type, must be the dataset's.
+            features: The columns.
+            robot_type: The robot.
+            versions: Software versions of this session, kept with each of its episodes.
+            verify: Read every file anew, also those that have not changed since they were last checked.
+
+        Raises:
+            HandrailError: Not Handrail's, or one that differs, is damaged or being written; unchanged then.
+        """
+        layout = Layout(Path(root).expanduser().absolute())
+        existing = read_manifest(layout)
+        manifest = Manifest(repo_id, fps, robot_type, dict(features), dict(versions or {}))
+        manifest.check()
+        manifest.check_continues(existing, layout.root)
+        check_folders(layout)
+        with explained(f"--resume: cannot add to dataset {str(layout.root)!r}"):
+            lock = DatasetLock(layout.staging)
+            with lock.released_on_error():
+                report, totals = tidy_locked(layout, existing, Checksums(layout.root, anew=verify))
+                types = read_column_types(layout.row(totals.episodes - 1)) if totals.episodes else None
+        return cls(layout, manifest, totals, lock, types, report)
+
+    @property
+    def root(self) -> Path:
+        """The dataset's folder."""
+        return self._layout.root
+
+    @property
+    def features(self) -> Mapping[str, Feature]:
+        """The columns that each frame must have."""
+        return self._manifest.features
+
+    @property
+    def num_episodes(self) -> int:
+        """Number of saved episodes."""
+        return self._totals.episodes
+
+    @property
+    def num_frames(self) -> int:
+        """Number of frames in the saved episodes."""
+        return self._totals.frames
+
+    @property
+    def open_frames(self) -> int:
+        """Number of frames in the episode being recorded."""
+        return self._episode.length
+
+    def add_frame(self, frame: Mapping[str, Any], task: str) -> None:
+        """Add one frame to the open episode.
+
+        Args:
+            frame: A value for every feature, copied; see `schema.check_frame`.
+            task: What is being done, in words.
+
+        Raises:
+            HandrailError: The frame does not fit the schema; it is not in then.
+        """
+        self._check_usable()
+        self._episode.add(frame, task)
+
+    def save_episode(self, columns: Mapping[str, Scalar | None] | None = None) -> int:
+        """Save the open episode and return its number; it survives a crash and a power failure from then on.
+
+        Args:
+            columns: Of the episode's metadata, such as success; the first episode fixes which there are.
+
+        Raises:
+            HandrailError: There is no frame or a column does not fit (the episode stays open), or an encoder
+                or the disk failed (the episode is gone, the saved ones are whole).
+        """
+        self._check_usable()
+        if not self._episode.length:
+            raise HandrailError(f"episode {self.num_episodes}: expected at least one frame, got none")
+        versions = json.dumps(dict(self._manifest.versions), sort_keys=True)
+        extras = plain_columns({"versions": versions, **(columns or {})})
+        types = self._types or column_types(extras)
+        extras = fit_columns(extras, types)
+        self._unusable = "was interrupted while it saved an episode"  # until the state is known again
+        try:
+            totals = self._stage(extras, types)
+            self._publish_files(totals)
+        except (OSError, HandrailError) as error:
+            raise self._abandoned(error) from error
+        self._types, self._totals, episode = types, totals, self.num_episodes
+        self._episode = OpenEpisode(self._layout, self._manifest)
+        self._unusable = ""
+        with explained(f"episode {episode} is saved, but the summary files are late; `repair` rebuilds them"):
+            self._publish_summary(episode)
+        return episode
+
+    def discard_episode(self) -> None:
+        """Forget the open episode; nothing of it stays on the disk."""
+        self._check_usable()
+        self._discard()
+
+    def close(self) -> None:
+        """Forget the open episode, remove the temporary files, give the dataset free. Safe to call twice."""
+        if self._unusable == "is closed":
+            return
+        with contextlib.suppress(OSError):  # the next `resume` or `repair` removes what is left
+            self._discard()
+        self._unusable = "is closed"
+        with explained(f"cannot close dataset {str(self.root)!r}"):
+            self._lock.release()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def _stage(self, extras: Mapping[str, Scalar | None], types: ColumnTypes) -> Totals:
+        """Write every file under its temporary name; only renames are left to do."""
+        staging, episode = self._layout.staging, self._episode
+        stats = episode.finish_videos()
+        columns = episode.columns(self._totals)
+        write_synced(staging / "data.parquet", data_bytes(self._manifest.features, columns))
+        record = EpisodeRecord(
+            episode=self.num_episodes,
+            start=self.num_frames,
+            length=episode.length,
+            tasks=tuple(dict.fromkeys(episode.tasks)),
+            stats=numeric_stats(columns) | stats,
+            columns=extras,
+            files={self._layout.relative(path): FileSeal.of(staged) for staged, path in self._streams()},
+        )
+        totals = self._totals.grown(record)
+        write_synced(staging / "row.parquet", row_bytes(self._manifest, record, types))
+        write_synced(staging / "tasks.parquet", tasks_bytes(totals.tasks))
+        write_synced(staging / "info.json", info_bytes(self._manifest, totals, self._encodings))
+        write_synced(staging / "stats.json", stats_bytes(totals.stats or {}))
+        for path in (self._layout.row(self.num_episodes), *(path for _, path in self._streams())):
+            make_folder(path.parent)
+        return totals
+
+    def _streams(self) -> list[tuple[Path, Path]]:
+        """Return the staged and the final path of each video and of the data."""
+        number, keys = self.num_episodes, video_keys(self._manifest.features)
+        videos = [(self._episode.staged_video(key), self._layout.video(key, number)) for key in keys]
+        return [*videos, (self._layout.staging / "data.parquet", self._layout.data(number))]
+
+    def _publish_files(self, totals: Totals) -> None:
+        for staged, path in self._streams():
+            move(staged, path)
+        if totals.tasks != self._totals.tasks:
+            move(self._layout.staging / "tasks.parquet", self._layout.tasks)
+        os.replace(self._layout.staging / "row.parquet", self._layout.row(self.num_episodes))  # the commit
+
+    def _publish_summary(self, episode: int) -> None:
+        sync_folder(self._layout.row(episode).parent)
+        os.replace(self._layout.staging / "info.json", self._layout.info)
+        os.replace(self._layout.staging / "stats.json", self._layout.stats)
+        sync_folder(self._layout.info.parent)
+
+    def _abandoned(self, error: Exception) -> HandrailError:
+        """Drop the episode that could not be saved and return the error that says so."""
+        number, saved = self.num_episodes, f"the {self.num_episodes} saved episodes are whole"
+        with contextlib.suppress(OSError):  # the next save overwrites leftovers, `repair` removes them
+            for _, path in self._streams():
+                remove(path)
+            self._discard()
+        self._unusable = ""
+        why = error if isinstance(error, HandrailError) else reason(error)
+        return HandrailError(f"episode {number} in {str(self.root)!r} could not be saved: {why}; {saved}")
+
+    def _discard(self) -> None:
+        self._episode.cancel()
+        self._episode = OpenEpisode(self._layout, self._manifest)
+        clear_staging(self._layout)
+
+    def _check_usable(self) -> None:
+        if self._unusable:
+            why = f"{self._unusable}: open the dataset again with --resume"
+            raise HandrailError(f"writer of {str(self.root)!r} {why}")

@@ -1,0 +1,241 @@
+"""Shares of successes and how they differ: intervals and exact tests, after Newcombe 1998.
+
+Newcombe, "Interval estimation for the difference between independent proportions" (Statistics in Medicine 17,
+873–890) and "Improved confidence intervals for the difference between binomial proportions based on paired
+data" (2635–2650), method 10 of each.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import stats
+
+from handrail.controllers.arrays import FloatArray, IntArray
+from handrail.datasets.statistics.paired import paired_success, wilson
+from handrail.datasets.statistics.resampling import Interval
+
+LEVEL = 0.05  # below which a p that is adjusted for their number counts
+POWER = 0.8
+
+
+@dataclass(frozen=True)
+class ShareDifference:
+    """How two shares differ, first minus second.
+
+    Attributes:
+        estimate: Of the difference, −1 to 1.
+        interval: 95 %, Newcombe's method 10; trials of one scene count for as many as they are worth.
+        p: Two-sided, exact: McNemar's where paired, else Boschloo's; trials of one scene are one observation.
+        paired: Whether the same trials were made under both.
+        trials: Pairs, or trials of the first and of the second.
+        error: Standard error of the difference if there were none, of shares that are never quite 0 or 1.
+    """
+
+    estimate: float
+    interval: Interval
+    p: float
+    paired: bool
+    trials: tuple[int, ...]
+    error: float
+
+    def detectable(self, tests: int = 1) -> float:
+        """Return the difference that would be seen as one in 80 % of such experiments.
+
+        Args:
+            tests: Number of comparisons that the p is adjusted for.
+        """
+        return min(1.0, reach(tests) * self.error)
+
+
+def reach(tests: int = 1, freedom: float = np.inf) -> float:
+    """Return how many standard errors a difference has to have, to be detected in 80 % of experiments.
+
+    t_{1 − α/2m} + t_{0.8}, of the t distribution; m tests, of which Holm gives the smallest p the level α/m.
+
+    Args:
+        tests: m.
+        freedom: Degrees of freedom with which the standard error is known; ∞ is the normal distribution.
+    """
+    return float(stats.t.ppf(1.0 - 0.5 * LEVEL / max(1, tests), freedom) + stats.t.ppf(POWER, freedom))
+
+
+def independent_trials(values: FloatArray, scenes: Sequence[int]) -> float:
+    """Return how many independent trials those are worth of which several met the same scene.
+
+    n = M Var / Var_scenes, within the number of scenes J and that of trials M, with the variance of a mean of
+    trials that have nothing in common, and that of one whose scenes are drawn with all their trials:
+    J / (J − 1) Σ_j (Σ_{i in j} (y_i − ȳ))² / M².
+
+    Args:
+        values: y, `(M,)`.
+        scenes: Which scene each met, `(M,)`.
+    """
+    _, owner = np.unique(np.asarray(scenes), return_inverse=True)
+    away, most, least = values - values.mean(), len(values), int(owner.max()) + 1
+    alone = float(away @ away) * most / max(1, most - 1)
+    together = float((np.bincount(owner, weights=away) ** 2).sum()) * least / max(1, least - 1)
+    if not alone or least < 2:
+        return float(least)
+    return float(np.clip(most * alone / max(together, 1e-12), least, most))
+
+
+def paired_shares(
+    first: Sequence[bool], second: Sequence[bool], scenes: Sequence[int] | None = None
+) -> ShareDifference:
+    """Compare successes of the same trials under two conditions.
+
+    Args:
+        first: `(N,)`.
+        second: `(N,)`.
+        scenes: What pairs may have in common, `(N,)`: for the interval and the error those of a scene count
+            for as many as they are worth, and the test turns them together; None where each is for itself.
+
+    Raises:
+        HandrailError: The sizes differ, or there are none.
+    """
+    found = paired_success(np.asarray(first), np.asarray(second))
+    one, other = np.asarray(first, bool), np.asarray(second, bool)
+    both, neither = int(np.sum(one & other)), int(np.sum(~one & ~other))
+    worth, p = 1.0, found.p_mcnemar
+    if scenes is not None:
+        worth = independent_trials(one.astype(float) - other, scenes) / found.pairs
+        p = mcnemar_by_scene(one.astype(int) - other, scenes)
+    cells = [worth * count for count in (both, found.only_first, found.only_second, neither)]
+    pairs = sum(cells)
+    discordant = (cells[1] + cells[2] + 2.0) / (pairs + 4.0)
+    return ShareDifference(
+        estimate=(found.only_first - found.only_second) / found.pairs,
+        interval=newcombe_paired(*cells),
+        p=p,
+        paired=True,
+        trials=(found.pairs,),
+        error=float(np.sqrt(discordant / pairs)),
+    )
+
+
+def mcnemar_by_scene(differences: IntArray, scenes: Sequence[int]) -> float:
+    """Return P(|Σ_j ± d_j| ≥ |Σ_j d_j|), d_j the sum over the pairs of scene j, signs fair and independent.
+
+    Under the null hypothesis the conditions may be exchanged in a scene, for all its pairs at once. Exact;
+    McNemar's exact test where no scene repeats.
+
+    Args:
+        differences: Success under the first condition minus that under the second, `(N,)`: −1, 0 or 1.
+        scenes: Which scene each pair met, `(N,)`.
+    """
+    _, owner = np.unique(np.asarray(scenes), return_inverse=True)
+    sums = np.bincount(owner, weights=differences).round().astype(int)
+    chances = np.ones(1)  # of every sum from −Σ |d_j| to Σ |d_j|
+    for size in np.abs(sums[sums != 0]):
+        step = np.zeros(2 * size + 1)
+        step[[0, -1]] = 0.5
+        chances = np.convolve(chances, step)
+    away = np.abs(np.arange(len(chances)) - len(chances) // 2)
+    return min(1.0, float(chances[away >= abs(sums.sum())].sum()))
+
+
+def unpaired_shares(
+    first: Sequence[bool],
+    second: Sequence[bool],
+    scenes: tuple[Sequence[int], Sequence[int]] | None = None,
+) -> ShareDifference:
+    """Compare successes of different trials under two conditions.
+
+    Args:
+        first: `(N,)`.
+        second: `(M,)`.
+        scenes: What the trials of each may have in common, `(N,)` and `(M,)`, as for `paired_shares`.
+
+    Raises:
+        HandrailError: There are none.
+    """
+    one, other = (int(np.sum(first)), len(first)), (int(np.sum(second)), len(second))
+    sides = (first, second) if scenes else ()
+    worth = [float(one[1]), float(other[1])]
+    for place, (values, each) in enumerate(zip(sides, scenes or (), strict=True)):
+        worth[place] = independent_trials(np.asarray(values, float), each)
+    shares = one[0] / one[1], other[0] / other[1]
+    trials = [round(each) for each in worth]
+    hits = [round(share * count) for share, count in zip(shares, trials, strict=True)]
+    table = [hits, [count - hit for count, hit in zip(trials, hits, strict=True)]]
+    share = (one[0] + other[0] + 2) / (one[1] + other[1] + 4)
+    spread = np.sqrt(share * (1 - share) * (1 / worth[0] + 1 / worth[1]))
+    return ShareDifference(
+        estimate=shares[0] - shares[1],
+        interval=newcombe_unpaired(shares[0] * worth[0], worth[0], shares[1] * worth[1], worth[1]),
+        p=float(stats.boschloo_exact(table).pvalue),
+        paired=False,
+        trials=(one[1], other[1]),
+        error=float(spread),
+    )
+
+
+def newcombe_paired(both: float, only_first: float, only_second: float, neither: float) -> Interval:
+    """Return the 95 % interval of the difference of two paired shares (method 10).
+
+    The Wilson intervals of the two shares, combined as squares with their correlation φ̂ taken off; the
+    numerator of φ̂ is brought nearer to zero by n/2 where it is positive.
+
+    Args:
+        both: Pairs that succeeded twice; these numbers need not be whole where pairs count for less than one.
+        only_first: That succeeded under the first condition only.
+        only_second: Under the second only.
+        neither: Under none.
+
+    Raises:
+        HandrailError: There are no pairs.
+    """
+    count = both + only_first + only_second + neither
+    low_1, high_1 = wilson(both + only_first, count)
+    low_2, high_2 = wilson(both + only_second, count)
+    share_1, share_2 = (both + only_first) / count, (both + only_second) / count
+    phi = _correlation(both, only_first, only_second, neither)
+    below, above = (share_1 - low_1, high_2 - share_2), (high_1 - share_1, share_2 - low_2)
+    difference = share_1 - share_2
+    return difference - _combined(*below, phi), difference + _combined(*above, phi)
+
+
+def newcombe_unpaired(successes_1: float, trials_1: float, successes_2: float, trials_2: float) -> Interval:
+    """Return the 95 % interval of the difference of two independent shares (method 10).
+
+    Raises:
+        HandrailError: No trials, or more successes than trials.
+    """
+    low_1, high_1 = wilson(successes_1, trials_1)
+    low_2, high_2 = wilson(successes_2, trials_2)
+    share_1, share_2 = successes_1 / trials_1, successes_2 / trials_2
+    difference = share_1 - share_2
+    return (
+        difference - _combined(share_1 - low_1, high_2 - share_2, 0.0),
+        difference + _combined(high_1 - share_1, share_2 - low_2, 0.0),
+    )
+
+
+def holm(p: Sequence[float]) -> list[float]:
+    """Return p-values adjusted for there being several (Holm 1979): p'_(i) = max_{j ≤ i} (m − j + 1) p_(j).
+
+    Args:
+        p: `(m,)`.
+
+    Returns:
+        In the same order, at most 1.
+    """
+    order = np.argsort(p)
+    steps = np.arange(len(p), 0, -1) * np.asarray(p, float)[order]
+    adjusted = np.empty(len(p))
+    adjusted[order] = np.minimum(1.0, np.maximum.accumulate(steps))
+    return adjusted.tolist()
+
+
+def _correlation(both: float, only_first: float, only_second: float, neither: float) -> float:
+    rows = (both + only_first) * (only_second + neither) * (both + only_second) * (only_first + neither)
+    if not rows:
+        return 0.0
+    half = 0.5 * (both + only_first + only_second + neither)
+    product = both * neither - only_first * only_second
+    return (max(product - half, 0.0) if product > 0 else product) / float(np.sqrt(rows))
+
+
+def _combined(one: float, other: float, phi: float) -> float:
+    return float(np.sqrt(max(0.0, one**2 - 2.0 * phi * one * other + other**2)))

@@ -1,0 +1,77 @@
+"""One writer a folder, such as a dataset: an advisory lock that dies with its process."""
+
+import contextlib
+import fcntl
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from typing import BinaryIO
+
+from handrail.controllers.errors import HandrailError
+from handrail.datasets.storage.atomic import make_folder
+
+LOCK_NAME = "lock"
+
+
+class DatasetLock:
+    """The right to change one dataset, held from construction to `release`."""
+
+    def __init__(self, staging: Path, thing: str = "dataset", holder: str = "recorder"):
+        """Take the lock.
+
+        Args:
+            staging: The dataset's staging folder; created if missing.
+            thing: What is locked, in words.
+            holder: Who else may hold it, in words.
+
+        Raises:
+            HandrailError: Another process, or another writer in this one, holds it.
+            OSError: The folder cannot be written.
+        """
+        self._path = staging / LOCK_NAME
+        self._thing, self._holder = thing, holder
+        self._file: BinaryIO | None = self._acquire()
+
+    def release(self) -> None:
+        """Give the lock back and remove the staging folder if nothing else is in it; safe to call twice."""
+        if self._file is None:
+            return
+        file, self._file = self._file, None
+        try:
+            self._path.unlink(missing_ok=True)
+            with contextlib.suppress(OSError):  # not empty: somebody else's already, or worth a look
+                self._path.parent.rmdir()
+        finally:
+            file.close()
+
+    @contextlib.contextmanager
+    def released_on_error(self) -> Iterator[None]:
+        """Give the lock back if what is done under it fails."""
+        try:
+            yield
+        except BaseException:
+            self.release()
+            raise
+
+    def _acquire(self) -> BinaryIO:
+        while True:
+            make_folder(self._path.parent)
+            file = open(self._path, "ab")  # noqa: SIM115 - held open for as long as the lock is
+            try:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except OSError as error:
+                file.close()
+                raise HandrailError(
+                    f"{self._thing} {str(self._path.parent.parent)!r} is being written by another"
+                    f" {self._holder}: expected to be the only one; close the other, or choose another folder"
+                ) from error
+            if self._is_current(file):
+                return file
+            file.close()
+
+    def _is_current(self, file: BinaryIO) -> bool:
+        """Return whether the locked file is still the one with the lock's name (its owner removes it)."""
+        try:
+            return os.path.samestat(os.fstat(file.fileno()), self._path.stat())
+        except FileNotFoundError:
+            return False

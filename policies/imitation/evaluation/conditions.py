@@ -1,0 +1,256 @@
+"""What is evaluated: a checkpoint under a condition, which together are an arm."""
+
+import hashlib
+import itertools
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from handrail.collect.config import TASKS
+from handrail.collect.operators.modes import find_mode
+from handrail.collect.perturbations.perturbations import Perturbation
+from handrail.controllers.entries import is_count
+from handrail.controllers.errors import HandrailError
+from handrail.controllers.robot.description import robot_names
+from handrail.datasets.storage.strict_json import load_json
+from handrail.policies.imitation.evaluation.config import EvaluateConfig
+from handrail.policies.imitation.evaluation.features import pictures, place_of
+from handrail.policies.imitation.interface.checkpoint import NAME, PolicyMeta, model_folder, read_meta
+from handrail.policies.imitation.interface.interface import PolicyInterface
+from handrail.policies.imitation.interface.trust import check_policy_folder
+
+UNPROTECTED = ("direct", "split")  # completions of modes that keep nothing but the joints' limits
+_PART = 2**20  # bytes
+
+
+@dataclass(frozen=True)
+class Checkpoint:
+    """A trained policy on the disk.
+
+    Attributes:
+        folder: its files.
+        meta: what it says of itself.
+        interface: what it reads and writes; None if that is what was recorded.
+        pictures: height and width of what it sees, by camera [px].
+        movers: how many moving obstacles it knows of.
+        digest: of all its files.
+    """
+
+    folder: Path
+    meta: PolicyMeta
+    interface: PolicyInterface | None
+    pictures: Mapping[str, tuple[int, int]]
+    movers: int
+    digest: str
+
+    @property
+    def intent_mode(self) -> str:
+        """Teleop mode whose intents it decides on; empty for joint velocities."""
+        return self.meta.mode if self.meta.actions == "intent" else ""
+
+    @property
+    def key(self) -> tuple[int, int]:
+        """Draw of the dataset and training seed."""
+        return self.meta.dataset_draw, self.meta.training_seed
+
+
+@dataclass(frozen=True)
+class Arm:
+    """A checkpoint under a condition.
+
+    Attributes:
+        checkpoint: which policy.
+        protection: what stands between it and the robot: `none`, `mpc`, `filter`, or a mode's `cbf`.
+        perturbation: what disturbs.
+        time_limit: after which a rollout is given up [s]; the task's own when 0.
+        label: what it is called.
+    """
+
+    checkpoint: Checkpoint
+    protection: str
+    perturbation: Perturbation
+    time_limit: float
+    label: str
+
+    @property
+    def conditions(self) -> dict[str, str]:
+        """What all rollouts of this label have in common."""
+        meta = self.checkpoint.meta
+        return {
+            **{name: str(getattr(meta, name)) for name in ("environment", "robot", "mode", "fps", "actions")},
+            "protection": self.protection,
+            "perturbation": self.perturbation.text,
+            "time_limit": f"{self.time_limit:g}",
+        }
+
+
+def read_checkpoint(folder: Path, config: EvaluateConfig) -> Checkpoint:
+    """Return the checkpoint in a folder, or the last one of a training run's folder.
+
+    Args:
+        folder: of the checkpoint.
+        config: says what plain LeRobot's do not, their rate and perhaps their task.
+
+    Raises:
+        HandrailError: there is none, it could do harm, or Handrail has no task for it.
+    """
+    place = model_folder(folder)
+    settings = check_policy_folder(place)
+    where = f"--policy {place}"
+    interface, meta = (
+        read_meta(place) if (place / NAME).is_file() else (None, _plain(place, settings, config))
+    )
+    if config.task and meta.environment in TASKS and meta.environment != config.task:
+        raise HandrailError(f"{where}: expected one trained for {config.task}, got {meta.environment!r}")
+    if interface is not None:
+        _check_task(meta.environment, where)
+        movers = len({n.split(".")[0] for n in interface.environment_names if n.startswith("mover_")})
+    else:
+        robot = meta.robot if meta.robot in robot_names() else ""
+        known = place_of(
+            settings, where, robot, meta.environment if meta.environment in TASKS else config.task
+        )
+        meta, movers = replace(meta, environment=known.task, robot=known.robot), known.movers
+    return Checkpoint(place, meta, interface, pictures(settings, where), movers, _digest(place))
+
+
+def _check_task(task: str, where: str) -> None:
+    if task not in TASKS:
+        raise HandrailError(f"{where}: expected one trained for one of {', '.join(TASKS)}, got {task!r}")
+
+
+def _plain(place: Path, settings: Mapping[str, Any], config: EvaluateConfig) -> PolicyMeta:
+    """Return what is known of a policy of plain `lerobot-train`."""
+    path = place / "train_config.json"
+    training = load_json(path, "settings of LeRobot") if path.is_file() else {}
+    seed = training.get("seed") if isinstance(training, dict) else None
+    step = place.parent.name
+    return PolicyMeta(
+        environment="",
+        mode="",
+        robot="",
+        fps=config.fps,
+        actions="recorded",
+        training_seed=seed if is_count(seed) else 0,
+        dataset_draw=0,
+        trained_on={},
+        policy=settings["type"],
+        steps=int(step) if step.isdecimal() else 0,
+    )
+
+
+def arms(config: EvaluateConfig, refused: list[str] | None = None) -> tuple[Arm, ...]:
+    """Return every checkpoint under every condition of the settings.
+
+    Args:
+        config: of the evaluation.
+        refused: takes why a checkpoint is none, or cannot be under a condition; without it that is an error.
+
+    Raises:
+        HandrailError: there is no arm, they are for several tasks, or two are one and the same policy.
+    """
+    why: list[str] = []
+    checkpoints = [
+        each
+        for folder in config.folders
+        if (each := _tried(why, lambda f=folder: read_checkpoint(f, config)))
+    ]
+    environments = {checkpoint.meta.environment for checkpoint in checkpoints}
+    if len(environments) > 1:
+        raise HandrailError(
+            f"--policy: expected policies for one task, got {', '.join(sorted(environments))}"
+        )
+    conditions = itertools.product(config.perturbations, config.protections, checkpoints)
+    found: dict[tuple[str, tuple[int, int]], Arm] = {}
+    for perturbation, protection, checkpoint in conditions:
+        arm = _tried(why, lambda: _arm(checkpoint, protection, perturbation, config))  # noqa: B023
+        if arm is None:
+            continue
+        before = found.setdefault((arm.label, checkpoint.key), arm)
+        if before != arm:
+            raise HandrailError(
+                f"--policy {checkpoint.folder}: expected each dataset draw and training seed once, but arm "
+                f"{arm.label!r} has {checkpoint.key} already, {before.checkpoint.folder}; give it a --label"
+            )
+    if why and (refused is None or not found):
+        raise HandrailError("; ".join(dict.fromkeys(why)))
+    if refused is not None:
+        refused += dict.fromkeys(why)
+    return tuple(found.values())
+
+
+def _tried[Value](refused: list[str], make: Callable[[], Value]) -> Value | None:
+    try:
+        return make()
+    except HandrailError as error:
+        refused.append(str(error))
+        return None
+
+
+def _arm(checkpoint: Checkpoint, protection: str, perturbation: Perturbation, config: EvaluateConfig) -> Arm:
+    own = _own(checkpoint)
+    chosen = own if protection == "own" else protection
+    if chosen in ("mpc", "filter") and chosen != own and not _fits(checkpoint, chosen):
+        raise HandrailError(
+            f"--protection {protection}: expected a policy that commands every joint, or own or none; "
+            f"{checkpoint.folder} decides on the intent of mode {checkpoint.meta.mode}"
+        )
+    words = [config.label or _name(checkpoint), _protected(chosen, own), perturbation.words]
+    return Arm(checkpoint, chosen, perturbation, config.time_limit, " ".join(filter(None, words)))
+
+
+def _own(checkpoint: Checkpoint) -> str:
+    """Return the protection that a policy's actions have by themselves."""
+    if not checkpoint.intent_mode:
+        return "none"
+    completion = find_mode(checkpoint.intent_mode).controller
+    return "none" if completion in UNPROTECTED else completion
+
+
+def _fits(checkpoint: Checkpoint, protection: str) -> bool:
+    """Return whether a controller can stand in for a policy's own.
+
+    The filter completes nothing, so it needs every joint; so does the MPC where joints that nobody commands
+    are meant to rest.
+    """
+    if not checkpoint.intent_mode:
+        return True
+    completes = find_mode(checkpoint.intent_mode).controller != "direct"
+    return (protection == "mpc" and completes) or _commands_joints(checkpoint.interface)
+
+
+def _commands_joints(interface: PolicyInterface | None) -> bool:
+    """Return whether every mask leaves nothing over: all joints, or the base's twist and the arm's joints."""
+    if interface is None:
+        return True
+    names, masks = interface.channels, np.array(interface.masks, bool)  # (k, m)
+    base, joint = (np.array([name.startswith(group) for name in names]) for group in ("base.", "joint."))
+    joints = masks[:, joint]  # (k, n), the base's first
+    driven = masks[:, base].all(axis=1) & joints[:, base.sum() :].all(axis=1) & base.any()
+    return bool(np.all(joints.all(axis=1) | driven))
+
+
+def _name(checkpoint: Checkpoint) -> str:
+    meta = checkpoint.meta
+    return (meta.mode or meta.policy) + (" intent" if checkpoint.intent_mode else "")
+
+
+def _protected(chosen: str, own: str) -> str:
+    if chosen == own:
+        return ""
+    return "unprotected" if chosen == "none" else chosen
+
+
+def _digest(folder: Path) -> str:
+    """Return a short digest of a folder's files."""
+    digest = hashlib.sha256()
+    for path in sorted(folder.iterdir()):
+        if path.is_file():
+            digest.update(path.name.encode())
+            with open(path, "rb") as file:
+                while part := file.read(_PART):
+                    digest.update(part)
+    return digest.hexdigest()[:16]

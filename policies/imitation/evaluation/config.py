@@ -1,0 +1,127 @@
+"""What `handrail-evaluate` runs, as typed settings; light to import."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from handrail.collect.config import FPS_RANGE, MOST_TIME, TASKS
+from handrail.collect.flags import only_one
+from handrail.collect.perturbations.perturbations import Perturbation
+from handrail.controllers.errors import HandrailError, unknown_name
+from handrail.datasets.lists import Names, Words
+
+PROTECTIONS = ("own", "none", "mpc", "filter")
+MOST_WORKERS = 64
+MOST_EPISODES = 1_000_000
+FIRST_SEED = 2**32  # recordings use the numbers below it
+
+
+@dataclass(frozen=True)
+class EvaluateConfig:
+    """Run trained policies on declared seeds, with and without the MPC's protection, undisturbed or not."""
+
+    policy: Words = ()
+    """The same as FOLDER …"""
+    json: str = ""
+    """Write every rollout to this file; what is in it already is not run again."""
+    episodes: int = 100
+    """Rollouts of each policy under each condition."""
+    seed: int = 0
+    """Of the evaluation: which beginnings and disturbances; never those of a recording."""
+    protection: Names = "own"
+    """What stands between policy and robot, one or more: own (an intent's own controller; none for joint
+    velocities), none, mpc, filter."""
+    perturbation: Names = "none"
+    """What disturbs, one or more: none, push, shift, delay, with a size such as push:2 or delay:5, joined
+    by + to have several at once."""
+    label: str = ""
+    """Name of the arm; the teleop mode, and what is special about it, when empty."""
+    task: str = ""
+    """Of policies that do not say it, such as lerobot-train's: drawer, pick_place, reach or tray."""
+    fps: int = 20
+    """Decisions a second of such policies: the rate of their dataset [Hz]."""
+    time_limit: float = 0.0
+    """Time after which a rollout is given up [s]; the task's own when 0."""
+    workers: int = 1
+    """Processes that share the rollouts."""
+    video: str = ""
+    """Also film the first rollout to this .mp4 file (needs OpenGL)."""
+    checkpoints: Annotated[tyro.conf.Positional[Words], tyro.conf.arg(metavar="FOLDER [FOLDER …]")] = ()
+    """Checkpoint folders; several training seeds of one arm add up."""
+
+    @property
+    def folders(self) -> tuple[Path, ...]:
+        """The checkpoint folders.
+
+        Raises:
+            HandrailError: they are given in two ways.
+        """
+        given = only_one(self.checkpoints, self.policy, "--policy")
+        return tuple(Path(folder).expanduser() for folder in given)
+
+    @property
+    def file(self) -> Path:
+        """Where the rollouts are written."""
+        return Path(self.json).expanduser()
+
+    @property
+    def protections(self) -> tuple[str, ...]:
+        """The protections asked for."""
+        return tuple(name.strip() for name in self.protection.split(",") if name.strip())
+
+    @property
+    def perturbations(self) -> tuple[Perturbation, ...]:
+        """The perturbations asked for, each a condition of its own.
+
+        Raises:
+            HandrailError: one is none of those that there are.
+        """
+        return tuple(Perturbation.parse(text) for text in self.perturbation.split(",") if text.strip())
+
+    @property
+    def seeds(self) -> tuple[int, ...]:
+        """The seeds of the episodes: `2³² + 10⁶ seed + i`, i from 0; those of recordings are below 2³²."""
+        first = FIRST_SEED + MOST_EPISODES * self.seed
+        return tuple(range(first, first + self.episodes))
+
+    def check(self) -> None:
+        """Check what can be checked without loading anything heavy.
+
+        Raises:
+            HandrailError: one setting is wrong; the message says what may be chosen.
+        """
+        for name, least, most in (
+            ("episodes", 1, MOST_EPISODES),
+            ("seed", 0, 10**9),
+            ("workers", 1, MOST_WORKERS),
+            ("fps", *FPS_RANGE),
+        ):
+            if not least <= getattr(self, name) <= most:
+                raise HandrailError(
+                    f"--{name} {getattr(self, name)}: expected a whole number from {least} to {most}"
+                )
+        if self.task and self.task not in TASKS:
+            raise unknown_name("task", self.task, TASKS)
+        for name in self.protections:
+            if name not in PROTECTIONS:
+                raise unknown_name("protection", name, PROTECTIONS)
+        for flag, given in (("protection", self.protections), ("perturbation", self.perturbations)):
+            if not given or len(set(given)) != len(given):
+                raise HandrailError(f"--{flag} {getattr(self, flag)}: expected one or more, each once")
+        if not 0.0 <= self.time_limit <= MOST_TIME:
+            raise HandrailError(
+                f"--time_limit {self.time_limit}: expected 0 (the task's own) to {MOST_TIME} s"
+            )
+        if not self.folders:
+            raise HandrailError(
+                "policy: expected one checkpoint folder or more, such as outputs/act; got none"
+            )
+        self._check_files()
+
+    def _check_files(self) -> None:
+        for flag, path, ending in (("json", self.json, ".json"), ("video", self.video, ".mp4")):
+            file = Path(path).expanduser()
+            if path and not (path.endswith(ending) and file.absolute().parent.is_dir()):
+                raise HandrailError(f"--{flag} {path}: expected a {ending} file in an existing folder")

@@ -1,0 +1,103 @@
+"""The file that an evaluation writes, `handrail.evaluations/1`, and goes on from."""
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from handrail.controllers.errors import HandrailError
+from handrail.datasets.comparison.evaluations import FORMAT, read_evaluations
+from handrail.datasets.storage.atomic import explained, write_whole
+from handrail.datasets.storage.strict_json import read_json
+from handrail.policies.imitation.evaluation.conditions import Arm, Checkpoint
+
+
+class EvaluationFile:
+    """The rollouts of all arms, in memory and on the disk.
+
+    Beside what `handrail-compare` reads it says of each arm under which `conditions` it ran, and of each
+    policy which `checkpoint` it was, so that nothing of another kind is added to it later.
+
+    Args:
+        path: of the file; None keeps everything in memory.
+
+    Raises:
+        HandrailError: there is another kind of file, or it cannot be read.
+    """
+
+    def __init__(self, path: Path | None) -> None:
+        self._path = path
+        self.content: dict[str, Any] = {"format": FORMAT, "conditions": {}, "arms": {}}
+        if path is not None and path.exists():
+            read_evaluations([path])
+            self.content |= read_json(path)
+            if not isinstance(self.content["conditions"], dict):
+                raise HandrailError(
+                    f"--json {path}: expected conditions by arm, got {self.content['conditions']!r:.80}"
+                )
+
+    def open(self, arms: Sequence[Arm]) -> None:
+        """Check that arms fit what is there.
+
+        Raises:
+            HandrailError: the file is of another task, an arm ran under other conditions, or a policy is
+                another.
+        """
+        task = self.content.setdefault("task", arms[0].checkpoint.meta.environment)
+        for arm in arms:
+            where = f"--json {self._path}: arm {arm.label!r}"
+            if arm.checkpoint.meta.environment != task:
+                raise HandrailError(f"{where}: expected task {task}, got {arm.checkpoint.meta.environment}")
+            before = self.content["conditions"].get(arm.label)
+            if arm.label in self.content["arms"] and before != arm.conditions:
+                raise HandrailError(
+                    f"{where}: expected {before}, got {arm.conditions}; choose another --label or --json"
+                )
+            entry = self._entry(arm)
+            if entry and entry.get("checkpoint") != arm.checkpoint.digest:
+                raise HandrailError(
+                    f"{where}: has another policy with dataset draw and training seed {arm.checkpoint.key} "
+                    f"than {arm.checkpoint.folder}; choose another --label or --json"
+                )
+
+    def done(self, arm: Arm) -> set[int]:
+        """Return the seeds that have been run."""
+        return {row["seed"] for row in (self._entry(arm) or {"rollouts": ()})["rollouts"]}
+
+    def add(self, arm: Arm, row: dict[str, Any]) -> None:
+        """Add a rollout; they are kept in the order of their seeds."""
+        entry = self._entry(arm)
+        if entry is None:
+            entry = _new_entry(arm.checkpoint)
+            self.content["conditions"][arm.label] = arm.conditions
+            self.content["arms"].setdefault(arm.label, []).append(entry)
+        entry["rollouts"].append(row)
+        entry["rollouts"].sort(key=lambda rollout: rollout["seed"])
+
+    def save(self) -> None:
+        """Write everything, so that a reader sees the old file or the new one, whole.
+
+        Raises:
+            HandrailError: the file cannot be written.
+        """
+        if self._path is None or not self.content["arms"]:
+            return
+        with explained(f"--json {self._path}"):
+            write_whole(self._path, (json.dumps(self.content, indent=1, allow_nan=False) + "\n").encode())
+
+    def _entry(self, arm: Arm) -> dict[str, Any] | None:
+        for entry in self.content["arms"].get(arm.label, ()):
+            if (int(entry.get("dataset_draw", 0)), int(entry["training_seed"])) == arm.checkpoint.key:
+                return entry
+        return None
+
+
+def _new_entry(checkpoint: Checkpoint) -> dict[str, Any]:
+    draw, seed = checkpoint.key
+    return {
+        "training_seed": seed,
+        "dataset_draw": draw,
+        "trained_on": dict(checkpoint.meta.trained_on),
+        "checkpoint": checkpoint.digest,
+        "rollouts": [],
+    }

@@ -1,0 +1,122 @@
+"""A trained policy as an operator: it sees what was recorded and asks for what it learned."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any, Protocol
+
+import numpy as np
+
+from handrail.collect.operators.operator import View
+from handrail.controllers.arrays import FloatArray
+from handrail.controllers.interface.channels import Channels
+from handrail.controllers.interface.intent import Intent
+
+_CLOSED = 0.5  # a gripper command beyond it closes
+
+
+class Interface(Protocol):
+    """How a policy's numbers come from and go to what Handrail records."""
+
+    @property
+    def action_names(self) -> tuple[str, ...]:
+        """Names of the numbers in an action, (a,)."""
+        ...
+
+    def observe(self, state: FloatArray, environment: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return what the policy sees of an observation."""
+        ...
+
+    def decode(self, action: FloatArray, state: FloatArray) -> Intent:
+        """Return what an action asks for."""
+        ...
+
+
+class Policy(Protocol):
+    """A trained policy."""
+
+    @property
+    def interface(self) -> Any:
+        """How it is spoken to: an `Interface`; None if it reads and writes what is recorded."""
+        ...
+
+    def reset(self) -> None:
+        """Forget the episode before."""
+        ...
+
+    def act(self, state: FloatArray, environment: FloatArray, images: Mapping[str, np.ndarray]) -> FloatArray:
+        """Return the action, (a,)."""
+        ...
+
+
+class AsRecorded:
+    """Observations and commanded joint velocities as the dataset has them; an interface.
+
+    Args:
+        channels: of the robot.
+    """
+
+    def __init__(self, channels: Channels) -> None:
+        self._channels = channels
+
+    @property
+    def action_names(self) -> tuple[str, ...]:
+        """The joints' velocities and the gripper, (n + 1,)."""
+        return (*self._channels.joints, "gripper")
+
+    def observe(self, state: FloatArray, environment: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the observation."""
+        return state, environment
+
+    def decode(self, action: FloatArray, state: FloatArray) -> Intent:
+        """Return an intent on every joint."""
+        values = np.zeros(self._channels.size)
+        values[self._channels.joint_slice] = action[:-1]
+        return Intent(values, self._channels.mask("joint"), gripper=float(action[-1] > _CLOSED))
+
+
+class PolicyOperator:
+    """Lets a policy steer; an operator.
+
+    An action of another size, or one that is not finite, becomes an intent that no controller accepts: the
+    robot brakes.
+
+    Args:
+        policy: whoever was trained.
+        channels: of the robot.
+        mode: name of the teleop mode that the intents carry.
+
+    Attributes:
+        malformed: unusable actions of this episode so far.
+    """
+
+    def __init__(self, policy: Policy, channels: Channels, mode: str) -> None:
+        self._policy = policy
+        self._interface: Interface = policy.interface or AsRecorded(channels)
+        self._channels = channels
+        self._mode = mode
+        self.malformed = 0
+
+    @property
+    def name(self) -> str:
+        """Who steers."""
+        return "policy"
+
+    def reset(self, view: View, rng: np.random.Generator) -> None:
+        """Begin an episode."""
+        self._policy.reset()
+        self.malformed = 0
+
+    def act(self, view: View) -> Intent:
+        """Return the intent now."""
+        seen = view.observation
+        observed = self._interface.observe(seen["agent_pos"], seen["environment_state"])
+        action = np.asarray(self._policy.act(*observed, seen.get("pixels", {})))
+        if action.shape != (len(self._interface.action_names),) or not np.all(np.isfinite(action)):
+            self.malformed += 1
+            return self._unusable(view.state.time)
+        intent = self._interface.decode(action, seen["agent_pos"])
+        return replace(intent, mode=self._mode, time=view.state.time)
+
+    def _unusable(self, time: float) -> Intent:
+        size = self._channels.size
+        return Intent(np.full(size, np.nan), np.ones(size, bool), mode=self._mode, time=time)

@@ -1,0 +1,138 @@
+"""One rollout of a trained policy through the one session loop."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from handrail.collect.config import SessionConfig
+from handrail.collect.envs.env import HandrailEnv
+from handrail.collect.perturbations.delayed import DelayedOperator
+from handrail.collect.perturbations.push import Pusher
+from handrail.collect.perturbations.shift import ShiftedTask
+from handrail.collect.session.build import build_env, build_task
+from handrail.collect.session.session import Observer, Outcome, Session
+from handrail.controllers.errors import HandrailError
+from handrail.controllers.interface.channels import Channels
+from handrail.controllers.interface.controller import Controller
+from handrail.datasets.quality.safety import contacts_begun
+from handrail.datasets.recording.frames import Moment
+from handrail.policies.imitation.evaluation.conditions import Arm
+from handrail.policies.imitation.evaluation.operator import Policy, PolicyOperator
+from handrail.policies.imitation.evaluation.protection import build_protection
+from handrail.policies.imitation.evaluation.torch_state import one_thread, repeatable
+
+Load = Callable[[Path], Policy]
+Row = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Rollout:
+    """What to run.
+
+    Attributes:
+        arm: policy and condition.
+        seed: of the episode.
+    """
+
+    arm: Arm
+    seed: int
+
+
+def run_rollout(
+    rollout: Rollout,
+    load: Load,
+    observers: Sequence[Observer] = (),
+    render: tuple[int, int] | bool = False,
+) -> Row:
+    """Run a policy once and return how it went, as an evaluation file has it.
+
+    Args:
+        rollout: what to run.
+        load: reads the policy of a folder.
+        observers: shown every moment.
+        render: height and width of good-looking pictures that the environment draws [px], if it does.
+    """
+    arm = rollout.arm
+    env = _env(_session_config(arm), arm.checkpoint.meta.fps, arm.perturbation.shift, render)
+    controller = _controller(arm.protection, arm.checkpoint.intent_mode, arm.checkpoint.meta.environment, env)
+    policy = _policy(arm.checkpoint.folder, arm.checkpoint.digest, load)
+    with one_thread(), repeatable(rollout.seed):
+        operator = PolicyOperator(policy, Channels.of(env.model.description), arm.checkpoint.meta.mode)
+        perturbation, watch = arm.perturbation, _Watch()
+        late = DelayedOperator(operator, perturbation.delay)
+        pushers = (Pusher(perturbation.push),) if perturbation.push else ()
+        session = Session(env, controller, late, (watch, *observers), disturbances=pushers)
+        outcome = session.run(rollout.seed)
+    return _row(outcome, watch, operator.malformed)
+
+
+def _session_config(arm: Arm) -> SessionConfig:
+    meta, pictures = arm.checkpoint.meta, arm.checkpoint.pictures
+    sizes = {size for picture in pictures.values() for size in picture} or {128}
+    if len(sizes) > 1:
+        raise HandrailError(f"{arm.checkpoint.folder}: expected square pictures of one size, got {pictures}")
+    return SessionConfig(
+        task=meta.environment,
+        robot=meta.robot,
+        moving_obstacles=arm.checkpoint.movers,
+        cameras=",".join(pictures),
+        image_size=sizes.pop(),
+        time_limit=arm.time_limit,
+    )
+
+
+@lru_cache(maxsize=8)
+def _env(config: SessionConfig, fps: int, shift: float, render: tuple[int, int] | bool) -> HandrailEnv:
+    """Return an environment, built once a process."""
+    task = build_task(config)
+    return build_env(config, fps, render, ShiftedTask(task, shift) if shift else task)
+
+
+@lru_cache(maxsize=8)
+def _controller(protection: str, mode: str, task: str, env: HandrailEnv) -> Controller:
+    """Return a controller, built once a process."""
+    return build_protection(protection, mode, task, env.model, env.fps)
+
+
+@lru_cache(maxsize=4)
+def _policy(folder: Path, digest: str, load: Load) -> Policy:
+    """Return a policy, read once a process."""
+    return load(folder)
+
+
+class _Watch:
+    """Counts contacts along a rollout; an observer."""
+
+    def begin(self, env: HandrailEnv, seed: int) -> None:
+        """Begin."""
+        self.contacts: list[int] = []
+
+    def see(self, moment: Moment) -> None:
+        """Note how many there were in the period."""
+        self.contacts.append(moment.contacts)
+
+
+def _row(outcome: Outcome, watch: _Watch, malformed: int) -> Row:
+    contacts = np.array(watch.contacts, float)
+    period = outcome.seconds / outcome.frames
+    row: Row = {
+        "seed": outcome.seed,
+        "success": outcome.success,
+        "contacts": int(contacts_begun(contacts)),
+        "contact_time": round(period * int(np.count_nonzero(contacts)), 6),
+        "length": round(outcome.seconds, 6),
+        "brakes": outcome.brakes,
+        "malformed": malformed,
+        "failure_reason": outcome.failure_reason,
+    }
+    if np.isfinite(outcome.smallest_distance):
+        row["smallest_distance"] = outcome.smallest_distance
+    if outcome.success:
+        row["time_to_success"] = row["length"]
+    parts = {"policy": "operator", "controller": "controller", "environment": "environment"}
+    timing = {name: 1e3 * outcome.spent[part] / outcome.frames for name, part in parts.items()}
+    return row | {"timing": {name: round(value, 3) for name, value in timing.items()}}

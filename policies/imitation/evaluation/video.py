@@ -1,0 +1,43 @@
+"""A rollout as a video."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from handrail.collect.session.film import SIZE, Filmer
+from handrail.collect.simulation.gl import graphics_trouble
+from handrail.datasets.recording.frames import Moment
+from handrail.policies.imitation.evaluation.conditions import arms
+from handrail.policies.imitation.evaluation.config import EvaluateConfig
+from handrail.policies.imitation.evaluation.evaluation import load_trained
+from handrail.policies.imitation.evaluation.rollout import Load, Rollout, run_rollout
+
+
+def film(config: EvaluateConfig, content: Mapping[str, Any], load: Load = load_trained) -> str:
+    """Film the first rollout of the first policy that drove; return why there is no video, or nothing.
+
+    Args:
+        config: what was evaluated.
+        content: of the evaluation file.
+        load: reads the policy of a checkpoint folder.
+    """
+    trouble = graphics_trouble()
+    if trouble:
+        return trouble
+    drove = {entry.get("checkpoint") for entries in content["arms"].values() for entry in entries}
+    arm = next((arm for arm in arms(config, refused=[]) if arm.checkpoint.digest in drove), None)
+    if arm is None:
+        return "no policy drove"
+    rollout = Rollout(arm, config.seeds[0])
+    with Filmer(Path(config.video).expanduser(), arm.checkpoint.meta.fps, arm.label, _words) as filmer:
+        run_rollout(rollout, load, (filmer,), SIZE)
+    return ""
+
+
+def _words(moment: Moment) -> str:
+    """Say when it is, how near things are and how the controller fares."""
+    health = moment.health
+    return (
+        f"{moment.intent.time:5.1f} s     nearest: {health.smallest_distance:.3f} m     "
+        f"contacts: {moment.contacts}     controller: {health.status.value}"
+    )

@@ -1,0 +1,170 @@
+"""What a checkpoint may hold before LeRobot loads it: whoever made it, loading it runs no code of theirs.
+
+LeRobot imports and calls whatever `class` a processor's JSON names, reads what its paths lead to, and some of
+its policies fetch networks and tokenizers, with code, from where their settings say. So here
+
+- a policy and every step of its processors are called by the names under which they are registered,
+- weights and numbers are safetensors in the folder itself, and no file is a link out of it,
+- no setting names a file, a folder or a repository, but for those that are LeRobot's own defaults.
+"""
+
+import contextlib
+import importlib
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import MISSING, fields
+from pathlib import Path, PurePath
+from typing import Any
+
+from handrail.controllers.errors import HandrailError, unknown_name
+from handrail.datasets.storage.strict_json import load_json
+
+CONFIG, WEIGHTS = "config.json", "model.safetensors"
+PROCESSORS = ("policy_preprocessor.json", "policy_postprocessor.json")
+# notes, by which nothing is loaded
+_NOTES = ("pretrained_path", "pretrained_revision", "repo_id", "license", "tags")
+# what names no place: kinds are registered names, the device is the user's, a state file is checked by itself
+_NO_PLACE = ("type", "device", "registry_name", "state_file")
+
+
+def check_links(folder: Path) -> None:
+    """Check that every file in a folder lies in it.
+
+    Raises:
+        HandrailError: one is a link to somewhere else.
+    """
+    home = folder.resolve()
+    for path in sorted(folder.glob("*")):
+        if not path.resolve().is_relative_to(home):
+            raise HandrailError(
+                f"{str(path)!r}: expected a file in the folder, found a link out of it; copy it with cp -rL"
+            )
+
+
+def policy_settings(folder: Path) -> dict[str, Any]:
+    """Return the settings in `config.json`, `type` included, without what is only noted.
+
+    Raises:
+        HandrailError: there are none, or of no registered policy.
+    """
+    path = folder / CONFIG
+    settings = load_json(path, "a policy of LeRobot")
+    if not isinstance(settings, dict):
+        raise HandrailError(f"{str(path)!r}: expected a policy of LeRobot, got {settings!r:.80}")
+    kinds = registered_policies()
+    kind = settings.get("type")
+    if not isinstance(kind, str) or kind not in kinds:
+        raise HandrailError(f"{str(path)!r}: {unknown_name('policy', kind, kinds)}")
+    return {key: value for key, value in settings.items() if key not in _NOTES}
+
+
+def check_policy_folder(folder: Path, asked: Iterable[Any] = ()) -> dict[str, Any]:
+    """Check all that LeRobot would load from a folder; return the settings of the policy.
+
+    Args:
+        folder: `pretrained_model` of a checkpoint.
+        asked: what the user gave themselves; it may name other places.
+
+    Raises:
+        HandrailError: loading it could run somebody's code, or lead somewhere else.
+    """
+    check_links(folder)
+    settings = policy_settings(folder)
+    known = {*_texts(_defaults(registered_policies()[settings["type"]])), *_texts(list(asked))}
+    check_places(folder / CONFIG, settings, known)
+    for name in PROCESSORS:
+        for step in _steps(folder / name, settings["type"]):
+            check_places(folder / name, step, known)
+    if not (folder / WEIGHTS).is_file():
+        raise HandrailError(f"policy {str(folder)!r}: expected weights in {WEIGHTS}, found none")
+    return settings
+
+
+def check_places(path: Path, settings: Any, known: Iterable[str]) -> None:
+    """Check that settings name no other place.
+
+    Raises:
+        HandrailError: one does.
+    """
+    for text in set(_texts(settings)).difference(known):
+        if "/" in text or "\\" in text or (text and _is_there(text)):
+            raise HandrailError(
+                f"{str(path)!r}: expected settings of the policy alone, got {text!r:.80}, which names a file,"
+                " a folder or a repository elsewhere"
+            )
+
+
+def registered_policies() -> Mapping[str, type]:
+    """Return the policies that LeRobot knows, by name; those of installed plugins too."""
+    import lerobot.policies  # noqa: F401  (registers its own)
+    from lerobot.configs.policies import PreTrainedConfig
+    from lerobot.utils.import_utils import register_third_party_plugins
+
+    register_third_party_plugins()
+    return PreTrainedConfig.get_known_choices()
+
+
+def _steps(path: Path, policy: str) -> list[dict[str, Any]]:
+    """Return the steps of a processor, each checked."""
+    content = load_json(path, "a processor of LeRobot")
+    steps = content.get("steps") if isinstance(content, dict) else None
+    if not isinstance(steps, list):
+        raise HandrailError(f"{str(path)!r}: expected a processor with steps, got {content!r:.80}")
+    known = _registered_steps(policy)
+    for number, step in enumerate(steps):
+        where = f"{str(path)!r}: step {number}"
+        name = step.get("registry_name") if isinstance(step, dict) else step
+        if isinstance(step, dict) and "class" in step:
+            raise HandrailError(f"{where}: expected a registered name, got the class {step['class']!r:.80}")
+        if not isinstance(name, str) or name not in known:
+            raise HandrailError(f"{where}: expected a registered name, got {name!r:.80}")
+        _check_numbers(path.parent, step, where)
+    return steps
+
+
+def _check_numbers(folder: Path, step: Mapping[str, Any], where: str) -> None:
+    if "state_file" not in step:
+        return
+    name = step["state_file"]
+    plain = isinstance(name, str) and PurePath(name).name == name and name.endswith(".safetensors")
+    if not plain or not (folder / name).is_file():
+        raise HandrailError(f"{where}: expected a .safetensors file in the folder, got {name!r:.80}")
+
+
+def _registered_steps(policy: str) -> frozenset[str]:
+    """Return the names of the steps that LeRobot knows, those that a policy brings included."""
+    from lerobot.processor.pipeline import ProcessorStepRegistry
+
+    module = registered_policies()[policy].__module__.replace("configuration_", "processor_")
+    with contextlib.suppress(ImportError):  # what is missing for it is said when it is loaded
+        importlib.import_module(module)  # where LeRobot looks for them; beside a registered policy
+    return frozenset(ProcessorStepRegistry.list())
+
+
+def _defaults(kind: type) -> Iterator[Any]:
+    for entry in fields(kind):
+        if entry.default is not MISSING:
+            yield entry.default
+        elif entry.default_factory is not MISSING:
+            yield entry.default_factory()
+
+
+def _texts(content: Any) -> Iterator[str]:
+    """Yield every text in settings that may name a place, whatever holds it; not the keys."""
+    if isinstance(content, str):
+        yield str.__str__(content)  # the value of an enumeration too
+    elif isinstance(content, PurePath):
+        yield str(content)
+    elif isinstance(content, Mapping):
+        content = [value for key, value in content.items() if key not in _NO_PLACE]
+    elif hasattr(content, "__dataclass_fields__"):
+        content = vars(content).values()
+    if isinstance(content, Iterable) and not isinstance(content, str | bytes):
+        for each in content:
+            yield from _texts(each)
+
+
+def _is_there(text: str) -> bool:
+    try:
+        return Path(text).expanduser().exists()
+    except (OSError, ValueError):
+        return False

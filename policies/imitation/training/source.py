@@ -1,0 +1,283 @@
+"""From a recorded dataset to what a policy is trained on: chosen episodes, seen through its interface."""
+
+import hashlib
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import torch
+
+from handrail.collect.config import MODE_NAMES
+from handrail.controllers.errors import HandrailError
+from handrail.datasets.format.schema import Feature
+from handrail.datasets.format.stats import column_stats
+from handrail.datasets.reading.check import check_whole
+from handrail.datasets.reading.labels import with_success
+from handrail.datasets.reading.reader import DatasetInfo, read_episodes, read_info, read_rows_of
+from handrail.policies.imitation.config import TrainConfig
+from handrail.policies.imitation.interface.checkpoint import PolicyMeta
+from handrail.policies.imitation.interface.interface import COLUMNS, PolicyInterface
+from handrail.policies.imitation.training.memory import MemoryDataset, MemoryMeta
+from handrail.policies.imitation.training.selection import Selection, select, select_again
+
+if TYPE_CHECKING:
+    from lerobot.configs.policies import PreTrainedConfig
+    from lerobot.datasets.lerobot_dataset import LeRobotDataset
+
+Columns = dict[str, np.ndarray]
+STATE, ENVIRONMENT, ACTION = "observation.state", "observation.environment_state", "action"
+_LEARNT = ("observation", "action", "next.")
+_COUNTERS = ("timestamp", "frame_index", "episode_index", "index", "task_index")
+_NOWHERE = "handrail/local--only"  # no name on the hub, from where LeRobot would fetch what is missing
+_FLOOR = 1e-2  # [m, rad, m/s, …] least spread of a number: what hardly moved in training must not explode
+_READ_STATE = ("act", "diffusion", "multi_task_dit", "vqbet")  # of LeRobot's, what cannot do without it
+_READ_SCENE = ("act", "diffusion")  # what needs pictures or the environment's state
+_RANGES = (("min", "max"), ("q01", "q99"), ("q10", "q90"))
+
+
+@dataclass(frozen=True)
+class Source:
+    """Chosen episodes of a dataset.
+
+    Attributes:
+        config: what was asked for.
+        info: the dataset.
+        selection: the episodes.
+        interface: what the policy reads and writes; None where that is what was recorded.
+        features: LeRobot's description of every column and camera.
+        columns: all columns of all episodes, (N, …) each.
+    """
+
+    config: TrainConfig
+    info: DatasetInfo
+    selection: Selection
+    interface: PolicyInterface | None
+    features: dict[str, dict[str, Any]]
+    columns: Columns
+
+    @property
+    def digest(self) -> str:
+        """What tells the data apart: of the numbers in all columns."""
+        digest = hashlib.sha256()
+        for key, values in sorted(self.columns.items()):
+            digest.update(f"{key} {values.dtype} {values.shape}".encode())
+            digest.update(np.ascontiguousarray(values).tobytes())
+        return digest.hexdigest()[:16]
+
+    @property
+    def trained_on(self) -> dict[str, float]:
+        """How many episodes, how many attempts they took, and how long those were [s]."""
+        chosen = self.selection
+        return {
+            "episodes": len(chosen.rows),
+            "attempts": chosen.attempts,
+            "operator_time": chosen.operator_time,
+        }
+
+    def dataset(self, policy: "PreTrainedConfig") -> MemoryDataset:
+        """Return what LeRobot trains a policy on."""
+        from lerobot.datasets.factory import resolve_delta_timestamps
+        from lerobot.datasets.feature_utils import get_delta_indices
+
+        lengths = tuple(row["length"] for row in self.selection.rows)
+        stats = {key: steadied(column_stats(self.columns[key])) for key in self._numeric}
+        meta = MemoryMeta(self.features, stats, self.info.fps, lengths, self.info.robot_type)
+        stamps = resolve_delta_timestamps(policy, meta) or {}  # pyright: ignore[reportArgumentType]
+        cameras = meta.camera_keys
+        pictures = None
+        if cameras:
+            pictures = self._pictures({key: stamps[key] for key in cameras if key in stamps})
+            stats |= {key: _picture_stats(pictures, key) for key in cameras}
+        windows = {
+            key: offsets
+            for key, offsets in get_delta_indices(stamps, meta.fps).items()
+            if key in self.columns
+        }
+        columns = {key: torch.from_numpy(np.ascontiguousarray(v)) for key, v in self.columns.items()}
+        sentences = ["; ".join(row.get("tasks") or []) for row in self.selection.rows]
+        return MemoryDataset(meta, columns, sentences, windows, pictures)
+
+    @property
+    def _numeric(self) -> list[str]:
+        return [key for key in self.columns if key in self.features]
+
+    def _pictures(self, stamps: Mapping[str, list[float]]) -> "LeRobotDataset":
+        from huggingface_hub.errors import HFValidationError
+        from lerobot.datasets.lerobot_dataset import LeRobotDataset
+
+        try:
+            return LeRobotDataset(
+                _NOWHERE,
+                root=self.info.root,
+                episodes=[row["episode_index"] for row in self.selection.rows],
+                delta_timestamps=dict(stamps) or None,
+                return_uint8=True,
+            )
+        except HFValidationError as error:
+            raise HandrailError(
+                f"dataset {str(self.info.root)!r}: expected all its files, found some missing"
+            ) from error
+
+
+def read_source(config: TrainConfig, began: PolicyMeta | None = None) -> Source:
+    """Read what a config asks for, or what a training began with.
+
+    Args:
+        config: what to train on.
+        began: what the checkpoint says that the training goes on from.
+
+    Raises:
+        HandrailError: there is no such dataset, it cannot be read, or it lacks what the policy needs.
+    """
+    root = config.dataset.folder
+    check_whole(root, config.verify)
+    info = read_info(root)
+    rows = with_success(info, read_episodes(root))
+    if began is not None and began.episodes:
+        selection = select_again(rows, began.episodes, began.trained_on)
+    else:
+        selection = select(rows, info.fps, config)
+    if config.actions == "intent":
+        _check_one_mode(selection)
+    if config.actions == "recorded":
+        interface, features, columns = None, *_recorded(info, selection, config)
+        _check_inputs(config, info, features)
+    else:
+        interface, features, columns = _interpreted(info, selection, config.actions)
+    if config.images:
+        features |= _cameras(info)
+    return Source(config, info, selection, interface, features, columns | _counters(selection, info.fps))
+
+
+def _check_one_mode(selection: Selection) -> None:
+    """Check that an intent can be completed when the policy drives: as in its mode, and there is but one."""
+    modes = Counter(str(row.get("mode") or "") for row in selection.rows)
+    if len(modes) == 1 and modes.keys() <= set(MODE_NAMES):
+        return
+    found = ", ".join(f"{mode or 'no mode'} ({count})" for mode, count in modes.most_common())
+    known = next((mode for mode, _ in modes.most_common() if mode in MODE_NAMES), None)
+    flag = f"--mode {known}" if known else "--actions realised"
+    raise HandrailError(
+        f"--actions intent: expected episodes of one teleop mode, whose controller completes the intent when"
+        f" the policy drives; got {found}; say {flag}"
+    )
+
+
+def steadied(stats: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Return statistics in which nothing is steadier than 0.01.
+
+    A number that was the same throughout would otherwise be divided by (almost) nothing, and the least
+    change of it when the policy drives would be huge.
+    """
+    stats = dict(stats, std=np.maximum(stats["std"], _FLOOR))
+    for low, high in _RANGES:
+        lack = np.maximum(0.0, _FLOOR - (stats[high] - stats[low]) / 2.0)
+        stats |= {low: stats[low] - lack, high: stats[high] + lack}
+    return stats
+
+
+def _interpreted(
+    info: DatasetInfo, selection: Selection, actions: str
+) -> tuple[PolicyInterface, dict[str, dict[str, Any]], Columns]:
+    missing = [key for key in COLUMNS if key not in info.features]
+    if missing:
+        raise HandrailError(
+            f"--actions {actions}: expected the columns that handrail-record writes, found no"
+            f" {', '.join(missing)}; for other datasets say --actions recorded"
+        )
+    episodes = [read_rows_of(info, dict(row), COLUMNS) for row in selection.rows]
+    interface = PolicyInterface.of_dataset(info.features, episodes, actions)
+    observed = [interface.observe(episode[STATE], episode[ENVIRONMENT]) for episode in episodes]
+    columns = {
+        STATE: np.concatenate([state for state, _ in observed]),
+        ENVIRONMENT: np.concatenate([environment for _, environment in observed]),
+        ACTION: np.concatenate([interface.encode(episode) for episode in episodes]),
+    }
+    names = dict(zip(columns, (*interface.observation_names, interface.action_names), strict=True))
+    columns = {key: values for key, values in columns.items() if values.shape[1]}
+    return interface, {key: _feature("float32", (len(names[key]),), names[key]) for key in columns}, columns
+
+
+def _recorded(
+    info: DatasetInfo, selection: Selection, config: TrainConfig
+) -> tuple[dict[str, dict[str, Any]], Columns]:
+    keys = [
+        key
+        for key, feature in info.features.items()
+        if key.startswith(_LEARNT) and feature.dtype not in ("video", "image", "string")
+    ]
+    if ACTION not in keys:
+        raise HandrailError(
+            f"dataset {str(info.root)!r}: expected a column 'action', got {', '.join(keys) or 'none'}"
+        )
+    episodes = [read_rows_of(info, dict(row), keys) for row in selection.rows]
+    columns = {key: np.concatenate([episode[key] for episode in episodes]) for key in keys}
+    columns = {key: v.astype(np.float32) if v.dtype == np.float64 else v for key, v in columns.items()}
+    features = {key: _feature(f.dtype, f.shape, f.names) for key in keys for f in (info.features[key],)}
+    if config.policy in _READ_SCENE and STATE in columns and not (ENVIRONMENT in columns or _pictured(info)):
+        features[ENVIRONMENT], columns[ENVIRONMENT] = features[STATE], columns[STATE]
+    return features, columns
+
+
+def _check_inputs(config: TrainConfig, info: DatasetInfo, features: Mapping[str, Any]) -> None:
+    """Check that there is what the policy reads, before LeRobot stumbles over what is not there."""
+    numbers = [key for key in features if key.startswith("observation")]
+    dataset, cameras = f"dataset {str(info.root)!r}", _pictured(info)
+    if STATE not in numbers and config.policy in _READ_STATE:
+        beside = " beside pictures (--images)" if cameras else ""
+        raise HandrailError(
+            f"{dataset}: expected a column {STATE!r}, which policy {config.policy} needs{beside};"
+            f" got {', '.join((*numbers, *cameras)) or 'no observation'}"
+        )
+    blind = not numbers or (config.policy in _READ_SCENE and ENVIRONMENT not in numbers)
+    if blind and cameras and not config.images:
+        raise HandrailError(
+            f"{dataset}: expected {ENVIRONMENT!r} or --images for policy {config.policy};"
+            f" there are pictures ({', '.join(cameras)}): say --images"
+        )
+
+
+def _pictured(info: DatasetInfo) -> dict[str, Feature]:
+    return {
+        key: feature
+        for key, feature in info.features.items()
+        if feature.dtype in ("video", "image") and key.startswith("observation")
+    }
+
+
+def _cameras(info: DatasetInfo) -> dict[str, dict[str, Any]]:
+    found = _pictured(info)
+    if not found:
+        raise HandrailError(f"--images: expected cameras in {str(info.root)!r}, found none")
+    return {key: _feature(f.dtype, f.shape, f.names) for key, f in found.items()}
+
+
+def _counters(selection: Selection, fps: float) -> Columns:
+    """Return the columns that LeRobot adds to every dataset, counted in the chosen part."""
+    lengths = [row["length"] for row in selection.rows]
+    frames = np.concatenate([np.arange(length) for length in lengths])
+    sentences = ["; ".join(row.get("tasks") or []) for row in selection.rows]
+    task = {sentence: number for number, sentence in enumerate(dict.fromkeys(sentences))}
+    values = (
+        (frames / fps).astype(np.float32),
+        frames,
+        np.repeat(np.arange(len(lengths)), lengths),
+        np.arange(len(frames)),
+        np.repeat([task[sentence] for sentence in sentences], lengths),
+    )
+    return dict(zip(_COUNTERS, values, strict=True))
+
+
+def _picture_stats(pictures: "LeRobotDataset", key: str) -> dict[str, np.ndarray]:
+    from lerobot.datasets.factory import IMAGENET_STATS
+
+    stats = {name: np.asarray(value) for name, value in (pictures.meta.stats or {}).get(key, {}).items()}
+    if not all(np.isfinite(value).all() for value in stats.values()):
+        raise HandrailError(f"meta/stats.json: expected finite numbers for {key}; compute them anew")
+    return stats | {name: np.asarray(value, np.float32) for name, value in IMAGENET_STATS.items()}
+
+
+def _feature(dtype: str, shape: Sequence[int], names: Sequence[str] | None) -> dict[str, Any]:
+    return {"dtype": dtype, "shape": tuple(shape), "names": None if names is None else list(names)}

@@ -1,0 +1,204 @@
+"""Training of an imitation policy: a part of a dataset, through an interface, with LeRobot's own training."""
+
+import json
+import logging
+import os
+import shutil
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from handrail.controllers.errors import HandrailError
+from handrail.datasets.storage.atomic import write_whole
+from handrail.policies.imitation.config import TrainConfig
+from handrail.policies.imitation.interface.checkpoint import (
+    MODEL,
+    PolicyMeta,
+    last_checkpoint,
+    read_meta,
+    software_versions,
+    write_meta,
+)
+from handrail.policies.imitation.interface.trust import check_links, check_policy_folder
+from handrail.policies.imitation.training.curve import NAME as CURVE
+from handrail.policies.imitation.training.presets import policy_config, resolved
+from handrail.policies.imitation.training.refusal import in_one_line
+from handrail.policies.imitation.training.resume import as_json, check_data, check_settings
+from handrail.policies.imitation.training.source import Source, read_source
+
+if TYPE_CHECKING:
+    from handrail.policies.imitation.training.run import Pipeline
+
+RECORD = "training.json"
+_LOG_EVERY = 50  # updates
+_WARMUP = 500  # updates in which the learning rate rises, or a tenth of all if that is fewer
+
+
+def train(config: TrainConfig, quiet: bool = False) -> Path:
+    """Train, or go on training, and return the folder of the policy in the last checkpoint.
+
+    Args:
+        config: what to train on what.
+        quiet: show no progress.
+
+    Raises:
+        HandrailError: a setting is wrong, the dataset does not fit, or there is a training already.
+    """
+    config.check()
+    checkpoint = _begin(config)
+    began = None if checkpoint is None else _goes_on(config, checkpoint)
+    source, steps = read_source(config, began), resolved(config).steps
+    if began is not None:
+        check_data(source, began)
+    if checkpoint is not None and int(checkpoint.name) >= steps:
+        return checkpoint / MODEL
+    with _threads(config.threads), _no_pages_of_logs(), in_one_line(config):
+        _run(config, source, steps, checkpoint, quiet)
+    last = last_checkpoint(config.folder)
+    assert last is not None
+    return last / MODEL
+
+
+def _goes_on(config: TrainConfig, checkpoint: Path) -> PolicyMeta:
+    """Return what a checkpoint says of itself, once it is sure to do no harm and to fit."""
+    for folder in (checkpoint, checkpoint / "training_state"):
+        check_links(folder)
+    _, began = read_meta(checkpoint / MODEL)
+    check_settings(config, began)
+    check_policy_folder(checkpoint / MODEL, asked=[policy_config(config)])
+    return began
+
+
+def _run(config: TrainConfig, source: Source, steps: int, checkpoint: Path | None, quiet: bool) -> None:
+    from handrail.policies.imitation.training.run import Run
+
+    pipeline = _pipeline(config, steps, checkpoint)
+    assert pipeline.policy is not None
+    dataset = source.dataset(pipeline.policy)
+    run = Run(
+        pipeline,
+        dataset,
+        checkpoint,
+        lambda folder, step: write_meta(folder, source.interface, _meta(source, step)),
+        quiet,
+    )
+    began = time.monotonic()
+    curve = run.train()
+    if curve is not None:
+        seconds = time.monotonic() - began
+        done = steps - (int(checkpoint.name) if checkpoint else 0)
+        record = {"seconds": seconds, "steps_a_second": done / seconds, "steps": steps}
+        record |= {"frames": len(dataset), "loss": curve.rows[-1]["loss"] if curve.rows else None}
+        content = record | asdict(_meta(source, steps))
+        write_whole(config.folder / RECORD, (json.dumps(content, indent=1) + "\n").encode())
+
+
+def _pipeline(config: TrainConfig, steps: int, checkpoint: Path | None) -> "Pipeline":
+    from lerobot.configs.default import DatasetConfig
+    from lerobot.optim.schedulers import CosineAnnealingWithWarmupSchedulerConfig as Cosine
+
+    from handrail.policies.imitation.training.run import Pipeline
+
+    sizes = resolved(config)
+    return Pipeline(
+        dataset=DatasetConfig(config.dataset.name, root=str(config.dataset.folder), video_backend="pyav"),
+        policy=policy_config(config),
+        output_dir=config.folder,
+        resume=checkpoint is not None,
+        seed=config.seed,
+        num_workers=0,
+        batch_size=sizes.batch_size,
+        steps=steps,
+        log_freq=_LOG_EVERY,
+        save_freq=config.save_freq,
+        env_eval_freq=0,
+        scheduler=Cosine(min(_WARMUP, steps // 10)) if sizes.cosine else None,
+    )
+
+
+def _begin(config: TrainConfig) -> Path | None:
+    """Make room for a training; return the checkpoint that it goes on from, if any."""
+    folder = config.folder
+    if folder.exists() and not folder.is_dir():
+        raise HandrailError(f"--output {config.output}: expected a folder, found a file")
+    if config.resume or not folder.exists() or not _is_main_process():
+        return last_checkpoint(folder) if config.resume else None
+    foreign = _foreign(folder)
+    if foreign:
+        raise HandrailError(
+            f"--output {config.output}: expected a missing or empty folder, found {', '.join(foreign[:3])};"
+            " choose another"
+        )
+    if any(folder.iterdir()) and not config.overwrite:
+        raise HandrailError(
+            f"--output {config.output}: there is a training already; say --resume or --overwrite"
+        )
+    shutil.rmtree(folder)
+    return None
+
+
+def _foreign(folder: Path) -> list[str]:
+    """Return what lies in a training's folder and is not the training's."""
+    files = {name for each in (RECORD, CURVE) for name in (each, f".{each}.partial")}
+    kept = [path for path in (folder / "checkpoints").glob("*") if not _is_checkpoint(path)]
+    others = [path for path in folder.iterdir() if path.name not in files | {"checkpoints"}]
+    return sorted(path.relative_to(folder).as_posix() for path in (*others, *kept))
+
+
+def _is_checkpoint(path: Path) -> bool:
+    return path.name in ("last", ".last") or path.name.strip(".").removesuffix(".old").isdecimal()
+
+
+def _meta(source: Source, steps: int) -> PolicyMeta:
+    config, rows = source.config, source.selection.rows
+    return PolicyMeta(
+        environment=_common([str(row.get("environment") or "") for row in rows]),
+        mode=_common([str(row.get("mode") or "") for row in rows]),
+        robot=source.info.robot_type,
+        fps=source.info.fps,
+        actions=config.actions,
+        training_seed=config.seed,
+        dataset_draw=config.draw,
+        trained_on=source.trained_on,
+        policy=config.policy,
+        steps=steps,
+        training=asdict(config),
+        versions=software_versions(),
+        sizes=as_json(resolved(config)),
+        episodes=[int(row["episode_index"]) for row in rows],
+        data=source.digest,
+    )
+
+
+def _common(values: list[str]) -> str:
+    return values[0] if len(set(values)) == 1 else "mixed"
+
+
+def _is_main_process() -> bool:
+    return os.environ.get("RANK", "0") == "0"
+
+
+@contextmanager
+def _threads(count: int) -> Iterator[None]:
+    import torch
+
+    before = torch.get_num_threads()
+    torch.set_num_threads(count)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(before)
+
+
+@contextmanager
+def _no_pages_of_logs() -> Iterator[None]:
+    """Keep to oneself what LeRobot says on its way, such as which decoders of videos it could not load."""
+    before = logging.root.manager.disable
+    logging.disable(logging.WARNING)
+    try:
+        yield
+    finally:
+        logging.disable(before)

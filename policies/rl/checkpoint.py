@@ -1,0 +1,207 @@
+"""The folder of a training run: settings, the last checkpoint, every evaluated actor.
+
+Stable-Baselines3's own loader unpickles what it finds, and so runs the code of whoever wrote it. Only arrays
+are read here: networks and optimisers from `model.zip`, transitions from `replay_buffer.npz`.
+"""
+
+import json
+import re
+import shutil
+from collections.abc import Mapping
+from dataclasses import asdict, fields
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+import torch
+from stable_baselines3 import SAC
+from stable_baselines3.common.buffers import ReplayBuffer
+from stable_baselines3.common.save_util import load_from_zip_file
+
+from handrail.controllers.entries import is_amounts
+from handrail.controllers.errors import HandrailError, message_of
+from handrail.datasets.storage.atomic import publish_folder, write_whole
+from handrail.datasets.storage.strict_json import load_json
+from handrail.policies.imitation.interface.trust import check_links
+from handrail.policies.rl.config import TrainRlConfig
+from handrail.policies.rl.figure import PUBLISHED
+from handrail.policies.rl.policy import Actor
+
+Curve = list[dict[str, float]]
+_NETWORKS, _TRANSITIONS, _CURVE = "model.zip", "replay_buffer.npz", "curve.json"
+_ARRAYS = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
+_ROW = {"steps", "updates", "seconds", *PUBLISHED}  # what every row of the curve has
+_STEPS = re.compile(r"\d{8}", re.ASCII)  # name of a checkpoint
+_ENTROPY = "log_ent_coef"
+_WRITTEN = ("config.json", "actor.json", "actor.npz", "curve.png")
+_OURS = {*_WRITTEN, *(f".{name}.partial" for name in _WRITTEN), "checkpoints", "actors", "tensorboard"}
+
+
+def begin_run(config: TrainRlConfig) -> None:
+    """Make the folder of a new run and write its settings.
+
+    Raises:
+        HandrailError: something is there that must not be removed.
+    """
+    folder, settings = config.folder, config.folder / "config.json"
+    if folder.exists() and any(folder.iterdir()):
+        if not config.overwrite:
+            raise HandrailError(f"{folder}: there is something already; expected --resume or --overwrite")
+        foreign = sorted(path.name for path in folder.iterdir() if path.name not in _OURS)
+        if foreign or not settings.is_file():
+            found = ", ".join(foreign[:3]) or "something else"
+            raise HandrailError(f"--overwrite: expected only a training run in {folder}, found {found}")
+        shutil.rmtree(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    write_whole(settings, (json.dumps(asdict(config), indent=1) + "\n").encode())
+
+
+def check_resumes(config: TrainRlConfig) -> Path:
+    """Return the last checkpoint of a run that goes on with these settings.
+
+    Raises:
+        HandrailError: there is no checkpoint, or the settings differ from those that the run began with.
+    """
+    last = _there(config.folder, "--resume")
+    path = config.folder / "config.json"
+    settings = load_json(path, "settings of a training run")
+    names = {entry.name for entry in fields(TrainRlConfig)}
+    if not isinstance(settings, dict) or not settings.keys() <= names or "layers" not in settings:
+        raise HandrailError(f"{str(path)!r}: expected settings of a training run, got {settings!r:.80}")
+    layers = settings["layers"]
+    earlier = {**settings, "layers": tuple(layers) if isinstance(layers, list) else layers}
+    config.check_continues(TrainRlConfig(**earlier))
+    return last
+
+
+def resume_run(last: Path, model: SAC) -> Curve:
+    """Give a model all that a checkpoint has, transitions too; return the curve until then.
+
+    Args:
+        last: checkpoint of the run.
+        model: untrained, with the same settings.
+
+    Raises:
+        HandrailError: the checkpoint is broken, or of another version.
+    """
+    curve = _curve(last / _CURVE, int(last.name))
+    parameters, variables = _tensors(last / _NETWORKS)
+    try:
+        model.set_parameters(dict(parameters), exact_match=True, device="cpu")
+        with torch.no_grad():
+            cast(torch.Tensor, model.log_ent_coef).copy_(variables[_ENTROPY])
+    except Exception as error:  # of PyTorch: whatever the tensors are, they do not fit
+        raise _broken(last / _NETWORKS, error) from error
+    assert model.replay_buffer is not None
+    _read_transitions(last / _TRANSITIONS, model.replay_buffer)
+    model.num_timesteps, model._n_updates = int(last.name), int(curve[-1]["updates"])
+    return curve
+
+
+def last_networks(folder: Path) -> Mapping[str, Any]:
+    """Return actor, critics and target critics of a run's last checkpoint, without the optimisers' memory.
+
+    Raises:
+        HandrailError: there is no checkpoint, or it is broken.
+    """
+    last = _there(folder, "--start_from")
+    parameters, _ = _tensors(last / _NETWORKS)
+    if "policy" not in parameters:
+        raise _broken(last / _NETWORKS, "no policy")
+    return parameters["policy"]
+
+
+def write_checkpoint(folder: Path, model: SAC, actor: Actor, curve: Curve) -> None:
+    """Write a checkpoint under another name, rename it, and remove the one before."""
+    name = f"{model.num_timesteps:08d}"
+    (folder / "actors").mkdir(exist_ok=True)
+    actor.save(folder / "actors" / f"{name}.npz")
+    last, final = _last(folder), folder / "checkpoints" / name
+    partial = final.with_suffix(".partial")
+    shutil.rmtree(partial, ignore_errors=True)
+    partial.mkdir(parents=True)
+    model.save(partial / _NETWORKS)
+    assert model.replay_buffer is not None
+    _write_transitions(partial / _TRANSITIONS, model.replay_buffer)
+    write_whole(partial / _CURVE, (json.dumps(curve, indent=1) + "\n").encode())
+    publish_folder(partial, final)
+    if last is not None:
+        shutil.rmtree(last)
+
+
+def evaluated_actors(folder: Path, most: int) -> list[Actor]:
+    """Return the last evaluated actors of a run, at most so many."""
+    return [Actor.load(path) for path in sorted((folder / "actors").glob("*.npz"))[-most:]]
+
+
+def _last(folder: Path) -> Path | None:
+    found = sorted(path for path in (folder / "checkpoints").glob("*") if _STEPS.fullmatch(path.name))
+    return found[-1] if found else None
+
+
+def _there(folder: Path, flag: str) -> Path:
+    """Return the last checkpoint of somebody's run.
+
+    Raises:
+        HandrailError: there is none, or a file of it is a link to somewhere else.
+    """
+    last = _last(folder)
+    if last is None:
+        raise HandrailError(f"{flag}: expected a run with a checkpoint in {folder}, found none")
+    check_links(last)
+    return last
+
+
+def _tensors(path: Path) -> tuple[Mapping[str, Any], Mapping[str, torch.Tensor]]:
+    """Return state dictionaries and single tensors of a model; what is pickled beside them is not read."""
+    try:
+        _, parameters, variables = load_from_zip_file(path, load_data=False, device="cpu")
+    except Exception as error:  # of zipfile, pickle and PyTorch: whatever the file holds, it is refused
+        raise _broken(path, error) from error
+    return parameters, variables or {}
+
+
+def _write_transitions(path: Path, buffer: ReplayBuffer) -> None:
+    count = buffer.size()
+    arrays: dict[str, Any] = {name: getattr(buffer, name)[:count] for name in _ARRAYS}
+    np.savez(path, place=np.array([buffer.pos, buffer.full]), **arrays)
+
+
+def _read_transitions(path: Path, buffer: ReplayBuffer) -> None:
+    if not path.is_file():
+        raise HandrailError(
+            f"{str(path)!r}: expected the transitions of a run of this version, found none;"
+            " --start_from begins a new run with the networks of this one"
+        )
+    try:
+        with open(path, "rb") as file, np.load(file, allow_pickle=False) as arrays:
+            place, full = map(int, arrays["place"])
+            count = buffer.buffer_size if full else place
+            for name in _ARRAYS:
+                target = getattr(buffer, name)[:count]
+                if arrays[name].shape != target.shape or not np.isfinite(arrays[name]).all():
+                    raise _broken(path, f"{name} of shape {arrays[name].shape}, finite or not")
+                target[...] = arrays[name]
+    except HandrailError:
+        raise
+    except Exception as error:  # of NumPy and zipfile: whatever the file holds, it is refused
+        raise _broken(path, error) from error
+    if not 0 <= place < buffer.buffer_size:
+        raise _broken(path, f"place {place}")
+    buffer.pos, buffer.full = place, bool(full)
+
+
+def _curve(path: Path, steps: int) -> Curve:
+    """Return the curve of a checkpoint after so many steps."""
+    curve = load_json(path, "the curve of a training run")
+    rows = curve if isinstance(curve, list) and all(map(is_amounts, curve)) else []
+    if not rows or not all(row.keys() >= _ROW for row in rows) or rows[-1]["steps"] != steps:
+        raise HandrailError(
+            f"{str(path)!r}: expected the curve of a training run until step {steps}, got {curve!r:.80}"
+        )
+    return rows
+
+
+def _broken(path: Path, reason: str | Exception) -> HandrailError:
+    found = reason if isinstance(reason, str) else message_of(reason)
+    return HandrailError(f"{str(path)!r}: expected a checkpoint of this run, got {found}")

@@ -1,0 +1,166 @@
+"""Training of the reinforcement-learning baseline with soft actor-critic from Stable-Baselines3."""
+
+import json
+import time
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+import numpy as np
+import torch
+from gymnasium import spaces
+from gymnasium.wrappers import TransformObservation
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from stable_baselines3 import SAC
+from stable_baselines3.common.callbacks import BaseCallback
+
+from handrail.datasets.storage.atomic import write_whole
+from handrail.policies.rl.checkpoint import (
+    Curve,
+    begin_run,
+    check_resumes,
+    evaluated_actors,
+    last_networks,
+    resume_run,
+    write_checkpoint,
+)
+from handrail.policies.rl.config import TrainRlConfig
+from handrail.policies.rl.env import GoalReachingEnv, Reward
+from handrail.policies.rl.evaluation import FINAL_SEED, evaluate, evaluation_goals, means, spreads
+from handrail.policies.rl.figure import save_curve
+from handrail.policies.rl.observation import conditioning
+from handrail.policies.rl.policy import Actor
+from handrail.policies.rl.record import training_record
+
+_TARGET_ENTROPY = -3.0
+
+
+def train(config: TrainRlConfig) -> dict[str, Any]:
+    """Train, or go on training, and return the record that was written beside the actor.
+
+    The folder holds `config.json`, `checkpoints/<steps>/` (networks, replay buffer, curve; only the last),
+    `actors/<steps>.npz` (all), `tensorboard/`, and at the end `actor.npz`, `actor.json` and `curve.png`.
+
+    Raises:
+        HandrailError: a setting is wrong, there is a run already, or there is none to resume.
+    """
+    config.check()
+    torch.set_num_threads(config.threads)
+    model, curve = _resumed(config) if config.resume else _new(config)
+    remaining = config.steps - model.num_timesteps
+    if remaining > 0:
+        callback = Watch(config, curve)
+        model.learn(remaining, callback, log_interval=20, reset_num_timesteps=not config.resume)
+    actor = Actor.mean(evaluated_actors(config.folder, config.average))
+    actor.save(config.folder / "actor.npz")
+    final = spreads(evaluate(actor, evaluation_goals(config.final_goals, FINAL_SEED), config.physics))
+    record = training_record(config, curve, final)
+    write_whole(config.folder / "actor.json", (json.dumps(record, indent=1) + "\n").encode())
+    save_curve(curve, config.folder / "curve.png")
+    return record
+
+
+def actor_of(model: SAC) -> Actor:
+    """Return the actor of a model as plain arrays."""
+    state = {name: value.cpu().numpy() for name, value in model.actor.state_dict().items()}
+    return Actor.from_state(state, conditioning())
+
+
+class Watch(BaseCallback):
+    """Evaluates and saves every so many steps, and shows how far the training is.
+
+    Args:
+        config: of the training.
+        curve: evaluations so far; more are appended.
+    """
+
+    model: SAC
+
+    def __init__(self, config: TrainRlConfig, curve: Curve) -> None:
+        super().__init__()
+        self._config, self._curve = config, curve
+        self._goals = evaluation_goals(config.goals)
+        self._began = time.monotonic() - (curve[-1]["seconds"] if curve else 0.0)
+        columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+        self._progress = Progress(*columns)
+        self._bar = self._progress.add_task("training", total=config.steps)
+
+    def _on_training_start(self) -> None:
+        self._progress.start()
+
+    def _on_step(self) -> bool:
+        self._progress.update(self._bar, completed=self.num_timesteps)
+        if self.num_timesteps % self._config.save_every == 0:
+            self._evaluate_and_save()
+        return True
+
+    def _on_training_end(self) -> None:
+        if not self._curve or self._curve[-1]["steps"] != self.num_timesteps:
+            self._evaluate_and_save()
+        self._progress.stop()
+
+    def _evaluate_and_save(self) -> None:
+        actor = actor_of(self.model)
+        score = means(evaluate(actor, self._goals, self._config.physics))
+        seconds = time.monotonic() - self._began
+        updates = float(self.model._n_updates)
+        row = {"steps": self.num_timesteps, "updates": updates, "seconds": seconds}
+        self._curve.append({**row, "learning_rate": self._config.learning_rate, **score})
+        for name, value in score.items():
+            self.logger.record(f"evaluation/{name}", value)
+        self.logger.dump(self.num_timesteps)
+        self._progress.console.print(
+            f"{self.num_timesteps} steps, {seconds:.0f} s: {score['success']:.0%} of the goals, "
+            f"effort {score['arm_effort']:.1f}, jerkiness {score['jerkiness']:.3f}"
+        )
+        write_checkpoint(self._config.folder, self.model, actor, self._curve)
+
+
+def _new(config: TrainRlConfig) -> tuple[SAC, Curve]:
+    begin_run(config)
+    model = _model(config)
+    if config.start_from:
+        model.policy.load_state_dict(last_networks(Path(config.start_from).expanduser()))
+    return model, []
+
+
+def _model(config: TrainRlConfig) -> SAC:
+    return SAC(
+        "MlpPolicy",
+        _environment(config),
+        learning_rate=config.learning_rate,
+        buffer_size=config.buffer_size,
+        learning_starts=config.random_steps,
+        batch_size=config.batch_size,
+        tau=config.tau,
+        gamma=config.gamma,
+        train_freq=config.train_freq,
+        gradient_steps=config.gradient_steps,
+        ent_coef=f"auto_{config.temperature}",
+        target_entropy=_TARGET_ENTROPY,
+        policy_kwargs={"net_arch": list(config.layers), "optimizer_kwargs": {"fused": True}},
+        tensorboard_log=str(config.folder / "tensorboard"),
+        seed=config.seed,
+        device="cpu",
+    )
+
+
+def _resumed(config: TrainRlConfig) -> tuple[SAC, Curve]:
+    last = check_resumes(config)
+    model = _model(config)
+    curve = resume_run(last, model)
+    model.set_random_seed(config.seed + model.num_timesteps)  # else the same goals would come again
+    return model, curve
+
+
+def _environment(config: TrainRlConfig) -> gymnasium.Env:
+    reward = Reward(
+        scale=config.reward_scale,
+        change=config.action_change,
+        size=config.action_size,
+        failure=config.failure_cost,
+    )
+    matrix = conditioning()
+    space = spaces.Box(-np.inf, np.inf, (len(matrix),), np.float32)
+    env = GoalReachingEnv(reward=reward, physics=config.physics, repeat_missed=config.repeat_missed)
+    return TransformObservation(env, lambda values: (matrix @ values).astype(np.float32), space)

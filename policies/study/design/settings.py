@@ -1,0 +1,162 @@
+"""The settings of every job: the configs it runs with, and of them what its result depends on."""
+
+import itertools
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from handrail.collect.config import DatasetConfig, RecordConfig, StoredConfig
+from handrail.controllers.errors import HandrailError
+from handrail.policies.imitation.config import TrainConfig
+from handrail.policies.imitation.evaluation.config import EvaluateConfig
+from handrail.policies.imitation.training.presets import check_policy, resolved
+from handrail.policies.imitation.training.resume import as_json
+from handrail.policies.study.design.design import StudyDesign
+from handrail.policies.study.design.jobs import Cell, Job, PolicyArm, jobs
+
+BATCH = 10  # episodes, until the next person has a turn
+_FPS = 20  # [Hz]
+_RECORDED = ("task", "mode", "noise", "time_limit", "seed")
+_LEARNT = ("policy", "actions", "success_only", "episodes", "minutes", "draw", "seed")
+_DRIVEN = ("episodes", "seed", "label", "protection", "perturbation", "time_limit")
+
+
+def recording(cell: Cell, design: StudyDesign, root: Path, so_far: int = 0) -> RecordConfig:
+    """Return how the next turn of a dataset is recorded.
+
+    Args:
+        cell: what is collected.
+        design: of the study.
+        root: folder of the dataset.
+        so_far: episodes in it.
+    """
+    return RecordConfig(
+        task=cell.task,
+        mode=cell.mode,
+        noise=cell.noise,
+        person=1 + so_far // BATCH % design.persons,
+        time_limit=design.tasks[cell.task].time_limit.get(cell.mode, 0.0),
+        seed=design.seed,
+        dataset=DatasetConfig(
+            repo_id=f"study/{cell.task}-{cell.mode}",
+            root=str(root),
+            num_episodes=BATCH - so_far % BATCH,
+            fps=_FPS,
+        ),
+        resume=root.exists(),
+    )
+
+
+def training(arm: PolicyArm, design: StudyDesign, dataset: Path, output: Path) -> TrainConfig:
+    """Return how a policy is trained."""
+    task, timed = design.tasks[arm.cell.task], arm.budget == "time"
+    return TrainConfig(
+        dataset=StoredConfig(root=str(dataset)),
+        output=str(output),
+        policy=design.policy,
+        actions=arm.actions,
+        success_only=True,
+        steps=task.steps,
+        batch_size=task.batch_size,
+        seed=arm.seed,
+        policy_options=task.policy_options,
+        minutes=task.minutes if timed else 0.0,
+        episodes=0 if timed else task.episodes,
+        resume=True,
+    )
+
+
+def evaluations(job: Job, design: StudyDesign, policy: str = "policy") -> dict[str, EvaluateConfig]:
+    """Return how the policy of a job is driven, by condition.
+
+    Args:
+        job: that trains it.
+        design: of the study.
+        policy: folder of the policy.
+    """
+    arm, more = job.arm, design.robustness
+    assert arm is not None
+    common: dict[str, Any] = {
+        "policy": (policy,),
+        "seed": design.seed,
+        "label": arm.label,
+        "time_limit": design.tasks[arm.cell.task].rollout_limit,
+    }
+    found = {"nominal": EvaluateConfig(episodes=design.rollouts, **common)}
+    if job.robust and more:
+        common["episodes"] = min(design.rollouts, more.rollouts)
+        found["disturbed"] = EvaluateConfig(perturbation=",".join(more.perturbations), **common)
+        if arm.actions == "realised" and more.protections:
+            found["protected"] = EvaluateConfig(protection=",".join(more.protections), **common)
+    return found
+
+
+def fingerprint(job: Job, design: StudyDesign) -> dict[str, Any]:
+    """Return all settings that a job's result depends on, as JSON has them, nothing left to a preset.
+
+    Of a dataset `recording` says what it is; `wanted` may grow. A policy depends on both, on its `training`
+    and on its `evaluations`; a comparison on all that it compares.
+    """
+    if job.cell:
+        return _of_cell(job.cell, design)
+    if job.arm:
+        config = training(job.arm, design, Path("dataset"), Path("policy"))
+        learnt = _some(config, _LEARNT) | {"sizes": as_json(resolved(config))}
+        driven = {what: _some(each, _DRIVEN) for what, each in evaluations(job, design).items()}
+        return _of_cell(job.arm.cell, design) | {"training": learnt, "evaluations": driven}
+    needed = {each.name: fingerprint(each, design) for each in jobs(design) if each.name in job.needs}
+    return {"modes": list(design.modes), "baseline": design.baseline, "compared": needed}
+
+
+def check_jobs(design: StudyDesign) -> None:
+    """Check the settings of every job of a study before one begins.
+
+    Raises:
+        HandrailError: one is wrong.
+    """
+    found = jobs(design)
+    for job in found:
+        with _named(design, job):
+            if job.cell:
+                recording(job.cell, design, Path("dataset")).check()
+            if job.arm:
+                training(job.arm, design, Path("dataset"), Path("policy")).check()
+                for config in evaluations(job, design).values():
+                    config.check()
+    names = sorted(job.name for job in found)
+    twice = [one for one, next_one in itertools.pairwise(names) if one == next_one]
+    if twice:
+        raise HandrailError(f"study {design.name}: expected every job once, got {twice[0]} twice")
+
+
+def check_policies(design: StudyDesign) -> None:
+    """Build the policy of every task once, untrained; loads PyTorch.
+
+    Raises:
+        HandrailError: it cannot be built.
+    """
+    firsts = {job.arm.cell.task: job for job in reversed(jobs(design)) if job.arm}
+    for job in firsts.values():
+        with _named(design, job):
+            assert job.arm is not None
+            check_policy(training(job.arm, design, Path("dataset"), Path("policy")))
+
+
+def _of_cell(cell: Cell, design: StudyDesign) -> dict[str, Any]:
+    task = design.tasks[cell.task]
+    config, turns = recording(cell, design, Path("dataset")), {"persons": design.persons, "turn": BATCH}
+    recorded = _some(config, _RECORDED) | turns | {"fps": config.dataset.fps}
+    return {"recording": recorded, "wanted": {"episodes": task.episodes, "minutes": task.minutes}}
+
+
+def _some(config: Any, names: tuple[str, ...]) -> dict[str, Any]:
+    return {name: getattr(config, name) for name in names}
+
+
+@contextmanager
+def _named(design: StudyDesign, job: Job) -> Iterator[None]:
+    try:
+        yield
+    except HandrailError as error:
+        raise HandrailError(f"study {design.name}, {job.name}: {error}") from error

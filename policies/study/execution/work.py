@@ -1,0 +1,144 @@
+"""Does one job of a study, in a process of its own; whatever is killed goes on where it was."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from handrail.controllers.errors import HandrailError
+from handrail.datasets.comparison.config import CompareConfig
+from handrail.datasets.reading.reader import read_episodes, read_info
+from handrail.datasets.storage.atomic import remove
+from handrail.policies.imitation.evaluation.config import EvaluateConfig
+from handrail.policies.imitation.interface.checkpoint import last_checkpoint
+from handrail.policies.study.design.design import StudyDesign, TaskDesign
+from handrail.policies.study.design.jobs import CONDITIONS, Cell, Job, Layout, PolicyArm
+from handrail.policies.study.design.settings import evaluations, fingerprint, recording, training
+from handrail.policies.study.progress.notes import read_json, write_json
+from handrail.policies.study.progress.progress import Standing
+
+_MOST_ATTEMPTS = 6  # for each success that is wanted
+
+
+def begin(job: Job, design: StudyDesign, layout: Layout) -> None:
+    """Remove what a job made with other settings before, then note with which it begins.
+
+    A dataset may grow, but never mix two ways to record; rollouts of other conditions go, and those of a
+    policy that is gone; a policy that learnt otherwise goes with all its rollouts.
+
+    Raises:
+        HandrailError: nobody knows with which settings something was made that is there.
+    """
+    settings, before = fingerprint(job, design), read_json(layout.begun(job))
+    stale = [path for path in _stale(job, settings, before, layout) if path.exists()]
+    if stale and "recording" not in before:
+        raise HandrailError(
+            f"{job.name}: expected a note of this version on how {stale[0]} was made in "
+            f"{layout.begun(job)}, found none; remove what is there, or choose another --output"
+        )
+    for path in stale:
+        print(f"removed, made with other settings: {path}")
+        remove(path)
+    write_json(layout.begun(job), settings)
+
+
+def _stale(job: Job, now: Mapping[str, Any], before: Mapping[str, Any], layout: Layout) -> list[Path]:
+    """Return where something would be that does not go with the settings of now."""
+    if job.cell:
+        return [layout.dataset(job.cell)] if now["recording"] != before.get("recording") else []
+    if job.arm is None:
+        return []
+    arm, driven = job.arm, before.get("evaluations", {})
+    if any(now[part] != before.get(part) for part in ("recording", "wanted", "training")):
+        return [layout.policy(arm), *(layout.evaluation(arm, what) for what in CONDITIONS)]
+    gone = last_checkpoint(layout.policy(arm)) is None
+    others = [what for what in CONDITIONS if gone or now["evaluations"].get(what) != driven.get(what)]
+    return [layout.evaluation(arm, what) for what in others]
+
+
+def work(job: Job, design: StudyDesign, layout: Layout) -> dict[str, Any]:
+    """Do a job and return what is worth noting about it.
+
+    Raises:
+        HandrailError: it cannot be done.
+    """
+    if job.cell:
+        return _collect(job.cell, design, layout)
+    if job.arm:
+        return _policy(job, job.arm, design, layout)
+    return _compare(job.task, design, layout)
+
+
+def _collect(cell: Cell, design: StudyDesign, layout: Layout) -> dict[str, Any]:
+    """Record in turns of a few episodes, each by another person, until there is enough."""
+    from handrail.collect.commands.record import record
+
+    wanted, root = design.tasks[cell.task], layout.dataset(cell)
+    found = _collected(root) if root.exists() else {"episodes": 0, "successes": 0, "minutes": 0.0}
+    while not _enough(found, wanted):
+        code = record(recording(cell, design, root, found["episodes"]))
+        if code:
+            raise HandrailError(f"collecting {cell.name}: recording ended with exit code {code}")
+        found = _collected(root)
+        if found["episodes"] >= _MOST_ATTEMPTS * wanted.episodes and found["successes"] < wanted.episodes:
+            raise HandrailError(
+                f"collecting {cell.name}: expected {wanted.episodes} successes, "
+                f"got {found['successes']} in {found['episodes']} attempts"
+            )
+    return found
+
+
+def _collected(root: Any) -> dict[str, Any]:
+    episodes = read_episodes(root)
+    return {
+        "episodes": len(episodes),
+        "successes": sum(bool(episode["success"]) for episode in episodes),
+        "minutes": sum(episode["length"] for episode in episodes) / read_info(root).fps / 60.0,
+    }
+
+
+def _enough(found: Mapping[str, Any], wanted: TaskDesign) -> bool:
+    return found["successes"] >= wanted.episodes and found["minutes"] >= wanted.minutes
+
+
+def _policy(job: Job, arm: PolicyArm, design: StudyDesign, layout: Layout) -> dict[str, Any]:
+    """Train a policy and let it drive."""
+    from handrail.policies.imitation.training.training import train
+
+    folder = train(training(arm, design, layout.dataset(arm.cell), layout.policy(arm)))
+    driven = evaluations(job, design, str(folder))
+    shares = {what: _evaluate(config, layout.evaluation(arm, what)) for what, config in driven.items()}
+    return {"checkpoint": str(folder.relative_to(layout.root)), "success": shares}
+
+
+def _evaluate(config: EvaluateConfig, file: Path) -> dict[str, float]:
+    """Run rollouts into a file of their own and return the success of each arm in it."""
+    from handrail.datasets.comparison.evaluations import read_evaluations
+    from handrail.policies.imitation.evaluation.evaluation import evaluate
+
+    file.parent.mkdir(parents=True, exist_ok=True)
+    evaluate(replace(config, json=str(file)))
+    arms = read_evaluations([file])
+    return {label: float(found.runs()[0].values.mean()) for label, found in arms.items()}
+
+
+def _compare(task: str, design: StudyDesign, layout: Layout) -> dict[str, Any]:
+    """Write the report of a task: its datasets and what the policies did."""
+    from handrail.datasets.comparison.compare import compare
+    from handrail.datasets.comparison.findings import findings
+    from handrail.datasets.comparison.report.report import write_report
+
+    cells = [Cell(task, mode) for mode in design.modes]
+    standing = Standing(design, layout)
+    files = [path for cell in cells for path in standing.evaluations(cell, "nominal")]
+    comparison = compare(
+        CompareConfig(
+            datasets=tuple(str(layout.dataset(cell)) for cell in cells),
+            labels=design.modes,
+            baseline=design.baseline,
+            evaluations=tuple(map(str, files)),
+            output=str(layout.comparison(task)),
+        )
+    )
+    write_report(comparison)
+    return {"findings": [finding.text for finding in findings(comparison)]}

@@ -1,0 +1,93 @@
+"""What the arms of a study are, and which of them are compared with which."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+
+from handrail.controllers.errors import unknown_name
+from handrail.datasets.comparison.outcomes import LIKE_FOR_LIKE, Pair
+from handrail.policies.study.design.design import StudyDesign
+from handrail.policies.study.design.jobs import Actions, Cell, PolicyArm
+
+UNPROTECTED = "joint velocities, unprotected"
+THROUGH_MPC = "intent through the MPC"
+CONTROLLER = "policy-plus-controller"  # families of comparisons, besides like for like
+PROTECTED = "protected"
+
+
+@dataclass(frozen=True)
+class StudyArm:
+    """What an arm is, field by field.
+
+    Attributes:
+        mode: in which the demonstrations were made.
+        actions: what the policy writes, `realised` joint velocities or the operator's `intent`.
+        budget: how much it was trained on, `time` or `number`.
+        condition: what disturbs or protects, `pushed` or `filter`; "" for neither.
+    """
+
+    mode: str
+    actions: Actions
+    budget: str
+    condition: str = ""
+
+    @property
+    def label(self) -> str:
+        """What the policies are called under whatever condition."""
+        return PolicyArm(Cell("", self.mode), self.actions, self.budget, 0).label
+
+    @property
+    def family(self) -> str:
+        """Which family of comparisons it belongs to: p is adjusted over all of one, for every task."""
+        if self.actions == "intent":
+            return CONTROLLER
+        return PROTECTED if self.condition else LIKE_FOR_LIKE
+
+    @property
+    def driven(self) -> str:
+        """What drives the robot: the policy alone, or a policy and a controller."""
+        return THROUGH_MPC if self.actions == "intent" else UNPROTECTED
+
+
+def identify(design: StudyDesign, labels: Sequence[str]) -> dict[str, StudyArm]:
+    """Return what the arms of evaluation files are, like for like first: joint velocities, then intents.
+
+    A label says mode, actions and budget, then the condition; this is the only place where one is read.
+
+    Raises:
+        HandrailError: an arm is not of the study.
+    """
+    spaces: tuple[Actions, ...] = ("realised", "intent")
+    kinds = [StudyArm(*each) for each in product(design.modes, spaces, design.budgets)]
+    known = {kind.label: kind for kind in kinds}
+    found = {label: _identified(label, known) for label in labels}
+    return dict(sorted(found.items(), key=lambda item: _place(item[1], design)))
+
+
+def _identified(label: str, known: Mapping[str, StudyArm]) -> StudyArm:
+    own = max((each for each in known if f"{label} ".startswith(f"{each} ")), key=len, default=None)
+    if own is None:
+        raise unknown_name("arm of the evaluations", label, known)
+    kind = known[own]
+    return StudyArm(kind.mode, kind.actions, kind.budget, label.removeprefix(own).strip())
+
+
+def _place(arm: StudyArm, design: StudyDesign) -> tuple[int, bool, int]:
+    return design.budgets.index(arm.budget), arm.actions == "intent", design.modes.index(arm.mode)
+
+
+def pairs(arms: Mapping[str, StudyArm], baseline: str) -> list[Pair]:
+    """Return what is compared with what: like for like apart from a policy plus a controller.
+
+    That is the baseline mode's joint velocities on the same budget under the same condition. An arm for which
+    there is none (yet) is compared with nothing.
+    """
+    base = {
+        (arm.budget, arm.condition): label
+        for label, arm in arms.items()
+        if (arm.mode, arm.actions) == (baseline, "realised")
+    }
+    against = {label: base.get((arm.budget, arm.condition)) for label, arm in arms.items()}
+    return [
+        Pair(label, other, arms[label].family) for label, other in against.items() if other and other != label
+    ]

@@ -1,0 +1,200 @@
+"""The tables of a study, for a page in HTML and one in Markdown alike."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from handrail.datasets.comparison.outcomes import ArmOutcome, OutcomeDifference
+from handrail.datasets.presentation.wording import (
+    DASH,
+    THESE_POLICIES,
+    WITH_TRAINING,
+    duration,
+    number,
+    p_value,
+    percent,
+    percent_span,
+    points,
+    points_span,
+)
+from handrail.policies.study.report.arms import StudyArm
+from handrail.policies.study.report.conditions import Condition
+from handrail.policies.study.report.results import TaskResults
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table.
+
+    Attributes:
+        title: what it shows.
+        headings: of its columns.
+        rows: of text.
+    """
+
+    title: str
+    headings: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+
+
+def tables(results: TaskResults) -> list[Table]:
+    """Return the tables of a task that have something in them."""
+    made = [
+        _collected(results),
+        _policies(results),
+        _differences(results),
+        _conditions(results),
+        _sweep(results),
+    ]
+    return [table for table in made if table.rows]
+
+
+def _collected(results: TaskResults) -> Table:
+    headings = (
+        "mode", "episodes", "success", "95 %", "operator time", "s a success", "successes / h", "failures",
+    )  # fmt: skip
+    rows = []
+    for mode, each in results.collected.items():
+        seconds = each.operator_time / each.successes if each.successes else None
+        reasons = ", ".join(f"{reason} ({count})" for reason, count in each.reasons.items())
+        rows.append(
+            (
+                mode,
+                str(each.episodes),
+                percent(each.success),
+                percent_span(each.success_interval),
+                duration(each.operator_time),
+                number(seconds),
+                number(each.successes_an_hour),
+                reasons or DASH,
+            )
+        )
+    return Table("Collecting", headings, tuple(rows))
+
+
+def _policies(results: TaskResults) -> Table:
+    headings = (
+        "policy", "what drives", "success", THESE_POLICIES, WITH_TRAINING, "each training seed", "length s",
+        "rollouts with contact", "trained on",
+    )  # fmt: skip
+    rows = []
+    for label, condition in results.conditions.items():
+        arm = condition.outcome
+        length = f"{number(arm.means['length'][0])}" if "length" in arm.means else DASH
+        rows.append(
+            (
+                label,
+                condition.arm.driven,
+                _share(arm),
+                percent_span(arm.wilson),
+                percent_span(arm.nested),
+                ", ".join(percent(share) for share in arm.seeds),
+                length,
+                percent(condition.touched),
+                _data(arm.trained_on),
+            )
+        )
+    return Table("Policies, undisturbed", headings, tuple(rows))
+
+
+def _differences(results: TaskResults) -> Table:
+    headings = (
+        "policy",
+        "against",
+        "what is compared",
+        "points",
+        THESE_POLICIES,
+        WITH_TRAINING,
+        "p (Holm)",
+        "detectable",
+    )
+    found = [
+        (conditions_[each.label], each)
+        for outcomes, conditions_ in (
+            (results.policies, results.conditions),
+            (results.shielded, results.protected),
+        )
+        for each in (outcomes.differences if outcomes else ())
+    ]
+    found.sort(key=lambda pair: pair[0].arm.actions == "intent")  # like for like first
+    return Table("Differences", headings, tuple(_difference(each, what.arm) for what, each in found))
+
+
+def _difference(each: OutcomeDifference, arm: StudyArm) -> tuple[str, ...]:
+    alike = f"joint velocities, both through the {arm.condition}" if arm.condition else arm.driven
+    return (
+        each.label,
+        each.baseline,
+        "policy plus controller" if arm.actions == "intent" else alike,
+        points(each.rollouts.estimate) + (" ●" if each.detected else ""),
+        points_span(each.rollouts.interval),
+        DASH if each.nested is None else points_span(each.nested),
+        p_value(each.p_adjusted).removeprefix("p = ").removeprefix("p "),
+        f"{100 * each.detectable:.0f} points",
+    )
+
+
+def _conditions(results: TaskResults) -> Table:
+    headings = (
+        "policy",
+        "condition",
+        "success",
+        THESE_POLICIES,
+        "without",
+        "points",
+        "points 95 %",
+        "rollouts with contact",
+        "contacts / 100 rollouts",
+    )
+    rows = [_condition(each) for each in (*results.disturbed.values(), *results.protected.values())]
+    return Table("Disturbed, protected; beside the same rollouts without", headings, tuple(rows))
+
+
+def _condition(each: Condition) -> tuple[str, ...]:
+    return (
+        each.arm.label,
+        each.arm.condition,
+        _share(each.outcome),
+        percent_span(each.outcome.wilson),
+        _share(each.without) if each.without else DASH,
+        points(each.change.estimate) if each.change else DASH,
+        points_span(each.change.interval) if each.change else DASH,
+        percent(each.touched),
+        number(100 * each.contacts),
+    )
+
+
+def _sweep(results: TaskResults) -> Table:
+    headings = (
+        "policy",
+        "operator's noise",
+        "success",
+        THESE_POLICIES,
+        "each training seed",
+        "s a demonstration",
+    )
+    rows = [
+        (
+            label,
+            f"{point.noise:g}",
+            _share(point.outcome),
+            percent_span(point.outcome.wilson),
+            ", ".join(percent(share) for share in point.outcome.seeds),
+            number(point.seconds),
+        )
+        for label, points_ in results.sweep.items()
+        for point in points_
+    ]
+    return Table("Operators from perfect to clumsy", headings, tuple(rows))
+
+
+def _share(arm: ArmOutcome) -> str:
+    return f"{percent(arm.share)} ({arm.successes} of {arm.rollouts})"
+
+
+def _data(trained_on: Mapping[str, float]) -> str:
+    parts = []
+    if "episodes" in trained_on:
+        parts.append(f"{trained_on['episodes']:.0f} episodes")
+    if "operator_time" in trained_on:
+        parts.append(duration(trained_on["operator_time"]))
+    return ", ".join(parts) or DASH

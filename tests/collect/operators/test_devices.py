@@ -1,0 +1,116 @@
+"""The laws of input devices: one axis at a time, a leader without jumps, switches that cost time."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from device_helpers import GOAL, HOME, MODEL, PERIOD, Wisher, drive, first_view
+
+from handrail.collect.operators.devices.devices import input_map
+from handrail.collect.operators.devices.joint_order import clear_order, sweep_clearance
+from handrail.collect.operators.human.human import HumanSettings
+from handrail.collect.operators.human.motion_goal import Wish
+from handrail.collect.operators.modes import find_mode
+from handrail.collect.operators.operator import View
+from handrail.controllers.baselines.split_controller import split_controller
+from handrail.controllers.collision.model import CollisionModel
+from handrail.controllers.interface.controller import State
+from handrail.controllers.interface.intent import Intent
+from handrail.controllers.robot.shape import Obstacle, Shape
+
+NAMES = ["direct_single", "leader", "decoupled", "direct"]
+
+
+@pytest.fixture(scope="module")
+def view() -> View:
+    return first_view()
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_device_brings_the_hand_to_the_goal(view, name):
+    _, path = drive(view, name, HumanSettings.perfect(), seconds=30.0)
+    nearest = min(np.linalg.norm(MODEL.pose(q).position - GOAL.position) for q in path[::10])
+    assert nearest < 0.03
+
+
+def test_one_axis_at_a_time(view):
+    intents, _ = drive(view, "direct_single", HumanSettings())
+    channels = input_map(MODEL, find_mode("direct_single")).channels
+    assert all(np.count_nonzero(intent.mask) == 1 for intent in intents)
+    assert all(np.count_nonzero(intent.values) <= 1 for intent in intents)
+    assert all(intent.raw.axes <= 1 for intent in intents)
+    used = {channels.names[int(np.argmax(intent.mask))] for intent in intents}
+    assert {name.split(".")[0] for name in used} == {"base", "joint"}
+    assert not used & {f"joint.{name}" for name in MODEL.description.base_joints}
+
+
+@pytest.mark.parametrize("name", ["direct_single", "decoupled", "leader", "ee"])
+def test_switches_are_counted_and_cost_time(view, name):
+    human = replace(HumanSettings.perfect(), switch_time=0.6)
+    intents, _ = drive(view, name, human, seconds=6.0)
+    masks = [intent.mask.tobytes() for intent in intents]
+    changes = [step for step in range(1, len(masks)) if masks[step] != masks[step - 1]]
+    assert intents[-1].raw.switches == len(changes)
+    assert bool(changes) == (name in ("direct_single", "decoupled"))
+    for step in changes:
+        pause = intents[step : step + 12]
+        assert all(not intent.values.any() for intent in pause), step
+
+
+def test_a_leader_starts_without_a_jump_and_never_outruns_its_operator(view):
+    """The target begins where the arm is, and moves no faster than a joint's full stick."""
+    intents, path = drive(view, "leader", HumanSettings(), seconds=8.0)
+    arm = intents[0].mask.copy()
+    arm[:3] = False
+    raw = np.array([intent.raw.values[arm] for intent in intents])
+    np.testing.assert_allclose(raw[0], HOME[3:], atol=1e-9)
+    np.testing.assert_allclose(intents[0].values, 0.0, atol=1e-9)
+    rate = find_mode("leader").gains.joint_rate
+    assert np.max(np.abs(np.diff(raw, axis=0))) <= rate * PERIOD + 1e-9
+    assert np.max(np.abs(path[:-1, 3:] - raw)) < 0.35
+    assert len({intent.mask.tobytes() for intent in intents}) == 1
+
+
+def test_a_still_leader_holds_the_arm(view):
+    class Rest(Wisher):
+        def wish(self, view):
+            return Wish.rest()
+
+    _, path = drive(view, "leader", HumanSettings(), seconds=5.0, script=Rest())
+    assert np.max(np.abs(path - HOME)) < 0.03
+
+
+def test_the_split_controller_coordinates_nothing():
+    """The base's stick moves no arm joint, the hand's moves no base joint."""
+    mode = find_mode("decoupled")
+    sticks = input_map(MODEL, mode)
+    controller = split_controller(MODEL)
+    state = State(HOME, np.zeros(MODEL.size))
+    operator_wish = Wish(np.array([0.1, 0.0, 0.1, 0.0, 0.1, 0.0]), np.array([0.2, 0.1, 0.1]))
+    for focus, resting in (("hand", slice(0, 3)), ("base", slice(3, None))):
+        controller.reset()
+        mask, values = sticks.wanted(replace(operator_wish, focus=focus), state)
+        velocity = controller.update(state, Intent(values, mask)).velocity(PERIOD)
+        np.testing.assert_array_equal(velocity[resting], 0.0)
+        assert np.any(velocity)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_same_seed_is_the_same_operator(view, name):
+    first, again = (drive(view, name, HumanSettings(), seconds=2.0)[0] for _ in range(2))
+    for a, b in zip(first, again, strict=True):
+        np.testing.assert_array_equal(a.values, b.values)
+        np.testing.assert_array_equal(a.raw.values, b.raw.values)
+
+
+def test_joints_are_moved_in_an_order_that_hits_nothing():
+    """A table under the hand: what lowers the arm has to wait for what lifts it."""
+    table = Obstacle("table", Shape("box", np.array([0.6, 2.0, 0.5])), np.array([0.1, 0.0, 0.25]))
+    collision, goal, clear = CollisionModel(MODEL, (table,)), HOME.copy(), 0.02
+    goal[[4, 5]] += [0.5, -0.8]  # shoulder down, elbow up
+    assert sweep_clearance(collision, HOME, 4, 0.5) < clear
+    for preferred in ([4, 5], [5, 4]):
+        assert clear_order(collision, HOME, goal, preferred, clear) == [5, 4]
+    assert clear_order(CollisionModel(MODEL), HOME, goal, [4, 5], clear) == [4, 5]
+    everywhere = Obstacle("wall", table.shape, MODEL.pose(HOME).position)
+    assert clear_order(CollisionModel(MODEL, (everywhere,)), HOME, goal, [4, 5], clear) == []

@@ -1,0 +1,132 @@
+"""Large motions of the hand: without folding the arm, without leaning, without hitting the cabinet."""
+
+from contextlib import closing
+
+import numpy as np
+import pytest
+from device_helpers import HOME, MODEL, drive, first_view
+
+from handrail.collect.commands.record import episode_seed
+from handrail.collect.config import SessionConfig
+from handrail.collect.operators.devices.arm_solutions import REACHED, arm_solutions, straight_solution
+from handrail.collect.operators.human.human import HumanSettings
+from handrail.collect.operators.human.motion_goal import Target, Wish
+from handrail.collect.operators.human.steering import Gains, hand_twist, pose_errors
+from handrail.collect.operators.operator import View
+from handrail.collect.operators.scripts.drawer import before_driving
+from handrail.collect.session.build import build_env, build_session
+from handrail.controllers.collision.model import CollisionModel
+from handrail.controllers.robot.inverse_kinematics import arm_configuration
+from handrail.controllers.robot.model import Pose
+
+START = MODEL.pose(HOME)
+DOWN = np.diag([1.0, -1.0, -1.0])
+
+
+class Bring:
+    """Wants the hand at one pose and rests there; a script."""
+
+    def __init__(self, goal, tilt=np.inf):
+        self._goal, self._tilt = goal, tilt
+
+    def reset(self, view):
+        pass
+
+    def wish(self, view):
+        distance, angle = pose_errors(view.tool, self._goal)
+        if distance < 0.02 and angle < 0.1:
+            return Wish.rest()
+        target = Target(self._goal, view.state.q[:3], distance=0.02, angle=0.2, tilt=self._tilt)
+        return Wish(hand_twist(view.tool, self._goal, Gains()), np.zeros(3), target=target)
+
+
+@pytest.fixture(scope="module")
+def view() -> View:
+    return first_view()
+
+
+def nearest(path):
+    """Return the smallest distance of the robot to itself along a path [m]."""
+    return float(np.min(CollisionModel(MODEL).values(path[::2])))
+
+
+def by_joints(*offsets: float) -> Pose:
+    """Return where the tool is when the arm's joints are off from home by so much [rad]."""
+    return MODEL.pose(HOME + np.array([0.0, 0.0, 0.0, *offsets]))
+
+
+def leans(path):
+    """Return how far the hand leans from pointing down along a path [rad]."""
+    return np.array([np.arccos(np.clip(-MODEL.pose(q).rotation[2, 2], -1.0, 1.0)) for q in path])
+
+
+@pytest.mark.parametrize(
+    "offsets",
+    [
+        (0.0, 0.8, -1.6, -0.8, 0.0, -2.4),
+        (0.2, 0.3, -0.4, -1.2, 0.0, -2.6),
+        (0.2, 0.7, -1.2, -1.0, -0.2, -2.7),
+    ],
+)
+def test_a_leader_makes_large_turns_without_folding_the_arm(view, offsets):
+    """By the hand's straight way, the forearm would come within 36 mm of the palm."""
+    goal = by_joints(*offsets)
+    _, path = drive(view, "leader", HumanSettings.perfect(), 16.0, Bring(goal))
+    end = MODEL.pose(path[-1])
+    assert np.linalg.norm(end.position - goal.position) < 0.02
+    assert np.trace(end.rotation.T @ goal.rotation) > 2.98
+    assert nearest(path) > 0.07
+
+
+def test_the_straight_way_keeps_clear_where_there_is_one_that_does():
+    """The first solution that can be gone to straight, though a nearer one reaches the goal as well."""
+    collision, clear, farther = CollisionModel(MODEL), 0.03, 0
+    share = np.linspace(0.1, 1.0, 10)[:, None]
+    for offsets in np.random.default_rng(3).uniform(-2.0, 2.0, (8, 6)):
+        goal = by_joints(*offsets)
+        kept = [
+            np.min(collision.values(HOME + share * (there - HOME)))
+            for there, error in arm_solutions(MODEL, HOME, goal)
+            if error < REACHED
+        ]
+        there = straight_solution(MODEL, collision, HOME, goal, clear)
+        found = np.min(collision.values(HOME + share * (there - HOME)))
+        np.testing.assert_allclose(MODEL.pose(there).position, goal.position, atol=0.01)
+        assert found >= min(clear, max(kept)) - 1e-9
+        farther += kept[0] < clear <= found
+    assert farther
+
+
+def test_one_axis_at_a_time_keeps_the_hand_upright_where_it_must_not_lean(view):
+    ahead = HOME[:3] * [1.0, 1.0, 0.0] + [1.1, 0.0, 0.95]
+    down = arm_configuration(MODEL, HOME, Pose(ahead, DOWN))[0]
+    goal = Pose(MODEL.pose(down).position + [0.05, 0.1, -0.15], DOWN)
+    worst = {}
+    for tilt in (0.06, np.inf):
+        script = Bring(goal, tilt)
+        _, path = drive(view, "direct_single", HumanSettings.perfect(), 40.0, script, start=down)
+        assert np.linalg.norm(MODEL.pose(path[-1]).position - goal.position) < 0.03
+        worst[tilt] = leans(path).max()
+    assert worst[0.06] < 0.08
+    assert worst[np.inf] > 0.12
+
+
+def test_the_hand_is_made_ready_where_the_base_will_bring_it():
+    now, stand = np.array([-1.5, 0.1, -0.2]), np.array([-0.4, 0.6, 0.3])
+    q = HOME.copy()
+    q[:3] = stand
+    there = MODEL.pose(q)
+    q[:3] = now
+    ready = before_driving(there, stand, now)
+    np.testing.assert_allclose(ready.position, MODEL.pose(q).position, atol=1e-9)
+    np.testing.assert_allclose(ready.rotation, MODEL.pose(q).rotation, atol=1e-9)
+
+
+@pytest.mark.parametrize("episode", [1, 3])
+def test_an_expert_by_joints_turns_the_hand_over_without_touching_himself(episode):
+    """By the hand's way, the palm was pressed against the forearm for 20 s."""
+    config = SessionConfig(task="reach", mode="direct", person=episode)
+    with closing(build_env(config, 20)) as env:
+        outcome = build_session(config, env).run(episode_seed(900, episode))
+    assert outcome.success
+    assert outcome.contacts == 0

@@ -1,0 +1,111 @@
+"""The display's laws: refused before anything is written, for this machine alone, never in the way."""
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import urllib.request
+from pathlib import Path
+
+import pytest
+from command_helpers import command
+
+from handrail.collect.config import SessionConfig
+from handrail.collect.session import viewer
+from handrail.collect.session.build import build_env, build_session
+from handrail.collect.session.display import Display
+from handrail.collect.session.rerun_drawing import Drawing
+from handrail.datasets.reading.reader import read_info
+
+pytest.importorskip("rerun")
+SCREENS = ("DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET")
+REACH = ("--task", "reach", "--dataset.num_episodes", "1")
+
+
+def listening() -> dict[int, str]:
+    """Return every port that somebody listens on and its address, as the kernel writes it."""
+    lines = [
+        line.split()
+        for name in ("tcp", "tcp6")
+        for line in Path(f"/proc/net/{name}").read_text().splitlines()
+    ]
+    return {int(w[1].split(":")[1], 16): w[1].split(":")[0] for w in lines if w[3] == "0A"}
+
+
+def ports(address: str) -> list[int]:
+    return [int(port) for port in re.findall(r"127\.0\.0\.1(?::|%3A)(\d+)", address)]
+
+
+@pytest.mark.parametrize("screen", ["", ":4711"])
+def test_without_a_screen_the_viewer_is_refused_at_once(screen, tmp_path):
+    """In a process of its own: what hangs there fails here."""
+    words = [*REACH, "--display_data", str(tmp_path / "set")]
+    blind = {name: value for name, value in os.environ.items() if name not in SCREENS}
+    done = subprocess.run(
+        [sys.executable, "-m", "handrail.scripts.record", *words],
+        env=blind | ({"DISPLAY": screen} if screen else {}),
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1), done.stderr
+    assert {"--display_data:", "--display_web", "--display_save"} <= set(done.stderr.split())
+    assert not (tmp_path / "set").exists()
+
+
+def test_the_web_viewer_is_for_this_machine_alone_and_ends_with_the_recording(tmp_path):
+    said = []
+    display = Display(web=True, save=str(tmp_path / "seen.rrd"), say=said.append)
+    try:
+        address = said[0].split()[-1]
+        there = listening()
+        assert [there[port] for port in ports(address)] == ["0100007F"] * 2
+        with urllib.request.urlopen(address, timeout=10) as page:
+            assert b"Rerun" in page.read()
+    finally:
+        display.close()
+    assert not set(ports(address)) & set(listening())
+    assert (tmp_path / "seen.rrd").stat().st_size > 0
+
+
+@pytest.mark.parametrize("trouble", [signal.SIGKILL, signal.SIGSTOP])
+def test_a_viewer_that_dies_or_stalls_never_stops_a_recording(trouble, tmp_path, monkeypatch):
+    monkeypatch.setattr(viewer, "_MOST_WAITING", 2**17)
+    honest, sent = viewer.Viewer.send, []
+
+    def troubled(self, data):
+        sent.append(data)
+        if len(sent) == 4:
+            os.kill(self._process.pid, trouble)
+            if trouble == signal.SIGKILL:
+                self._process.wait()
+        honest(self, data * (1 if len(sent) < 4 else 40))
+
+    monkeypatch.setattr(viewer.Viewer, "send", troubled)
+    draw, drawn = Drawing.see, []
+    monkeypatch.setattr(Drawing, "see", lambda self, moment: (drawn.append(moment), draw(self, moment)))
+    saved = tmp_path / "seen.rrd"
+    done = command(*REACH, "--display_web", "--display_save", saved, tmp_path / "set")
+    assert done.returncode == 0, done.stderr
+    assert done.stderr.count("the recording goes on") == 1
+    info = read_info(tmp_path / "set")
+    assert info.episodes == 1
+    assert len(drawn) == info.frames  # the file has the rest too
+    assert saved.stat().st_size > 2**17
+
+
+def test_what_goes_wrong_in_drawing_is_said_once_and_no_more(monkeypatch):
+    said = []
+    display = Display(say=said.append)
+    monkeypatch.setattr(display._drawing, "see", lambda moment: 1 / 0)
+    config = SessionConfig(task="reach", time_limit=1.0)
+    build_session(config, build_env(config, 20), [display]).run(2)
+    display.close()
+    assert said == ["display: division by zero; the recording goes on"]
+
+
+def test_one_viewer_at_a_time(tmp_path):
+    done = command("--display_data", "--display_web", tmp_path / "set")
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
+    assert "--display_data and --display_web: expected one of them" in done.stderr

@@ -1,0 +1,70 @@
+"""The safety fuzz: rude intents in clutter with movers, in physics, without the environment's limiter."""
+
+from collections import Counter
+
+import numpy as np
+import pytest
+from fuzz_helpers import failing, run
+
+from handrail.controllers.mpc.masked_mpc import MaskedMpc
+from handrail.controllers.mpc.safety_filter import safety_filter
+from handrail.controllers.numerics.threads import single_threaded
+from handrail.controllers.robot.description import robot_names
+from handrail.controllers.robot.model import load_model
+
+EXCESS = 1e-6  # of a limit, relative, that is rounding
+
+
+def check(seeds, seconds, movers=0, robot="ridgeback_ur10", make=MaskedMpc, failures=0.0):
+    """Run seeds; the robot touches neither itself nor what stands, keeps its limits, and gets somewhere."""
+    model, results = load_model(robot), {}
+    controller = make(model)
+    with single_threaded():
+        for seed in seeds:
+            with failing(controller, seed, failures):
+                results[seed] = run(model, controller, seed, seconds, movers)
+    statuses = sum((result.statuses for result in results.values()), Counter())
+    own = np.quantile([result.nearest_own for result in results.values()], [0, 0.05, 0.5]).round(3)
+    travelled = np.quantile([result.travelled for result in results.values()], [0, 0.5]).round(1)
+    print(f"{robot}, {movers} movers, {len(results)} runs: {dict(statuses)}")
+    print(f"  nearest to itself {own} m (least, 5 %, median), travelled {travelled} m (least, median)")
+    for seed, result in results.items():
+        for contact in result.moving[:1]:
+            print(f"  seed {seed}: a mover met {contact}")
+    assert not {seed: r.own for seed, r in results.items() if r.own}
+    assert not {seed: r.standing for seed, r in results.items() if r.standing}
+    assert max(result.velocity_excess for result in results.values()) < EXCESS
+    assert max(result.acceleration_excess for result in results.values()) < EXCESS
+    assert travelled[1] > 0.3 * seconds  # a robot that freezes is safe too
+    return statuses, [seed for seed, result in results.items() if result.moving]
+
+
+@pytest.mark.parametrize("make", [MaskedMpc, safety_filter])
+@pytest.mark.parametrize("robot", robot_names())
+def test_rude_intents_in_clutter(make, robot):
+    statuses, _ = check(range(1000, 1004), 5.0, make=make, robot=robot)
+    assert {"ok", "invalid_intent", "stale_intent"} <= set(statuses)
+
+
+@pytest.mark.parametrize("movers", [1, 2])
+def test_rude_intents_among_movers(movers):
+    assert not check(range(1000, 1003), 5.0, movers)[1]
+
+
+def test_rude_intents_in_clutter_with_a_solver_that_fails():
+    statuses, _ = check(range(1000, 1004), seconds=5.0, failures=0.05)
+    assert statuses["solver_failed"] > 20
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("robot", robot_names())
+@pytest.mark.parametrize("movers", [0, 1, 2])
+def test_rude_intents_at_length(robot, movers):
+    """Movers stop for nobody and can close in from two sides: met in 1 of 10 runs at most."""
+    _, met = check(range(70), 15.0, movers, robot)
+    assert len(met) <= 7
+
+
+@pytest.mark.slow
+def test_rude_intents_in_clutter_with_a_solver_that_fails_at_length():
+    check(range(50), seconds=20.0, failures=0.05)

@@ -1,0 +1,190 @@
+"""Disturbances' laws: the seed alone decides, they matter, and without them nothing changes."""
+
+import numpy as np
+import pytest
+from collect_helpers import action, environment
+
+from handrail.collect.operators.operator import View
+from handrail.collect.perturbations.delayed import DelayedOperator
+from handrail.collect.perturbations.perturbations import DEFAULTS, Perturbation
+from handrail.collect.perturbations.push import Pusher, sample_pushes
+from handrail.collect.perturbations.shift import ShiftedTask
+from handrail.collect.session.build import TASK_CLASSES
+from handrail.collect.session.session import Session
+from handrail.collect.tasks.reach import Reach
+from handrail.controllers.baselines.direct import DirectController
+from handrail.controllers.collision.model import CollisionModel
+from handrail.controllers.interface.channels import Channels
+from handrail.controllers.interface.intent import Intent
+from handrail.controllers.mpc.masked_mpc import MaskedMpc
+from handrail.controllers.robot.model import load_model
+
+MODEL = load_model()
+
+
+def test_what_is_written_is_what_is_read():
+    for text in ("none", "push:1", "push:2.5+shift:0.3+delay:4"):
+        assert Perturbation.parse(text).text == text
+    assert Perturbation.parse("push+shift+delay").sizes == DEFAULTS
+    assert Perturbation.parse(" push + delay:5 ").words == "pushed delayed:5"
+    assert Perturbation.parse("none") == Perturbation()
+
+
+class Motionless:
+    """Asks for nothing, and notes what it sees."""
+
+    name = "motionless"
+
+    def reset(self, view, rng):
+        self.seen = []
+
+    def act(self, view):
+        self.seen.append(view)
+        return Intent.idle(Channels.of(MODEL.description), time=view.state.time)
+
+
+class Watcher:
+    def __init__(self):
+        self.states = []
+
+    def begin(self, env, seed):
+        self.states = []
+
+    def see(self, moment):
+        self.states.append(moment.state)
+
+
+def path(env, seed, disturbances=(), controller=None):
+    """Return where a robot that nobody steers goes, (T, s); by default one whose servos just hold."""
+    watcher = Watcher()
+    controller = controller or DirectController(MODEL, 1.0 / env.fps)
+    Session(env, controller, Motionless(), (watcher,), disturbances=disturbances).run(seed)
+    return np.array(watcher.states)
+
+
+def test_pushes_are_the_seed_s():
+    first = sample_pushes(7, 90.0)
+    for push, again in zip(first, sample_pushes(7, 90.0), strict=True):
+        assert (push.start, push.end, push.hand) == (again.start, again.end, again.hand)
+        np.testing.assert_array_equal(push.direction, again.direction)
+    shorter = sample_pushes(7, 20.0)
+    assert [push.start for push in shorter] == [push.start for push in first[: len(shorter)]]
+    assert sample_pushes(8, 90.0)[0].start != first[0].start
+    pushes = [push for seed in range(50) for push in sample_pushes(seed, 30.0)]
+    assert {push.hand for push in pushes} == {True, False}
+    assert all(push.direction[2] == 0.0 for push in pushes if not push.hand)
+    np.testing.assert_allclose([np.linalg.norm(push.direction) for push in pushes], 1.0)
+
+
+def test_a_push_moves_the_robot_and_more_strength_moves_it_more():
+    """Displacements of the tool by the first push of some seeds, median, at rest."""
+    with environment("Reach") as env:
+        moved = {}
+        for size in (0.0, 1.0, 2.0):
+            away = []
+            for seed in range(8):
+                env.reset(seed=seed)
+                pusher, start = Pusher(size), env.simulation.tool.position
+                pusher.begin(env, seed)
+                while env.simulation.data.time < sample_pushes(seed, 30.0)[0].end + 0.5:
+                    pusher.act(env.simulation)
+                    env.step(action(env))
+                away.append(np.linalg.norm(env.simulation.tool.position - start))
+            moved[size] = float(np.median(away))
+    assert moved[0.0] < 0.035  # the servos nearly hold
+    assert 0.02 < moved[1.0] < 0.3
+    assert moved[2.0] > 1.5 * moved[1.0]
+
+
+def test_the_mpc_holds_against_a_push_as_the_servos_alone_do():
+    """A plan that went on from what is measured would give way, and then coast to rest."""
+    controller, moved = MaskedMpc(MODEL), []
+    with environment("Reach", task=Reach(horizon=4.0)) as env:
+        for seed in range(4):
+            held, planned = (path(env, seed, (Pusher(1.0),), who)[:, :9] for who in (None, controller))
+            moved.append([np.abs(way - way[0]).max() for way in (held, planned)])
+    held, planned = np.array(moved).T
+    assert held.max() > 0.02
+    assert np.all(planned < 1.2 * held + 0.005)
+
+
+def test_forces_end_with_the_push():
+    with environment("Reach") as env:
+        env.reset(seed=0)
+        env.simulation.push(np.array([100.0, 0.0, 0.0]), np.array([0.0, 50.0, 0.0]))
+        assert np.abs(env.simulation.data.xfrc_applied).sum() > 100
+        env.simulation.push(np.zeros(3), np.zeros(3))
+        assert not env.simulation.data.xfrc_applied.any()
+
+
+def test_a_session_without_disturbance_is_what_it_was():
+    with environment("Reach", task=Reach(horizon=3.0)) as env:
+        calm, again = path(env, 3), path(env, 3, (Pusher(0.0),))
+        pushed, repeated = path(env, 3, (Pusher(1.0),)), path(env, 3, (Pusher(1.0),))
+    assert np.abs(calm[:, :9] - calm[0, :9]).max() < 1e-3
+    np.testing.assert_array_equal(pushed, repeated)
+    assert np.abs(pushed - calm).max() > 0.01
+    assert np.abs(again - calm).max() < np.abs(pushed - calm).max()
+
+
+@pytest.mark.parametrize("task", sorted(TASK_CLASSES))
+def test_a_shifted_start_is_elsewhere_and_free(task):
+    usual = TASK_CLASSES[task]()
+    shifted = ShiftedTask(usual, 0.3)
+    assert (shifted.name, shifted.horizon, shifted.state_names) == (
+        usual.name,
+        usual.horizon,
+        usual.state_names,
+    )
+    for seed in range(4):
+        before, after, again = (
+            one.sample(MODEL, np.random.default_rng(seed)) for one in (usual, shifted, shifted)
+        )
+        np.testing.assert_array_equal(after.q, again.q)
+        assert 0.1 < np.linalg.norm(after.q[:2] - before.q[:2]) <= 0.3 + 1e-9
+        assert np.abs(after.q[2] - before.q[2]) <= 0.3
+        for item, there in zip(before.scene.objects, after.scene.objects, strict=True):
+            carried = before.grip is not None and item.movable
+            assert np.array_equal(item.position, there.position) != carried
+        solid = tuple(item.obstacle() for item in after.scene.objects if not item.ghost)
+        near = CollisionModel(MODEL, solid).values(after.q[None])[0]
+        assert near.min() > 0.0 or after.grip is not None
+
+
+def test_what_is_held_keeps_its_place_in_the_hand():
+    usual, shifted = TASK_CLASSES["tray"](), ShiftedTask(TASK_CLASSES["tray"](), 0.5)
+    before, after = (one.sample(MODEL, np.random.default_rng(1)) for one in (usual, shifted))
+    for name in ("tray", "can"):
+        places = []
+        for episode in (before, after):
+            hand, item = MODEL.pose(episode.q), episode.scene.find(name)
+            places.append(hand.rotation.T @ (item.position - hand.position))
+        np.testing.assert_allclose(*places, atol=1e-9)
+
+
+@pytest.mark.parametrize("periods", [0, 1, 4])
+def test_delayed_is_what_was_seen_k_periods_ago(periods):
+    with environment("Reach") as env:
+        env.reset(seed=0)
+        inner = Motionless()
+        operator = DelayedOperator(inner, periods)
+        views = []
+        for _ in range(10):
+            task = env.task_state()
+            views.append(View(env.state(), task.tool, task.opening, task))
+            if len(views) == 1:
+                operator.reset(views[0], np.random.default_rng(0))
+            intent = operator.act(views[-1])
+            assert intent.time == views[-1].state.time
+            env.step(action(env, 0.1))
+    assert inner.seen == [views[max(0, step - periods)] for step in range(10)]
+    assert operator.name == "motionless"
+
+
+def test_an_operator_sees_what_is_recorded():
+    with environment("Reach", task=Reach(horizon=1.0)) as env:
+        watcher, operator = Watcher(), Motionless()
+        Session(env, DirectController(MODEL), operator, (watcher,)).run(0)
+    for view, state in zip(operator.seen, watcher.states, strict=True):
+        np.testing.assert_array_equal(view.observation["agent_pos"], state)
+        np.testing.assert_array_equal(state[:9], view.state.q.astype(np.float32))

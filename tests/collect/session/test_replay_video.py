@@ -1,0 +1,48 @@
+"""`handrail-replay --video`: the whole episode, or one line."""
+
+import av
+import numpy as np
+import pytest
+from command_helpers import command
+
+from handrail.datasets.reading.reader import read_episodes, read_info
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory):
+    root = tmp_path_factory.mktemp("recorded") / "reach"
+    done = command(root, "--task", "reach", "--dataset.num_episodes", 1)
+    assert done.returncode == 0, done.stderr
+    return root
+
+
+@pytest.mark.needs_gl
+def test_a_replay_is_filmed_from_beginning_to_end(recorded, tmp_path):
+    film = tmp_path / "episode.mp4"
+    done = command(recorded, "--episode", 0, "--video", film, name="replay")
+    assert (done.returncode, done.stdout.count(str(film))) == (0, 1), done.stderr
+    with av.open(str(film)) as container:
+        pictures = [frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)]
+        assert container.streams.video[0].average_rate == read_info(recorded).fps
+    assert len(pictures) == read_episodes(recorded)[0]["length"]
+    assert np.any(pictures[0] != pictures[-1])
+
+
+@pytest.mark.needs_gl
+def test_a_film_or_sheet_that_cannot_be_written_is_one_line(recorded, tmp_path):
+    """And nothing lies about afterwards."""
+    for flag, ending in (("--video", "mp4"), ("--sheet", "png")):
+        (folder := tmp_path / f"folder.{ending}").mkdir()
+        done = command(recorded, "--episode", 0, flag, folder, name="replay")
+        assert (done.returncode, done.stderr.count("\n")) == (2, 1), done.stderr
+        assert str(folder) in done.stderr
+    assert len(list(tmp_path.rglob("*"))) == 2
+
+
+@pytest.mark.parametrize(
+    "words", ["--video a.mp4", "--video a.gif --episode 0", "--video no/a.mp4 --episode 0"]
+)
+def test_a_film_that_cannot_be_made_is_one_line(words, recorded):
+    done = command(recorded, *words.split(), name="replay")
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1), done.stderr
+    assert "--video" in done.stderr

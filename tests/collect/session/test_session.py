@@ -1,0 +1,231 @@
+"""The session's laws: episodes succeed without contact, repeat bit for bit, and replay."""
+
+import numpy as np
+import pytest
+
+from handrail.collect.config import SessionConfig
+from handrail.collect.operators.modes import MODES, find_mode
+from handrail.collect.session.build import (
+    build_controller,
+    build_env,
+    build_mode,
+    build_operator,
+    build_session,
+    session_features,
+)
+from handrail.collect.session.session import Session
+from handrail.controllers.baselines.cbf_filter import CbfFilter
+from handrail.controllers.baselines.direct import DirectController
+from handrail.controllers.errors import HandrailError
+from handrail.controllers.interface.command import Status
+from handrail.controllers.interface.intent import Intent
+from handrail.controllers.mpc.masked_mpc import MaskedMpc
+from handrail.controllers.mpc.safety_filter import filter_settings, safety_filter
+from handrail.datasets.format.schema import check_frame
+from handrail.datasets.recording.frames import moment_row
+
+CLOCKED = ("controller.solve_time", "wall_clock")
+
+
+class Watcher:
+    def __init__(self):
+        self.moments = []
+
+    def begin(self, env, seed):
+        self.moments = []
+
+    def see(self, moment):
+        self.moments.append(moment)
+
+
+def run(seed=3, **settings):
+    watcher = Watcher()
+    config = SessionConfig(**settings)
+    env = build_env(config, 20)
+    outcome = build_session(config, env, [watcher]).run(seed)
+    return outcome, watcher.moments, env
+
+
+@pytest.mark.parametrize("mode", ["ee", "switching"])
+def test_pick_and_place_succeeds_without_contact(mode):
+    outcome, moments, _ = run(task="pick_place", mode=mode)
+    assert outcome.success, outcome
+    assert outcome.contacts == 0
+    assert outcome.brakes == 0
+    assert outcome.smallest_distance >= 0.05
+    masks = {moment.intent.mask.tobytes() for moment in moments}
+    assert len(masks) == (2 if mode == "switching" else 1)
+
+
+@pytest.mark.parametrize("mode", sorted(set(MODES) - {"base"}))
+def test_every_mode_reaches(mode):
+    """All but base driving, which cannot turn the hand."""
+    limit = 60.0 if mode == "direct_single" else 0.0  # one axis at a time takes longer than the task gives
+    outcome, moments, _ = run(task="reach", mode=mode, seed=2, time_limit=limit)
+    assert outcome.success, outcome
+    assert MODES[mode].controller in ("direct", "split") or outcome.contacts == 0
+    assert all(moment.intent.mode == mode for moment in moments)
+
+
+def test_base_mode_moves_the_base_alone():
+    outcome, moments, _ = run(task="reach", mode="base", seed=1)
+    moved = np.abs(moments[-1].state[:9] - moments[0].state[:9])
+    assert moved[:2].max() > 0.1
+    assert moved[3:].max() < 0.3  # the arm only keeps clear
+    assert outcome.contacts == 0
+
+
+def test_the_same_seed_is_the_same_episode():
+    rows = []
+    for _ in range(2):
+        _, moments, _ = run(task="reach", mode="ee", seed=5)
+        rows.append([moment_row(moment) for moment in moments])
+    assert len(rows[0]) == len(rows[1])
+    for first, again in zip(*rows, strict=True):
+        for key in set(first) - set(CLOCKED):
+            np.testing.assert_array_equal(first[key], again[key], err_msg=key)
+
+
+def test_moments_fit_the_schema():
+    _, moments, env = run(task="reach", mode="ee", seed=5)
+    features = session_features(env)
+    for moment in moments:
+        check_frame(moment_row(moment), features)
+
+
+def test_noise_zero_is_smoother():
+    def jerk(noise):
+        _, moments, _ = run(task="reach", mode="ee", seed=7, noise=noise)
+        return np.mean(np.abs(np.diff([moment.action[:9] for moment in moments], n=2, axis=0)))
+
+    assert jerk(0.0) < jerk(1.0)
+
+
+class Unruly:
+    """An operator whose commands are garbage now and then."""
+
+    name = "unruly"
+
+    def __init__(self, channels):
+        self._channels = channels
+        self._asked = 0
+
+    def reset(self, view, rng):
+        self._rng = rng
+
+    def act(self, view):
+        self._asked += 1
+        size = self._channels.size
+        values = self._rng.uniform(-1, 1, size)
+        if self._asked % 5 == 0:
+            values[:] = self._rng.choice([np.nan, np.inf, 1e12])
+        if self._asked % 7 == 0:
+            return Intent(np.zeros(3), np.zeros(3, dtype=bool), time=view.state.time)
+        late = 1.0 if self._asked % 11 == 0 else 0.0
+        return Intent(values, self._channels.mask("ee"), time=view.state.time - late)
+
+
+@pytest.mark.parametrize("kind", [MaskedMpc, DirectController, CbfFilter, safety_filter])
+def test_garbage_brakes_and_is_counted(kind):
+    env = build_env(SessionConfig(task="reach"), 20)
+    controller = kind(env.model)
+    watcher = Watcher()
+    outcome = Session(env, controller, Unruly(controller.channels), [watcher]).run(0)
+    statuses = [moment.health.status for moment in watcher.moments]
+    assert outcome.brakes == sum(status.brakes for status in statuses) > 0
+    assert {Status.INVALID_INTENT, Status.STALE_INTENT} <= set(statuses)
+    assert all(np.all(np.isfinite(moment.action)) for moment in watcher.moments)
+    actions = np.array([moment.action[:9] for moment in watcher.moments])
+    limits = env.model.description.limits
+    assert np.all(np.abs(np.diff(actions, axis=0)) <= limits.acceleration / 20 * 1.001 + 1e-5)
+
+
+def test_a_mask_of_ones_own():
+    env = build_env(SessionConfig(task="reach"), 20)
+    mask = "000111000000000000"
+    mode = build_mode(SessionConfig(task="reach", mask=mask), env.model)
+    session = build_session(SessionConfig(task="reach", mask=mask), env, [watcher := Watcher()])
+    session.run(0)
+    assert mode.groups("hand") == ("ee.vx", "ee.vy", "ee.vz")
+    assert {"".join(map(str, moment.intent.mask.astype(int))) for moment in watcher.moments} == {mask}
+    with pytest.raises(HandrailError, match="expected 18 characters 0 or 1"):
+        build_mode(SessionConfig(mask="0101"), env.model)
+
+
+def test_controllers_follow_the_mode():
+    env = build_env(SessionConfig(task="reach"), 20)
+    assert isinstance(build_controller(find_mode("direct"), env.model, 20), DirectController)
+    assert isinstance(build_controller(find_mode("ee"), env.model, 20), MaskedMpc)
+    assert isinstance(build_controller(find_mode("direct_cbf"), env.model, 20), CbfFilter)
+    filtered = build_controller(find_mode("direct_filtered"), env.model, 25)
+    assert isinstance(filtered, MaskedMpc)
+    assert filtered.settings == filter_settings(0.04)
+
+
+def test_a_second_robot_is_a_new_description_and_nothing_else(tmp_path):
+    """A UR5 on a smaller base goes through controller, operator and session."""
+    from collect_helpers import write_small_robot
+
+    path = write_small_robot(tmp_path)
+    env = build_env(SessionConfig(task="reach", robot=str(path)), 20)
+    outcome = build_session(SessionConfig(task="reach", robot=str(path)), env, [watcher := Watcher()]).run(2)
+    assert outcome.brakes == 0
+    assert outcome.contacts == 0
+    goal = watcher.moments[0].environment[:3]
+    tool = [list(env.agent_names).index(f"tool.{axis}") for axis in "xyz"]
+    start, end = (np.linalg.norm(watcher.moments[k].state[tool] - goal) for k in (0, -1))
+    assert end < 0.5 * start
+
+
+def test_rerun_sees_a_session(tmp_path):
+    pytest.importorskip("rerun", reason="rerun is an extra")
+    from handrail.collect.session.display import Display
+
+    path = tmp_path / "session.rrd"
+    display = Display(save=str(path))
+    config = SessionConfig(task="reach")
+    build_session(config, build_env(config, 20), [display]).run(2)
+    display.close()
+    assert path.stat().st_size > 100_000
+
+
+class Grip:
+    """Holds the robot fast for two seconds, whatever its servos do; a disturbance."""
+
+    def begin(self, env, seed):
+        self._free = env.simulation.mujoco_model.dof_damping.copy()
+
+    def act(self, simulation):
+        held = 2.0 <= simulation.data.time < 4.0
+        simulation.mujoco_model.dof_damping[:] = 1e9 if held else self._free
+
+
+@pytest.mark.parametrize("mode", ["ee", "direct"])
+def test_what_is_recorded_is_what_was_sent(mode):
+    """Also of a robot that is held fast: consecutive actions keep the limits; the controller knows them."""
+    watcher, config = Watcher(), SessionConfig(task="reach", mode=mode)
+    env = build_env(config, 20)
+    chosen = build_mode(config, env.model)
+    operator = build_operator(config, chosen, env.model)
+    controller = build_controller(chosen, env.model, env.fps, config.task)
+    session = Session(env, controller, operator, [watcher], disturbances=[Grip()])
+    sent = []
+    step = env.step
+
+    def stepped(action):
+        result = step(action)
+        sent.append(np.append(env.commanded_velocity, result[4]["sent"][-1]))
+        return result
+
+    env.step = stepped
+    session.run(3)
+    actions = np.array([moment.action for moment in watcher.moments])
+    commands = np.array([moment.command for moment in watcher.moments])
+    np.testing.assert_array_equal(actions, sent)
+    limits = env.model.description.limits
+    steps = np.abs(np.diff(actions[:, :-1], axis=0, prepend=np.zeros((1, env.model.size))))
+    assert np.all(steps <= limits.acceleration / env.fps * (1.0 + 1e-5))
+    if mode == "ee":
+        speeds = np.abs(actions[:, :-1] / limits.velocity).max(axis=1)
+        assert speeds[60:80].max() < 0.5 * speeds[:40].max()  # held: the command waits
+        np.testing.assert_allclose(actions, commands, atol=1e-6)  # and nothing is cut behind its back

@@ -1,0 +1,203 @@
+"""What the hand holds moves with the hand, and keeps from the robot and from what stands around."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from handrail.controllers.baselines.cbf_filter import CbfFilter
+from handrail.controllers.baselines.direct import DirectController
+from handrail.controllers.collision.margins import Margins
+from handrail.controllers.collision.model import CollisionModel
+from handrail.controllers.errors import HandrailError
+from handrail.controllers.interface.command import Status
+from handrail.controllers.interface.controller import State
+from handrail.controllers.interface.intent import Intent
+from handrail.controllers.mpc.masked_mpc import MaskedMpc
+from handrail.controllers.numerics.rotation import matrix_from_rpy
+from handrail.controllers.robot.model import load_model
+from handrail.controllers.robot.shape import Obstacle, Shape
+
+MODEL = load_model()
+HOME = MODEL.description.home
+TURN = matrix_from_rpy([0.3, -0.2, 0.5])
+BOX = Obstacle("box", Shape("box", [0.4, 0.3, 0.4]), [0.02, 0.05, 0.1], TURN, frame="tool")
+POST = Obstacle("post", Shape("cylinder", [0.2, 1.2]), [0.4, 0.8, 0.6])
+TABLE = Obstacle("table", Shape("box", [0.6, 0.8, 0.6]), [1.5, 0.0, 0.3], work_surface=True)
+
+
+def held_rows(collision):
+    return [index for index, pair in enumerate(collision.pairs) if "box" in pair]
+
+
+def test_a_held_thing_keeps_from_robot_and_obstacles_but_may_be_put_down():
+    with_it, without = CollisionModel(MODEL, (POST, TABLE, BOX)), CollisionModel(MODEL, (POST, TABLE))
+    assert with_it.pairs[: without.size] == without.pairs
+    added = with_it.pairs[without.size :]
+    partners = {a for a, b in MODEL.description.self_pairs if b == "fingers"}
+    assert {a for a, b in added if b == "box"} == partners
+    assert [b for a, b in added if a == "box"] == ["post"]  # neither table nor floor
+    assert not with_it.work[without.size :].any()
+
+
+def test_a_held_thing_is_where_the_hand_takes_it():
+    """Its distance is that of an obstacle standing where it is now."""
+    rng = np.random.default_rng(0)
+    collision = CollisionModel(MODEL, (POST, BOX))
+    rows = [row for row in held_rows(collision) if collision.pairs[row][1] == "box"]
+    for q in rng.uniform(-1.5, 1.5, (10, MODEL.size)):
+        tool = MODEL.pose(q)
+        there = tool.position + tool.rotation @ BOX.position
+        standing = CollisionModel(MODEL, (Obstacle("box", BOX.shape, there, tool.rotation @ TURN),))
+        for row in rows:
+            if collision.pairs[row] in standing.pairs:  # the shoulder cannot meet the scene's obstacles
+                other = standing.values(q[None])[0, standing.pairs.index(collision.pairs[row])]
+                assert collision.values(q[None])[0, row] == pytest.approx(other, abs=1e-5)
+
+
+def test_gradients_and_bounds_of_held_things():
+    rng, h = np.random.default_rng(1), 1e-3
+    collision = CollisionModel(MODEL, (POST, BOX))
+    rows, errors = held_rows(collision), []
+    for _ in range(30):
+        q = rng.uniform(-1.5, 1.5, MODEL.size)
+        distances = collision.distances(q[None])
+        steps = h * np.eye(MODEL.size)
+        slopes = ((collision.values(q + steps) - collision.values(q - steps)) / (2 * h)).T
+        apart = [row for row in rows if distances.values[0, row] > 0.02]
+        errors += np.abs(distances.gradients - slopes)[apart].max(axis=1).tolist()
+        path = q + np.cumsum(rng.uniform(-0.05, 0.05, (30, MODEL.size)), axis=0)
+        exact = collision.values(path)
+        assert np.all(collision.values(path, None, (path[0], exact[0])) <= exact + 1e-5)
+    assert len(errors) > 100
+    assert np.median(errors) < 1e-3
+    assert np.quantile(errors, 0.98) < 2e-2
+
+
+def test_what_is_held_does_not_come_nearer_because_other_things_come():
+    """What it keeps once it keeps on; to what came while it was held, what there was then."""
+    other = replace(POST, name="other")
+    first, second = (CollisionModel(MODEL, things) for things in ((POST, BOX), (POST, other, BOX)))
+    before = Margins(first, 0.1, 0.008)
+    before.see(np.full(first.size, 1.0))
+    margins = Margins(second, 0.1, 0.008, before)
+    margins.see(np.full(second.size, 0.02))
+    for row in held_rows(second):
+        assert margins.values[row] == (0.02 if "other" in second.pairs[row] else 0.1)
+
+
+def test_things_come_and_go_and_change():
+    collision = CollisionModel(MODEL, (POST,))
+    assert collision.among((POST,)) is collision
+    holding = collision.among((POST, BOX))
+    assert len(held_rows(holding)) > 0
+    assert holding.among((POST, BOX)) is holding
+    assert not held_rows(holding.among((POST,)))
+    larger = replace(POST, shape=Shape(POST.shape.kind, 2.0 * POST.shape.size))
+    for others in ((TABLE,), (TABLE, BOX), (), (BOX,), (larger,), (replace(POST, work_surface=True),)):
+        now, fresh = collision.among(others), CollisionModel(MODEL, others)
+        assert now.pairs == fresh.pairs
+        np.testing.assert_array_equal(now.values(HOME[None]), fresh.values(HOME[None]))
+    with pytest.raises(HandrailError, match="frame 'nowhere'"):
+        collision.among((POST, Obstacle("box", BOX.shape, BOX.position, frame="nowhere")))
+
+
+def towards_the_base(controller, held, seconds=8.0, period=0.05):
+    """Ask the hand to come to the base at rest; return the box's least distance from the robot on the way."""
+    truth, q, v = CollisionModel(MODEL, (BOX,)), np.array(HOME), np.zeros(MODEL.size)
+    mask = controller.channels.mask("base", "ee")
+    goal = MODEL.pose(q, "planar_base").position + [0.2, 0.0, 1.0]
+    rows, smallest, statuses = held_rows(truth), np.inf, []
+    for k in range(int(seconds / period)):
+        controller.observe((BOX,) if held else ())
+        direction = goal - MODEL.pose(q).position
+        values = np.zeros(controller.channels.size)
+        values[controller.channels.tool_slice][:3] = 0.3 * direction / max(np.linalg.norm(direction), 0.1)
+        command = controller.update(State(q, v, k * period), Intent(values, mask, time=k * period))
+        after = command.velocity(period)
+        q, v = q + period * 0.5 * (v + after), after
+        smallest = min(smallest, truth.values(q[None])[0, rows].min())
+        statuses.append(command.health.status)
+    return smallest, statuses
+
+
+def test_the_mpc_keeps_what_the_hand_holds_from_the_robot():
+    mpc = MaskedMpc(MODEL)
+    mpc.reset()
+    ignorant, _ = towards_the_base(mpc, held=False)
+    mpc.reset()
+    kept, statuses = towards_the_base(mpc, held=True)
+    assert ignorant < 0.0  # it would run into itself
+    assert kept > mpc.settings.margin - 5e-3
+    assert set(statuses) == {Status.OK}
+
+
+@pytest.mark.parametrize(("build", "group"), [(MaskedMpc, "ee"), (MaskedMpc, "joint"), (CbfFilter, "joint")])
+def test_a_grasp_beside_an_obstacle_moves_nothing_and_the_thing_may_come_away(build, group):
+    """A rod is grasped, its end 5 mm from a wall: it stays, and taken away does not come so near again."""
+    tool, length = MODEL.pose(HOME), 0.6
+    rod = Obstacle("rod", Shape("box", [0.05, 0.05, length]), [0.0, 0.0, length / 2], frame="tool")
+    ahead = tool.rotation[:, 2]
+    wall = Obstacle("wall", Shape("box", [0.02] * 3), tool.position + (length + 0.015) * ahead, tool.rotation)
+    truth = CollisionModel(MODEL, (wall, rod))
+    row, period = truth.pairs.index(("rod", "wall")), 0.05
+    controller = build(MODEL)
+    controller.reset((wall,))
+    q, v, gaps, hand = np.array(HOME), np.zeros(MODEL.size), [], []
+    for k in range(160):
+        controller.observe((wall, rod))
+        rate = 0.0 if k < 40 else -0.05 if k < 100 else 0.05  # rest, away, back
+        mask, values = controller.channels.mask(group), np.zeros(controller.channels.size)
+        twist = np.append(rate * ahead, np.zeros(3))
+        values[controller.channels.tool_slice] = twist if group == "ee" else 0.0
+        joints = np.linalg.pinv(MODEL.jacobian(q)) @ twist
+        values[controller.channels.joint_slice] = joints if group == "joint" else 0.0
+        command = controller.update(State(q, v, k * period), Intent(values, mask, time=k * period))
+        after = command.velocity(period)
+        q, v = q + period * 0.5 * (v + after), after
+        gaps.append(truth.values(q[None])[0, row])
+        hand.append(MODEL.pose(q).position)
+    assert np.linalg.norm(hand[39] - tool.position) < 2e-3
+    assert gaps[39] == pytest.approx(0.005, abs=2e-3)
+    assert gaps[99] > 0.1
+    assert min(gaps[120:]) > 0.09
+
+
+@pytest.mark.parametrize("build", [MaskedMpc, CbfFilter, DirectController])
+def test_a_grasp_on_the_way_does_not_jerk_the_robot(build):
+    controller = build(MODEL)
+    controller.reset((POST,))
+    channels, period, limits = controller.channels, 0.05, MODEL.description.limits
+    values = np.zeros(channels.size)
+    values[channels.joint_slice] = 0.2 * np.sin(np.arange(MODEL.size))
+    mask = channels.mask("joint")
+    q, v = np.array(HOME), np.zeros(MODEL.size)
+    for k in range(30):
+        controller.observe((POST, BOX) if 10 <= k < 20 else (POST,))
+        command = controller.update(State(q, v, k * period), Intent(values, mask, time=k * period))
+        after = command.velocity(period)
+        assert np.all(np.abs(after - v) <= limits.acceleration * period * (1 + 1e-6) + 1e-9)
+        assert not command.health.status.brakes
+        q, v = q + period * 0.5 * (v + after), after
+
+
+def test_a_thing_that_has_slipped_is_where_it_is_now():
+    before, now = (Obstacle("box", BOX.shape, [0.0, 0.0, z], TURN, frame="tool") for z in (0.1, 0.2))
+    collision = CollisionModel(MODEL, (POST, before))
+    assert collision.among((POST, now)) is collision
+    path = np.random.default_rng(2).uniform(-1.5, 1.5, (20, MODEL.size))
+    fresh = CollisionModel(MODEL, (POST, now)).values(path)
+    np.testing.assert_allclose(collision.values(path), fresh, atol=1e-6)
+
+
+def test_bounds_hold_for_a_thing_that_has_slipped():
+    """A thing that sits otherwise in the hand than when it was grasped may reach farther from some joints."""
+    rng, cube = np.random.default_rng(3), Shape("box", [0.05, 0.05, 0.05])
+    collision = CollisionModel(MODEL, (POST, Obstacle("box", cube, [0.0, 0.0, 0.0], frame="tool")))
+    collision.observe((POST, Obstacle("box", cube, [0.0, 0.0, 0.6], frame="tool")))
+    for _ in range(60):
+        q = rng.uniform(-1.5, 1.5, MODEL.size)
+        path = q + np.outer(np.linspace(0.0, 0.4, 30), np.eye(MODEL.size)[rng.integers(6, 8)])  # a wrist
+        exact = collision.values(path)
+        cheap = collision.values(path, None, (path[0], exact[0]), np.full(collision.size, -1.0))
+        assert np.all(cheap <= exact + 1e-5)

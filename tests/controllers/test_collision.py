@@ -1,0 +1,149 @@
+"""Distances' laws: gradients against finite differences, bulk reading against one by one."""
+
+import numpy as np
+import pytest
+
+from handrail.controllers.collision.model import CollisionModel
+from handrail.controllers.errors import HandrailError
+from handrail.controllers.robot.model import load_model
+from handrail.controllers.robot.shape import Obstacle, Shape
+
+MODEL = load_model()
+
+
+def scene(rng):
+    shapes = [Shape("box", [0.3, 0.2, 0.5]), Shape("cylinder", [0.2, 0.5]), Shape("sphere", [0.2])]
+    shapes.append(Shape("capsule", [0.1, 0.4]))
+    return tuple(
+        Obstacle(f"o{i}", shape, rng.uniform([-1, -1, 0], [2, 2, 1.5])) for i, shape in enumerate(shapes)
+    )
+
+
+def test_gradients_are_the_derivatives_of_the_distances():
+    rng = np.random.default_rng(0)
+    collision, h = CollisionModel(MODEL, scene(rng)), 1e-3
+    checked = 0
+    for _ in range(20):
+        q = rng.uniform(-1.5, 1.5, MODEL.size)
+        distances = collision.distances(q[None])
+        steps = h * np.eye(MODEL.size)
+        after, before = collision.values(q + steps), collision.values(q - steps)
+        slopes = ((after - before) / (2 * h)).T  # (P, n)
+        pair = distances.near[:, 1]
+        apart = distances.values[0, pair] > 0.02
+        error = np.abs(distances.gradients - slopes[pair])[apart]
+        checked += len(error)
+        assert np.median(error) < 1e-3
+        assert np.quantile(error, 0.98) < 2e-2  # coal's own tolerance, and kinks at edges
+    assert checked > 500
+
+
+def test_bulk_reading_is_reading_one_by_one():
+    collision = CollisionModel(MODEL, scene(np.random.default_rng(1)))
+    reader = collision._all.results
+    assert reader._view is not None, "coal lays its results out differently: updates will be slow"
+    for q in np.random.default_rng(2).uniform(-2, 2, (10, MODEL.size)):
+        collision.values(q[None])
+        np.testing.assert_array_equal(reader.read(), reader._one_by_one())
+
+
+def test_what_is_skipped_is_far():
+    """Values that are not measured are lower bounds, and never of a pair within reach."""
+    rng = np.random.default_rng(4)
+    collision = CollisionModel(MODEL, scene(rng))
+    for _ in range(30):
+        start = rng.uniform(-1.5, 1.5, MODEL.size)
+        path = start + np.cumsum(rng.uniform(-0.05, 0.05, (30, MODEL.size)), axis=0)
+        exact = collision.values(path)
+        distances = collision.distances(path, reach=0.3)
+        assert np.all(distances.values <= exact + 1e-5)
+        near = exact < 0.3
+        np.testing.assert_allclose(distances.values[near], exact[near], atol=1e-5)
+        cheap = collision.values(path, None, (path[0], exact[0]))
+        assert np.all(cheap <= exact + 1e-5)
+        np.testing.assert_allclose(cheap[exact < 0.15], exact[exact < 0.15], atol=1e-5)
+        reach = rng.uniform(0.0, 0.4, collision.size)
+        cheap, near = collision.values(path, None, (path[0], exact[0]), reach), exact < reach
+        assert np.all(cheap <= exact + 1e-5)
+        np.testing.assert_allclose(cheap[near], exact[near], atol=1e-5)
+
+
+def test_what_is_skipped_is_far_after_a_similar_trajectory():
+    """The memory of the last trajectory spares measurements, and changes nothing of what is near."""
+    rng = np.random.default_rng(5)
+    obstacles = scene(rng)
+    collision = CollisionModel(MODEL, obstacles)
+    skipped = 0
+    path = MODEL.description.home + np.cumsum(rng.uniform(-0.2, 0.2, (12, MODEL.size)), axis=0)
+    for _ in range(30):
+        path = path + rng.uniform(-0.01, 0.02, (12, MODEL.size))
+        exact, fresh = collision.values(path), CollisionModel(MODEL, obstacles).distances(path, reach=0.3)
+        distances = collision.distances(path, reach=0.3)
+        assert np.all(distances.values <= exact + 1e-5)
+        np.testing.assert_array_equal(distances.near, fresh.near)
+        np.testing.assert_allclose(distances.gradients, fresh.gradients, atol=1e-6)
+        spared = [np.count_nonzero(each.values < exact - 1e-3) for each in (distances, fresh)]
+        skipped += spared[0] - spared[1]
+    assert skipped > 0
+
+
+def test_what_was_far_of_an_obstacle_is_forgotten_when_it_has_moved():
+    far, near = (Obstacle("ball", Shape("sphere", [0.1]), [x, 0.0, 0.14]) for x in (9.0, -0.8))
+    collision, path = CollisionModel(MODEL, (far,)), np.tile(MODEL.description.home, (3, 1))
+    assert not np.any(collision.distances(path, reach=0.3).values[:, -1] < 0.3)
+    collision.observe((near,))
+    exact = collision.values(path)
+    distances = collision.distances(path, reach=0.3)
+    np.testing.assert_allclose(distances.values[exact < 0.3], exact[exact < 0.3], atol=1e-5)
+    row = collision.pairs.index(("chassis", "ball"))
+    assert np.all(distances.values[:, row] < 0.3)
+
+
+def test_moving_obstacles_are_where_they_will_be():
+    ball = Obstacle("ball", Shape("sphere", [0.1]), [2.0, 0.0, 0.14], velocity=[-0.5, 0.0, 0.0])
+    collision = CollisionModel(MODEL, (ball,))
+    q, times = np.tile(MODEL.description.home, (3, 1)), np.array([0.0, 1.0, 2.0])
+    row = collision.pairs.index(("chassis", "ball"))
+    expected = 2.0 - 0.5 * times - 0.1 - (-1.5 + 0.48)
+    np.testing.assert_allclose(collision.values(q, times)[:, row], expected, atol=1e-6)
+    np.testing.assert_allclose(collision.distances(q, np.inf, times).values[:, row], expected, atol=1e-6)
+    nearer = Obstacle("ball", ball.shape, [1.0, 0.0, 0.14])
+    collision.observe((nearer,))
+    np.testing.assert_allclose(collision.values(q, times)[:, row], expected[0] - 1.0, atol=1e-6)
+    with pytest.raises(HandrailError, match="obstacles: expected ball as they were, got none"):
+        collision.observe((Obstacle("none", ball.shape, [1, 0, 0]),))
+    with pytest.raises(HandrailError, match="obstacles: expected ball as they were, got ball"):
+        collision.observe((Obstacle("ball", Shape("sphere", [0.2]), [1, 0, 0]),))
+
+
+def test_the_distance_to_a_wall_is_the_gap():
+    """The chassis is 0.48 m long ahead of its centre."""
+    wall = Obstacle("wall", Shape("box", [0.2, 4.0, 2.0]), [1.0, 0.0, 1.0])
+    collision = CollisionModel(MODEL, (wall,))
+    q = np.array(MODEL.description.home)
+    q[0] = -0.5
+    row = collision.pairs.index(("chassis", "wall"))
+    assert collision.values(q[None])[0, row] == pytest.approx(0.9 - (-0.5 + 0.48), abs=1e-6)
+
+
+def test_only_near_pairs_have_gradients():
+    collision = CollisionModel(MODEL)
+    home = np.tile(MODEL.description.home, (3, 1))
+    distances = collision.distances(home, reach=0.3)
+    assert len(distances.near) == np.sum(distances.values < 0.3) > 0
+    assert not len(collision.distances(home, reach=-np.inf).near)
+
+
+def test_work_pairs_are_tools_at_work_surfaces():
+    table = Obstacle("table", Shape("box", [1, 1, 1]), [3, 0, 0.5], work_surface=True)
+    wall = Obstacle("wall", Shape("box", [1, 1, 1]), [-3, 0, 0.5])
+    collision = CollisionModel(MODEL, (table, wall))
+    work = {pair for pair, is_work in zip(collision.pairs, collision.work, strict=True) if is_work}
+    assert work == {("fingers", "table")}
+
+
+@pytest.mark.parametrize("names", [("a", "a"), ("floor",), ("palm",)])
+def test_things_have_names_of_their_own(names):
+    things = [Obstacle(name, Shape("sphere", [0.1]), [1, 0, 0]) for name in names]
+    with pytest.raises(HandrailError, match=f"expected each once .*, got \\['{names[0]}'\\] again"):
+        CollisionModel(MODEL, tuple(things))

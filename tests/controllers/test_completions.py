@@ -1,0 +1,232 @@
+"""Laws of the completions: rules that turn a twist of the tool into a whole-body velocity."""
+
+from dataclasses import replace
+
+import casadi as ca
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from handrail.collect.experiments.benchmark.baselines import CONTENDERS
+from handrail.collect.tasks.goal_reaching import STEP
+from handrail.controllers.baselines.arm_completion import WeldedBaseCompletion
+from handrail.controllers.baselines.blended_completion import BlendedCompletion
+from handrail.controllers.baselines.decoupled_completion import DecoupledCompletion, DecoupledSettings
+from handrail.controllers.baselines.twist_completion import tool_twist, twist_controller
+from handrail.controllers.baselines.whole_body_completion import WholeBodyCompletion
+from handrail.controllers.errors import HandrailError
+from handrail.controllers.interface.channels import Channels
+from handrail.controllers.interface.command import Status
+from handrail.controllers.interface.controller import State
+from handrail.controllers.interface.frames import Frames
+from handrail.controllers.interface.intent import Intent
+from handrail.controllers.objectives.objective import Stage
+from handrail.controllers.objectives.tracking import channel_velocities
+from handrail.controllers.robot.model import RobotModel, load_model
+
+MODEL = load_model()
+HOME = MODEL.description.home
+LIMITS = MODEL.description.limits
+CHANNELS = Channels.of(MODEL.description)
+REST = np.zeros(9)
+TWISTS = arrays(float, 6, elements=st.floats(-0.2, 0.2))
+NEAR_HOME = arrays(float, 9, elements=st.floats(-0.3, 0.3)).map(lambda change: HOME + change)
+ANY_TWIST = arrays(float, 6, elements=st.floats(-10, 10))
+RIVALS = [name for name in CONTENDERS if name not in ("mpc", "safety_filter")]
+
+
+def controller(name):
+    if name == "mink":
+        pytest.importorskip("mink")
+    return CONTENDERS[name].build(MODEL)
+
+
+def hand_intent(twist, time=0.0, frames=None):
+    values = np.zeros(CHANNELS.size)
+    values[CHANNELS.tool_slice] = twist
+    return Intent(values, CHANNELS.mask("ee"), time=time, frames=frames or Frames())
+
+
+@given(NEAR_HOME, TWISTS, st.sampled_from(["world", "tool"]), arrays(float, 3, elements=st.floats(-0.3, 0.3)))
+@settings(max_examples=30, deadline=None)
+def test_a_twist_means_the_same_as_in_the_mpc(q, twist, frame, point):
+    """A velocity with the twist at the robot's tool point tracks the intent's channels without error."""
+    intent = hand_intent(twist, frames=Frames(tool=frame, point=point))
+    meant = tool_twist(intent, CHANNELS, MODEL.pose(q))
+    v = np.linalg.lstsq(MODEL.jacobian(q), meant, rcond=None)[0]
+    z, p = ca.SX.sym("z", 27), ca.SX.sym("p", 5)
+    stage = Stage(MODEL, z[:9], z[9:18], z[18:])
+    channels = ca.Function("channels", [z, p], [channel_velocities(stage, CHANNELS, p)])
+    found = np.array(channels(np.concatenate([q, v, REST]), intent.frames.parameters)).ravel()
+    np.testing.assert_allclose(found[CHANNELS.tool_slice], twist, atol=1e-6)
+
+
+@given(NEAR_HOME, TWISTS)
+@settings(max_examples=30, deadline=None)
+def test_least_squares_is_the_optimum(q, twist):
+    """No other velocity has a lower cost: its gradient vanishes."""
+    damping = 0.01
+    v = WholeBodyCompletion(MODEL, damping)(q, REST, twist, STEP)
+    jacobian = MODEL.jacobian(q)
+    gradient = jacobian.T @ (jacobian @ v - twist) + damping * v / LIMITS.velocity**2
+    np.testing.assert_allclose(gradient, 0.0, atol=1e-9)
+
+
+def test_less_damping_tracks_better():
+    twist = np.array([0.1, -0.05, 0.05, 0.1, 0.2, -0.3])
+    errors = [
+        np.linalg.norm(
+            MODEL.jacobian(HOME) @ WholeBodyCompletion(MODEL, damping)(HOME, REST, twist, STEP) - twist
+        )
+        for damping in (1.0, 0.1, 1e-6)
+    ]
+    assert errors[0] > errors[1] > errors[2]
+    assert errors[2] < 1e-6
+
+
+@given(TWISTS, st.floats(0.0, 1.0))
+@settings(max_examples=20, deadline=None)
+def test_a_blend_gives_the_hand_what_both_give_it(twist, alpha):
+    """The twist of the blend is the weighted mean of the two twists; at the ends it is one of the two."""
+    parts = WholeBodyCompletion(MODEL), WeldedBaseCompletion(MODEL)
+    blend = BlendedCompletion(*parts, alpha)(HOME, REST, twist, STEP)
+    operator, autonomy = (part(HOME, REST, twist, STEP) for part in parts)
+    jacobian = MODEL.jacobian(HOME)
+    np.testing.assert_allclose(
+        jacobian @ blend, alpha * jacobian @ operator + (1 - alpha) * jacobian @ autonomy, atol=1e-12
+    )
+    if alpha in (0.0, 1.0):
+        np.testing.assert_allclose(blend, operator if alpha else autonomy, atol=1e-12)
+
+
+def test_a_share_is_a_share():
+    with pytest.raises(HandrailError, match=r"alpha: expected 0 to 1, got 1\.5"):
+        BlendedCompletion(WholeBodyCompletion(MODEL), WholeBodyCompletion(MODEL), 1.5)
+
+
+def test_a_decoupled_base_keeps_the_hand_in_its_place():
+    """Pull the hand away: the base follows until the hand is back within the free distance of its place."""
+    rule = DecoupledCompletion(MODEL)
+    np.testing.assert_allclose(rule.base_velocity(HOME), 0.0, atol=1e-12)
+    q = HOME.copy()
+    q[:2] -= [0.6, 0.3]  # the same as the hand 0.67 m ahead of where it should be, were it held in the world
+    held = MODEL.pose(HOME).position
+
+    class Held(DecoupledCompletion):
+        """The hand stays where it is in the world."""
+
+        def _seen_from_base(self, q):
+            c, s = np.cos(q[2]), np.sin(q[2])
+            away = held[:2] - q[:2]
+            return np.array([c * away[0] + s * away[1], -s * away[0] + c * away[1]])
+
+    held_rule = Held(MODEL)
+    for _ in range(2000):
+        q[:3] += 0.01 * held_rule.base_velocity(q)
+    assert abs(np.linalg.norm(q[:2] - HOME[:2]) - DecoupledSettings().free) < 0.02
+
+
+def test_a_decoupled_base_rests_when_nothing_is_asked():
+    q = HOME.copy()
+    q[3] += 0.8  # the hand is out of its place
+    rule = DecoupledCompletion(MODEL)
+    assert np.linalg.norm(rule.base_velocity(q)) > 0.05
+    np.testing.assert_allclose(rule(q, REST, np.zeros(6), STEP), 0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize("name", ["dls", "dls_arm", "blended", "mink"])
+def test_a_rival_follows_the_hand(name):
+    """From home, after the acceleration, a slow twist is followed to a few per cent."""
+    rival, twist = controller(name), np.array([0.05, 0.03, 0.02, 0.05, -0.05, 0.1])
+    q, v = HOME.copy(), REST
+    for step in range(30):
+        command = rival.update(State(q, v, step * STEP), hand_intent(twist, step * STEP))
+        after = command.velocity(STEP)
+        q, v = q + 0.5 * STEP * (v + after), after
+    np.testing.assert_allclose(MODEL.jacobian(q) @ v, twist, atol=0.05 * float(np.linalg.norm(twist)))
+
+
+@pytest.mark.parametrize("name", RIVALS)
+@given(twists=st.lists(ANY_TWIST, min_size=4, max_size=4))
+@settings(max_examples=10, deadline=None)
+def test_a_rival_stays_inside_the_limits(name, twists):
+    """Whatever is asked, velocity and acceleration stay inside, and a garbled message brakes."""
+    rival, v, q = controller(name), REST, HOME.copy()
+    operator = CONTENDERS[name].operator(MODEL)
+    for step, twist in enumerate(twists):
+        state = State(q, v, step * STEP)
+        after = rival.update(state, operator(twist, state, state.time)).velocity(STEP)
+        assert np.all(np.abs(after) <= LIMITS.velocity + 1e-9)
+        assert np.all(np.abs(after - v) <= LIMITS.acceleration * STEP + 1e-9)
+        q, v = q + 0.5 * STEP * (v + after), after
+    state = State(q, v, 4 * STEP)
+    garbled = replace(operator(np.full(6, 0.1), state, state.time), time=np.nan)
+    command = rival.update(state, garbled)
+    assert command.health.status is Status.INVALID_INTENT
+    assert np.all(np.abs(command.velocity(STEP)) <= np.abs(v) + 1e-9)
+
+
+@pytest.mark.parametrize("name", RIVALS)
+def test_a_rival_says_how_it_fares(name):
+    rival = controller(name)
+    state = State(HOME, REST, 1.0)
+    stale = CONTENDERS[name].operator(MODEL)(np.full(6, 0.1), state, 0.5)
+    command = rival.update(state, stale)
+    assert command.health.status is Status.STALE_INTENT
+    assert command.health.solve_time > 0
+    assert 0.05 < command.health.smallest_distance < 0.2
+    np.testing.assert_array_equal(command.velocity(STEP), 0.0)
+
+
+@pytest.mark.parametrize("name", ["dls", "decoupled", "mink"])
+def test_who_completes_twists_refuses_other_channels(name):
+    intent = Intent(np.full(CHANNELS.size, 0.1), CHANNELS.mask("ee", "base"))
+    command = controller(name).update(State(HOME, REST), intent)
+    assert command.health.status is Status.INVALID_INTENT
+    np.testing.assert_array_equal(command.velocity(STEP), 0.0)
+
+
+def test_nobody_steers_nothing_moves():
+    command = twist_controller(MODEL, WholeBodyCompletion(MODEL)).update(
+        State(HOME, REST), Intent.idle(CHANNELS)
+    )
+    assert command.health.status is Status.OK
+    np.testing.assert_array_equal(command.velocities, 0.0)
+
+
+def test_mink_keeps_its_distance():
+    """Drive the hand into the robot's own mount: plain least squares gets close, mink does not."""
+    pytest.importorskip("mink")
+    smallest = {}
+    for name in ("dls", "mink"):
+        rival, q, v = controller(name), HOME.copy(), REST
+        for step in range(500):
+            towards = MODEL.pose(q, "shoulder_link").position - MODEL.pose(q).position
+            twist = np.append(0.15 * towards / np.linalg.norm(towards), np.zeros(3))
+            command = rival.update(State(q, v, step * STEP), hand_intent(twist, step * STEP))
+            after = command.velocity(STEP)
+            q, v = q + 0.5 * STEP * (v + after), after
+            smallest[name] = min(smallest.get(name, np.inf), command.health.smallest_distance)
+    assert smallest["dls"] < 0.02
+    assert smallest["mink"] > 0.04
+
+
+def test_an_arm_without_a_base_completes_too():
+    description = MODEL.description
+    fixed = replace(
+        description,
+        base_kind="fixed",
+        home=HOME[3:],
+        limits=replace(
+            LIMITS,
+            **{name: getattr(LIMITS, name)[3:] for name in vars(LIMITS)},
+        ),
+    )
+    arm = RobotModel(fixed)
+    twist = np.array([0.02, 0.01, 0.02, 0.0, 0.0, 0.0])
+    for complete in (WholeBodyCompletion(arm, 1e-4), DecoupledCompletion(arm)):
+        v = complete(fixed.home, np.zeros(6), twist, STEP)
+        assert v.shape == (6,)
+        assert (arm.jacobian(fixed.home) @ v) @ twist > 0

@@ -1,0 +1,223 @@
+"""The converged solver's laws: it minimises the very problem that the real-time solver steps on."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+
+from handrail.controllers.errors import HandrailError
+from handrail.controllers.interface.controller import State
+from handrail.controllers.interface.intent import Intent
+from handrail.controllers.mpc.masked_mpc import MaskedMpc
+from handrail.controllers.numerics.threads import single_threaded
+from handrail.controllers.robot.model import RobotModel, load_model
+from handrail.controllers.robot.shape import Obstacle, Shape
+from handrail.controllers.solvers.basis import to_motion
+from handrail.controllers.solvers.reference.converged import ConvergedSolver
+from handrail.controllers.solvers.reference.evaluation import Evaluator, distance_bounds
+from handrail.controllers.solvers.reference.linear_distances import linear_distances
+
+DESCRIPTION = load_model().description
+ALONE = RobotModel(replace(DESCRIPTION, collision=(), self_pairs=(), self_margins=np.zeros(0)))
+LIMITS = DESCRIPTION.limits
+PERIOD = 0.05
+SETTLED = 5  # updates after a jump of the intent
+MODES = (
+    ("ee",),
+    ("base",),
+    ("joint",),
+    ("base", "ee"),
+    ("ee.vx", "ee.vy", "ee.vz"),
+    ("joint.elbow_joint", "base"),
+)
+
+
+def solver(mpc, backend):
+    settings = mpc.settings
+    return ConvergedSolver(mpc.residuals, settings.horizon, mpc.model.size, settings.dt, backend)
+
+
+def random_state(rng):
+    q = DESCRIPTION.home + rng.uniform(-0.5, 0.5, 9)
+    return State(q, rng.uniform(-0.5, 0.5, 9) * np.minimum(LIMITS.velocity, 1.0))
+
+
+def random_intent(mpc, rng, speed=0.4):
+    mode = MODES[rng.integers(len(MODES))]
+    mask = mpc.channels.mask(*mode)
+    return Intent(
+        np.where(mask, rng.uniform(-speed, speed, mpc.channels.size), 0.0), mask, mode="+".join(mode)
+    )
+
+
+def fixed_point(mpc, problem, steps=100):
+    u = np.zeros((problem.horizon, 9))
+    for _ in range(steps):
+        u = mpc.solver.solve(problem, u).u
+    return u
+
+
+@pytest.mark.parametrize("backend", ["ipopt", "fatrop"])
+def test_both_solvers_agree_where_the_real_time_one_rests(backend):
+    mpc = MaskedMpc(ALONE)
+    converged, evaluate = solver(mpc, backend), Evaluator(mpc.residuals, mpc.settings.horizon)
+    rng = np.random.default_rng(1)
+    for _ in range(4):
+        mpc.reset()
+        problem = mpc.problem(random_state(rng), random_intent(mpc, rng))
+        u = fixed_point(mpc, problem)
+        plan = converged.solve(problem, np.zeros_like(u))
+        assert plan.is_solution(problem)
+        np.testing.assert_allclose(
+            evaluate(problem, plan.u).cost, evaluate(problem, u).cost, rtol=1e-4, atol=1e-4
+        )
+        np.testing.assert_allclose(plan.u / LIMITS.acceleration, u / LIMITS.acceleration, atol=5e-3)
+
+
+def test_both_backends_agree_where_limits_bind():
+    mpc = MaskedMpc(ALONE)
+    mpc.reset()
+    q = np.array(DESCRIPTION.home)
+    q[0] = LIMITS.position_upper[0] - 0.05  # too fast to stop in time: needs slack
+    v = np.zeros(9)
+    v[0] = 0.9
+    problem = mpc.problem(State(q, v), Intent.idle(mpc.channels))
+    guess = np.zeros((10, 9))
+    one, other = (solver(mpc, backend).solve(problem, guess) for backend in ("ipopt", "fatrop"))
+    assert one.limit_slack > 0.01
+    np.testing.assert_allclose(one.limit_slack, other.limit_slack, atol=1e-5)
+    real_time = mpc.solver.solve(problem, guess)
+    np.testing.assert_allclose(one.limit_slack, real_time.limit_slack, atol=1e-4)
+
+
+def test_what_is_asked_of_distances_is_what_the_real_time_solver_asks():
+    from handrail.controllers.ocp.nodes import Nodes
+    from handrail.controllers.solvers.rows import rows_around
+
+    post = Obstacle("post", Shape("cylinder", [0.2, 1.2]), [0.4, 0.5, 0.6])
+    mpc = MaskedMpc(load_model())
+    mpc.reset((post,))
+    problem = mpc.problem(State(DESCRIPTION.home, 0.2 * LIMITS.velocity), Intent.idle(mpc.channels))
+    u = np.random.default_rng(2).uniform(-0.3, 0.3, (10, 9))
+    q, v = problem.rollout(u)
+    nodes = Nodes(problem, q, v)
+    found = problem.collision.distances(nodes.q, problem.margins + problem.reach, nodes.times)
+    matrix = mpc.solver.cost.matrix
+    rows = rows_around(problem, (q, v, u), nodes, found, matrix).constraints
+    node, pair = found.near[found.near[:, 0] > 0].T
+    bounds = distance_bounds(problem, found.values[0], len(nodes.q))
+    np.testing.assert_allclose(rows.upper, found.values[node, pair] - bounds[node, pair], atol=1e-12)
+    s, motion = np.random.default_rng(3).uniform(-0.1, 0.1, 90), np.zeros((10, 3, 9))
+    to_motion(matrix, s, motion)  # and so is how they change
+    change = motion[:, 2]
+    padded = np.append(np.zeros(18), s)  # nothing changes before the first stage
+    moved = [row @ padded[9 * k : 9 * k + 27] for row, k in zip(rows.coefficients, rows.stage, strict=True)]
+    linear = linear_distances(problem, u)
+    left = (linear.at(*problem.rollout(u + change)) - linear.lower)[linear.pairs >= 0]
+    expected = rows.upper - moved
+    np.testing.assert_allclose(np.sort(left), np.sort(expected), atol=1e-9)
+
+
+def test_an_obstacle_is_kept_away_from():
+    """The hand is driven at a wall: the converged plan keeps the margin at every node, at no lower cost."""
+    wall = Obstacle("wall", Shape("box", [0.2, 3.0, 2.0]), [0.45, 0.0, 1.0])
+    mpc = MaskedMpc(load_model())
+    mpc.reset((wall,))
+    evaluate = Evaluator(mpc.residuals, 10)
+    mask = mpc.channels.mask("ee.vx", "ee.vy", "ee.vz")
+    values = np.zeros(18)
+    values[3] = 0.5
+    problem = mpc.problem(State(DESCRIPTION.home, np.zeros(9)), Intent(values, mask))
+    guess = np.zeros((10, 9))
+    plan = solver(mpc, "ipopt").solve(problem, guess)
+    assert plan.is_solution(problem)
+    assert plan.collision_slack < 1e-5
+    assert evaluate(problem, plan.u).cost < evaluate(problem, guess).cost
+    real_time = fixed_point(mpc, problem, 30)
+    assert evaluate(problem, plan.u).cost <= 1.01 * evaluate(problem, real_time).cost + 1e-3
+
+
+def test_an_unknown_backend_is_named():
+    mpc = MaskedMpc(ALONE)
+    with pytest.raises(HandrailError, match=r"backend.*snopt.*fatrop, ipopt"):
+        solver(mpc, "snopt")
+
+
+def test_it_prints_nothing(capfd):
+    mpc = MaskedMpc(ALONE)
+    problem = mpc.problem(State(DESCRIPTION.home, np.zeros(9)), Intent.idle(mpc.channels))
+    for backend in ("ipopt", "fatrop"):
+        solver(mpc, backend).solve(problem, np.zeros((10, 9)))
+    assert capfd.readouterr() == ("", "")
+
+
+@dataclass(frozen=True)
+class Gap:
+    """How far an update's first command is from the converged one's, and how much more its plan costs."""
+
+    velocity: float  # relative to the velocity limit
+    acceleration: float  # relative to the acceleration limit
+    cost: float  # relative to the converged cost, or to that of not moving where that is much larger
+    since_jump: int  # updates since the intent changed
+    mode: str
+
+
+def closed_loops(count, updates, seed):
+    """Run closed loops from random states; compare every warm-started update with the converged solution."""
+    mpc = MaskedMpc(ALONE)
+    converged, evaluate = solver(mpc, "fatrop"), Evaluator(mpc.residuals, mpc.settings.horizon)
+    rng = np.random.default_rng(seed)
+    gaps = []
+    for _ in range(count):
+        mpc.reset()
+        state, jump = random_state(rng), 0
+        intent = random_intent(mpc, rng)
+        for update in range(updates):
+            if update == updates // 2:
+                intent, jump = random_intent(mpc, rng), update
+            now = replace(intent, time=state.time)
+            problem = mpc.problem(state, now)
+            command = mpc.update(state, now)
+            if update > 0:  # the first begins from nothing
+                best = converged.solve(problem, mpc.plan.u)
+                assert best.solved
+                gaps.append(gap(problem, evaluate, mpc.plan.u, best.u, update - jump, intent.mode))
+            after = command.velocity(PERIOD)
+            state = State(state.q + 0.5 * PERIOD * (state.v + after), after, state.time + PERIOD)
+    return gaps
+
+
+def gap(problem, evaluate, u, best, since_jump, mode):
+    change = np.abs(u[0] - best[0])
+    # without penalties: a limit broken by the real-time solver's tolerance would cost more than the rest
+    ours, theirs, idle = (evaluate(problem, plan).tracking for plan in (u, best, np.zeros_like(u)))
+    scale = max(theirs, 1e-3 * idle, 1e-6)
+    return Gap(
+        float(np.max(change * PERIOD / LIMITS.velocity)),
+        float(np.max(change / LIMITS.acceleration)),
+        (ours - theirs) / scale,
+        since_jump,
+        mode,
+    )
+
+
+def check(gaps):
+    settled = [entry for entry in gaps if entry.since_jump >= SETTLED]
+    for name in ("velocity", "cost"):
+        values = np.array([getattr(entry, name) for entry in settled])
+        assert np.median(values) < 0.01
+        assert values.max() < 0.05
+    every = np.array([entry.velocity for entry in gaps])
+    assert np.median(every) < 0.01
+    assert every.max() < 0.05
+
+
+def test_a_closed_loop_follows_the_converged_solution():
+    with single_threaded():
+        check(closed_loops(count=6, updates=20, seed=4))
+
+
+@pytest.mark.slow
+def test_closed_loops_from_200_random_states_follow_the_converged_solution():
+    with single_threaded():
+        check(closed_loops(count=200, updates=20, seed=5))

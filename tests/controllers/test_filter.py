@@ -1,0 +1,223 @@
+"""The safety filters' laws: what is feasible passes, what is not is changed least, nothing is touched."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from collect_helpers import environment
+
+from handrail.collect.simulation.scene import Scene
+from handrail.collect.tasks.furniture import pillar
+from handrail.collect.tasks.task import Episode
+from handrail.controllers.baselines.cbf_filter import CbfFilter, CbfSettings
+from handrail.controllers.baselines.direct import DirectController
+from handrail.controllers.collision.model import CollisionModel
+from handrail.controllers.errors import HandrailError
+from handrail.controllers.interface.channels import Channels
+from handrail.controllers.interface.command import Status
+from handrail.controllers.interface.controller import State
+from handrail.controllers.interface.intent import Intent
+from handrail.controllers.mpc.safety_filter import filter_settings, safety_filter
+from handrail.controllers.numerics.threads import single_threaded
+from handrail.controllers.robot.model import RobotModel, load_model
+from handrail.controllers.robot.shape import Obstacle, Shape
+from handrail.controllers.solvers.reference.converged import ConvergedSolver
+from handrail.controllers.solvers.reference.evaluation import Evaluator
+
+MODEL = load_model()
+ALONE = RobotModel(replace(MODEL.description, collision=(), self_pairs=(), self_margins=np.zeros(0)))
+HOME, LIMITS = MODEL.description.home, MODEL.description.limits
+CHANNELS = Channels.of(MODEL.description)
+JOINTS, MASK = CHANNELS.joint_slice, CHANNELS.mask("joint")
+PERIOD = 0.05
+FILTERS = (safety_filter, CbfFilter)
+POST = Obstacle("post", Shape("cylinder", [0.2, 0.4]), [-0.3, 0.0, 0.2])
+AHEAD = np.array([1.0, 0, 0, 0, 0, 0, 0, 0, 1.0])  # drive on, and turn a wrist that has nothing to do with it
+
+
+def asked(velocities, time=0.0):
+    values = np.zeros(CHANNELS.size)
+    values[JOINTS] = velocities
+    return Intent(values, MASK, time=time)
+
+
+def roll(controller, velocities, q=HOME):
+    """Run a controller on an ideal robot; return positions (T + 1, n), what was sent (T, n), and commands."""
+    q, v, sent, path, commands = np.array(q), np.zeros(9), [], [np.array(q)], []
+    for step, wanted in enumerate(velocities):
+        command = controller.update(State(q, v, step * PERIOD), asked(wanted, step * PERIOD))
+        after = command.velocity(PERIOD)
+        q, v = q + PERIOD * 0.5 * (v + after), after
+        sent.append(after)
+        path.append(q)
+        commands.append(command)
+    return np.array(path), np.array(sent), commands
+
+
+def feasible(rng, steps=60):
+    """Return velocities that the accelerations allow and that stay clear of the position limits, (T, n)."""
+    times = PERIOD * np.arange(1, steps + 1)[:, None]
+    rate = rng.uniform(2.5, 6.0, 9)
+    amplitude = np.minimum(0.9 * LIMITS.acceleration / rate, 0.9 * LIMITS.velocity)
+    return amplitude * np.sin(rate * times)
+
+
+@pytest.mark.parametrize("make", FILTERS)
+@pytest.mark.parametrize("seed", range(3))
+def test_a_feasible_command_passes(make, seed):
+    velocities = feasible(np.random.default_rng(seed))
+    _, sent, commands = roll(make(ALONE, PERIOD), velocities)
+    assert np.abs((sent - velocities) / LIMITS.velocity).max() < 1e-3
+    assert {command.health.status for command in commands} == {Status.OK}
+
+
+@pytest.mark.parametrize("make", FILTERS)
+def test_in_free_space_the_smallest_correction_is_the_clip(make):
+    """Full stick to and fro: what the limits of velocity and acceleration cut is all that is cut."""
+    rng = np.random.default_rng(3)
+    velocities = np.repeat(LIMITS.velocity * rng.choice([-1.5, 0.0, 1.0], (6, 9)), 5, axis=0)
+    _, sent, _ = roll(make(ALONE, PERIOD), velocities)
+    _, clipped, _ = roll(DirectController(ALONE, PERIOD), velocities)
+    assert np.abs((sent - clipped) / LIMITS.velocity).max() < 1e-3
+
+
+def test_the_cost_is_that_of_the_multi_step_filter():
+    mpc = safety_filter(MODEL, PERIOD)
+    problem = mpc.problem(State(HOME, np.zeros(9)), asked(0.1 * LIMITS.velocity))
+    tracked = problem.weights[:, JOINTS]
+    shares = np.append(0.85 ** np.arange(5), np.zeros(problem.horizon - 5))
+    np.testing.assert_allclose(tracked / tracked[0], np.tile(shares[:, None], 9))
+    np.testing.assert_allclose(
+        problem.reference[:, JOINTS], np.tile(0.1 * LIMITS.velocity, (problem.horizon, 1))
+    )
+    others = np.delete(problem.weights, np.arange(JOINTS.start, JOINTS.stop), axis=1)
+    assert others.max() <= 1e-6 * tracked[0, 0]
+    assert problem.dt == PERIOD  # the first planned velocity is the command
+    assert filter_settings(0.1, steps=3, decay=0.5).discounts[:4].tolist() == [1.0, 0.5, 0.25, 0.0]
+
+
+def test_the_correction_is_the_smallest():
+    """Close to a post, full speed ahead: no plan that keeps the limits deviates less, says IPOPT."""
+    mpc = safety_filter(MODEL, PERIOD)
+    mpc.reset((POST,))
+    path, sent, _ = roll(mpc, [AHEAD] * 14)
+    state, intent = State(path[-1], sent[-1], 14 * PERIOD), asked(AHEAD, 14 * PERIOD)
+    problem = mpc.problem(state, intent)
+    velocity = mpc.update(state, intent).velocity(PERIOD)
+    evaluate = Evaluator(mpc.residuals, problem.horizon)
+    found = evaluate(problem, mpc.plan.u)
+    solver = ConvergedSolver(mpc.residuals, problem.horizon, MODEL.size, problem.dt, "ipopt")
+    best = evaluate(problem, solver.solve(problem, mpc.plan.u).u)
+    assert velocity[0] < 0.7  # it does correct
+    assert found.collision_slack < 1e-3
+    assert found.tracking < 1.01 * best.tracking
+
+
+@pytest.mark.parametrize("make", FILTERS)
+def test_a_joint_that_threatens_nothing_is_left_alone(make):
+    controller = make(MODEL, PERIOD)
+    controller.reset((POST,))
+    path, sent, _ = roll(controller, [AHEAD] * 80)
+    np.testing.assert_allclose(sent[20:, 8], AHEAD[8], atol=1e-3)
+    assert np.abs(sent[-1, :3]).max() < 0.02  # the base stands
+    collision = CollisionModel(MODEL, (POST,))
+    left = collision.values(path)[:, collision.pairs.index(("chassis", "post"))]
+    assert 0.095 < left.min() < (0.105 if make is safety_filter else 0.13)  # exponentially, by barriers
+
+
+@pytest.mark.parametrize(
+    ("make", "touches"), [(safety_filter, False), (CbfFilter, False), (DirectController, True)]
+)
+def test_nothing_is_touched_in_physics(make, touches):
+    """Every joint at full stick between pillars, in MuJoCo: the filters go near and touch nothing."""
+    contacts, moved = 0, 0.0
+    with environment("Reach") as env, single_threaded():
+        env.reset(seed=0)
+        around = [pillar(f"p{k}", -1.5 + 1.3 * np.cos(k), 1.3 * np.sin(k), 0.15, 1.2) for k in range(1, 6)]
+        env.reset(options={"episode": Episode(Scene(tuple(around)), HOME)})
+        controller = make(MODEL, PERIOD)
+        controller.reset(env.obstacles())
+        rng = np.random.default_rng(1)
+        for step in range(100):
+            if step % 20 == 0:
+                wanted = LIMITS.velocity * rng.choice([-1.0, 1.0], 9)
+            state = env.state()
+            velocity = controller.update(state, asked(wanted, state.time)).velocity(PERIOD)
+            contacts += env.step(np.append(velocity, 0.0).astype(np.float32))[4]["contacts"]
+            moved += PERIOD * np.abs(velocity / LIMITS.velocity).mean()
+    assert (contacts > 0) == touches
+    assert moved > 1.0  # of 5 s: the filter does not just stand there
+
+
+def barriers(q, settings):
+    """Return how far all pairs are beyond their margins, (P,), and the gradients, (P, n)."""
+    collision = CollisionModel(MODEL, (POST,))
+    found = collision.distances(q[None])
+    assert len(found.near) == collision.size
+    return found.values[0] - np.minimum(settings.margin, collision.largest_margin), found.gradients
+
+
+def test_the_cbf_filter_projects_onto_the_barriers():
+    """Optimal for a convex QP: (u* - u_cmd)ᵀ W (u - u*) ≥ 0 for every allowed u; and u* is allowed."""
+    settings, rng = CbfSettings(), np.random.default_rng(0)
+    weights, corrected = LIMITS.velocity**-2.0, 0
+    for _ in range(20):
+        q = np.array(HOME)
+        q[0] += rng.uniform(0.0, 0.35)
+        v, wanted = (rng.uniform(-1, 1, 9) * share * LIMITS.velocity for share in (0.05, 0.3))
+        controller = CbfFilter(MODEL, PERIOD, settings)
+        controller.reset((POST,))
+        command = controller.update(State(q, v), asked(wanted))
+        u = command.velocity(PERIOD)
+        left, gradients = barriers(q, settings)
+        assert np.all(gradients @ u >= -settings.alpha * left - command.health.slack - 1e-5)
+        corrected += np.abs(u - wanted).max() > 1e-3
+        step = LIMITS.acceleration * PERIOD
+        others = np.clip(v + rng.uniform(-1, 1, (3000, 9)) * step, -LIMITS.velocity, LIMITS.velocity)
+        allowed = others[np.all(others @ gradients.T >= -settings.alpha * left, axis=1)]
+        assert command.health.slack > 1e-6 or np.all((allowed - u) @ (weights * (u - wanted)) >= -1e-6)
+    assert corrected > 10
+
+
+def test_the_cbf_filter_says_when_the_acceleration_is_not_enough():
+    """It looks one step ahead: too fast and too near, it can only brake, and reports the slack."""
+    controller = CbfFilter(MODEL, PERIOD)
+    near = np.array(HOME)
+    near[0] = POST.position[0] - 0.2 - 0.48 - 0.15
+    controller.reset((POST,))
+    command = controller.update(State(near, np.eye(9)[0]), asked(AHEAD))
+    assert command.health.status is Status.OK
+    assert command.health.slack > 0.1
+    np.testing.assert_allclose(command.velocity(PERIOD)[0], 1.0 - LIMITS.acceleration[0] * PERIOD, atol=1e-6)
+
+
+def test_the_cbf_filter_gives_way_to_what_comes():
+    controller, comes = CbfFilter(MODEL, PERIOD), 0.3
+    q, v, smallest = np.array(HOME), np.zeros(9), np.inf
+    controller.reset((POST,))
+    for step in range(80):
+        place = POST.position - np.array([comes * step * PERIOD, 0.0, 0.0])
+        seen = replace(POST, position=place, velocity=[-comes, 0.0, 0.0])
+        controller.observe((seen,))
+        command = controller.update(State(q, v, step * PERIOD), asked(np.zeros(9), step * PERIOD))
+        smallest = min(smallest, command.health.smallest_distance)
+        after = command.velocity(PERIOD)
+        q, v = q + PERIOD * 0.5 * (v + after), after
+    assert q[0] < HOME[0] - 0.2
+    assert smallest > 0.05
+
+
+def test_a_failed_qp_brakes(monkeypatch):
+    from handrail.controllers.baselines import cbf_filter
+
+    controller = CbfFilter(MODEL, PERIOD)
+    _, sent, _ = roll(controller, [0.3 * AHEAD] * 5)
+    monkeypatch.setattr(cbf_filter.daqp, "solve", lambda *_: (np.zeros(10), 0.0, -1, {}))
+    command = controller.update(State(HOME, sent[-1], 0.25), asked(AHEAD, 0.25))
+    assert command.health.status is Status.SOLVER_FAILED
+    assert np.all(np.abs(command.velocity(PERIOD)) <= np.abs(sent[-1]))
+
+
+def test_wrong_cbf_settings_are_refused():
+    with pytest.raises(HandrailError, match="CBF setting alpha: expected a finite number >= 0, got nan"):
+        CbfSettings(alpha=float("nan"))

@@ -1,0 +1,302 @@
+"""Laws of intent: prediction, frames, over-determined commands, the stop certificate."""
+
+import numpy as np
+import pytest
+
+from handrail.controllers.collision.margins import Margins
+from handrail.controllers.collision.model import CollisionModel
+from handrail.controllers.errors import HandrailError
+from handrail.controllers.interface.command import Status
+from handrail.controllers.interface.controller import State
+from handrail.controllers.interface.frames import Frames
+from handrail.controllers.interface.intent import Intent
+from handrail.controllers.interface.prediction import (
+    Bounded,
+    Decaying,
+    Extrapolated,
+    Preview,
+    Smoothed,
+    constant,
+)
+from handrail.controllers.mpc.masked_mpc import MaskedMpc
+from handrail.controllers.ocp.settings import MpcSettings
+from handrail.controllers.robot.model import load_model
+from handrail.controllers.robot.shape import Obstacle, Shape
+from handrail.controllers.safety.certificate import StopCertificate
+from handrail.controllers.safety.limiter import Limiter
+
+MODEL = load_model()
+HOME = MODEL.description.home
+MPC = MaskedMpc(MODEL)
+CHANNELS = MPC.channels
+TIMES = 0.1 * np.arange(1, 11)
+
+
+def intent(values, *groups, time=0.0, frames=None):
+    mask = CHANNELS.mask(*groups)
+    return Intent(np.where(mask, values, 0.0), mask, time=time, frames=frames or Frames())
+
+
+def roll(controller, command, steps=30, period=0.05, q=HOME):
+    q, v = np.array(q), np.zeros(9)
+    for k in range(steps):
+        after = controller.update(State(q, v, k * period), command(k * period)).velocity(period)
+        q, v = q + period * 0.5 * (v + after), after
+    return q, v
+
+
+def test_constant_holds():
+    asked = intent(np.arange(18.0), "ee", "base")
+    np.testing.assert_array_equal(constant(asked, TIMES), np.tile(asked.values, (10, 1)))
+
+
+def test_decaying_dies_away():
+    asked = intent(np.ones(18), "ee")
+    predicted = Decaying(0.5)(asked, TIMES)
+    np.testing.assert_allclose(predicted[:, 3], np.exp(-TIMES / 0.5))
+
+
+@pytest.mark.parametrize("speed", [0.05, 0.5, 1.0, 50.0])
+def test_bounded_holds_for_a_way_not_for_a_time(speed):
+    """The hand goes as far as the bound at any speed, to within a stage; other channels hold."""
+    times = 0.01 * np.arange(1, 2001)
+    values = np.full(18, 0.2)
+    values[3:9] = [speed, 0.0, 0.0, 0.0, 0.0, 0.0]
+    predicted = Bounded(CHANNELS, distance=0.4, angle=1.0)(intent(values, "ee", "base"), times)
+    way = 0.01 * predicted[:, 3].sum()
+    assert abs(way - 0.4) <= 0.01 * speed + 1e-9
+    assert predicted[0, 3] == speed
+    np.testing.assert_array_equal(predicted[:, :3], 0.2)
+
+
+def test_bounded_ends_with_the_first_of_way_and_turn():
+    values = np.zeros(18)
+    values[CHANNELS.tool_slice] = [0.1, 0.0, 0.0, 0.0, 0.0, 1.0]
+    predicted = Bounded(CHANNELS, distance=1.0, angle=0.55)(intent(values, "ee"), TIMES)
+    np.testing.assert_array_equal(predicted[:5], np.tile(values, (5, 1)))
+    np.testing.assert_array_equal(predicted[5:], 0.0)
+    resting = intent(np.zeros(18), "ee")
+    np.testing.assert_array_equal(Bounded(CHANNELS)(resting, TIMES), constant(resting, TIMES))
+
+
+def test_extrapolated_follows_a_ramp_and_levels_off():
+    predict = Extrapolated(window=0.3, fade=0.2)
+    for time in np.arange(0.0, 0.5, 0.05):
+        predicted = predict(intent(np.full(18, 2.0 * time), "ee", time=time), TIMES)
+    slope = (predicted[:, 3] - 2.0 * 0.45) / TIMES
+    assert slope[0] == pytest.approx(2.0, rel=0.25)
+    assert predicted[-1, 3] - 0.9 == pytest.approx(2.0 * 0.2, rel=0.02)
+    np.testing.assert_array_equal(predicted[:, 0], 0.0)
+
+
+def test_extrapolated_forgets_at_a_mode_switch():
+    predict = Extrapolated()
+    for time in (0.0, 0.1, 0.2):
+        predict(intent(np.full(18, time), "ee", time=time), TIMES)
+    asked = intent(np.full(18, 0.3), "base", time=0.3)
+    np.testing.assert_allclose(predict(asked, TIMES), constant(asked, TIMES))
+
+
+def test_smoothed_is_what_a_low_pass_will_do():
+    """What is predicted for a held command is the level at that time, in steps of any length."""
+    asked = np.linspace(-1.0, 1.0, 18)
+    once, often = Smoothed(constant, 0.5), Smoothed(constant, 0.5)
+    ahead = once(intent(asked, "ee", time=2.0), TIMES)
+    np.testing.assert_allclose(ahead[:, 3:9], (1.0 - np.exp(-TIMES[:, None] / 0.5)) * asked[3:9])
+    np.testing.assert_array_equal(ahead[:, 9:], 0.0)
+    for time in 2.0 + np.concatenate([[0.0], TIMES]):
+        level = often(intent(asked, "ee", time=time), np.zeros(1))[0]
+    np.testing.assert_allclose(level, ahead[-1], atol=1e-12)
+
+
+@pytest.mark.parametrize("time_constant", [0.3, np.linspace(0.2, 1.0, 18)])
+def test_smoothed_leads_where_the_command_does(time_constant):
+    """Bursts of 0.2 s: the level's integral is the command's in the end, however slow the channel."""
+    predict, step = Smoothed(constant, time_constant), 0.01
+    asked = [np.full(18, 0.5 * (k // 20 % 2 == 0) * (k < 200)) for k in range(1600)]
+    levels = [predict(intent(values, "ee", time=k * step), np.zeros(1))[0] for k, values in enumerate(asked)]
+    np.testing.assert_allclose(
+        step * np.sum(levels, axis=0)[3:9], step * np.sum(asked, axis=0)[3:9], rtol=0.02
+    )
+    steepest = np.abs(np.diff(levels, axis=0)).max(axis=0)[3:9]
+    assert np.all(steepest <= 0.5 * step / np.broadcast_to(time_constant, 18)[3:9] + 1e-9)
+
+
+def test_smoothed_begins_at_rest_after_a_reset_and_on_new_channels():
+    predict = Smoothed(constant, 0.5)
+    for time in (0.0, 1.0, 2.0):
+        predict(intent(np.ones(18), "ee", time=time), TIMES)
+    switched = predict(intent(np.ones(18), "base", time=2.1), np.zeros(1))[0]
+    assert 0.0 <= switched[:3].max() < 0.2
+    np.testing.assert_array_equal(switched[3:9], 0.0)
+    predict.reset()
+    np.testing.assert_array_equal(predict(intent(np.ones(18), "ee", time=9.0), np.zeros(1)), 0.0)
+
+
+def test_turns_may_be_followed_less_closely_than_the_way():
+    """A small weight of the tool's turning leaves the way alone and costs some of the turn."""
+    asked = np.zeros(18)
+    asked[CHANNELS.tool_slice] = [0.1, 0.0, 0.05, 0.0, 0.3, 0.0]
+    errors = []
+    for weight in (1000.0, 0.5):
+        controller = MaskedMpc(MODEL, MpcSettings(turn_tracking=weight))
+        q, v = roll(controller, lambda time: intent(asked, "ee", time=time))
+        twist = MODEL.jacobian(q) @ v
+        errors.append(np.abs(twist - asked[CHANNELS.tool_slice]))
+    assert errors[0].max() < 0.01
+    assert errors[1][:3].max() < 0.01
+    assert errors[1][3:].max() > 0.02
+
+
+def test_preview_looks_ahead_and_tracks_better():
+    """A sine that the controller knows is followed with less error than one that it has to guess."""
+
+    def plan(time):
+        values = np.zeros(18)
+        values[3] = 0.3 * np.sin(3.0 * time)
+        return values
+
+    def error(predict):
+        mpc, total = MaskedMpc(MODEL, predict=predict), 0.0
+        q, v = np.array(HOME), np.zeros(9)
+        for k in range(80):
+            time = 0.05 * k
+            after = mpc.update(State(q, v, time), intent(plan(time), "ee", time=time)).velocity(0.05)
+            q, v = q + 0.05 * 0.5 * (v + after), after
+            total += abs((MODEL.jacobian(q) @ v)[0] - plan(time + 0.05)[3])
+        return total
+
+    assert error(Preview(plan)) < 0.5 * error(constant)
+
+
+def test_any_callable_predicts():
+    asked = []
+
+    def predict(now, times):
+        asked.append(times)
+        return np.zeros((len(times), 18))
+
+    mpc = MaskedMpc(MODEL, predict=predict)
+    _, v = roll(mpc, lambda time: intent(np.full(18, 0.3), "ee", time=time), steps=5)
+    np.testing.assert_allclose(asked[0], TIMES)
+    np.testing.assert_allclose(v, 0.0, atol=1e-3)
+
+
+def test_only_the_tracked_stages_are_tracked():
+    settings = MpcSettings(tracked_stages=4, decay=0.5)
+    np.testing.assert_allclose(settings.discounts, [1, 0.5, 0.25, 0.125, 0, 0, 0, 0, 0, 0])
+    mpc = MaskedMpc(MODEL, settings)
+    problem = mpc.problem(State(HOME, np.zeros(9)), intent(np.full(18, 0.1), "ee"))
+    assert np.all(problem.weights[3, 3:9] > 0)
+    assert np.all(problem.weights[4:, 3:9] == 0)
+
+
+def test_the_base_twist_is_meant_in_its_frame():
+    turned = np.array(HOME)
+    turned[2] = np.pi / 2
+    values = np.zeros(18)
+    values[0] = 0.2
+    for frame, expected in (("base", [0.0, 0.2]), ("world", [0.2, 0.0])):
+        MPC.reset()
+        frames = Frames(base=frame)
+        _, v = roll(MPC, lambda time, f=frames: intent(values, "base", time=time, frames=f), q=turned)
+        np.testing.assert_allclose(v[:2], expected, atol=5e-3)
+
+
+def test_the_tool_twist_is_meant_in_its_frame_and_at_its_point():
+    values = np.zeros(18)
+    values[5], values[6] = 0.1, 0.2
+    point = np.array([0.1, 0.0, 0.15])
+    MPC.reset()
+    frames = Frames(tool="tool", point=point)
+    q, v = roll(MPC, lambda time: intent(values, "ee", time=time, frames=frames))
+    twist, rotation = MODEL.jacobian(q) @ v, MODEL.pose(q).rotation
+    at_point = twist[:3] + np.cross(twist[3:], rotation @ point)
+    np.testing.assert_allclose(rotation.T @ at_point, values[3:6], atol=5e-3)
+    np.testing.assert_allclose(rotation.T @ twist[3:], values[6:9], atol=5e-3)
+
+
+@pytest.mark.parametrize(
+    "frames", [Frames("moon"), Frames(tool="base"), Frames(point=[np.nan, 0, 0]), Frames(point=[0, 0])]
+)
+def test_a_frame_that_does_not_exist_brakes(frames):
+    MPC.reset()
+    command = MPC.update(State(HOME, np.zeros(9)), intent(np.full(18, 0.2), "ee", frames=frames))
+    assert command.health.status is Status.INVALID_INTENT
+    with pytest.raises(HandrailError):
+        frames.check()
+
+
+def test_an_over_determined_command_is_a_compromise():
+    """Hand and all joints at once: no robot can do both; the error is between the two and is reported."""
+    MPC.reset()
+    values = np.zeros(18)
+    values[3] = 0.2  # the hand forward, all joints at rest
+    both = lambda time: intent(values, "ee", "joint", time=time)  # noqa: E731
+    q, v = roll(MPC, both)
+    command = MPC.update(State(q, v, 1.5), both(1.5))
+    hand = (MODEL.jacobian(q) @ v)[0]
+    assert 0.02 < hand < 0.19
+    assert command.health.tracking_error > 0.01
+
+
+def test_a_feasible_command_has_no_tracking_error():
+    MPC.reset()
+    values = np.zeros(18)
+    values[3] = 0.1
+    q, v = roll(MPC, lambda time: intent(values, "ee", time=time))
+    command = MPC.update(State(q, v, 1.5), intent(values, "ee", time=1.5))
+    assert command.health.tracking_error < 0.002
+
+
+def test_the_certificate_measures_the_stop():
+    """At 0.8 m/s the base needs 0.32 m to stop; a wall is 0.2 m ahead, then 0.5 m."""
+    limiter = Limiter(MODEL.description)
+    v = np.zeros(9)
+    v[0] = 0.8
+    for gap, safe in ((0.2, False), (0.5, True)):
+        wall = Obstacle("wall", Shape("box", [0.2, 4.0, 0.2]), [HOME[0] + 0.48 + gap + 0.1, 0.0, 0.1])
+        collision = CollisionModel(MODEL, (wall,))
+        margins = Margins(collision, 0.1, 0.1)
+        certificate = StopCertificate(limiter, collision, margins, 0.3, MODEL.description.limits, span=1.0)
+        now = collision.values(HOME[None])[0]
+        shortfall = certificate.shortfall(HOME, v, (HOME, now))
+        assert (shortfall.all == 0.0) is safe
+        if not safe:
+            assert shortfall.all == pytest.approx(0.32 - 0.2 + 0.03, abs=5e-3)
+            assert shortfall.hard == pytest.approx(0.32 - 0.2 + 0.015, abs=5e-3)
+
+
+def test_an_unsafe_plan_is_replaced_by_a_full_stop(monkeypatch):
+    """If the solver's plan runs into a wall, the backup takes over and is counted."""
+    wall = Obstacle("wall", Shape("box", [0.2, 4.0, 0.2]), [HOME[0] + 0.48 + 0.35, 0.0, 0.1])
+    mpc = MaskedMpc(MODEL)
+    mpc.reset((wall,))
+    honest = mpc.solver.solve
+
+    def reckless(problem, guess):
+        from dataclasses import replace
+
+        plan = honest(problem, guess)
+        u = np.zeros_like(plan.u)
+        u[:, 0] = 1.0
+        q, v = problem.rollout(u)
+        return replace(plan, u=u, q=q, v=v)
+
+    monkeypatch.setattr(mpc.solver, "solve", reckless)
+    q, v, statuses = np.array(HOME), np.zeros(9), []
+    for k in range(60):
+        command = mpc.update(State(q, v, 0.05 * k), intent(np.full(18, 0.5), "base", time=0.05 * k))
+        after = command.velocity(0.05)
+        q, v = q + 0.05 * 0.5 * (v + after), after
+        statuses.append(command.health.status)
+    assert Status.BACKUP in statuses
+    assert mpc._collision.values(q[None])[0].min() > 0.02
+
+
+@pytest.mark.parametrize(
+    "change", [{"horizon": 1}, {"dt": 0.0}, {"decay": 1.5}, {"margin": np.nan}, {"reach": -1.0}]
+)
+def test_wrong_settings_are_refused(change):
+    with pytest.raises(HandrailError, match="MPC setting"):
+        MpcSettings(**change)

@@ -1,0 +1,59 @@
+"""No command leaves the limits, whatever is asked."""
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from handrail.controllers.robot.description import load_description
+from handrail.controllers.safety.limiter import Limiter
+
+DESCRIPTION = load_description("ridgeback_ur10")
+LIMITS = DESCRIPTION.limits
+LIMITER = Limiter(DESCRIPTION)
+ANYTHING = arrays(float, 9, elements=st.floats(width=64))
+INSIDE = arrays(float, 9, elements=st.floats(-1, 1)).map(lambda x: x * LIMITS.velocity)
+
+
+@given(INSIDE, ANYTHING, st.floats(0.001, 0.2))
+def test_velocity_and_acceleration_stay_inside(previous, target, duration):
+    velocity, clipped = LIMITER.limit(previous, target, duration)
+    assert np.all(np.abs(velocity) <= LIMITS.velocity + 1e-12)
+    assert np.all(np.abs(velocity - previous) <= LIMITS.acceleration * duration + 1e-12)
+    assert clipped or np.allclose(velocity, target, atol=1e-4)
+
+
+@given(INSIDE, st.integers(0, 8), st.sampled_from([np.nan, np.inf, -np.inf]))
+def test_what_is_not_a_number_brakes_everything(previous, index, value):
+    target = previous.copy()
+    target[index] = value
+    velocity, clipped = LIMITER.limit(previous, target, 0.05)
+    assert clipped
+    assert np.all(np.abs(velocity) <= np.abs(previous))
+
+
+@given(INSIDE, arrays(float, 9, elements=st.floats(-5, 5)))
+def test_position_limits_are_never_passed(start, target):
+    """Integrate a direct command into the limits: it stops before them."""
+    h, v = 0.02, np.zeros(9)
+    q = np.clip(start * 3.0, LIMITS.position_lower + 0.1, LIMITS.position_upper - 0.1)
+    for _ in range(400):
+        after, _ = LIMITER.limit(v, target, h, q)
+        q, v = q + h * 0.5 * (v + after), after
+    slack = 0.5 * LIMITS.acceleration * h**2 + LIMITS.velocity * h
+    assert np.all(q <= LIMITS.position_upper + slack)
+    assert np.all(q >= LIMITS.position_lower - slack)
+
+
+def test_a_target_of_the_wrong_size_brakes():
+    previous = 0.5 * LIMITS.velocity
+    velocity, clipped = LIMITER.limit(previous, np.ones(3), 0.05)
+    assert clipped
+    assert np.all(np.abs(velocity) < np.abs(previous))
+
+
+@given(INSIDE)
+def test_braking_is_the_fastest_stop(velocity):
+    braking = LIMITER.brake(velocity, 0.1, 40)
+    assert np.all(np.abs(np.diff(braking, axis=0)) <= LIMITS.acceleration * 0.1 + 1e-9)
+    np.testing.assert_allclose(braking[-1], 0.0)

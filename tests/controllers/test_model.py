@@ -1,0 +1,123 @@
+"""The model's laws: CasADi agrees with pinocchio, the description is checked."""
+
+import re
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from handrail.controllers.errors import HandrailError
+from handrail.controllers.interface.channels import Channels
+from handrail.controllers.interface.frames import Frames
+from handrail.controllers.objectives.objective import Stage
+from handrail.controllers.objectives.tracking import channel_velocities
+from handrail.controllers.robot.description import load_description
+from handrail.controllers.robot.model import load_model
+from handrail.controllers.robot.symbolic import symbolic_pose
+
+MODEL = load_model()
+N = MODEL.size
+
+
+@pytest.mark.parametrize("frame", ["tool", "forearm_link", "planar_base"])
+def test_casadi_agrees_with_pinocchio(frame):
+    q = ca.SX.sym("q", N)
+    pose = symbolic_pose(MODEL, q, frame)
+    function = ca.Function("pose", [q], [pose.position, pose.rotation, pose.jacobian])
+    rng = np.random.default_rng(0)
+    for _ in range(50):
+        x = rng.uniform(-3.0, 3.0, N)
+        position, rotation, jacobian = (np.array(value) for value in function(x))
+        expected = MODEL.pose(x, frame)
+        np.testing.assert_allclose(position.ravel(), expected.position, atol=1e-9)
+        np.testing.assert_allclose(rotation, expected.rotation, atol=1e-9)
+        np.testing.assert_allclose(jacobian, MODEL.jacobian(x, frame), atol=1e-9)
+
+
+def test_channel_velocities_are_what_moves():
+    """Base twist in the base frame and tool twist in the world, against finite differences of poses."""
+    channels = Channels.of(MODEL.description)
+    q, v, u = ca.SX.sym("q", N), ca.SX.sym("v", N), ca.SX.sym("u", N)
+    stage, p = Stage(MODEL, q, v, u), ca.SX.sym("p", 5)
+    function = ca.Function("c", [q, v, p], [channel_velocities(stage, channels, p)])
+    rng = np.random.default_rng(1)
+    for _ in range(20):
+        x, rate, h = rng.uniform(-2, 2, N), rng.uniform(-1, 1, N), 1e-6
+        values = np.array(function(x, rate, Frames().parameters)).ravel()
+        now, later = MODEL.pose(x, "planar_base"), MODEL.pose(x + h * rate, "planar_base")
+        linear = now.rotation.T @ (later.position - now.position) / h
+        np.testing.assert_allclose(values[:2], linear[:2], atol=1e-4)
+        np.testing.assert_allclose(values[2], rate[2])
+        now, later = MODEL.pose(x), MODEL.pose(x + h * rate)
+        np.testing.assert_allclose(values[3:6], (later.position - now.position) / h, atol=1e-4)
+        spin = (later.rotation - now.rotation) / h @ now.rotation.T
+        np.testing.assert_allclose(values[6:9], [spin[2, 1], spin[0, 2], spin[1, 0]], atol=1e-4)
+        np.testing.assert_allclose(values[9:], rate)
+
+
+def test_home_puts_the_tool_where_the_robot_has_it():
+    home = MODEL.description.home
+    np.testing.assert_allclose(MODEL.pose(home, "tool0").position, [-0.300, 0.174, 0.703], atol=1e-3)
+    np.testing.assert_allclose(MODEL.pose(home).position, [-0.010, 0.174, 0.703], atol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (("q = [-1.5,", "q = ["), "home: q: expected 9 numbers, one a joint, got 8"),
+        (('kind = "planar"', 'kind = "legs"'), "[base]: kind: expected planar or fixed, got 'legs'"),
+        (('["chassis", "upper_arm"]', '["chassis", "tail"]'), "collision shape 'tail'"),
+        (("[gripper]", '[gripper]\nshape = "paw"'), "collision shape 'paw'"),
+        (
+            ("box = [0.960, 0.793, 0.28]", "box = [0.960, -1.0, 0.28]"),
+            "chassis of [[collision]]: box: expected three lengths above 0",
+        ),
+        (('urdf = "example', 'urdf = "no-such'), "URDF no-such-robot-data"),
+        (("[home]", "[home"), "not valid TOML"),
+        (('name = "ridgeback_ur10"', ""), "expected an entry 'name'"),
+        (("[home]", "[[home]]"), "home: expected a table"),
+        (("mass = 165.3", "mass = nan"), "[base]: mass: expected a number above 0 [kg], got nan"),
+        (("mass = 165.3", "mass = true"), "mass: expected a number above 0"),
+        (("mass = 165.3", 'mass = "heavy"'), "mass: expected a number above 0"),
+        (("mass = 165.3", "mas = 165.3"), "[base]: unknown entry 'mas'"),
+        (("velocity = [1.0,", "velocity = [inf,"), "[limits]: velocity: expected numbers above 0"),
+        (("acceleration = [1.0,", "acceleration = [0.0,"), "acceleration: expected numbers above 0"),
+        (("effort = [2000.0,", "effort = [-2000.0,"), "effort: expected numbers above 0"),
+        (("effort = [2000.0, ", "effort = ["), "effort: expected 9 numbers"),
+        (
+            ("position_lower = [-3.0,", "position_lower = [3.0,"),
+            "expected position_lower below position_upper",
+        ),
+        (("q = [-1.5,", "q = [-3.5,"), "home of joint 1: expected -3.0 to 3.0, got -3.5"),
+        (("size = [0.960, 0.793]", "size = [0.960]"), "size: expected two lengths above 0"),
+        (("rpy = [0.0, 0.0, -1.57", "rpy = [0.0, -1.57"), "rpy: expected three numbers"),
+        (("capsule = 0.08", "capsule = 0.08\nbox = [1.0, 1.0, 1.0]"), "got box and capsule"),
+        (("b = [0.27, 0.01, 0.63]", "b = [0.27, 0.01, 0.28]"), "expected a and b apart"),
+        (('name = "mount"', 'name = "chassis"'), "expected each name once, got 'chassis' twice"),
+        (('["chassis", "upper_arm"]', '["chassis"]'), "pairs: expected pairs of names"),
+        (('["chassis", "upper_arm"]', '["chassis", "elbow"]'), "expected each pair once"),
+        (("stroke = 0.090", "stroke = 0.0"), "[gripper]: stroke: expected a number above 0"),
+        (("stroke = 0.090", "strokes = 0.090"), "[gripper]: unknown entry 'strokes'"),
+        (('urdf = "example', 'urdf = "../example'), "expected a path inside a package, or beside"),
+        (('urdf = "example', 'urdf = "/example'), "expected a path inside a package, or beside"),
+        (('urdf = "example', 'urdf = "robot.urdf" #'), "URDF robot.urdf: expected it beside"),
+        (('urdf = "example', 'urdf = "" #'), "urdf: expected a path"),
+        (('urdf = "example', 'urdf = "." #'), "expected a path inside a package, or beside"),
+        (('"shoulder_pan_joint"', '"shoulder_lift_joint"'), "joints: expected names, each once"),
+    ],
+)
+def test_a_wrong_description_says_what_is_wrong(tmp_path, change, words):
+    from handrail.controllers.robot import description
+
+    text = (description._FOLDER / "ridgeback_ur10.toml").read_text()
+    assert change[0] in text
+    path = tmp_path / "robot.toml"
+    path.write_text(text.replace(change[0], change[1], 1))
+    with pytest.raises(HandrailError, match=re.escape(words)) as error:
+        load_description(path)
+    assert "\n" not in str(error.value)
+
+
+def test_an_unknown_robot_lists_the_known():
+    with pytest.raises(HandrailError, match=r"unknown robot 'spot': .*ridgeback_ur10"):
+        load_description("spot")

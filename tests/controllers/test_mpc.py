@@ -1,0 +1,280 @@
+"""The masked MPC's laws."""
+
+import casadi as ca
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from handrail.controllers.collision.slacks import SLACKS
+from handrail.controllers.interface.command import Status
+from handrail.controllers.interface.controller import State
+from handrail.controllers.interface.frames import Frames
+from handrail.controllers.interface.intent import Intent
+from handrail.controllers.mpc.masked_mpc import MaskedMpc
+from handrail.controllers.ocp.settings import MpcSettings
+from handrail.controllers.robot.model import load_model
+from handrail.controllers.robot.shape import Obstacle, Shape
+from handrail.controllers.solvers.basis import to_motion
+
+MODEL = load_model()
+HOME = MODEL.description.home
+LIMITS = MODEL.description.limits
+MPC = MaskedMpc(MODEL)
+CHANNELS = MPC.channels
+PERIOD = 0.05
+POST = Obstacle("post", Shape("cylinder", [0.2, 1.2]), [0.4, 0.5, 0.6])
+
+
+def still(time=0.0):
+    return State(HOME, np.zeros(9), time)
+
+
+def roll(controller, intents, q=HOME, v=None, period=PERIOD):
+    """Run a controller on an ideal robot; return positions, velocities and commands."""
+    q, v = np.array(q), np.zeros(9) if v is None else np.array(v)
+    positions, velocities, commands = [q], [v], []
+    for k, intent in enumerate(intents):
+        command = controller.update(State(q, v, k * period), intent(k * period))
+        after = command.velocity(period)
+        q, v = q + period * 0.5 * (v + after), after
+        positions.append(q)
+        velocities.append(v)
+        commands.append(command)
+    return np.array(positions), np.array(velocities), commands
+
+
+def asking(values, *groups):
+    mask = CHANNELS.mask(*groups)
+    return lambda time: Intent(np.where(mask, values, 0.0), mask, time=time)
+
+
+@settings(max_examples=30, deadline=None)
+@given(
+    arrays(float, 18, elements=st.floats(-1e6, 1e6)),
+    arrays(bool, 18),
+    arrays(float, 9, elements=st.floats(-1, 1)),
+)
+def test_accelerations_are_hard_limits_for_any_intent(values, mask, share):
+    MPC.reset((POST,))
+    state = State(HOME, 0.9 * share * LIMITS.velocity)
+    command = MPC.update(state, Intent(values, mask))
+    steps = np.diff(command.velocities, axis=0)
+    assert np.all(np.abs(steps) <= LIMITS.acceleration * command.dt * (1 + 1e-6) + 1e-9)
+    np.testing.assert_allclose(command.velocities[0], state.v)
+
+
+@settings(max_examples=20, deadline=None)
+@given(
+    arrays(float, 18, elements=st.floats(-1, 1)),
+    arrays(float, 18, elements=st.floats(allow_nan=True, allow_infinity=True)),
+    arrays(bool, 18),
+)
+def test_what_is_masked_out_never_changes_the_plan(values, garbage, mask):
+    plans = []
+    for other in (np.zeros(18), garbage):
+        MPC.reset()
+        MPC.update(still(), Intent(np.where(mask, values, other), mask))
+        plans.append(MPC.plan.u)
+    np.testing.assert_array_equal(*plans)
+
+
+def bad_intents():
+    mask = CHANNELS.mask("ee")
+    nan, infinite = np.zeros(18), np.zeros(18)
+    nan[4], infinite[3] = np.nan, np.inf
+    return [
+        (Intent(nan, mask, time=9.0), Status.INVALID_INTENT),
+        (Intent(infinite, mask, time=9.0), Status.INVALID_INTENT),
+        (Intent(np.zeros(18), mask, gripper=np.nan, time=9.0), Status.INVALID_INTENT),
+        (Intent(np.zeros(18), mask, time=np.nan), Status.INVALID_INTENT),
+        (Intent(np.zeros(5), np.zeros(5, dtype=bool), time=9.0), Status.INVALID_INTENT),
+        (Intent(np.zeros(18), np.zeros(17, dtype=bool), time=9.0), Status.INVALID_INTENT),
+        (Intent(np.zeros(18), mask, time=8.7), Status.STALE_INTENT),
+    ]
+
+
+@pytest.mark.parametrize(("intent", "status"), bad_intents())
+def test_a_bad_intent_brakes(intent, status):
+    MPC.reset()
+    v = 0.5 * LIMITS.velocity
+    command = MPC.update(State(HOME, v, 9.0), intent)
+    assert command.health.status is status
+    assert status.brakes
+    speeds = np.abs(command.velocities)
+    assert np.all(np.diff(speeds, axis=0) <= 0)
+    assert np.all(np.abs(np.diff(command.velocities, axis=0)) <= LIMITS.acceleration * command.dt + 1e-9)
+    assert 0.0 <= command.gripper <= 1.0
+
+
+@pytest.mark.parametrize("state", [State(np.full(9, np.nan), np.zeros(9)), State(HOME[:4], np.zeros(4))])
+def test_a_bad_state_brakes_from_the_last_command(state):
+    MPC.reset()
+    asked = asking(np.full(18, 0.3), "ee")
+    roll(MPC, [asked] * 10)
+    command = MPC.update(state, asked(0.5))
+    assert command.health.status is Status.INVALID_STATE
+    assert np.all(np.isfinite(command.velocities))
+    assert np.all(np.abs(command.velocities[-1]) <= np.abs(command.velocities[0]))
+
+
+def test_a_failed_solve_brakes(monkeypatch):
+    from handrail.controllers.solvers import active_set
+
+    MPC.reset()
+    asked = asking(np.full(18, 0.3), "ee")
+    positions, velocities, _ = roll(MPC, [asked] * 10)
+
+    def infeasible(band, gradient, *rest):
+        return np.zeros(SLACKS), 0.0, False, 3, 0
+
+    monkeypatch.setattr(active_set, "solve", infeasible)
+    beyond = asking(np.full(18, -2.0), "ee")
+    command = MPC.update(State(positions[-1], velocities[-1], 0.5), beyond(0.5))
+    assert command.health.status is Status.SOLVER_FAILED
+    np.testing.assert_allclose(command.velocity(0.0), velocities[-1], atol=1e-9)
+    np.testing.assert_allclose(command.velocities[-1], 0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize("groups", [("ee",), ("base",), ("joint",)])
+def test_a_feasible_command_is_tracked(groups):
+    MPC.reset()
+    rng = np.random.default_rng(3)
+    scale = 0.1
+    values = rng.uniform(-scale, scale, 18)
+    positions, velocities, _ = roll(MPC, [asking(values, *groups)] * 20)
+    q, v = positions[-1], velocities[-1]
+    c, s = np.cos(q[2]), np.sin(q[2])
+    realised = np.concatenate([[c * v[0] + s * v[1], -s * v[0] + c * v[1], v[2]], MODEL.jacobian(q) @ v, v])
+    mask = CHANNELS.mask(*groups)
+    error = np.linalg.norm((realised - values)[mask]) / np.linalg.norm(values[mask])
+    assert error < 0.02
+
+
+def test_nobody_commands_nothing_moves():
+    MPC.reset()
+    positions, _, _ = roll(MPC, [lambda time: Intent.idle(CHANNELS, time)] * 10)
+    np.testing.assert_allclose(positions[-1], HOME, atol=1e-4)
+
+
+def test_switching_modes_is_smooth():
+    MPC.reset((POST,))
+    rng = np.random.default_rng(5)
+    groups = [("ee",), ("base",), ("joint",), ("base", "ee"), ("joint.elbow_joint",)]
+    intents = [asking(rng.uniform(-0.5, 0.5, 18), *groups[(k // 4) % 5]) for k in range(100)]
+    _, velocities, commands = roll(MPC, intents)
+    steps = np.abs(np.diff(velocities, axis=0))
+    assert np.all(steps <= LIMITS.acceleration * PERIOD * (1 + 1e-6) + 1e-9)
+    assert all(command.health.status is Status.OK for command in commands)
+
+
+def test_the_base_goes_round_an_obstacle_while_the_hand_keeps_its_course():
+    """The paper's case A, one obstacle: a low cylinder in the way of the base."""
+    low = Obstacle("low", Shape("cylinder", [0.3, 0.3]), [0.6, -0.25, 0.15])
+    MPC.reset((low,))
+    values = np.zeros(18)
+    values[3] = 0.3
+    positions, velocities, commands = roll(MPC, [asking(values, "ee")] * 160)
+    errors = [
+        np.linalg.norm((MODEL.jacobian(q) @ v)[:3] - values[3:6])
+        for q, v in zip(positions, velocities, strict=True)
+    ]
+    assert np.mean(errors[20:]) < 0.01 * 0.3
+    chassis = min(command.health.smallest_distance for command in commands)
+    assert chassis > 0.05
+    assert np.max(np.abs(positions[:, 1])) > 0.1  # it did go round
+
+
+def test_a_blocked_base_stops_at_the_margin():
+    wall = Obstacle("wall", Shape("box", [0.2, 6.0, 2.0]), [0.6, 0.0, 1.0])
+    MPC.reset((wall,))
+    values = np.zeros(18)
+    values[0] = 1.0
+    folded = np.array(HOME)
+    folded[3:] = [1.57, -2.0, 2.4, -0.4, 1.57, 1.31]
+    _, velocities, commands = roll(MPC, [asking(values, "base")] * 120, q=folded)
+    assert min(command.health.smallest_distance for command in commands) > 0.05
+    assert np.abs(velocities[-1][0]) < 0.02
+
+
+def test_the_quadratic_is_that_of_the_cost():
+    """Gradient and Gauss-Newton Hessian of the QP against finite differences of the stage costs."""
+    MPC.reset()
+    rng = np.random.default_rng(7)
+    mask = CHANNELS.mask("ee", "base")
+    state = State(HOME + rng.uniform(-0.2, 0.2, 9), rng.uniform(-0.2, 0.2, 9))
+    frames = Frames("world", "tool", [0.1, -0.2, 0.05])
+    problem = MPC.problem(state, Intent(rng.uniform(-0.3, 0.3, 18), mask, frames=frames))
+    u = rng.uniform(-0.5, 0.5, (10, 9))
+    residual = MPC.residuals.expression
+
+    def residuals(u):
+        q, v = problem.rollout(u)
+        z = np.hstack([q[1:], v[1:], u])
+        r = np.array([np.array(residual(row, problem.parameters)).ravel() for row in z])
+        return np.sqrt(problem.weights) * (r - problem.reference)
+
+    q, v = problem.rollout(u)
+    cost = MPC.solver.cost
+    quadratic = cost.expand(problem, q, v, u)
+    h, jacobian = 1e-6, []
+    motion = np.zeros((10, 3, 9))
+    for index in range(90):
+        to_motion(cost.matrix, h * np.eye(90)[index], motion)  # a variable's accelerations
+        step = motion[:, 2]
+        jacobian.append(((residuals(u + step) - residuals(u - step)) / (2 * h)).ravel())
+    jacobian = np.array(jacobian).T
+    expected = jacobian.T @ jacobian
+    width = quadratic.band.shape[1]
+    assert np.abs(expected[np.tril_indices(90, -width)]).max() < 1e-6  # nothing outside the band
+    inside = [(i, j) for i in range(90) for j in range(max(0, i - width + 1), i + 1)]
+    found = [quadratic.band[j, i - j] for i, j in inside]
+    band = [expected[i, j] for i, j in inside]
+    np.testing.assert_allclose(quadratic.value, 0.5 * np.sum(residuals(u) ** 2), rtol=1e-9)
+    np.testing.assert_allclose(cost.value(problem, q, v, u), quadratic.value, rtol=1e-12)
+    np.testing.assert_allclose(quadratic.gradient, jacobian.T @ residuals(u).ravel(), rtol=1e-4, atol=1e-3)
+    np.testing.assert_allclose(found, band, rtol=1e-4, atol=1e-2)
+
+
+def test_a_plan_knows_whether_it_is_a_solution():
+    from dataclasses import replace
+
+    MPC.reset()
+    problem = MPC.problem(still(), asking(np.full(18, 0.2), "ee")(0.0))
+    MPC.update(still(), asking(np.full(18, 0.2), "ee")(0.0))
+    plan = MPC.plan
+    assert plan.is_solution(problem)
+    assert not replace(plan, u=plan.u * 50.0).is_solution(problem)
+    assert not replace(plan, q=plan.q + 0.1).is_solution(problem)
+    assert not replace(plan, solved=False).is_solution(problem)
+
+
+def test_a_longer_horizon_is_a_setting():
+    mpc = MaskedMpc(MODEL, MpcSettings(horizon=15, dt=0.08))
+    command = mpc.update(still(), asking(np.full(18, 0.2), "ee")(0.0))
+    assert mpc.plan.v.shape == (16, 9)
+    np.testing.assert_array_equal(command.velocities[:16], mpc.plan.v)
+    np.testing.assert_array_equal(command.velocities[-1], 0.0)  # a command ends at rest
+    assert command.dt == 0.08
+
+
+def test_derivatives_come_from_casadi():
+    """Evaluated Jacobians against CasADi's own, one stage at a time; affine rows are constant."""
+    residuals = MPC.residuals
+    rng = np.random.default_rng(11)
+    q, v, u = (rng.uniform(-1, 1, (10, 9)) for _ in range(3))
+    p = Frames("world", "tool", [0.1, 0.0, 0.2]).parameters
+    _, values, jacobians = (part.copy() for part in residuals.evaluate(q, v, u, p))
+    np.testing.assert_array_equal(residuals.values(q, v, u, p)[1], values)
+    z = ca.SX.sym("z", 27)
+    jacobian = ca.Function("j", [z], [ca.densify(ca.jacobian(residuals.expression(z, p), z))])
+    affine = residuals.affine
+    assert set(affine.index) | set(residuals.curved) == set(range(residuals.size))
+    for k in range(10):
+        stage = np.concatenate([q[k], v[k], u[k]])
+        expected = np.array(residuals.expression(stage, p)).ravel()
+        np.testing.assert_allclose(values[k], expected[residuals.curved], atol=1e-9)
+        np.testing.assert_allclose(affine.jacobian @ stage + affine.offset, expected[affine.index], atol=1e-9)
+        np.testing.assert_allclose(jacobians[k].T, np.array(jacobian(stage))[residuals.curved], atol=1e-9)
+        np.testing.assert_allclose(affine.jacobian, np.array(jacobian(stage))[affine.index], atol=1e-9)

@@ -1,0 +1,50 @@
+"""Joints that cannot turn half around: which they are, when they are drawn to their middle, and what for."""
+
+from contextlib import closing
+
+import numpy as np
+
+from handrail.collect.commands.record import episode_seed
+from handrail.collect.config import SessionConfig
+from handrail.collect.operators.modes import find_mode
+from handrail.collect.session.build import build_controller, build_env, build_session
+from handrail.controllers.interface.channels import Channels
+from handrail.controllers.mpc.masked_mpc import MaskedMpc
+from handrail.controllers.objectives.limit_centring import narrow_joint_centring
+from handrail.controllers.robot.model import load_model
+
+
+def test_only_narrow_joints_and_only_while_just_the_whole_tool_is_steered():
+    model = load_model("ridgeback_panda")
+    channels = Channels.of(model.description)
+    (centring,) = narrow_joint_centring(channels, model.description.limits, 10.0)
+    narrow = np.isin(model.joints, ["panda_joint4", "panda_joint6"])
+    np.testing.assert_array_equal(centring.weights(channels.mask("ee")), 10.0 * narrow)
+    for names in (
+        ("base",),
+        ("base", "ee"),
+        ("ee.vx", "ee.vy", "ee.vz", "ee.wz"),
+        ("joint",),
+        ("ee", "arm"),
+        (),
+    ):
+        assert not centring.weights(channels.mask(*names)).any(), names
+
+
+def test_an_arm_whose_joints_turn_around_is_left_alone():
+    model = load_model()
+    channels = Channels.of(model.description)
+    assert narrow_joint_centring(channels, model.description.limits, 10.0) == ()
+    entries = build_controller(find_mode("ee"), model, 20).residuals.objectives  # pyright: ignore
+    assert [entry.name for entry in entries] == [
+        entry.name for entry in MaskedMpc(model).residuals.objectives
+    ]
+
+
+def test_a_hand_that_is_steered_to_a_far_pose_is_not_led_into_a_corner():
+    """Left alone joints 2 and 6 end at their limits there, 0.4 m from the goal, and stay."""
+    config = SessionConfig(task="reach", robot="ridgeback_panda")
+    with closing(build_env(config, 20)) as env:
+        outcome = build_session(config, env).run(episode_seed(100, 3))
+    assert outcome.success, outcome
+    assert outcome.contacts == 0

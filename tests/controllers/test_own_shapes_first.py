@@ -1,0 +1,54 @@
+"""The robot does not give up its distance to itself because something else has come too near."""
+
+import numpy as np
+import pytest
+from backup_helpers import HOME, LIMITS, MODEL, Robot, asking
+
+from handrail.controllers.interface.controller import State
+from handrail.controllers.mpc.masked_mpc import MaskedMpc
+from handrail.controllers.robot.shape import Obstacle, Shape
+from handrail.controllers.safety.backup import Backup, Situation
+from handrail.controllers.safety.certificate import Shortfall
+from handrail.controllers.safety.limiter import Limiter
+
+OWN = len(MODEL.description.self_pairs)
+
+
+@pytest.mark.parametrize("speed", [0.0, 0.5])
+def test_what_comes_too_near_buys_no_slack_to_the_robot_itself(speed):
+    """The wrist is turned towards the robot as far as it may; a ball is in the chassis, at rest or moving."""
+    mpc = MaskedMpc(MODEL)
+    turning = np.arange(mpc.channels.size) == mpc.channels.joint_slice.start + 7
+    ask = asking(mpc.channels, 1.0 * turning, "joint")
+    robot = Robot(mpc)
+    for _ in range(30):
+        robot.update(ask(robot.time))
+    ball = Obstacle(
+        "ball", Shape("sphere", [0.1]), [robot.q[0] - 0.53, 0.0, 0.14], velocity=[speed, 0.0, 0.0]
+    )
+    mpc.reset((ball,))
+    problem = mpc.problem(State(robot.q, np.zeros(MODEL.size), 0.0), ask(0.0))
+    plan = mpc.solver.solve(problem, np.zeros((mpc.settings.horizon, MODEL.size)))
+    for _ in range(5):
+        plan = mpc.solver.solve(problem, plan.u)
+    assert plan.collision_slack > 0.03  # to the ball, which nothing can be done about at once
+    short = problem.margins[:OWN] - problem.collision.values(plan.q)[:, :OWN]
+    assert short.max() < 1e-3
+
+
+class Judge:
+    """Says that a full stop is unsafe to the robot itself; what is stored, more so, but only to a mover."""
+
+    def shortfall(self, q, v, now, delay=0.0):
+        return Shortfall(hard=0.01, all=0.01)
+
+    def until_rest(self, path, times, now):
+        return Shortfall(hard=0.0, all=0.05)
+
+
+@pytest.mark.parametrize("halt", [True, False])
+def test_of_two_ways_that_are_not_safe_the_one_is_taken_that_keeps_from_itself(halt):
+    backup, moving = Backup(Judge(), Limiter(MODEL.description), 0.1), 0.3 * LIMITS.velocity  # pyright: ignore
+    backup.brake(moving)
+    way = backup.choose(Situation(HOME, moving, np.zeros(OWN), 0.0), None, halt)
+    assert way.shortfall == (0.0, 0.05)

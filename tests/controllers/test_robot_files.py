@@ -1,0 +1,121 @@
+"""A robot's file from whoever it is: a robot, or one line; whatever is put into it, deep down or between."""
+
+import shutil
+from pathlib import Path
+
+import pytest
+from command_helpers import command
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from toml_helpers import mutated
+
+from handrail.controllers.collision.model import CollisionModel
+from handrail.controllers.errors import HandrailError
+from handrail.controllers.robot import description as description_module
+from handrail.controllers.robot.description import load_description, robot_names
+from handrail.controllers.robot.model import RobotModel
+
+TEXTS = {name: (description_module._FOLDER / f"{name}.toml").read_text() for name in robot_names()}
+QUICK = settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
+
+
+def one_line_or_a_robot(path) -> None:
+    refusals = []
+    try:
+        model = RobotModel(load_description(path))
+        CollisionModel(model, ())
+        model.pose(model.description.home)
+    except HandrailError as error:
+        refusals.append(str(error))
+    assert "\n" not in "".join(refusals)
+
+
+@pytest.mark.parametrize("robot", robot_names())
+@given(data=st.data())
+@QUICK
+def test_an_entry_of_another_kind_is_one_line(robot, tmp_path, data):
+    path = tmp_path / "robot.toml"
+    path.write_text(mutated(TEXTS[robot], data))
+    one_line_or_a_robot(path)
+
+
+@given(data=st.data())
+@QUICK
+def test_another_text_is_one_line(tmp_path, data):
+    text = TEXTS["ridgeback_ur10"].encode()
+    first, last = sorted(data.draw(st.integers(0, len(text))) for _ in range(2))
+    path = tmp_path / "robot.toml"
+    path.write_bytes(text[:first] + data.draw(st.binary(max_size=8)) + text[min(last, first + 40) :])
+    one_line_or_a_robot(path)
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        *(b"\xff\xfe", b"", b"a = " + b"[" * 100_000, b"a = " + b"9" * 10_000, b"a=1\n" * 2, b"#" * 2**21),
+        TEXTS["ridgeback_ur10"].replace("mass = 165.3", "mass = 0x" + "f" * 10_000).encode(),
+    ],
+    ids=["bytes", "empty", "deep", "digits", "twice", "large", "hexadecimal"],
+)
+def test_what_is_no_description_is_one_line(content, tmp_path):
+    path = tmp_path / "robot.toml"
+    path.write_bytes(content)
+    with pytest.raises(HandrailError, match="robot description") as raised:
+        load_description(path)
+    assert "\n" not in str(raised.value)
+
+
+@pytest.mark.parametrize("name", ["floor", "finger_left", "cube"])
+def test_a_shape_with_a_name_that_is_taken_is_one_line(name, tmp_path):
+    """By the floor, by a finger of the gripper, by what stands in the scene."""
+    path = tmp_path / "robot.toml"
+    shape = f'[[collision]]\nname = "{name}"\nframe = "planar_base"\nsphere = 0.1\n\n[[visual]]'
+    path.write_text(TEXTS["ridgeback_ur10"].replace("[[visual]]", shape, 1))
+    flags = ["--robot", path, "--task", "pick_place", "--dataset.root", tmp_path / "set"]
+    done = command(*flags, "--dataset.num_episodes", 1)
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1), done.stderr
+    assert not (tmp_path / "set").exists()
+
+
+def beside(folder: Path, urdf: str) -> Path:
+    path = folder / "robot.toml"
+    text = TEXTS["ridgeback_ur10"]
+    path.write_text(text.replace("example-robot-data/robots/ur_description/urdf/ur10_robot.urdf", urdf))
+    return path
+
+
+def test_a_urdf_lies_beside_the_description_and_is_one(tmp_path):
+    own = load_description("ridgeback_ur10").urdf
+    (home := tmp_path / "home").mkdir()
+    path = beside(home, "arm.urdf")
+    shutil.copy(own, home / "arm.urdf")
+    assert RobotModel(load_description(path)).size == 9
+    shutil.move(home / "arm.urdf", tmp_path / "arm.urdf")
+    (home / "arm.urdf").symlink_to(tmp_path / "arm.urdf")
+    with pytest.raises(HandrailError, match="expected a path inside a package, or beside"):
+        load_description(path)
+
+
+@pytest.mark.parametrize("urdf", [".", "./", "..", "/etc/passwd", "a/../../b.urdf"])
+def test_a_urdf_elsewhere_is_one_line(urdf, tmp_path):
+    with pytest.raises(HandrailError, match="expected a path inside a package, or beside") as raised:
+        load_description(beside(tmp_path, urdf))
+    assert "\n" not in str(raised.value)
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        "",
+        "<robot",
+        "<robot name='x'/>",
+        "no",
+        "<a/>",
+        "<robot name='x'><link name='a'/><link name='a'/></robot>",
+    ],
+)
+def test_a_malformed_urdf_is_one_line(content, tmp_path):
+    (tmp_path / "arm.urdf").write_text(content)
+    with pytest.raises(HandrailError) as raised:
+        RobotModel(load_description(beside(tmp_path, "arm.urdf")))
+    assert "\n" not in str(raised.value)

@@ -1,0 +1,215 @@
+"""`handrail-compare` works on anybody's datasets, says what does not apply, and never claims too much."""
+
+import csv
+import json
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from compare_helpers import JOINTS, handrail_dataset, lerobot_dataset, quick_and_slow
+
+from handrail.controllers.errors import HandrailError
+from handrail.datasets.comparison.compare import compare
+from handrail.datasets.comparison.config import CompareConfig
+from handrail.datasets.comparison.evaluations import FORMAT
+from handrail.datasets.comparison.findings import findings, headline
+from handrail.datasets.comparison.report.report import as_json, write_report
+from handrail.datasets.quality.catalogue import METRICS
+from handrail.datasets.quality.load import read_demonstrations
+from handrail.datasets.quality.measure import measure
+from handrail.scripts import cli
+from handrail.scripts.compare import _compare
+
+
+@pytest.fixture(scope="module")
+def foreign(tmp_path_factory):
+    """Two datasets of another robot, not made by Handrail."""
+    folder = tmp_path_factory.mktemp("foreign")
+    return [
+        str(lerobot_dataset(folder / name, JOINTS, 30, jitter, name == "calm"))
+        for name, jitter in (("calm", 0.01), ("shaky", 0.3))
+    ]
+
+
+@pytest.fixture(scope="module")
+def ours(tmp_path_factory):
+    return quick_and_slow(tmp_path_factory.mktemp("ours"))
+
+
+def report(arguments, folder, **options):
+    comparison = compare(CompareConfig(tuple(arguments), str(folder), **options))
+    files = write_report(comparison)
+    return comparison, json.loads((folder / "report.json").read_text(), parse_constant=_no_constant), files
+
+
+def _no_constant(name):
+    raise AssertionError(f"{name} is no JSON")
+
+
+def test_two_datasets_that_handrail_did_not_make(foreign, tmp_path):
+    _, content, files = report(foreign, tmp_path)
+    assert [file.name for file in files] == ["report.html", "report.json", "episodes.csv", "differences.csv"]
+    metrics = content["views"]["all episodes"]["metrics"]
+    applies = {name for name, groups in metrics.items() if groups["calm"]["mean"] is not None}
+    never = {"contacts", "impulse", "smallest_distance", "time_within_margin", "slack_used", "input_effort"}
+    never |= {"input_reversals", "active_axes", "mode_switches"}
+    assert applies == {metric.name for metric in METRICS} - never
+    page = (tmp_path / "report.html").read_text()
+    for name in never:
+        assert metrics[name]["shaky"]["reason"].startswith("no column")
+        (metric,) = [metric for metric in METRICS if metric.name == name]
+        assert re.search(rf"{metric.title}</td><td>calm, shaky</td><td>no column", page)
+    assert metrics["tracking_error"]["calm"]["mean"] == pytest.approx(0.0, abs=1e-6)
+    found = {d["metric"]: d for d in content["views"]["all episodes"]["differences"]}
+    assert found["ldlj"]["estimate"] < 0 < found["action_variance"]["estimate"]
+    assert "calm" in page
+    assert "wave" in page
+    pictures = re.findall(r"data:image/jpeg;base64,([^\"]+)", page)
+    assert len(set(pictures)) == len(pictures) == 3  # the first of each of the first three episodes
+
+
+def test_the_page_needs_nothing_else(foreign, tmp_path):
+    report(foreign, tmp_path)
+    page = (tmp_path / "report.html").read_text()
+    addresses = re.findall(r'(?:src|href)="([^"]{0,30})', page)
+    assert addresses
+    assert all(address.startswith("data:image/") for address in addresses)
+    assert "<script" not in page
+    assert page.index("headline") < page.index('class="card"') < page.index('class="panels')
+
+
+def test_the_same_seed_gives_the_same_report(ours, tmp_path):
+    for name in ("one", "two"):
+        report(ours, tmp_path / name)
+    for name in ("episodes.csv", "differences.csv"):
+        assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes()
+    one, two = ((tmp_path / name / "report.html").read_text() for name in ("one", "two"))
+    assert one == two
+
+
+def test_what_does_not_apply_is_empty_and_never_zero(foreign, ours, tmp_path):
+    report([foreign[0], ours[0]], tmp_path)
+    rows = list(csv.DictReader((tmp_path / "episodes.csv").read_text().splitlines()))
+    assert {row["contacts"] for row in rows if row["group"] == "calm"} == {""}
+    assert [row["contacts"] for row in rows if row["group"] == "quick"][:3] == ["0.0", "1.0", "0.0"]
+    assert not any("nan" in value for row in rows for value in row.values())
+
+
+def test_different_columns_are_not_put_on_one_scale(foreign, ours, tmp_path):
+    _, content, _ = report([foreign[0], ours[0]], tmp_path)
+    reasons = {
+        d["metric"]: d.get("does_not_apply", "") for d in content["views"]["all episodes"]["differences"]
+    }
+    assert "no common scale" in reasons["state_coverage"]
+    assert reasons["length"] == ""
+    assert any("different columns" in finding["text"] for finding in content["findings"])
+
+
+def test_findings_claim_no_more_than_the_intervals(ours, tmp_path):
+    comparison = compare(CompareConfig(tuple(ours)))
+    found = findings(comparison)
+    assert any(finding.kind == "caution" and "No evaluations" in finding.text for finding in found)
+    silent = [finding.text for finding in found if not finding.detected and finding.kind != "caution"]
+    assert silent
+    assert all(
+        "not evidence of equality" in text or "go unseen" in text or "no difference" in text
+        for text in silent
+    )
+    assert not any(re.search(r"\bequal(ly)?\b(?! length)", finding.text) for finding in found)
+    same = compare(CompareConfig((ours[0], ours[0]), labels=("one", "other")))
+    assert not any(finding.detected for finding in findings(same))
+    assert "no difference in success detected" in headline(findings(same))
+
+
+def evaluations(path: Path, **shares) -> Path:
+    rng = np.random.default_rng(0)
+    content = {
+        label: [
+            {
+                "training_seed": seed,
+                "trained_on": {"episodes": 12, "operator_time": 30.0},
+                "rollouts": [{"seed": k, "success": bool(rng.random() < share)} for k in range(80)],
+            }
+            for seed in range(3)
+        ]
+        for label, share in shares.items()
+    }
+    path.write_text(json.dumps({"format": FORMAT, "arms": content}))
+    return path
+
+
+def test_policies_come_first(ours, tmp_path):
+    given = evaluations(tmp_path / "evaluations.json", quick=0.9, slow=0.5)
+    comparison, content, _ = report(ours, tmp_path / "out", evaluations=(str(given),))
+    found = findings(comparison)
+    assert found[0].kind == "outcome"
+    assert "Policies trained on quick succeeded more often" in headline(found)
+    assert content["outcomes"]["differences"][0]["nested"][1] < 0
+    assert any("training seeds" in text["text"] for text in content["findings"])
+    assert as_json(comparison, found)["outcomes"]["arms"][0]["label"] == "quick"
+    wrong = evaluations(tmp_path / "wrong.json", telepathy=0.9)
+    with pytest.raises(HandrailError, match="unknown arm 'telepathy', expected one of quick, slow"):
+        compare(CompareConfig(tuple(ours), evaluations=(str(wrong),)))
+
+
+def test_columns_may_be_named(foreign):
+    episodes = read_demonstrations(foreign[0], replace(CompareConfig(()).columns, asked="action"))
+    found = measure({"calm": episodes}, np.random.default_rng(0)).values
+    assert found["input_effort"]["calm"].applies
+    assert not found["contacts"]["calm"].applies
+
+
+def test_one_episode_is_enough_to_say_that_it_is_too_few(tmp_path):
+    roots = [handrail_dataset(tmp_path / name, 100, name, 1) for name in ("a", "b")]
+    comparison, content, _ = report(roots, tmp_path / "out")
+    reasons = [d["does_not_apply"] for d in content["views"]["all episodes"]["differences"]]
+    assert "fewer than 5 episodes of a group have a value" in reasons
+    assert (
+        content["views"]["all episodes"]["metrics"]["action_variance"]["a"]["reason"]
+        == "there is only one episode"
+    )
+    assert not any(finding.detected for finding in findings(comparison))
+
+
+WRONG = {
+    "nothing": ([], "DATASETS|expected one folder"),
+    "one": (
+        ["{quick}"],
+        "expected 2 to 8 groups of episodes, got quick; name another dataset, or say --by mode",
+    ),
+    "no such": (["{quick}", "nowhere"], "nowhere.*expected a folder, found none"),
+    "column": (["{quick}", "{slow}", "--by", "colour"], "unknown column 'colour'"),
+    "labels": (["{quick}", "{slow}", "--labels", "a"], "--labels: expected 2 names, got 1"),
+    "same name": (["{quick}", "{quick}"], "two datasets are called 'ours0/quick'"),
+    "baseline": (
+        ["{quick}", "{slow}", "--baseline", "z"],
+        "unknown baseline 'z': expected one of quick, slow",
+    ),
+    "margin": (["{quick}", "{slow}", "--margin", "-1"], "--margin -1.0: expected a positive distance"),
+    "output": (
+        ["{quick}", "{slow}", "--output", "{quick}/meta/info.json"],
+        "expected a folder, found a file",
+    ),
+    "evaluations": (["{quick}", "{slow}", "--evaluations", "no.json"], "expected a JSON file, found none"),
+    "flag": (["{quick}", "{slow}", "--speed", "9"], "--speed"),
+}
+
+
+@pytest.mark.parametrize(("arguments", "message"), WRONG.values(), ids=WRONG)
+def test_wrong_input_is_one_line_and_code_2(arguments, message, ours, capsys):
+    words = [word.format(quick=ours[0], slow=ours[1]) for word in arguments]
+    with pytest.raises(SystemExit) as stop:
+        cli.run(lambda: _compare(cli.parse(CompareConfig, "handrail-compare", words)))
+    assert stop.value.code == cli.BAD_INPUT
+    (line,) = capsys.readouterr().err.strip().splitlines()
+    assert re.search(message, line), line
+
+
+def test_the_command_says_what_it_found(ours, tmp_path, capsys):
+    words = [*ours, "--output", str(tmp_path / "out"), "--no_pictures"]
+    assert _compare(cli.parse(CompareConfig, "handrail-compare", words)) == 0
+    said = capsys.readouterr().out
+    assert "An operator hour gives" in said
+    assert str(tmp_path / "out" / "report.html") in said

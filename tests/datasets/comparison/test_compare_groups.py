@@ -1,0 +1,90 @@
+"""What `handrail-compare` compares: groups of episodes, matched in number and time, paired by their seeds."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from compare_helpers import handrail_dataset, quick_and_slow
+from datasets_helpers import create, frame_of
+
+from handrail.controllers.errors import HandrailError
+from handrail.datasets.comparison.collection import collected, matched_number, matched_time, shared_seeds
+from handrail.datasets.comparison.compare import compare
+from handrail.datasets.comparison.config import CompareConfig
+from handrail.datasets.comparison.groups import load_groups
+from handrail.datasets.comparison.productivity import rate_ratio
+from handrail.datasets.format.schema import Feature
+
+
+@pytest.fixture(scope="module")
+def ours(tmp_path_factory):
+    return quick_and_slow(tmp_path_factory.mktemp("ours"))
+
+
+def test_modes_of_one_dataset(tmp_path):
+    root = tmp_path / "both"
+    handrail_dataset(root, 100, "ee", 6)
+    groups = load_groups([str(root), handrail_dataset(tmp_path / "other", 100, "joints", 6)], "mode")
+    assert [group.label for group in groups] == ["both · ee", "other · joints"]
+    with pytest.raises(HandrailError, match="expected 2 to 8 groups of episodes, got ee"):
+        load_groups([str(root)], "mode")
+    with pytest.raises(HandrailError, match=r"unknown column 'colour' of episodes, expected one of .*mode"):
+        load_groups([str(root)], "colour")
+
+
+def test_a_mode_that_only_the_frames_know(tmp_path):
+    features = {"action": Feature("float32", (2,)), "teleop.mode": Feature("string")}
+    with create(tmp_path / "set", features=features) as writer:
+        for mode in ("ee", "base", "ee"):
+            for index in range(5):
+                frame = {"action": frame_of(0, index, False)["action"], "teleop.mode": mode}
+                writer.add_frame(frame, "go")
+            writer.save_episode()
+    groups = load_groups([tmp_path / "set"], "mode")
+    assert {group.label: len(group.episodes) for group in groups} == {"ee": 2, "base": 1}
+
+
+def test_matched_views(ours):
+    quick, slow = load_groups(ours)
+    short = replace(quick, episodes=quick.episodes[:5])
+    assert [len(group.episodes) for group in matched_number([short, slow])] == [5, 5]
+    matched = matched_time([quick, slow])
+    budget = collected(quick).operator_time
+    assert [collected(group).operator_time <= budget + 1e-9 for group in matched] == [True, True]
+    assert matched[0] == quick
+    assert budget - collected(matched[1]).operator_time < slow.episodes[len(matched[1].episodes)].seconds
+
+
+def test_collected(ours):
+    quick, slow = map(collected, load_groups(ours))
+    assert (quick.episodes, quick.successes, quick.failure_share) == (12, 12, 0.0)
+    assert (slow.successes, dict(slow.reasons)) == (6, {"timeout": 6})
+    assert quick.operator_time == pytest.approx(sum(range(30, 42)) / 30)
+    assert slow.successes_an_hour == pytest.approx(3600 * 6 / (sum(range(90, 102)) / 30))
+
+
+def test_episodes_that_began_alike_are_paired(ours):
+    quick, slow = load_groups(ours)
+    assert shared_seeds(quick, slow) == [(place, place) for place in range(12)]
+    again = replace(slow, episodes=(*slow.episodes, slow.episodes[0]))
+    assert shared_seeds(quick, again) == []
+
+
+def test_successes_an_hour(ours):
+    quick, slow = load_groups(ours)
+    ratio = rate_ratio(quick, slow, np.random.default_rng(0))
+    rates = [collected(group).successes_an_hour or 0.0 for group in (quick, slow)]
+    assert ratio.estimate == pytest.approx(rates[0] / rates[1])
+    assert 1.0 < ratio.interval[0] < ratio.estimate < ratio.interval[1]
+    assert ratio.p < 0.01
+    same = rate_ratio(quick, quick, np.random.default_rng(0))
+    assert (same.estimate, same.interval, same.p) == (1.0, (1.0, 1.0), 1.0)
+    few = replace(slow, episodes=slow.episodes[:5]), replace(quick, episodes=quick.episodes[7:])
+    assert rate_ratio(*few, np.random.default_rng(0)).p > 0.005  # 2 of 252 permutations
+
+
+def test_success_only(ours, tmp_path):
+    comparison = compare(CompareConfig(tuple(ours), success_only=True))
+    view = comparison.everything
+    assert [len(group.episodes) for group in view.groups] == [12, 6]
+    assert [each.episodes for each in view.collected] == [12, 12]

@@ -1,0 +1,245 @@
+"""What a comparison claims follows the data: not how many episodes, scenes or comparisons there were."""
+
+import numpy as np
+import pytest
+from compare_helpers import quick_and_slow
+
+from handrail.controllers.errors import HandrailError
+from handrail.datasets.comparison import compare as comparing
+from handrail.datasets.comparison.collection import collected, success_difference
+from handrail.datasets.comparison.config import CompareConfig
+from handrail.datasets.comparison.differences import differences
+from handrail.datasets.comparison.evaluations import Arm, Policy
+from handrail.datasets.comparison.findings import findings
+from handrail.datasets.comparison.groups import Group
+from handrail.datasets.comparison.outcomes import LIKE_FOR_LIKE, Pair, in_families, judge, judge_pairs
+from handrail.datasets.quality.catalogue import METRICS
+from handrail.datasets.quality.demonstration import Demonstration
+from handrail.datasets.quality.measure import measure
+from handrail.datasets.quality.neighbours import frames_of
+from handrail.datasets.reading.reader import DatasetInfo
+from handrail.datasets.statistics import resampling
+from handrail.datasets.statistics.paired import wilson
+from handrail.datasets.statistics.proportions import (
+    holm,
+    independent_trials,
+    paired_shares,
+    unpaired_shares,
+)
+
+OF_GROUP = [metric for metric in METRICS if metric.of_group]
+NAMES = {"observation.state": ("x", "y", "goal"), "action": ("v_x", "v_y")}
+
+
+def rng(*seed):
+    return np.random.default_rng(seed)
+
+
+def episode(number, generator, **meta):
+    """A minimum-jerk way to a goal that differs, with an operator's noise; 40 to 60 frames."""
+    count = int(generator.integers(40, 61))
+    time = np.linspace(0.0, 1.0, count)[:, None]
+    goal = generator.normal(size=(1, 2))
+    state = (10 * time**3 - 15 * time**4 + 6 * time**5) * goal + 0.02 * generator.normal(size=(count, 2))
+    frames = {
+        "observation.state": np.hstack([state, np.full((count, 1), goal.sum())]),
+        "action": np.gradient(state, axis=0),
+    }
+    return Demonstration(number, 20.0, frames, NAMES, {"length": count, "tasks": ["go"], **meta})
+
+
+def group(label, count, generator, **meta):
+    return Group(label, DatasetInfo, tuple(episode(k, generator, **meta) for k in range(count)))  # type: ignore[arg-type]
+
+
+def compared(groups, generator):
+    measured = measure({each.label: each.episodes for each in groups}, generator, metrics=METRICS)
+    return measured, differences(groups, measured, groups[-1].label, generator)
+
+
+@pytest.fixture
+def quick(monkeypatch):
+    """Few resamples: what is tested here does not hang on the third digit of p."""
+    for module in ("resampling", "differences"):
+        monkeypatch.setattr(f"handrail.datasets.{module}.RESAMPLES", 400)
+    assert resampling.RESAMPLES == 400
+
+
+@pytest.mark.parametrize("counts", [(36, 12), (12, 12)])
+def test_more_episodes_of_the_same_are_no_difference(quick, counts):
+    for seed in range(3):
+        generator = rng(seed, *counts)
+        groups = [group(label, count, generator) for label, count in zip("ab", counts, strict=True)]
+        _, found = compared(groups, generator)
+        assert not any(each.detected for each in found)
+        told = [each for each in found if each.metric.of_group]
+        assert [each.metric for each in told] == OF_GROUP
+        for each in told:
+            assert (each.tested, each.p_adjusted) == (False, 1.0)
+            assert bool(each.reason) == (counts[0] != counts[1])
+
+
+def test_what_is_not_tested_costs_no_power(quick):
+    """Holm's family is what has a p: as many as there are differences of single episodes."""
+    generator = rng(3)
+    _, found = compared([group("a", 12, generator), group("b", 12, generator)], generator)
+    tested = [each for each in found if each.tested and not each.reason]
+    assert [each.p_adjusted for each in tested] == pytest.approx(holm([each.p for each in tested]))
+
+
+def test_as_many_frames_stand_for_every_group(monkeypatch):
+    seen = []
+    metric = METRICS[[each.name for each in METRICS].index("state_coverage")]
+    generator = rng(4)
+    groups = [group("few", 9, generator), group("many", 30, generator)]
+    monkeypatch.setattr(
+        "handrail.datasets.quality.catalogue.consistency.state_coverage",
+        lambda points: seen.append(len(points)) or np.zeros(len(points)),
+    )
+    measure({each.label: each.episodes for each in groups}, generator, metrics=[metric])
+    assert seen[0] == seen[1] == sum(each.count for each in groups[0].episodes)
+
+
+@pytest.mark.parametrize("most", [1, 7, 100, 101, 10_000])
+def test_frames_of_episodes(most):
+    """Exactly as many as asked for if there are; each at most once; the ends of every episode among them."""
+    members = group("a", 5, rng(5)).episodes
+    chosen = frames_of(members, most)
+    assert sum(map(len, chosen)) == min(most, sum(each.count for each in members))
+    assert max(map(len, chosen)) - min(map(len, chosen)) <= (1 if most <= 200 else 21)
+    for each, frames in zip(members, chosen, strict=True):
+        assert len(set(frames)) == len(frames)
+        assert set(frames) <= set(range(each.count))
+
+
+def test_words_describe_a_group_and_claim_nothing(tmp_path):
+    found = findings(comparing.compare(CompareConfig(tuple(quick_and_slow(tmp_path)))))
+    titles = [metric.title for metric in OF_GROUP]
+    (said,) = [each for each in found if "described, not tested" in each.text]
+    assert not said.detected
+    assert all(title in said.text for title in titles)
+    assert not any(title in each.text for each in found if each.detected for title in titles)
+
+
+def test_the_success_that_is_shown_is_the_one_that_is_tested():
+    one = group("a", 12, rng(6), success=True, attempts=3)
+    other = group("b", 10, rng(7), success=False)
+    assert (collected(one).success, collected(other).success) == (1.0, 0.0)
+    assert success_difference(one, other).estimate == 1.0
+
+
+@pytest.mark.parametrize("value", [float("nan"), None, "yes"])
+def test_a_success_that_nobody_recorded_is_none(value):
+    assert episode(0, rng(), success=value).success is None
+
+
+def test_pairs_are_all_episodes_or_none():
+    generator = rng(8)
+    seeded = [tuple(episode(k, generator, seed=k, success=True) for k in range(n)) for n in (10, 9)]
+    one, other = (Group(label, None, each) for label, each in zip("ab", seeded, strict=True))  # type: ignore[arg-type]
+    assert not success_difference(one, other).paired
+    assert success_difference(one.first(9), other).paired
+    measured = measure({"a": one.episodes, "b": other.episodes}, generator, metrics=METRICS[:1])
+    assert measured.values["length"]["a"].applies
+
+
+def arm(label, mean, policies, generator, scenes=100, luck=0.0, hard=0.0, difficulty=None):
+    """Policies that differ by `luck` of their training, in scenes that differ by `hard`."""
+    found = []
+    for seed in range(policies):
+        share = mean + luck * generator.normal() + (0.0 if difficulty is None else hard * difficulty)
+        values = generator.random(scenes) < np.clip(share, 0.0, 1.0)
+        found.append(Policy(0, seed, {}, {k: {"success": float(value)} for k, value in enumerate(values)}))
+    return Arm(label, tuple(found))
+
+
+@pytest.mark.parametrize(("policies", "luck"), [(1, 0.0), (3, 0.05), (3, 0.1), (5, 0.1)])
+def test_what_is_called_detectable_is_detected_four_times_in_five(quick, policies, luck):
+    """A difference that experiments claim to see, in 60 others like them: seen in 60 to 95 % of these."""
+    generator = rng(9, policies, int(100 * luck))
+
+    def experiment(difference):
+        arms = [
+            arm(x, 0.5 + 0.5 * s * difference, policies, generator, luck=luck)
+            for x, s in (("a", 1), ("b", -1))
+        ]
+        return judge({each.label: each for each in arms}, "b", generator).differences[0]
+
+    claimed = np.median([experiment(0.2).detectable for _ in range(20)])
+    assert 0.6 <= np.mean([experiment(claimed).detected for _ in range(60)]) <= 0.95
+
+
+def test_more_comparisons_see_less(quick):
+    generator = rng(10)
+    arms = {x: arm(x, 0.5, 3, generator, luck=0.1) for x in "abcd"}
+    (alone,) = judge_pairs(arms, [Pair("a", "d")], generator).differences
+    family = in_families([alone, *judge(arms, "d", generator).differences])
+    assert family[0].tests == 4
+    assert family[0].detectable > alone.detectable
+    assert [each.p_adjusted for each in family] == holm([each.p for each in family])
+
+
+def test_every_family_is_corrected_for_itself(quick):
+    generator = rng(15)
+    arms = {x: arm(x, 0.5, 3, generator, luck=0.1) for x in "abcd"}
+    pairs = [Pair("a", "d"), Pair("b", "d", "mixed"), Pair("c", "d")]
+    like, mixed, also = judge_pairs(arms, pairs, generator).differences
+    assert [each.family for each in (like, mixed, also)] == [LIKE_FOR_LIKE, "mixed", LIKE_FOR_LIKE]
+    assert [each.tests for each in (like, mixed, also)] == [2, 1, 2]
+    assert [like.p_adjusted, also.p_adjusted] == holm([like.p, also.p])
+    assert mixed.p_adjusted == mixed.p
+
+
+@pytest.mark.parametrize("hard", [0.0, 0.45])
+def test_an_interval_over_scenes_covers(quick, hard):
+    """Three policies in the same 60 scenes: 95 % of 200 intervals should hold what any scenes give."""
+    generator, covered, naive = rng(11), 0, 0
+    for _ in range(200):
+        difficulty = generator.choice([-1.0, 1.0], size=60)
+        found = arm("a", 0.5, 3, generator, scenes=60, hard=hard, difficulty=difficulty)
+        (outcome,) = judge({"a": found}, "a", generator).arms
+        covered += outcome.wilson[0] <= 0.5 <= outcome.wilson[1]
+        low, high = wilson(outcome.successes, outcome.rollouts)
+        naive += low <= 0.5 <= high
+    assert covered >= 182
+    assert hard == 0.0 or naive < 170
+
+
+@pytest.mark.parametrize("paired", [True, False])
+def test_the_same_rollouts_three_times_say_no_more(paired):
+    one, other = (rng(14, k).random(100) < share for k, share in enumerate((0.7, 0.4)))
+    twice = list(np.tile(one, 3)), list(np.tile(other, 3))
+    scenes = [*range(100)] * 3
+    if paired:
+        once, again = paired_shares(one, other), paired_shares(*twice, scenes)
+    else:
+        once, again = unpaired_shares(one, other), unpaired_shares(*twice, (scenes, scenes))
+    assert again.estimate == pytest.approx(once.estimate)
+    assert again.interval == pytest.approx(once.interval, abs=2e-3)
+    assert again.error == pytest.approx(once.error, rel=0.03)
+    assert again.p == pytest.approx(once.p, rel=1e-6 if paired else 0.1)
+
+
+def test_how_many_trials_scenes_are_worth():
+    values = rng(12).integers(0, 2, size=300).astype(float)
+    assert independent_trials(values, range(300)) == pytest.approx(300)
+    assert independent_trials(np.tile(values, 3), [*range(300)] * 3) == pytest.approx(300, rel=0.01)
+    assert independent_trials(np.ones(30), [*range(10)] * 3) == 10.0
+    alike = independent_trials(rng(13).integers(0, 2, size=900).astype(float), [*range(300)] * 3)
+    assert 750 < alike <= 900
+
+
+def test_an_arm_is_compared_with_the_baseline_of_its_own_kind():
+    labels = ["ee", "direct"]
+    arms = ["ee", "ee intent", "direct", "ee intent same number", "direct same number", "ee filter"]
+    assert comparing._pairs(arms, "direct", labels) == [
+        Pair("ee", "direct"),
+        Pair("ee intent", "direct", comparing.MIXED),
+        Pair("ee intent same number", "direct same number", comparing.MIXED),
+        Pair("ee filter", "direct", comparing.MIXED),
+    ]
+    assert comparing._pairs(["ee"], "direct", labels) == []
+    with pytest.raises(
+        HandrailError, match="expected an arm 'direct' to compare 'ee' with, got ee, direct same"
+    ):
+        comparing._pairs(["ee", "direct same number"], "direct", labels)

@@ -1,0 +1,231 @@
+"""What the report shows: what is better is right, nothing is hidden at an edge, no title covers another."""
+
+import json
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from compare_helpers import check_texts, handrail_dataset, quick_and_slow
+
+from handrail.datasets.comparison.compare import compare
+from handrail.datasets.comparison.config import CompareConfig
+from handrail.datasets.comparison.differences import Difference
+from handrail.datasets.comparison.evaluations import FORMAT
+from handrail.datasets.comparison.findings import findings, headline
+from handrail.datasets.comparison.report.figures import answer_panels
+from handrail.datasets.comparison.report.metric_figures import (
+    draw_effect,
+    effects_panels,
+    metrics_panels,
+    turned,
+)
+from handrail.datasets.comparison.report.page import report_page
+from handrail.datasets.comparison.report.trajectories import trajectory_panels
+from handrail.datasets.presentation.drawing import new_figure, short
+from handrail.datasets.quality.catalogue import METRICS
+
+LENGTH, DISTANCE = (next(m for m in METRICS if m.name == name) for name in ("length", "smallest_distance"))
+LONG = ("a robot steered by the hand through the controller", "a robot steered joint by joint, unprotected")
+JUDGED = re.compile(r"\b(better|worse|best|worst)\b")
+
+
+@pytest.fixture(scope="module", autouse=True)
+def quick():
+    """Few resamples: what is tested here does not hang on the third digit of p."""
+    with pytest.MonkeyPatch.context() as patch:
+        for module in ("resampling", "differences", "productivity"):
+            patch.setattr(f"handrail.datasets.{module}.RESAMPLES", 500)
+        yield
+
+
+@pytest.fixture(scope="module")
+def ours(tmp_path_factory):
+    return quick_and_slow(tmp_path_factory.mktemp("ours"))
+
+
+@pytest.fixture(scope="module")
+def alike(ours):
+    return compare(CompareConfig(tuple(ours), labels=LONG))
+
+
+@pytest.fixture(scope="module")
+def unlike(ours, tmp_path_factory):
+    """The same comparison, but the second dataset is another task of another robot."""
+    found = compare(CompareConfig(tuple(ours)))
+    return replace(found, views=[replace(view, groups=_another(view.groups)) for view in found.views])
+
+
+def _another(groups):
+    one, other = groups
+    episodes = tuple(replace(e, meta={**e.meta, "tasks": ["stay"]}) for e in other.episodes)
+    return [one, replace(other, info=replace(other.info, robot_type="other"), episodes=episodes)]
+
+
+def drawn(metric, estimate, low, high, spread=1.0, sign=1.0):
+    """Return the markers of a difference, left to right, with where each stands."""
+    axes = new_figure(4.0, 1.0).subplots()
+    each = Difference(
+        metric, "a", "b", estimate=estimate, interval=(low, high), spread=spread, p_adjusted=0.001
+    )
+    draw_effect(axes, each, 0.0, "#000000", sign)
+    marks = [(line.get_marker(), line.get_xdata()) for line in axes.lines if line.get_marker() != "None"]
+    return sorted((float(np.ravel(x)[0]), mark) for mark, x in marks)
+
+
+def test_a_difference_without_spread_is_an_arrow_and_not_at_zero():
+    """Every episode of one group has 5 and of the other 2: infinitely many standard deviations."""
+    each = Difference(LENGTH, "a", "b", estimate=3.0, interval=(3.0, 3.0), spread=0.0)
+    assert each.effect == (np.inf, np.inf, np.inf)
+    assert {mark for _, mark in drawn(LENGTH, 3.0, 3.0, 3.0, spread=0.0)} == {">"}
+    assert {mark for _, mark in drawn(LENGTH, -3.0, -3.0, -3.0, spread=0.0)} == {"<"}
+    assert {place for place, _ in drawn(LENGTH, 0.1, 0.1, 0.1, spread=1e-17)} == {4.0}
+    assert drawn(LENGTH, 0.0, 0.0, 0.0, spread=0.0) == [(0.0, "o")]
+
+
+def test_intervals_that_are_cut_carry_arrows():
+    assert drawn(DISTANCE, 3.0, 1.0, 9.0) == [(3.0, "o"), (4.0, ">")]
+    assert drawn(DISTANCE, 0.0, -9.0, 9.0) == [(-4.0, "<"), (0.0, "o"), (4.0, ">")]
+    assert drawn(DISTANCE, 3.0, 2.0, 4.0) == [(3.0, "o")]
+    assert [mark for _, mark in drawn(DISTANCE, -7.0, -9.0, -5.0)] == ["<"] * 3
+
+
+def test_right_is_better():
+    assert drawn(LENGTH, 3.0, 1.0, 9.0, sign=-1.0) == [(-4.0, "<"), (-3.0, "o")]
+    assert (turned(LENGTH, True), turned(DISTANCE, True), turned(LENGTH, False)) == (True, False, False)
+
+
+def test_metrics_are_turned_so_that_right_is_better(alike):
+    (judged,) = effects_panels(alike)
+    assert judged.title == f"Right is better than {LONG[0]}, left is worse"
+    names = [label.get_text() for label in judged.figure.axes[0].get_yticklabels()]
+    assert "episode length ↓" in names
+    assert "path efficiency" in names
+    for panel in metrics_panels(alike):
+        (axes,) = panel.figure.axes
+        assert axes.xaxis_inverted() == ("↓" in panel.title)
+    turned_round = {panel.title.split(" ↓")[0] for panel in metrics_panels(alike) if "↓" in panel.title}
+    applied = {m.title for m in METRICS if alike.everything.means[m.name][LONG[0]].mean is not None}
+    assert turned_round == applied & {metric.title for metric in METRICS if metric.good == "lower"}
+
+
+def test_what_has_no_better_direction_stands_apart(alike):
+    ratio = next(metric for metric in METRICS if metric.name == "variation_ratio")
+    each = Difference(ratio, LONG[1], LONG[0], estimate=1.0, interval=(0.5, 1.5), spread=1.0)
+    view = replace(alike.everything, differences=[*alike.everything.differences, each])
+    judged, rest = effects_panels(replace(alike, views=[view, *alike.views[1:]]))
+    rows = [[label.get_text() for label in each.figure.axes[0].get_yticklabels()] for each in (judged, rest)]
+    assert rows[1] == [ratio.title]
+    assert ratio.title not in rows[0]
+    assert rest.title.endswith("neither counts as good")
+
+
+def test_no_text_covers_another(alike):
+    """Titles stand beside the figures, where the page breaks lines; within, nothing touches or is cut."""
+    panels = [
+        *answer_panels(alike), *effects_panels(alike), *metrics_panels(alike), *trajectory_panels(alike)
+    ]  # fmt: skip
+    for panel in panels:
+        assert not any(axes.get_title() for axes in panel.figure.axes)
+        check_texts(panel.figure)
+
+
+def test_figures_break_to_the_next_line_where_there_is_no_room(alike):
+    """At 800 pixels a column of 420 does not fit twice; titles are text of the page and break."""
+    page = report_page(alike, findings(alike))
+    assert "repeat(auto-fit, minmax(420px, 1fr))" in page
+    assert "overflow-wrap: anywhere" in page
+    assert page.count("<figcaption><strong>") == page.count('alt="') > 20
+
+
+def test_a_long_label_keeps_both_ends():
+    assert short("reach_ee", 8) == "reach_ee"
+    assert short("reach_ee_of_monday", 9) == "reac…nday"
+
+
+def test_headline_and_finding_name_the_same_ratio(ours):
+    for base in ("quick", "slow"):
+        found = findings(compare(CompareConfig(tuple(ours), baseline=base)))
+        (said,) = [each for each in found if "operator hour" in each.text]
+        assert said.detected
+        assert said.short in headline(found)
+        assert said.text.lower().startswith(said.short.lower())
+        assert float(re.search(r"gives ([\d.]+) times .* with quick", said.text)[1]) > 1.0
+
+
+def test_headline_and_finding_name_the_same_difference_of_policies(ours, tmp_path):
+    given = evaluated(tmp_path, quick=0.95, slow=0.3)
+    for base in ("quick", "slow"):
+        comparison = compare(CompareConfig(tuple(ours), baseline=base, evaluations=(given,)))
+        found = findings(comparison)
+        start = "Policies trained on quick succeeded more often"
+        assert headline(found).startswith(start)
+        assert found[0].text.startswith(start)
+        spans = [
+            re.search(r"difference (\S+ to \S+) points", text)[1] for text in (found[0].text, found[0].short)
+        ]
+        assert spans[0] == spans[1]
+        assert spans[0].startswith("+")
+        assert "over 1 like-for-like difference" in found[0].text
+        assert "1 like-for-like difference" in report_page(comparison, found).split("Families of Holm")[1]
+
+
+def evaluated(folder: Path, **shares) -> str:
+    rng = np.random.default_rng(0)
+    arms = {
+        label.replace("__", " "): [
+            {
+                "training_seed": seed,
+                "rollouts": [{"seed": k, "success": bool(rng.random() < share)} for k in range(60)],
+            }
+            for seed in range(4)
+        ]
+        for label, share in shares.items()
+    }
+    path = folder / "evaluations.json"
+    path.write_text(json.dumps({"format": FORMAT, "arms": arms}))
+    return str(path)
+
+
+@pytest.mark.parametrize("base", ["quick", "slow"])
+@pytest.mark.parametrize("label", ["quick", "quick__intent"])
+def test_policies_come_first_also_with_one_arm(ours, tmp_path, base, label):
+    given = evaluated(tmp_path, **{label: 0.9})
+    comparison = compare(CompareConfig(tuple(ours), baseline=base, evaluations=(given,)))
+    found, name = findings(comparison), label.replace("__", " ")
+    assert found[0].kind == "outcome"
+    assert re.match(rf"Policies trained on {name} succeeded in \d+ % of 240 rollouts", headline(found))
+    assert "compared with no other" in found[0].text
+    page = report_page(comparison, found)
+    cards = re.findall(r'<h3>(\w+)</h3><div class="big">(.*?)</div><small>(.*?)</small>', page)
+    assert cards[0][1].endswith("%")
+    assert cards[0][2].startswith("policy success")
+    assert cards[1][1:] == ("–", "no policy was evaluated")
+
+
+def test_where_tasks_or_robots_differ_that_comes_first_and_nothing_is_better(unlike, alike):
+    found = findings(unlike)
+    first = found[0].text
+    assert first.startswith("The tasks differ (quick: “go”; slow: “stay”). The robots differ (quick: ")
+    assert headline(found) == first
+    page = report_page(unlike, found)
+    said = re.sub(r"<style>.*?</style>|data:[^\"]*", "", page)
+    assert not JUDGED.search(said), JUDGED.findall(said)
+    assert JUDGED.search(report_page(alike, findings(alike)))
+    (panel,) = effects_panels(unlike)
+    assert panel.title.startswith("Right is more than quick, left is less")
+    assert not any(axes.xaxis_inverted() for panel in metrics_panels(unlike) for axes in panel.figure.axes)
+
+
+def test_policies_of_unlike_tasks_do_not_come_before_that(ours, unlike, tmp_path):
+    given = evaluated(tmp_path, quick=0.95, slow=0.3)
+    outcomes = compare(CompareConfig(tuple(ours), evaluations=(given,))).outcomes
+    found = findings(replace(unlike, outcomes=outcomes))
+    assert [each.kind for each in found[:2]] == ["caution", "outcome"]
+    assert "more often" not in headline(found)
+
+
+def test_the_same_tasks_in_another_order_are_the_same(tmp_path):
+    roots = [handrail_dataset(tmp_path / name, 100, name, 5) for name in ("a", "b")]
+    assert compare(CompareConfig(tuple(roots))).unlike == ()

@@ -1,0 +1,249 @@
+"""The statistics of a comparison: published values, and that chance is not taken for a difference."""
+
+import json
+
+import numpy as np
+import pytest
+from scipy.stats import fisher_exact
+
+from handrail.controllers.errors import HandrailError
+from handrail.datasets.comparison.differences import at_equal_length
+from handrail.datasets.comparison.evaluations import FORMAT, read_evaluations
+from handrail.datasets.comparison.outcomes import judge
+from handrail.datasets.statistics.proportions import (
+    holm,
+    newcombe_paired,
+    newcombe_unpaired,
+    paired_shares,
+    unpaired_shares,
+)
+from handrail.datasets.statistics.resampling import Run, mean_interval, p_of_difference, resample_runs
+
+# Newcombe 1998, Statistics in Medicine 17, 2635–2650, table III, method 10
+TABLE_III = {
+    (36, 12, 2, 0): (0.0569, 0.3404),
+    (20, 12, 2, 16): (0.0562, 0.3292),
+    (18, 12, 2, 18): (0.0562, 0.3290),
+    (36, 14, 0, 0): (0.1528, 0.4167),
+    (35, 14, 0, 1): (0.1461, 0.4175),
+    (2, 97, 1, 0): (0.8721, 0.9854),
+    (54, 0, 0, 0): (-0.0664, 0.0664),
+    (30, 0, 0, 24): (-0.0358, 0.0358),
+}
+
+
+def rng(seed=0):
+    return np.random.default_rng(seed)
+
+
+@pytest.mark.parametrize(("cells", "interval"), TABLE_III.items())
+def test_paired_interval_is_newcombe_s(cells, interval):
+    assert newcombe_paired(*cells) == pytest.approx(interval, abs=5e-5)
+    both, first, second, neither = cells
+    swapped = newcombe_paired(both, second, first, neither)
+    assert (-swapped[1], -swapped[0]) == pytest.approx(interval, abs=5e-5)
+
+
+def test_unpaired_interval_is_newcombe_s():
+    """Golden: 56 of 70 against 48 of 80, Newcombe 1998, 873–890, table II, method 10."""
+    assert newcombe_unpaired(56, 70, 48, 80) == pytest.approx((0.0524, 0.3339), abs=5e-5)
+
+
+def test_holm():
+    assert holm([0.01, 0.04, 0.03, 0.005]) == pytest.approx([0.03, 0.06, 0.06, 0.02])
+    assert holm([0.9, 0.8]) == [1.0, 1.0]
+    assert holm([]) == []
+
+
+def test_boschloo_is_symmetric_and_sees_more_than_fisher():
+    """7 of 12 against 1 of 12: uniformly more powerful than Fisher's test."""
+    found = unpaired_shares([True] * 7 + [False] * 5, [True] + [False] * 11)
+    swapped = unpaired_shares([True] + [False] * 11, [True] * 7 + [False] * 5)
+    assert (found.paired, found.trials) == (False, (12, 12))
+    assert found.estimate == pytest.approx(0.5)
+    assert swapped.p == pytest.approx(found.p)
+    assert 0.005 < found.p < float(np.asarray(fisher_exact([[7, 1], [5, 11]]))[1])
+
+
+def test_mcnemar():
+    """Golden: 8 discordant pairs against 1, p = 2 · 10 / 512."""
+    pairs = paired_shares([1] * 8 + [0] + [1] * 11, [0] * 8 + [1] + [1] * 11)
+    assert pairs.p == pytest.approx(20 / 512)
+    assert pairs.estimate == pytest.approx(7 / 20)
+
+
+def test_what_is_detectable_shrinks_with_the_root_of_the_trials():
+    few, many = (unpaired_shares([True, False] * n, [True, False] * n) for n in (10, 40))
+    assert few.detectable() == pytest.approx(2.8016 * np.sqrt(0.5 / 20), rel=1e-3)
+    assert many.detectable() == pytest.approx(0.5 * few.detectable(), rel=1e-3)
+    assert many.detectable(9) == pytest.approx((2.7730 + 0.8416) / 2.8016 * many.detectable(), rel=1e-3)
+
+
+def test_a_mean_of_few_has_no_interval():
+    assert mean_interval(np.arange(4.0), rng()) is None
+    values = rng().normal(size=400)
+    half = 1.96 * values.std() / 20.0
+    expected = values.mean() - half, values.mean() + half
+    assert mean_interval(values, rng()) == pytest.approx(expected, abs=0.01)
+
+
+def test_permutation_p():
+    same = rng().normal(size=30)
+    assert p_of_difference(same, same, True, rng()) == 1.0
+    assert p_of_difference(same + 5.0, same, True, rng()) < 0.001
+    assert p_of_difference(same + 5.0, same[:20], False, rng()) < 0.001
+    draws = [rng(seed).normal(size=(2, 20)) for seed in range(100)]
+    values = [p_of_difference(draw[0], draw[1], False, rng(seed)) for seed, draw in enumerate(draws)]
+    assert np.sum(np.array(values) < 0.05) <= 12
+    assert 0.35 < np.mean(values) < 0.65
+
+
+def test_differences_at_equal_length():
+    """Golden: y = 3 L + 5 [group], exactly: 5, whatever the lengths are."""
+    lengths = rng().uniform(1.0, 9.0, size=(2, 1, 30)) + np.array([4.0, 0.0])[:, None, None]
+    values = 3.0 * lengths + np.array([5.0, 0.0])[:, None, None]
+    assert at_equal_length(list(values), list(lengths)) == pytest.approx([5.0])
+    assert at_equal_length(list(values), [np.ones((1, 30))] * 2) == pytest.approx(
+        values[0].mean() - values[1].mean()
+    )
+
+
+def runs(shares, seeds=100, generator=None, draws=1):
+    generator = generator or rng()
+    return [
+        Run(place % draws, place, tuple(range(seeds)), (generator.random(seeds) < share).astype(float))
+        for place, share in enumerate(shares)
+    ]
+
+
+def test_runs_of_one_policy_vary_as_their_rollouts_do():
+    """Golden: four runs that are the same rollouts have the binomial standard error of one."""
+    (run,) = runs([0.5])
+    (means,) = resample_runs([[Run(0, seed, run.seeds, run.values) for seed in range(4)]], rng())
+    share = run.values.mean()
+    assert means.std() == pytest.approx(np.sqrt(share * (1 - share) / 100), rel=0.06)
+
+
+def test_training_seeds_widen_the_interval():
+    alike, apart = (resample_runs([runs(s, 200)], rng())[0] for s in ([0.5] * 4, [0.2, 0.4, 0.6, 0.8]))
+    assert apart.std() > 2.0 * alike.std()
+    between = [resample_runs([runs([0.2, 0.2, 0.8, 0.8], 200, draws=d)], rng())[0].std() for d in (1, 2)]
+    assert min(between) > 0.05
+
+
+def test_what_is_paired_stays_paired():
+    arm = runs([0.5])
+    one, other = resample_runs([arm, arm], rng())
+    assert np.array_equal(one, other)
+
+
+def arms(directory, **shares):
+    content = {
+        label: [
+            {
+                "training_seed": run.training_seed,
+                "rollouts": [
+                    {"seed": seed, "success": bool(value), "contacts": seed % 2}
+                    for seed, value in zip(run.seeds, run.values, strict=True)
+                ],
+            }
+            for run in runs(share, generator=rng(place))
+        ]
+        for place, (label, share) in enumerate(shares.items())
+    }
+    path = directory / "evaluations.json"
+    path.write_text(json.dumps({"format": FORMAT, "arms": content}))
+    return path
+
+
+def test_a_clear_difference_is_detected_and_chance_is_not(tmp_path):
+    found = read_evaluations([arms(tmp_path, a=[0.9] * 4, b=[0.5] * 4, c=[0.88] * 4)])
+    outcomes = judge(found, "a", rng())
+    clear, none = outcomes.differences
+    assert (clear.label, clear.detected, none.label, none.detected) == ("b", True, "c", False)
+    assert clear.rollouts.paired
+    assert clear.nested[1] < 0
+    assert clear.p <= clear.p_adjusted
+    assert outcomes.arms[0].means["contacts"][0] == pytest.approx(0.5)
+
+
+def test_training_seeds_are_not_taken_for_a_difference_of_data():
+    """Two arms that differ by training seeds alone: rollouts alone see a difference most of the time."""
+    nested = rollouts = 0
+    for seed in range(25):
+        generator = rng(seed)
+        drawn = {label: generator.uniform(0.3, 0.9, size=5) for label in "ab"}
+        both = {label: runs(shares, 200, generator) for label, shares in drawn.items()}
+        outcome = judge({label: FakeArm(label, each) for label, each in both.items()}, "a", generator)
+        (difference,) = outcome.differences
+        low, high = difference.rollouts.interval
+        rollouts += not low <= 0 <= high
+        nested += difference.detected
+    assert rollouts > 9
+    assert nested <= 4
+
+
+class FakeArm:
+    """An arm without files."""
+
+    def __init__(self, label, members):
+        self.label, self._runs = label, members
+        self.outcomes = ("success",)
+        self.policies = [type("Policy", (), {"trained_on": {}})]
+
+    def runs(self, outcome="success"):
+        return self._runs
+
+
+def test_one_training_seed_says_nothing_of_training(tmp_path):
+    outcomes = judge(read_evaluations([arms(tmp_path, a=[0.9], b=[0.5])]), "a", rng())
+    (difference,) = outcomes.differences
+    assert difference.nested is None
+    assert outcomes.arms[0].nested is None
+
+
+def test_two_training_seeds_are_too_few_where_they_differ_much(tmp_path):
+    """Resampling two policies of an arm never leaves their range; Student's interval of two is 12 errors."""
+    outcomes = judge(read_evaluations([arms(tmp_path, a=[0.95, 0.75], b=[0.6, 0.4])]), "a", rng())
+    (difference,) = outcomes.differences
+    assert difference.nested[1] > 0
+    assert difference.rollouts.p < 0.001
+    assert not difference.detected
+
+
+GOOD = {"training_seed": 0, "rollouts": [{"seed": 1, "success": True}]}
+WRONG = {
+    "format": ({"arms": {"a": [GOOD]}}, "expected the format 'handrail.evaluations/1', got None"),
+    "no arms": ({"format": FORMAT, "arms": {}}, "expected 'arms' with one label or more"),
+    "no policies": ({"format": FORMAT, "arms": {"a": []}}, "arm 'a': expected a list of trained policies"),
+    "no seed": ({"format": FORMAT, "arms": {"a": [{"rollouts": []}]}}, "arm 'a': expected"),
+    "no rollouts": (
+        {"format": FORMAT, "arms": {"a": [GOOD | {"rollouts": []}]}},
+        "expected one rollout or more, got none",
+    ),
+    "half a success": (
+        {"format": FORMAT, "arms": {"a": [GOOD | {"rollouts": [{"seed": 1, "success": 0.5}]}]}},
+        "expected 'success' true or false, got 0.5",
+    ),
+    "twice": (
+        {"format": FORMAT, "arms": {"a": [GOOD, GOOD]}},
+        "training seed 0: the rollout with seed 1 comes twice",
+    ),
+}
+
+
+@pytest.mark.parametrize(("content", "message"), WRONG.values(), ids=WRONG)
+def test_wrong_evaluations(tmp_path, content, message):
+    path = tmp_path / "wrong.json"
+    path.write_text(json.dumps(content))
+    with pytest.raises(HandrailError, match=message) as caught:
+        read_evaluations([path])
+    assert "\n" not in str(caught.value)
+
+
+def test_evaluations_that_are_not_there(tmp_path):
+    with pytest.raises(HandrailError, match="expected a JSON file, found none"):
+        read_evaluations([tmp_path / "none.json"])
+    (tmp_path / "torn.json").write_text('{"format": ')
+    with pytest.raises(HandrailError, match="expected a JSON file, got"):
+        read_evaluations([tmp_path / "torn.json"])

@@ -1,0 +1,152 @@
+"""Nothing is compared across units that are not known to be the same, and the report says why."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from compare_helpers import JOINTS, arm_dataset, handrail_dataset, lerobot_dataset
+
+from handrail.datasets.comparison.compare import compare
+from handrail.datasets.comparison.config import CompareConfig
+from handrail.datasets.comparison.findings import findings
+from handrail.datasets.comparison.report.page import report_page
+from handrail.datasets.quality.catalogue import METRICS
+from handrail.datasets.quality.demonstration import Demonstration, Source
+from handrail.datasets.quality.measure import measure
+from handrail.datasets.quality.units import why_not
+
+NAMES = ("a.pos", "b.pos", "c.pos")
+ARM = Source("one", "arm")
+OURS = Source("one", "ridgeback", from_handrail=True)
+ABSOLUTE = {"length", "smallest_distance", "contacts", "impulse", "time_within_margin", "mode_switches"}
+
+
+def group(source=ARM, names=NAMES, scale=1.0, fps=20.0, action=1.0, mode="", seed=0):
+    """Six episodes of an arm that follows its commands; `action` scales these against the state."""
+    generator, found = np.random.default_rng(seed), []
+    for number in range(6):
+        state = scale * np.cumsum(generator.normal(size=(40, len(names or NAMES))), axis=0)
+        frames = {"observation.state": state, "action": action * np.roll(state, -1, axis=0)}
+        if mode:
+            frames["teleop.mode"] = np.full(40, mode)
+        entries = {"observation.state": names, "action": names}
+        found.append(
+            Demonstration(number, fps, frames, entries, {"length": 40, "tasks": ["go"]}, source=source)
+        )
+    return found
+
+
+OTHER = replace(ARM, root="other")
+UNKNOWN = {
+    "no names": (group(names=None), group(OTHER, names=None), "have no names"),
+    "other names": (group(), group(OTHER, names=("x.pos", "y.pos", "z.pos")), "other entries in the"),
+    "names that say nothing": (
+        group(names=("pan", "lift", "elbow")),
+        group(OTHER, names=("pan", "lift", "elbow")),
+        r"names in the .*pan, lift, elbow.* do not say whether it is positions or velocities",
+    ),
+    "other robot": (group(), group(replace(OTHER, robot="leg")), r"robots are not known .*arm and leg"),
+    "no robot": (group(replace(ARM, robot="")), group(replace(OTHER, robot="")), "not recorded and not"),
+    "one of ours": (group(OURS), group(OTHER), "robots are not known"),
+    "other rate": (group(), group(OTHER, fps=50.0), "frame rates differ"),
+    "degrees": (group(), group(OTHER, scale=57.3), r"are 5\d times as large"),
+}
+KNOWN = {
+    "one dataset": (group(names=None), group(names=None, scale=20.0, seed=1)),
+    "the same robot": (group(), group(OTHER, scale=2.0, seed=1)),
+    "ours": (group(OURS, names=("pan",)), group(replace(OURS, root="other"), names=("pan",), scale=99.0)),
+}
+
+
+@pytest.mark.parametrize("needs", ["motion", "position", "action", "pool"])
+@pytest.mark.parametrize(("one", "other", "reason"), UNKNOWN.values(), ids=UNKNOWN)
+def test_what_is_not_known_to_be_the_same_is_not_compared(one, other, reason, needs):
+    found = why_not(needs, one, other)
+    if needs == "pool" and one[0].names != other[0].names:
+        reason = "different columns"
+    assert re.search(reason, found), found
+    assert why_not("", one, other) == ""
+
+
+@pytest.mark.parametrize("needs", ["motion", "position", "action", "pool"])
+@pytest.mark.parametrize(("one", "other"), KNOWN.values(), ids=KNOWN)
+def test_what_is_known_to_be_the_same_is_compared(one, other, needs):
+    assert why_not(needs, one, other) == ""
+
+
+def test_smoothness_needs_no_unit_where_both_are_a_tool_s():
+    tool = ("tool.x", "tool.y", "tool.z")
+    one, other = group(names=tool), group(replace(OTHER, robot="leg"), names=(*tool, "elbow.pos"))
+    assert why_not("motion", one, other) == ""
+    assert "other entries" in why_not("position", one, other)
+    ours = [
+        group(replace(OURS, root=root), names=names) for root, names in (("a", tool), ("b", (*tool, "q")))
+    ]
+    assert why_not("position", *ours) == ""
+
+
+def test_commands_that_the_state_does_not_measure_alike():
+    fast = group(action=20.0), group(OTHER, action=20.0)
+    assert "commands and state differ 20 times" in why_not("action", *fast)
+    slow = group(replace(OURS, root="other"), fps=50.0)
+    assert "a frame later" in why_not("action", group(OURS), slow)
+    assert why_not("pool", group(OURS), slow) == ""
+
+
+def test_slack_is_in_the_unit_of_the_controller_s_own_limits():
+    assert "modes differ" in why_not("controller", group(mode="ee"), group(mode="direct_cbf"))
+    assert why_not("controller", group(mode="ee"), group(OTHER, mode="ee")) == ""
+
+
+def test_every_metric_with_a_unit_of_its_dataset_says_what_that_hangs_on():
+    assert {metric.name for metric in METRICS if not metric.needs} == ABSOLUTE
+
+
+def test_only_what_is_on_one_scale_is_pooled():
+    groups = {"a": group(), "b": group(OTHER, seed=1), "degrees": group(replace(ARM, root="c"), scale=57.3)}
+    found = measure(groups, np.random.default_rng(0))
+    assert found.pools == {"a": 0, "b": 0, "degrees": 1}
+
+
+@pytest.fixture(scope="module")
+def scaled(tmp_path_factory):
+    """Positions of an arm at scale 20, and velocities of the same arm under the same names."""
+    folder = tmp_path_factory.mktemp("arms")
+    positions = arm_dataset(folder / "positions", 20.0, velocities=False)
+    return compare(
+        CompareConfig((str(positions), str(arm_dataset(folder / "velocities", 1.0, velocities=True))))
+    )
+
+
+def test_positions_at_scale_20_are_not_tested_against_velocities(scaled):
+    found = {each.metric.name: each for view in scaled.views for each in view.differences}
+    for name in (
+        "tracking_error",
+        "variation_ratio",
+        "saturation",
+        "action_variance",
+        "information",
+        "sparc",
+    ):
+        assert "do not say whether it is positions or velocities" in found[name].incomparable
+        assert found[name].p == 1.0
+        assert not found[name].detected
+    assert not found["length"].reason
+
+
+def test_the_report_says_what_is_not_comparable_and_why(scaled):
+    told = findings(scaled)
+    (said,) = [each.text for each in told if "tracking error" in each.text]
+    assert said.startswith("velocities and positions are not compared in tracking error")
+    page = report_page(scaled, told)
+    assert ">tracking error</td><td>velocities against positions</td><td>not comparable: the names" in page
+    assert "not comparable</td>" in page
+
+
+def test_a_foreign_arm_beside_ours(tmp_path):
+    theirs = lerobot_dataset(tmp_path / "theirs", JOINTS, 30, 0.05, camera=False)
+    ours = handrail_dataset(tmp_path / "ours", 100, "ee")
+    found = compare(CompareConfig((str(theirs), ours)))
+    tested = {each.metric.name for each in found.everything.differences if each.tested and not each.reason}
+    assert tested == {"length"}

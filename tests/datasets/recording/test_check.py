@@ -1,0 +1,151 @@
+"""Damage is noticed before a dataset is used: cheaply where nothing has changed, fully when asked."""
+
+import json
+import os
+import shutil
+
+import numpy as np
+import pytest
+from command_helpers import command
+from compare_helpers import JOINTS, lerobot_dataset, quick_and_slow
+from datasets_helpers import CAMERAS, record, tree
+
+from handrail.controllers.errors import HandrailError
+from handrail.datasets.format.layout import Layout
+from handrail.datasets.format.metadata import FileSeal
+from handrail.datasets.reading.check import check_report, check_whole
+from handrail.datasets.recording import checksums
+from handrail.policies.imitation.config import StoredConfig, TrainConfig
+from handrail.policies.imitation.training.source import read_source
+
+
+@pytest.fixture(scope="module")
+def original(tmp_path_factory):
+    return record(tmp_path_factory.mktemp("check") / "set", 3, cameras=True)
+
+
+@pytest.fixture
+def root(original, tmp_path):
+    return shutil.copytree(original, tmp_path / "set")
+
+
+@pytest.fixture
+def hashed(monkeypatch):
+    """Return which files are read in full."""
+    names, real = [], FileSeal.of.__func__
+    monkeypatch.setattr(
+        FileSeal, "of", classmethod(lambda cls, path: names.append(path.name) or real(cls, path))
+    )
+    return names
+
+
+def _harm(path, same_time=False):
+    """Change a number of a parquet file; its size stays, and its time if asked."""
+    times = path.stat()
+    content = bytearray(path.read_bytes())
+    content[60:70] = bytes(10)
+    path.write_bytes(content)
+    if same_time:
+        os.utime(path, ns=(times.st_atime_ns, times.st_mtime_ns))
+
+
+def test_a_whole_dataset_is_hashed_once(root, hashed):
+    check_whole(root)
+    assert len(hashed) == 9
+    check_whole(root)
+    assert len(hashed) == 9
+    os.utime(Layout(root).data(1))
+    check_whole(root)
+    assert len(hashed) == 10
+    check_whole(root, verify=True)
+    assert len(hashed) == 19
+
+
+def test_torn_memory_is_no_memory(root, hashed):
+    check_whole(root)
+    for content in (b"{", b"[]", b'{"data/chunk-000/file-000.parquet": 3}', b"\xff" * 9):
+        for path in checksums._folder().iterdir():
+            path.write_bytes(content)
+        hashed.clear()
+        check_whole(root)
+        assert len(hashed) == 9
+
+
+@pytest.mark.parametrize("same_time", [False, True])
+def test_changed_rows_are_noticed(root, same_time):
+    check_whole(root)
+    _harm(Layout(root).data(1), same_time)
+    with pytest.raises(HandrailError, match=r"\A[^\n]*episode 1: data/chunk-000/file-001[^\n]*\Z"):
+        check_whole(root)
+    assert len(check_report(root)) == 1
+
+
+def test_training_and_comparison_notice(tmp_path):
+    roots = quick_and_slow(tmp_path)
+    output = tmp_path / "report"
+    arguments = (*roots, "--output", output, "--no_pictures")
+    assert command(*arguments, name="compare").returncode == 0
+    config = TrainConfig(dataset=StoredConfig(root=roots[1]), actions="recorded")
+    assert read_source(config).info.episodes == 12
+    _harm(Layout(tmp_path / "slow").data(4))
+    before = tree(output)
+    done = command(*arguments, name="compare")
+    assert done.returncode == 2
+    assert "episode 4" in done.stderr
+    assert tree(output) == before
+    with pytest.raises(HandrailError, match="episode 4"):
+        read_source(config)
+
+
+@pytest.mark.parametrize("command_line", ["compare --verify", "train --verify", "record --resume --verify"])
+def test_verify_is_a_flag(command_line):
+    name, *words = command_line.split()
+    extra = ["folder"] if name == "compare" else []
+    done = command(*extra, *words, "--output" if name != "record" else "--task", "x", name=name)
+    assert "nrecognized" not in done.stderr
+
+
+def test_a_dataset_of_lerobot_copied_in_part_is_named_as_such(tmp_path):
+    root = lerobot_dataset(tmp_path / "set", JOINTS, 30, 0.0, camera=True)
+    check_whole(root)
+    assert check_report(root) == []
+    next(root.glob("videos/*/*/*.mp4")).unlink()
+    with pytest.raises(HandrailError, match=r"copied in part: .* files are missing \(videos/"):
+        check_whole(root)
+    assert len(check_report(root)) == 1
+    next(root.glob("data/*/*.parquet")).unlink()
+    done = command("--dataset.root", root, "--check", name="inspect")
+    assert done.returncode == 1
+    assert "episode 5" in done.stdout
+
+
+def test_a_missing_picture_file_is_noticed_before_training(root):
+    Layout(root).video(CAMERAS[0], 1).unlink()
+    with pytest.raises(HandrailError, match="copied in part"):
+        check_whole(root)
+
+
+def test_what_lerobot_adds_is_read_and_checked(tmp_path):
+    """A dataset that LeRobot has recorded on has lines without checksums: it is read, but not resumed."""
+    root = record(tmp_path / "set", 2)
+    import pyarrow.parquet as pq
+
+    layout = Layout(root)
+    for number in range(2):
+        table = pq.read_table(layout.row(number))
+        pq.write_table(table.replace_schema_metadata(None), layout.row(number))
+    check_whole(root)
+    assert check_report(root) == []
+
+
+def test_check_says_that_everything_is_as_it_was_saved(root):
+    done = command("--dataset.root", root, "--check", name="inspect")
+    assert done.returncode == 0
+    assert "everything is as it was saved" in done.stdout
+
+
+def test_statistics_that_are_no_json_are_noticed(root):
+    stats = json.loads(Layout(root).stats.read_bytes())
+    stats["action"]["max"] = [np.inf, 1.0]
+    Layout(root).stats.write_text(json.dumps(stats))
+    assert check_report(root) == ["meta/stats.json: Infinity is no JSON"]

@@ -1,0 +1,313 @@
+"""Errors are one line that says what is wrong, and change nothing."""
+
+import json
+import os
+import subprocess
+import sys
+from typing import Any
+
+import numpy as np
+import pytest
+from datasets_helpers import (
+    CAMERAS,
+    FPS,
+    REPO,
+    ROBOT,
+    STATE_FEATURES,
+    create,
+    frame_of,
+    record,
+    record_one,
+    resume,
+    tree,
+)
+
+from handrail.controllers.errors import HandrailError
+from handrail.datasets.format.layout import Layout
+from handrail.datasets.format.manifest import Manifest
+from handrail.datasets.format.schema import Feature, check_features, check_frame
+from handrail.datasets.reading.reader import read_episodes, read_frames, read_info
+from handrail.datasets.recording.repair import repair
+from handrail.datasets.recording.writer import EpisodeWriter
+
+
+def _fails(action, *words):
+    with pytest.raises(HandrailError) as caught:
+        action()
+    message = str(caught.value)
+    assert "\n" not in message
+    for word in words:
+        assert word in message, message
+
+
+def test_an_existing_dataset_is_not_overwritten(tmp_path):
+    root = record(tmp_path / "set", 1)
+    before = tree(root)
+    _fails(lambda: create(root), str(root), "exists already", "resume", "overwrite")
+    assert tree(root) == before
+
+
+def test_an_existing_dataset_is_overwritten_when_asked(tmp_path):
+    root = record(tmp_path / "set", 3)
+    (root / "notes.txt").write_text("mine")
+    with create(root, cameras=True, overwrite=True) as writer:
+        assert writer.num_episodes == 0
+        record_one(writer, cameras=True)
+    assert len(read_episodes(root)) == 1
+    assert (root / "notes.txt").read_text() == "mine"
+    assert len(list(root.glob("data/*/*"))) == 1
+
+
+@pytest.mark.parametrize(
+    "mine",
+    [
+        *("data/notes.txt", "data/chunk-000/mine.parquet", "videos/holiday.mp4", "meta/todo.md"),
+        *(".damaged/notes.txt", ".damaged/000/data/chunk-000/mine.parquet"),
+        ".damaged/chunk-000/file-001.mp4",
+    ],
+)
+def test_overwriting_removes_only_what_is_ours(tmp_path, mine):
+    root = record(tmp_path / "set", 1)
+    (root / mine).parent.mkdir(parents=True, exist_ok=True)
+    (root / mine).write_text("mine")
+    (root / "images").mkdir()
+    (root / "images" / "photo.png").write_text("mine too")
+    before = tree(root)
+    _fails(lambda: create(root, overwrite=True), mine, "--overwrite", "only its own")
+    assert tree(root) == before
+    (root / mine).unlink()
+    create(root, overwrite=True).close()
+    assert (root / "images" / "photo.png").read_text() == "mine too"
+
+
+def test_what_was_set_aside_is_overwritten_with_the_rest(tmp_path):
+    root = record(tmp_path / "set", 3, cameras=True)
+    Layout(root).data(0).write_bytes(b"torn")
+    assert len(repair(root, set_aside_damaged=True).lost) == 1
+    create(root, overwrite=True).close()
+    assert not (root / ".damaged").exists()
+
+
+def test_a_dataset_of_another_tool_is_never_overwritten(tmp_path):
+    root = record(tmp_path / "set", 1)
+    Layout(root).manifest.unlink()
+    before = tree(root)
+    _fails(lambda: create(root, overwrite=True), "not recorded by Handrail", "never removed")
+    assert tree(root) == before
+
+
+@pytest.mark.parametrize("overwrite", [False, True])
+def test_a_folder_that_is_no_dataset_is_never_removed(tmp_path, overwrite):
+    (tmp_path / "thesis").mkdir()
+    (tmp_path / "thesis" / "chapter.tex").write_text("years of work")
+    before = tree(tmp_path)
+    _fails(lambda: create(tmp_path / "thesis", overwrite=overwrite), "chapter.tex", "never removed")
+    _fails(lambda: create(tmp_path, overwrite=overwrite), "thesis", "never removed")
+    _fails(lambda: create(tmp_path / "thesis" / "chapter.tex", overwrite=overwrite), "is a file")
+    assert tree(tmp_path) == before
+
+
+def test_an_empty_folder_is_fine(tmp_path):
+    (tmp_path / "set").mkdir()
+    assert len(read_episodes(record(tmp_path / "set", 1))) == 1
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"fps": 0}, ("fps", "0")),
+        ({"fps": 30.0}, ("fps", "30.0")),
+        ({"repo_id": ""}, ("repo_id",)),
+        ({"repo_id": "a/b/c"}, ("repo_id", "a/b/c")),
+        ({"robot_type": ""}, ("robot_type",)),
+        ({"features": {}}, ("features",)),
+        ({"features": {"a/b": Feature("float32")}}, ("a/b", "'/'")),
+        ({"features": {"index": Feature("int64")}}, ("index", "LeRobot")),
+        ({"features": {"x": Feature("float16")}}, ("float16", "float32", "string")),
+        ({"features": {"x": Feature("float32", (2, 2))}}, ("x", "(2, 2)")),
+        ({"features": {"x": Feature("string", (2,))}}, ("x", "(1,)")),
+        ({"features": {"x": Feature("float32", (2,), ("a",))}}, ("2 names", "got 1")),
+        ({"features": {"c": Feature("video", (31, 48, 3))}}, ("c", "even", "(31, 48, 3)")),
+        ({"features": {"c": Feature("video", (3, 48, 48))}}, ("c", "(height, width, 3)")),
+    ],
+)
+def test_nothing_is_created_for_a_wrong_argument(tmp_path, change, words):
+    arguments = {"repo_id": REPO, "fps": FPS, "features": STATE_FEATURES, "robot_type": ROBOT} | change
+    _fails(lambda: EpisodeWriter.create(tmp_path / "set", **arguments), *words)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_folder_that_cannot_be_written(tmp_path):
+    _fails(lambda: create(tmp_path.__class__("/proc/handrail/set")), "/proc/handrail/set")
+    if os.geteuid() == 0:
+        return  # root may write anywhere else
+    tmp_path.chmod(0o555)
+    _fails(lambda: create(tmp_path / "set"), "can be written", str(tmp_path))
+    assert not list(tmp_path.iterdir())
+
+
+def test_two_recorders_never_share_a_dataset(tmp_path):
+    root = tmp_path / "set"
+    with create(root) as writer:
+        record_one(writer, cameras=False)
+        for attempt in (lambda: resume(root), lambda: create(root, overwrite=True)):
+            _fails(attempt, "another recorder")
+        code = f"from datasets_helpers import *; resume(Path({str(root)!r}))"
+        child = subprocess.run(
+            [sys.executable, "-c", code],
+            capture_output=True,
+            text=True,
+            cwd=os.path.dirname(__file__),
+            check=False,
+        )
+        assert "another recorder" in child.stderr
+        record_one(writer, cameras=False)
+    with resume(root) as writer:
+        assert writer.num_episodes == 2
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"fps": 50}, ("fps", "is 30", "got 50")),
+        ({"robot_type": "other"}, ("robot_type", "testbot", "other")),
+        ({"features": STATE_FEATURES | {"more": Feature("bool")}}, ("'more'", "none", "bool")),
+        ({"features": {"action": STATE_FEATURES["action"]}}, ("'observation.state'", "got none")),
+        ({"features": STATE_FEATURES | {"action": Feature("float32", (3,))}}, ("'action'", "(2,)", "(3,)")),
+    ],
+)
+def test_resume_refuses_another_schema(tmp_path, change, words):
+    root = record(tmp_path / "set", 1)
+    Layout(root).info.write_bytes(b"{torn")  # refused before anything is repaired
+    before = tree(root)
+    arguments = {"repo_id": REPO, "fps": FPS, "features": STATE_FEATURES, "robot_type": ROBOT} | change
+    _fails(lambda: EpisodeWriter.resume(root, **arguments), "--resume: cannot add to", *words)
+    assert tree(root) == before
+
+
+def test_resume_refuses_what_handrail_did_not_write(tmp_path):
+    _fails(lambda: resume(tmp_path / "none"), "found none")
+    _fails(lambda: resume(tmp_path), "not a LeRobot dataset")
+    (tmp_path / "meta").mkdir()
+    (tmp_path / "meta" / "info.json").write_text(json.dumps({"codebase_version": "v3.0"}))
+    _fails(lambda: resume(tmp_path), "not written by Handrail", "another folder")
+    (tmp_path / "meta" / "handrail.json").write_text("{torn")
+    _fails(lambda: resume(tmp_path), "handrail.json", "manifest")
+    assert sorted(tree(tmp_path)) == ["meta/handrail.json", "meta/info.json"]
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"action": None}, ("missing: action",)),
+        ({"surprise": 1}, ("unknown: surprise",)),
+        ({"action": np.zeros(3, np.float32)}, ("'action'", "(2,)", "(3,)")),
+        ({"action": np.zeros((1, 2))}, ("'action'", "(1, 2)")),
+        ({"safety.contacts": 1.5}, ("'safety.contacts'", "int64", "float64")),
+        ({"engaged": 1}, ("'engaged'", "bool", "int64")),
+        ({"teleop.mode": 3}, ("'teleop.mode'", "str", "int")),
+        ({"controller.solve_time": "fast"}, ("'controller.solve_time'", "float32")),
+        ({"action": np.array([0.0, np.nan])}, ("'action'", "finite", "gripper")),
+        ({"observation.state": np.array([1.0, np.inf, 0.0])}, ("'observation.state'", "inf", "at y")),
+        ({"observation.state": np.array([1.0, 1e300, 0.0])}, ("'observation.state'", "inf", "at y")),
+    ],
+)
+def test_frames_that_do_not_fit(tmp_path, change, words):
+    with create(tmp_path / "set") as writer:
+        frame = {k: v for k, v in (frame_of(0, 0, cameras=False) | change).items() if v is not None}
+        _fails(lambda: writer.add_frame(frame, "task"), *words)
+        assert writer.open_frames == 0
+        writer.add_frame(frame_of(0, 0, cameras=False) | {"controller.solve_time": np.nan}, "task")
+        writer.save_episode()
+
+
+def test_whole_numbers_must_fit_and_pictures_must_be_bytes():
+    features = {"n": Feature("int8"), "camera": Feature("video", (32, 32, 3))}
+    picture = np.zeros((32, 32, 3), np.uint8)
+    check_features(features)
+    assert check_frame({"n": np.int64(-3), "camera": picture}, features)["n"].dtype == np.int8
+    _fails(lambda: check_frame({"n": 300, "camera": picture}, features), "'n'", "int8", "300")
+    _fails(lambda: check_frame({"n": 3, "camera": picture.astype(float)}, features), "'camera'", "uint8")
+    _fails(lambda: check_frame({"n": 3, "camera": picture.transpose(2, 0, 1)}, features), "(32, 32, 3)")
+
+
+def test_a_frame_is_copied(tmp_path):
+    root = tmp_path / "set"
+    with create(root, cameras=True) as writer:
+        frame = frame_of(0, 0, cameras=True)
+        for _ in range(3):
+            writer.add_frame(frame, "task")
+        frame["action"][:] = 99
+        frame[CAMERAS[0]][:] = 0
+        writer.save_episode()
+    assert np.array_equal(read_frames(root, 0)["action"][0], frame_of(0, 0, cameras=False)["action"])
+
+
+def test_episode_columns_keep_their_names_and_types(tmp_path):
+    root = tmp_path / "set"
+    frame = frame_of(0, 0, cameras=False)
+    with create(root) as writer:
+        writer.add_frame(frame, "task")
+        for name in ("tasks", "a/b", "length"):
+            _fails(lambda name=name: writer.save_episode({name: 1}), name)
+        wrong: dict[str, Any] = {"success": [True]}
+        _fails(lambda: writer.save_episode(wrong), "success", "list")
+        right: dict[str, Any] = {"success": np.True_, "score": 1.5, "why": None}
+        assert writer.save_episode(right) == 0
+        writer.add_frame(frame, "task")
+        _fails(lambda: writer.save_episode({"weather": "fine"}), "weather", "success")
+        _fails(lambda: writer.save_episode({"success": "yes"}), "success", "bool", "'yes'")
+        assert writer.open_frames == 1
+        assert writer.save_episode({"score": 2}) == 1
+    rows = read_episodes(root)
+    assert [row["success"] for row in rows] == [True, None]
+    assert [row["score"] for row in rows] == [1.5, 2.0]
+    assert [row["why"] for row in rows] == ["", ""]
+
+
+def test_the_writer_says_when_it_cannot(tmp_path):
+    writer = create(tmp_path / "set")
+    _fails(writer.save_episode, "at least one frame")
+    _fails(lambda: writer.add_frame(frame_of(0, 0, cameras=False), ""), "task")
+    writer.close()
+    writer.close()
+    _fails(lambda: writer.add_frame(frame_of(0, 0, cameras=False), "task"), "is closed")
+    _fails(writer.save_episode, "is closed")
+
+
+def test_an_interrupt_while_saving_leaves_a_writer_that_refuses(tmp_path, monkeypatch):
+    def interrupt(*_):
+        raise KeyboardInterrupt
+
+    with create(tmp_path / "set") as writer:
+        record_one(writer, cameras=False)
+        writer.add_frame(frame_of(1, 0, cameras=False), "task")
+        monkeypatch.setattr("handrail.datasets.recording.writer.move", interrupt)
+        with pytest.raises(KeyboardInterrupt):
+            writer.save_episode()
+        monkeypatch.undo()
+        _fails(lambda: writer.add_frame(frame_of(1, 0, cameras=False), "task"), "interrupted", "resume")
+    with resume(tmp_path / "set") as writer:
+        assert record_one(writer, cameras=False) == 1
+
+
+def test_reading_what_is_not_there(tmp_path):
+    root = record(tmp_path / "set", 2)
+    _fails(lambda: read_info(tmp_path / "none"), "found none")
+    _fails(lambda: read_info(tmp_path), "not a LeRobot dataset")
+    _fails(lambda: read_frames(root, 2), "episode 2", "0 to 1")
+    _fails(lambda: read_frames(root, 0, ["speed"]), "speed", "action")
+    Layout(root).data(1).write_bytes(b"no parquet")
+    _fails(lambda: read_frames(root, 1), "file-001.parquet", "handrail-repair")
+    Layout(root).row(1).unlink()
+    _fails(lambda: read_episodes(root), "expected 2", "repair")
+    Layout(root).info.write_text('{"codebase_version": "v2.1"}')
+    _fails(lambda: read_info(root), "v3.0", "v2.1")
+    Layout(root).info.write_text("{")
+    _fails(lambda: read_info(root), "info.json", "repair")
+
+
+def test_the_manifest_survives_a_round_trip():
+    manifest = Manifest(REPO, FPS, ROBOT, STATE_FEATURES, {"handrail": "0"})
+    content = json.loads(manifest.to_bytes())
+    assert content["features"]["observation.state"]["names"] == ["x", "y", "v_x"]

@@ -1,0 +1,289 @@
+"""Killed at any moment, a recording loses at most the open episode, and nothing it had reported as saved."""
+
+import gc
+import json
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from datasets_guillotine import Guillotine, tear_staged_files
+from datasets_helpers import (
+    TINY_FEATURES,
+    check_pictures,
+    create,
+    digest,
+    frame_of,
+    length_of,
+    open_with_lerobot,
+    record,
+    record_one,
+    resume,
+    tree,
+)
+from places import HELPERS
+
+from handrail.datasets.format.layout import Layout
+from handrail.datasets.reading.reader import read_episodes, read_frames
+from handrail.datasets.recording.repair import repair
+from handrail.datasets.storage.lock import LOCK_NAME
+
+GUILLOTINE = Guillotine()
+
+
+@pytest.fixture
+def quick_disk(monkeypatch):
+    """Skip the waits for the disk: a killed process, unlike a power failure, does not need them."""
+    monkeypatch.setattr("os.fsync", lambda descriptor: None)
+    gc.freeze()  # collecting after each kill need not walk through torch
+    yield
+    gc.unfreeze()
+
+
+def _session(root: Path, saved: dict[int, str]) -> None:
+    """Record two episodes, close, resume, discard one, record two more (with another task)."""
+    with create(root, features=TINY_FEATURES) as writer:
+        for _ in range(2):
+            episode = record_one(writer, cameras=False)
+            saved[episode] = digest(root, episode, cameras=False)
+    with resume(root, features=TINY_FEATURES) as writer:
+        writer.add_frame({"action": [0.0, 0.0], "teleop.mode": "base"}, "forget me")
+        writer.discard_episode()
+        for _ in range(2):
+            episode = record_one(writer, cameras=False)
+            saved[episode] = digest(root, episode, cameras=False)
+
+
+def _check_episodes(root: Path, count: int) -> None:
+    rows = read_episodes(root)
+    assert [row["episode_index"] for row in rows] == list(range(count))
+    start = 0
+    for episode, row in enumerate(rows):
+        assert (row["dataset_from_index"], row["length"]) == (start, length_of(episode))
+        frames = read_frames(root, episode)
+        assert frames["index"].tolist() == list(range(start, start + length_of(episode)))
+        expected = [frame_of(episode, i, cameras=False)["action"] for i in range(length_of(episode))]
+        assert np.array_equal(frames["action"], np.array(expected))
+        start += length_of(episode)
+
+
+def _check_after_kill(root: Path, saved: dict[int, str]) -> None:
+    """The law: all that was reported is there to the byte, repair settles, and recording goes on."""
+    if not Layout(root).manifest.exists():
+        assert not saved
+        create(
+            root, features=TINY_FEATURES
+        ).close()  # a folder that never became a dataset is as good as an empty one
+    report = repair(root)
+    assert len(saved) <= report.episodes <= len(saved) + 1
+    assert not report.moved
+    assert not report.damage
+    for episode, expected in saved.items():
+        assert digest(root, episode, cameras=False) == expected
+    settled = tree(root)
+    assert repair(root).clean
+    assert tree(root) == settled
+    with resume(root, features=TINY_FEATURES) as writer:
+        assert record_one(writer, cameras=False) == report.episodes
+    _check_episodes(root, report.episodes + 1)
+    assert not (root / ".handrail").exists()
+    assert not any(LOCK_NAME in path for path in tree(root))
+
+
+def _kill_session_everywhere(folder: Path, is_torn: Callable[[int], bool]) -> None:
+    lived, k = False, 0
+    while not lived:
+        k += 1
+        root, saved = folder / str(k), {}
+        lived = GUILLOTINE.run(root, k, lambda root=root, saved=saved: _session(root, saved))
+        if is_torn(k):
+            tear_staged_files(root)
+        _check_after_kill(root, saved)
+    assert len(saved) == 4
+    assert k > 60  # the hook really saw the changes
+
+
+def test_killed_at_every_change_to_the_disk(tmp_path, quick_disk):
+    _kill_session_everywhere(tmp_path, lambda k: k % 2 == 0)
+
+
+@pytest.mark.slow
+def test_killed_at_every_change_to_the_disk_the_other_way(tmp_path, quick_disk):
+    _kill_session_everywhere(tmp_path, lambda k: k % 2 == 1)
+
+
+def test_overwriting_killed_at_every_change(tmp_path, quick_disk):
+    """Cut short, it leaves the old dataset whole, or an empty one; either may be overwritten or resumed."""
+    lived, k = False, 0
+    while not lived:
+        k += 1
+        root = record(tmp_path / str(k), 2, features=TINY_FEATURES)
+        lived = GUILLOTINE.run(
+            root, k, lambda root=root: create(root, features=TINY_FEATURES, overwrite=True).close()
+        )
+        episodes = repair(root).episodes
+        assert episodes in (0, 2)
+        with resume(root, features=TINY_FEATURES) as writer:
+            assert record_one(writer, cameras=False) == episodes
+        _check_episodes(root, episodes + 1)
+        create(root, features=TINY_FEATURES, overwrite=True).close()
+    assert k > 10
+
+
+def _damage(root: Path) -> list[bytes]:
+    """Damage episode 1; return what the files of the whole episodes hold that are not renumbered."""
+    layout = Layout(root)
+    os.truncate(layout.data(1), 100)
+    return [read_frames(root, episode)["action"].tobytes() for episode in (0, 2, 3)]
+
+
+def _check_nothing_lost(root: Path, kept: list[bytes]) -> None:
+    """However far a repair came, another one ends as if it had not been killed."""
+    repair(root)
+    assert repair(root, set_aside_damaged=True).episodes == 3
+    assert repair(root).clean
+    assert [row["seed"] for row in read_episodes(root)] == [0, 2, 3]
+    assert [read_frames(root, episode)["action"].tobytes() for episode in range(3)] == kept
+    assert Path(root / ".damaged").exists()
+    with resume(root, features=TINY_FEATURES) as writer:
+        assert record_one(writer, cameras=False) == 3
+
+
+@pytest.mark.parametrize("torn", [False, pytest.param(True, marks=pytest.mark.slow)])
+def test_repair_killed_at_every_change(tmp_path, quick_disk, torn):
+    original = record(tmp_path / "original", 4, features=TINY_FEATURES)
+    kept = _damage(original)
+    if torn:
+        Layout(original).info.write_bytes(b"{torn")
+    lived, k = False, 0
+    while not lived:
+        k += 1
+        root = shutil.copytree(original, tmp_path / str(k))
+        lived = GUILLOTINE.run(root, k, lambda root=root: repair(root, set_aside_damaged=True))
+        if k % 2:
+            tear_staged_files(root)
+        _check_nothing_lost(root, kept)
+    assert k > 30
+
+
+def _run(folder: Path, k: int, *words: object) -> subprocess.CompletedProcess:
+    script = HELPERS / "killed_command.py"
+    command = [sys.executable, script, folder, k, *words]
+    return subprocess.run(list(map(str, command)), capture_output=True, text=True)
+
+
+def _killed(folder: Path, k: int, *words: object) -> bool:
+    """Run a command that kills itself at its k-th change below a folder; return whether it did."""
+    done = _run(folder, k, *words)
+    assert done.returncode in (-signal.SIGKILL, 0), done.stderr
+    return done.returncode == -signal.SIGKILL
+
+
+def _changes(folder: Path, *words: object) -> int:
+    """Return how many changes below a folder a command makes."""
+    return int(_run(folder, 0, *words).stderr.splitlines()[-1])
+
+
+@pytest.mark.slow
+def test_repair_killed_30_times(tmp_path):
+    original = record(tmp_path / "original", 4, features=TINY_FEATURES)
+    kept = _damage(original)
+    trial = shutil.copytree(original, tmp_path / "trial")
+    changes = _changes(trial, "repair", trial, "--set_aside")
+    assert changes >= 30
+    for k in np.linspace(1, changes, 30).astype(int).tolist():
+        root = shutil.copytree(original, tmp_path / str(k))
+        assert _killed(root, k, "repair", root, "--set_aside")
+        _check_nothing_lost(root, kept)
+
+
+@pytest.mark.slow
+def test_compare_killed_10_times(tmp_path):
+    """Each file of a report is the old one or the new one, whole; the datasets are as they were."""
+    from compare_helpers import quick_and_slow
+
+    roots = list(map(Path, quick_and_slow(tmp_path)))
+    before = [tree(root) for root in roots]
+    output = tmp_path / "report"
+    words = ("compare", *roots, "--output", output, "--no_pictures", "--seed")
+    assert not _killed(output, 0, *words, 0)
+    old = tree(output)
+    changes = _changes(output, *words, 0)
+    assert changes >= 2 * len(old)
+    for number in range(10):
+        shutil.rmtree(output)
+        output.mkdir()
+        for name, content in old.items():
+            (output / name).write_bytes(content)
+        assert _killed(output, 1 + number % changes, *words, number)
+        assert set(old) <= set(tree(output))
+        assert all(_is_whole(output / name) for name in old)
+        assert [tree(root) for root in roots] == before
+    assert not _killed(output, 0, *words, 0)
+    assert tree(output) == old  # what a killed one left behind is gone
+
+
+def _is_whole(path: Path) -> bool:
+    content = path.read_text()
+    if path.suffix == ".json":
+        return bool(json.loads(content))
+    return content.endswith("</html>\n" if path.suffix == ".html" else "\n") and len(content) > 1000
+
+
+def _kill_repeatedly(root: Path, kills: int) -> tuple[int, int]:
+    """Kill a recorder again and again; return the number of reported episodes and of repairs."""
+    reported: dict[int, str] = {}
+    repairs, moments = 0, random.Random(kills)
+    for _ in range(kills):
+        command = [sys.executable, str(HELPERS / "datasets_recorder.py"), str(root)]
+        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as child:
+            assert child.stdout is not None
+            assert child.stdout.readline() == "ready\n"
+            lines = [child.stdout.readline() for _ in range(moments.randrange(4))]  # however slow it is
+            time.sleep(moments.uniform(0.0, 0.3))
+            child.kill()
+            lines += [line for line in child.stdout.read().splitlines(keepends=True) if line.endswith("\n")]
+        reported |= {int(line.split()[0]): line.split()[1] for line in lines}
+        repairs += not _check_survivors(root, reported)
+    return len(reported), repairs
+
+
+def _check_survivors(root: Path, reported: dict[int, str]) -> bool:
+    """Check the law with cameras; return whether there was nothing to repair."""
+    for episode, expected in reported.items():
+        assert digest(root, episode, cameras=True) == expected
+    report = repair(root)
+    assert len(reported) <= report.episodes <= len(reported) + 1
+    assert not report.moved
+    with resume(root, cameras=True) as writer:
+        record_one(writer, cameras=True)
+        reported |= {episode: digest(root, episode, cameras=True) for episode in range(writer.num_episodes)}
+    dataset = open_with_lerobot(root)
+    assert dataset.num_episodes == len(reported)
+    assert len(dataset) == sum(map(length_of, reported))
+    check_pictures(
+        dataset, [0, len(dataset) // 2, len(dataset) - length_of(len(reported) - 1), len(dataset) - 1]
+    )
+    return report.clean
+
+
+def test_sigkill(tmp_path):
+    reported, _ = _kill_repeatedly(tmp_path / "set", 4)
+    assert reported > 4
+
+
+@pytest.mark.slow
+def test_sigkill_often(tmp_path, capsys):
+    reported, repairs = _kill_repeatedly(tmp_path / "set", 30)
+    with capsys.disabled():
+        print(
+            f"\n30 kills, {reported} saved episodes, none lost; {repairs} times there was something to repair"
+        )
+    assert reported > 60

@@ -1,0 +1,129 @@
+"""What other tools do to a dataset is no damage; what repair and `--resume` do is said in one line."""
+
+import json
+import os
+import subprocess
+import sys
+import warnings
+
+import numpy as np
+import pytest
+from command_helpers import command
+from datasets_helpers import (
+    CAMERAS,
+    check_pictures,
+    create,
+    frame_of,
+    length_of,
+    open_with_lerobot,
+    record,
+    record_one,
+    resume,
+    tree,
+)
+
+from handrail.controllers.errors import HandrailError
+from handrail.datasets.format.layout import Layout
+from handrail.datasets.reading.reader import read_episodes
+from handrail.datasets.recording.repair import repair
+
+
+@pytest.fixture
+def root(tmp_path):
+    return record(tmp_path / "set", 4, cameras=True)
+
+
+def test_what_lerobot_encoded_anew_is_whole(root):
+    """The first version set aside every episode of a dataset after `lerobot-edit-dataset reencode_videos`."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        from lerobot.configs import RGBEncoderConfig
+        from lerobot.datasets.dataset_tools import reencode_dataset
+
+        reencode_dataset(open_with_lerobot(root), RGBEncoderConfig(vcodec="h264", crf=35, g=4))
+    info = json.loads(Layout(root).info.read_bytes())["features"][CAMERAS[0]]["info"]
+    assert info["video.crf"] == 35
+    with resume(root, cameras=True) as writer:
+        assert "whole, but not as they were saved: videos/" in str(writer.repaired)
+        assert record_one(writer, cameras=True) == 4
+    assert json.loads(Layout(root).info.read_bytes())["features"][CAMERAS[0]]["info"] == info
+    checked = command("--dataset.root", root, "--check", name="inspect")
+    assert checked.stdout.count("but the right frames") == 8
+    done = command(root, name="repair")
+    assert done.returncode == 0
+    assert "another tool" in done.stdout
+    assert command("--dataset.root", root, "--check", name="inspect").returncode == 0
+    assert repair(root).clean
+    check_pictures(open_with_lerobot(root), range(len(open_with_lerobot(root))))
+
+
+def test_statistics_that_lerobot_computed_anew_are_replaced(tmp_path):
+    """Its `recompute_stats` writes NaN and Infinity, which is no JSON, where a column is not finite."""
+    with create(tmp_path / "set") as writer:
+        for index in range(12):
+            frame = frame_of(0, index, cameras=False)
+            writer.add_frame(frame | {"controller.solve_time": np.inf if index % 2 else 0.1}, "wait")
+        writer.save_episode({"success": True, "failure_reason": None, "seed": 0})
+    path = Layout(tmp_path / "set").stats
+    ours = path.read_bytes()
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        from lerobot.datasets.dataset_tools import recompute_stats
+
+        recompute_stats(open_with_lerobot(tmp_path / "set"))
+    assert b"NaN" in path.read_bytes() or b"Infinity" in path.read_bytes()
+    assert "is no JSON" in command("--dataset.root", tmp_path / "set", "--check", name="inspect").stdout
+    with resume(tmp_path / "set") as writer:
+        assert path.read_bytes() == ours
+        record_one(writer, cameras=False)
+    text = path.read_text()
+    assert "NaN" not in text
+    assert "Infinity" not in text
+    assert json.loads(text)["index"]["count"] == [12 + length_of(1)]
+
+
+def test_statistics_never_come_from_the_file(root):
+    """Whoever wrote `stats.json`, what is recorded on is added to what the episodes say."""
+    path = Layout(root).stats
+    before, stats = path.read_bytes(), json.loads(path.read_bytes())
+    stats["action"]["mean"] = [1e6, 1e6]
+    path.write_text(json.dumps(stats))
+    resume(root, cameras=True).close()
+    assert path.read_bytes() == before
+
+
+def test_episodes_of_another_tool_are_not_touched(tmp_path):
+    root = record(tmp_path / "set", 2)
+    import pyarrow.parquet as pq
+
+    layout = Layout(root)
+    pq.write_table(pq.read_table(layout.row(1)).replace_schema_metadata(None), layout.row(2))
+    before = tree(root)
+    for attempt in (lambda: repair(root), lambda: resume(root)):
+        with pytest.raises(HandrailError, match="written by another tool"):
+            attempt()
+        assert tree(root) == before
+
+
+def test_resume_says_what_it_put_in_order(tmp_path):
+    base = ["--task", "reach", "--dataset.root", tmp_path / "set", "--dataset.num_episodes", 1]
+    base += ["--time_limit", 1]
+    assert command(*base).returncode == 0
+    assert "written anew" not in command(*base, "--resume").stderr
+    Layout(tmp_path / "set").stats.write_text('{"action": {"mean": [NaN]}}')
+    assert "written anew: meta/stats.json" in command(*base, "--resume").stderr
+    os.truncate(Layout(tmp_path / "set").data(1), 10)
+    done = command(*base, "--resume")
+    assert done.returncode == 2
+    assert "episode 1" in done.stderr
+    assert len(read_episodes(tmp_path / "set")) == 3
+
+
+def test_the_command_runs_as_a_command(tmp_path):
+    root = record(tmp_path / "set", 1)
+    words = [sys.executable, "-m", "handrail.scripts.repair"]
+    for place in ([str(root)], ["--dataset.root", str(root)]):
+        done = subprocess.run([*words, *place], capture_output=True, text=True, check=True)
+        assert "nothing to repair" in done.stdout
+    done = subprocess.run([*words, str(tmp_path)], capture_output=True, text=True)
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1)

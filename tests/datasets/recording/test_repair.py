@@ -1,0 +1,303 @@
+"""Repair loses no saved episode: it names what is damaged, puts back what is whole, mends the rest."""
+
+import json
+import os
+import shutil
+
+import numpy as np
+import pytest
+from command_helpers import command
+from datasets_helpers import (
+    CAMERAS,
+    FPS,
+    create,
+    files_of,
+    frame_of,
+    length_of,
+    open_with_lerobot,
+    record,
+    record_one,
+    resume,
+    tree,
+)
+
+from handrail.controllers.errors import HandrailError
+from handrail.datasets.format.layout import Layout
+from handrail.datasets.reading.reader import read_episodes, read_frames
+from handrail.datasets.recording.repair import repair
+
+
+@pytest.fixture(scope="module")
+def original(tmp_path_factory):
+    return record(tmp_path_factory.mktemp("repair") / "set", 4, cameras=True)
+
+
+@pytest.fixture
+def root(original, tmp_path):
+    return shutil.copytree(original, tmp_path / "set")
+
+
+def _flip_a_byte(path, place=1 / 3):
+    content = bytearray(path.read_bytes())
+    content[int(len(content) * place)] ^= 0xFF
+    path.write_bytes(content)
+
+
+def _cut(path, count):
+    os.truncate(path, path.stat().st_size - count)
+
+
+def _check_is(root, originals):
+    """Check that the episodes are, in order, those that were recorded under these numbers."""
+    rows = read_episodes(root)
+    assert [row["seed"] for row in rows] == list(originals)
+    start = 0
+    for place, number in enumerate(originals):
+        assert (rows[place]["dataset_from_index"], rows[place]["length"]) == (start, length_of(number))
+        frames = read_frames(root, place)
+        expected = [frame_of(number, i, cameras=False)["action"] for i in range(length_of(number))]
+        assert np.array_equal(frames["action"], np.array(expected))
+        assert frames["index"].tolist() == list(range(start, start + length_of(number)))
+        assert set(frames["episode_index"]) == {place}
+        start += length_of(number)
+
+
+def test_a_whole_dataset_is_left_alone(root):
+    before = tree(root)
+    report = repair(root)
+    assert report.clean
+    assert report.complete
+    assert report.episodes == 4
+    assert str(report).endswith("nothing to repair")
+    assert tree(root) == before
+
+
+@pytest.mark.parametrize("name", ["info", "stats", "tasks"])
+@pytest.mark.parametrize("content", [None, b"", b'{"total_episodes": 4, "feat', b"[1, 2]"])
+def test_summary_files_are_rebuilt_to_the_byte(root, name, content):
+    before, path = tree(root), getattr(Layout(root), name)
+    path.unlink()
+    if content is not None:
+        path.write_bytes(content)
+    report = repair(root)
+    assert report.rebuilt == (path.relative_to(root).as_posix(),)
+    assert not report.moved
+    assert tree(root) == before
+    assert repair(root).clean
+
+
+def test_resume_repairs_torn_files_by_itself(root):
+    Layout(root).info.write_bytes(b"{")
+    Layout(root).stats.unlink()
+    Layout(root).tasks.unlink()
+    with resume(root, cameras=True) as writer:
+        assert len(writer.repaired.rebuilt) == 3
+        assert record_one(writer, cameras=True) == 4
+    assert open_with_lerobot(root).num_episodes == 5
+    assert repair(root).clean
+
+
+@pytest.mark.parametrize("stream", range(4), ids=["data", "line", "wrist", "scene"])
+@pytest.mark.parametrize("harm", ["cut", "empty", "gone", "flipped"])
+def test_a_damaged_episode_is_named_and_costs_no_other(root, stream, harm):
+    path = files_of(root, 1, cameras=True)[stream]
+    if harm == "gone":
+        path.unlink()
+    elif harm == "flipped":
+        _flip_a_byte(path)
+    else:
+        os.truncate(path, path.stat().st_size // 2 if harm == "cut" else 0)
+    before = tree(root)
+    checked = command("--dataset.root", root, "--check", name="inspect")
+    if stream == 1 and harm == "flipped" and checked.returncode == 0:
+        return  # the byte was one that nothing depends on
+    assert checked.returncode == 1
+    assert path.relative_to(root).as_posix() in checked.stdout
+    if "but the right frames" in checked.stdout:
+        return  # it decodes to what was saved: noticed, and no damage
+    with pytest.raises(HandrailError, match=r"\A[^\n]*episode 1[^\n]*handrail-repair[^\n]*\Z"):
+        resume(root, cameras=True)
+    assert tree(root) == before
+    done = command(root, name="repair")
+    assert (done.returncode, done.stdout.count("\n")) == (1, 1)
+    assert path.relative_to(root).as_posix() in done.stdout
+    assert tree(root) == before  # nothing that was saved is moved without being asked
+    done = command(root, "--set_aside", name="repair")
+    assert (done.returncode, done.stdout.count("\n")) == (1, 1)
+    assert "3 put back" not in done.stdout
+    assert "2 put back" in done.stdout
+    _check_is(root, [0, 2, 3])
+    assert not path.exists() or path.read_bytes() != before.get(path.relative_to(root).as_posix())
+    assert repair(root).clean
+    with resume(root, cameras=True) as writer:
+        assert record_one(writer, cameras=True) == 3
+    dataset = open_with_lerobot(root)
+    assert dataset.num_episodes == 4
+    assert dataset.meta.stats["index"]["count"].tolist() == [len(dataset)]
+
+
+def test_pictures_move_up_with_their_episode(root):
+    os.truncate(Layout(root).data(0), 10)
+    repair(root, set_aside_damaged=True)
+    dataset = open_with_lerobot(root)
+    moved = {key: dataset[length_of(1) + 2][key].mean().item() * 255 for key in CAMERAS}
+    for place, key in enumerate(CAMERAS):
+        assert moved[key] == pytest.approx(frame_of(2, 2, cameras=True)[CAMERAS[place]].mean(), abs=2.5)
+
+
+def test_one_byte_missing_in_episode_2_of_24(tmp_path):
+    """The first version moved 22 episodes away, 21 of them whole, and said nothing."""
+    root = record(tmp_path / "set", 24)
+    _cut(Layout(root).data(2), 1)
+    before = tree(root)
+    with pytest.raises(HandrailError, match=r"1 of 24 episodes are not whole \(episode 2: data/chunk-000"):
+        resume(root)
+    assert tree(root) == before
+    report = repair(root, set_aside_damaged=True)
+    assert (report.episodes, len(report.lost), report.put_back, report.complete) == (23, 1, 21, False)
+    _check_is(root, [0, 1, *range(3, 24)])
+
+
+def test_what_the_first_version_moved_away_is_put_back(tmp_path):
+    """As it left them: everything from the damaged episode on in `.damaged/000`, and recorded on since."""
+    root = record(tmp_path / "set", 6)
+    os.truncate(Layout(root).data(2), 100)
+    layout, target = Layout(root), tmp_path / "set" / ".damaged" / "000"
+    for number in range(2, 6):
+        for path in (layout.data(number), layout.row(number)):
+            (target / layout.relative(path)).parent.mkdir(parents=True, exist_ok=True)
+            path.rename(target / layout.relative(path))
+    layout.info.write_text(layout.info.read_text().replace('"total_episodes": 6', '"total_episodes": 2'))
+    with resume(root) as writer:
+        record_one(writer, cameras=False)
+    done = command(root, name="repair")
+    assert done.returncode == 0
+    assert "3 put back" in done.stdout
+    _check_is(root, [0, 1, 2, 3, 4, 5])
+    assert [path.name for path in target.rglob("*.parquet")] == ["file-002.parquet"] * 2  # what is not whole
+    assert repair(root).clean
+    assert open_with_lerobot(root).num_episodes == 6
+
+
+def test_leftovers_of_a_save_that_was_never_committed_are_removed(root):
+    layout, donor = Layout(root), files_of(root, 3, cameras=True)
+    shutil.copy(donor[0], layout.data(4))
+    shutil.copy(donor[2], layout.video(CAMERAS[0], 4))
+    layout.staging.mkdir()
+    (layout.staging / "data.parquet").write_bytes(b"PAR1 and no footer")
+    report = repair(root)
+    assert report.episodes == 4
+    assert sorted(report.removed) == sorted(
+        [
+            ".handrail/data.parquet",
+            layout.relative(layout.data(4)),
+            layout.relative(layout.video(CAMERAS[0], 4)),
+        ]
+    )
+    assert not report.moved
+    assert not report.damage
+    assert not layout.data(4).exists()
+
+
+@pytest.mark.parametrize("asked", [False, True])
+def test_lost_lines_of_metadata_never_cost_data(root, asked):
+    """If the lines of saved episodes vanish, their files are no leftovers of a crash."""
+    before = {content for path, content in tree(root).items() if path.startswith(("data", "videos"))}
+    shutil.rmtree(root / "meta" / "episodes")
+    Layout(root).info.unlink()
+    report = repair(root, asked)
+    assert report.episodes == (0 if asked else 4)
+    assert all("is missing" in fault for fault in report.damage or report.lost)
+    assert before <= set(tree(root / ".damaged" if asked else root).values())
+    assert not report.removed
+
+
+@pytest.mark.parametrize("episodes", [1, 3])
+@pytest.mark.parametrize("info", [None, "{"])
+def test_the_last_line_and_the_count_gone_cost_no_data(tmp_path, episodes, info):
+    """A crash leaves `info.json` whole: without it, the files of the last episode are no leftovers."""
+    root = record(tmp_path / "set", episodes)
+    layout, rows = Layout(root), Layout(root).data(episodes - 1).read_bytes()
+    layout.row(episodes - 1).unlink()
+    layout.info.unlink() if info is None else layout.info.write_text(info)
+    with pytest.raises(HandrailError, match=f"episode {episodes - 1}: meta/.* is missing"):
+        resume(root)
+    assert not repair(root).removed
+    assert layout.data(episodes - 1).read_bytes() == rows
+
+
+def test_the_last_line_gone_is_noticed_by_the_count(root):
+    Layout(root).row(3).unlink()
+    report = repair(root)
+    assert report.damage == ("episode 3: meta/episodes/chunk-000/file-003.parquet is missing",)
+    assert not report.removed
+    assert len(repair(root, set_aside_damaged=True).lost) == 1
+    assert len(tree(root / ".damaged")) == 3
+
+
+def test_a_dataset_copied_in_part_is_named_as_such(root):
+    layout = Layout(root)
+    for path in files_of(root, 3, cameras=True):
+        path.unlink()
+    with pytest.raises(HandrailError, match=r"copied in part.*episodes 3 to 3: missing"):
+        resume(root, cameras=True)
+    layout.video(CAMERAS[0], 2).unlink()
+    with pytest.raises(HandrailError, match=r"copied in part: 2 of 4 episodes"):
+        resume(root, cameras=True)
+    assert repair(root).episodes == 4
+    assert repair(root, set_aside_damaged=True).episodes == 2
+    _check_is(root, [0, 1])
+
+
+def test_a_stray_file_that_lerobot_would_read_is_set_aside(root):
+    stray = root / "data" / "chunk-000" / "copy of file-000.parquet"
+    shutil.copy(Layout(root).data(0), stray)
+    report = repair(root)
+    assert report.episodes == 4
+    assert report.moved == (stray.relative_to(root).as_posix(),)
+    assert open_with_lerobot(root).num_episodes == 4
+
+
+def test_a_dataset_with_no_episode(tmp_path):
+    create(tmp_path / "set").close()
+    assert repair(tmp_path / "set").clean
+    Layout(tmp_path / "set").info.unlink()
+    assert repair(tmp_path / "set").rebuilt == ("meta/info.json",)
+    assert json.loads(Layout(tmp_path / "set").info.read_bytes())["total_episodes"] == 0
+
+
+def test_an_episode_put_back_comes_once(root):
+    """Cut short after the episode was saved and before `.damaged` was cleared, nothing comes twice."""
+    os.truncate(Layout(root).data(1), 10)
+    copies = shutil.copytree(root, root.parent / "copies")
+    repair(root, set_aside_damaged=True)
+    for number in (2, 3):
+        for path in files_of(copies, number, cameras=True):
+            target = root / ".damaged" / "007" / path.relative_to(copies)
+            target.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy(path, target)
+    report = repair(root)
+    assert (report.episodes, report.put_back) == (3, 0)
+    assert not (root / ".damaged" / "007").exists()
+    _check_is(root, [0, 2, 3])
+
+
+def test_chunks_roll_over(tmp_path, monkeypatch):
+    from handrail.datasets.format import layout, metadata
+
+    monkeypatch.setattr(layout, "FILES_IN_A_CHUNK", 3)
+    monkeypatch.setattr(metadata, "FILES_IN_A_CHUNK", 3)
+    root = record(tmp_path / "set", 5)
+    with resume(root) as writer:
+        for _ in range(3):
+            record_one(writer, cameras=False)
+    assert sorted(path.name for path in (root / "data").iterdir()) == ["chunk-000", "chunk-001", "chunk-002"]
+    assert repair(root).clean
+    dataset = open_with_lerobot(root)
+    assert dataset.num_episodes == 8
+    assert dataset[len(dataset) - 1]["timestamp"].item() == pytest.approx((length_of(7) - 1) / FPS)
+    last = frame_of(7, length_of(7) - 1, cameras=False)["action"]
+    assert np.array_equal(dataset[len(dataset) - 1]["action"].numpy(), last)
+    os.truncate(Layout(root).data(1), 10)
+    repair(root, set_aside_damaged=True)
+    _check_is(root, [0, *range(2, 8)])

@@ -1,0 +1,129 @@
+"""Shared by the tests of `handrail-compare`: datasets of another robot by plain LeRobot, and our own."""
+
+import warnings
+from pathlib import Path
+
+import numpy as np
+from datasets_helpers import REPO, create
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+from handrail.datasets.format.schema import Feature
+
+JOINTS = [f"{name}.pos" for name in ("pan", "lift", "elbow", "flex", "roll", "gripper")]
+CAMERA = "observation.images.top"
+EPISODES, FRAMES = 6, 24
+
+
+def lerobot_dataset(root: Path, names: list[str], fps: int, jitter: float, camera: bool) -> Path:
+    """Record with plain LeRobot an arm that follows commanded positions one frame later."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        from lerobot.datasets.lerobot_dataset import LeRobotDataset
+
+        vector = {"dtype": "float32", "shape": (len(names),), "names": names}
+        features = {"observation.state": vector, "action": vector}
+        if camera:
+            axes = ["height", "width", "channels"]
+            features[CAMERA] = {"dtype": "video", "shape": (32, 48, 3), "names": axes}
+        dataset = LeRobotDataset.create(REPO, fps, features, root=root, robot_type="so101")
+        rng = np.random.default_rng(len(names))
+        for episode in range(EPISODES):
+            state = np.zeros(len(names), np.float32)
+            for index in range(FRAMES + 3 * episode):
+                goal = np.sin(0.1 * index + np.arange(len(names))) + jitter * rng.normal(size=len(names))
+                action = goal.astype(np.float32)
+                picture = np.full((32, 48, 3), 40 * episode, np.uint8)
+                frame = {"observation.state": state, "action": action, "task": "wave"}
+                dataset.add_frame(frame | ({CAMERA: picture} if camera else {}))
+                state = action
+            dataset.save_episode()
+        dataset.finalize()
+    return root
+
+
+def arm_dataset(root: Path, scale: float, velocities: bool) -> Path:
+    """Record with plain LeRobot an arm with bare names, steered by positions or by velocities."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        from lerobot.datasets.lerobot_dataset import LeRobotDataset
+
+        vector = {"dtype": "float32", "shape": (3,), "names": ["pan", "lift", "elbow"]}
+        features = {"observation.state": vector, "action": vector}
+        dataset = LeRobotDataset.create(REPO, 30, features, root=root, robot_type="arm")
+        rng = np.random.default_rng(1)
+        for episode in range(8):
+            state = np.zeros(3, np.float32)
+            for index in range(FRAMES + 2 * episode):
+                goal = scale * (np.sin(0.1 * index + np.arange(3)) + 0.05 * rng.normal(size=3))
+                action = (30.0 * (goal - state) if velocities else goal).astype(np.float32)
+                dataset.add_frame({"observation.state": state, "action": action, "task": "wave"})
+                state = goal.astype(np.float32)
+            dataset.save_episode()
+        dataset.finalize()
+    return root
+
+
+def handrail_dataset(root: Path, fail_every: int, mode: str, episodes: int = 12, slow: int = 0) -> str:
+    """Record with Handrail's writer: seeds are the same in every dataset, lengths are not."""
+    names = ("tool.x", "tool.y", "tool.z")
+    features = {
+        "observation.state": Feature("float32", (3,), names),
+        "action": Feature("float32", (2,), ("v_x", "gripper")),
+        "teleop.values": Feature("float32", (2,), ("ee.vx", "gripper")),
+        "teleop.mode": Feature("string"),
+        "controller.smallest_distance": Feature("float32"),
+        "safety.contacts": Feature("int64"),
+    }
+    rng = np.random.default_rng(len(mode))
+    with create(root, features=features) as writer:
+        for episode in range(episodes):
+            count = 30 + episode + slow
+            for index in range(count):
+                place = np.array([index / count, 0.1 * np.sin(index / 5), 0.0]) + 0.001 * rng.normal(size=3)
+                writer.add_frame(
+                    {
+                        "observation.state": place,
+                        "action": np.array([1.0 + 0.1 * rng.normal(), 0.0]),
+                        "teleop.values": np.array([rng.normal(), 0.0]),
+                        "teleop.mode": mode,
+                        "controller.smallest_distance": 0.2 - 0.15 * index / count,
+                        "safety.contacts": int(index == 5 and episode == 1),
+                    },
+                    "go",
+                )
+            success = (episode + 1) % fail_every != 0
+            reason = None if success else "timeout"
+            writer.save_episode({"success": success, "failure_reason": reason, "seed": episode, "mode": mode})
+    return str(root)
+
+
+def quick_and_slow(folder: Path) -> list[str]:
+    """Record two datasets: one short and always successful, one slow that fails every other time."""
+    return [
+        handrail_dataset(folder / "quick", 100, "ee"),
+        handrail_dataset(folder / "slow", 2, "joints", slow=60),
+    ]
+
+
+def texts(figure):
+    """Return the texts of a figure and the boxes that they take; ticks beyond the limits are not drawn."""
+    FigureCanvasAgg(figure).draw()
+    shown = []
+    for axes in figure.axes:
+        shown += [axes.title, axes.xaxis.label, axes.yaxis.label, *axes.texts]
+        for axis, (low, high) in ((axes.xaxis, axes.get_xlim()), (axes.yaxis, axes.get_ylim())):
+            ticks = zip(axis.get_ticklocs(), axis.get_ticklabels(), strict=False)  # shared axes have none
+            shown += [label for place, label in ticks if min(low, high) <= place <= max(low, high)]
+    return [(text.get_text(), text.get_window_extent()) for text in shown if text.get_text()]
+
+
+def check_texts(figure) -> None:
+    """Check that no text of a figure leaves it or covers another."""
+    shown = texts(figure)
+    assert shown
+    inside = figure.bbox.padded(1.0)
+    for place, (text, box) in enumerate(shown):
+        assert inside.containsx(box.x0) and inside.containsx(box.x1), text  # noqa: PT018
+        assert inside.containsy(box.y0) and inside.containsy(box.y1), text  # noqa: PT018
+        others = [other for other, its in shown[place + 1 :] if box.padded(-0.5).overlaps(its)]
+        assert not others, (text, others)

@@ -1,0 +1,29 @@
+"""The configuration of every command."""
+
+from handrail.collect.config import DemoConfig, InspectConfig, RecordConfig, RepairConfig, ReplayConfig
+from handrail.collect.experiments.benchmark.config import BenchmarkConfig
+from handrail.collect.experiments.profiling.config import ProfileConfig
+from handrail.collect.experiments.showcase.config import ShowcaseConfig
+from handrail.collect.experiments.trials.config import TrialsConfig
+from handrail.datasets.comparison.config import CompareConfig
+from handrail.policies.imitation.config import TrainConfig
+from handrail.policies.imitation.evaluation.config import EvaluateConfig
+from handrail.policies.rl.config import TrainRlConfig
+from handrail.policies.study.config import StudyConfig
+
+CONFIGS = {
+    "handrail-record": RecordConfig,
+    "handrail-replay": ReplayConfig,
+    "handrail-inspect": InspectConfig,
+    "handrail-repair": RepairConfig,
+    "handrail-demo": DemoConfig,
+    "handrail-showcase": ShowcaseConfig,
+    "handrail-profile": ProfileConfig,
+    "handrail-train": TrainConfig,
+    "handrail-train-rl": TrainRlConfig,
+    "handrail-benchmark": BenchmarkConfig,
+    "handrail-compare": CompareConfig,
+    "handrail-evaluate": EvaluateConfig,
+    "handrail-study": StudyConfig,
+    "handrail-trials": TrialsConfig,
+}

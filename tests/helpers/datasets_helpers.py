@@ -1,0 +1,126 @@
+"""What the dataset tests share: a small schema, frames whose content is known, LeRobot as the judge."""
+
+import hashlib
+import os
+import tempfile
+import warnings
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+os.environ["HF_HUB_OFFLINE"] = "1"
+os.environ.setdefault("HF_DATASETS_CACHE", str(Path(tempfile.gettempdir()) / "handrail-test-datasets"))
+
+from handrail.datasets.format.layout import Layout
+from handrail.datasets.format.schema import Feature
+from handrail.datasets.recording.writer import EpisodeWriter
+
+FPS = 30
+REPO = "handrail/test"
+ROBOT = "testbot"
+TASKS = ("lift the cup", "put it down")
+CAMERAS = ("observation.images.wrist", "observation.images.scene")
+
+STATE_FEATURES = {
+    "observation.state": Feature("float32", (3,), ("x", "y", "v_x")),
+    "action": Feature("float32", (2,), ("v_x", "gripper")),
+    "teleop.mask": Feature("bool", (4,)),
+    "teleop.mode": Feature("string"),
+    "controller.solve_time": Feature("float32"),
+    "safety.contacts": Feature("int64"),
+    "engaged": Feature("bool"),
+    "wall_clock": Feature("float64"),
+}
+TINY_FEATURES = {key: STATE_FEATURES[key] for key in ("action", "teleop.mode")}  # for many quick episodes
+CAMERA_FEATURES = STATE_FEATURES | {key: Feature("video", (32, 48, 3)) for key in CAMERAS}
+
+
+def brightness(episode: int, index: int, camera: int) -> int:
+    """Return the level that all pixels of a picture have; it tells which picture it is."""
+    return (episode * 17 + index * 7 + camera * 101) % 200 + 20
+
+
+def frame_of(episode: int, index: int, cameras: bool) -> dict:
+    number = episode * 1000 + index
+    frame = {
+        "observation.state": np.array([number, np.sin(number), index / 3], np.float32),
+        "action": np.array([np.cos(number), index % 2], np.float32),
+        "teleop.mask": np.arange(4) == index % 4,
+        "teleop.mode": ("base", "arm")[index // 3 % 2],
+        "controller.solve_time": 1e-3 * (index + 1),
+        "safety.contacts": index % 3,
+        "engaged": index % 2 == 0,
+        "wall_clock": 1.7e9 + number / 7,
+    }
+    if cameras:
+        for place, key in enumerate(CAMERAS):
+            frame[key] = np.full((32, 48, 3), brightness(episode, index, place), np.uint8)
+    return frame
+
+
+def length_of(episode: int) -> int:
+    return 8 + 3 * (episode % 3)
+
+
+def record_one(writer: EpisodeWriter, cameras: bool) -> int:
+    """Record and save the next episode."""
+    episode = writer.num_episodes
+    for index in range(length_of(episode)):
+        frame = frame_of(episode, index, cameras)
+        writer.add_frame({key: frame[key] for key in writer.features}, TASKS[episode // 2 % 2])
+    return writer.save_episode({"success": episode % 2 == 0, "failure_reason": None, "seed": episode})
+
+
+def create(root: Path, cameras: bool = False, features=None, **options) -> EpisodeWriter:
+    features = features or (CAMERA_FEATURES if cameras else STATE_FEATURES)
+    return EpisodeWriter.create(root, REPO, FPS, features, ROBOT, {"handrail": "0"}, **options)
+
+
+def resume(root: Path, cameras: bool = False, features=None) -> EpisodeWriter:
+    features = features or (CAMERA_FEATURES if cameras else STATE_FEATURES)
+    return EpisodeWriter.resume(root, REPO, FPS, features, ROBOT, {"handrail": "0"})
+
+
+def record(root: Path, episodes: int, cameras: bool = False, features=None) -> Path:
+    with create(root, cameras, features) as writer:
+        for _ in range(episodes):
+            record_one(writer, cameras)
+    return root
+
+
+def files_of(root: Path, episode: int, cameras: bool) -> list[Path]:
+    layout = Layout(root)
+    videos = [layout.video(key, episode) for key in CAMERAS] if cameras else []
+    return [layout.data(episode), layout.row(episode), *videos]
+
+
+def digest(root: Path, episode: int, cameras: bool) -> str:
+    """Return one hash over all files of an episode."""
+    content = b"".join(path.read_bytes() for path in files_of(root, episode, cameras))
+    return hashlib.sha256(content).hexdigest()
+
+
+def tree(root: Path) -> dict[str, bytes]:
+    """Return the content of every file in a folder."""
+    return {
+        path.relative_to(root).as_posix(): path.read_bytes() for path in root.rglob("*") if path.is_file()
+    }
+
+
+def open_with_lerobot(root: Path, **options) -> Any:
+    """Open a dataset with unmodified LeRobot; its own warnings are not ours to judge."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        from lerobot.datasets.lerobot_dataset import LeRobotDataset
+
+        return LeRobotDataset(REPO, root=root, video_backend="pyav", **options)
+
+
+def check_pictures(dataset, rows) -> None:
+    """Check that the pictures that LeRobot shows for some rows are those recorded with them."""
+    for row in rows:
+        item = dataset[int(row)]
+        for place, key in enumerate(CAMERAS):
+            expected = brightness(int(item["episode_index"]), int(item["frame_index"]), place)
+            assert abs(float(item[key].mean()) * 255 - expected) < 2.5

@@ -1,0 +1,64 @@
+"""Shared by the tests of input devices: an operator whose command is integrated without physics."""
+
+import numpy as np
+from collect_helpers import environment
+
+from handrail.collect.operators.human.motion_goal import Target, Wish
+from handrail.collect.operators.modes import find_mode
+from handrail.collect.operators.operator import View
+from handrail.collect.operators.scripts.scripted import ScriptedOperator
+from handrail.collect.tasks.task import TaskState
+from handrail.controllers.baselines.direct import DirectController
+from handrail.controllers.baselines.split_controller import split_controller
+from handrail.controllers.interface.controller import State
+from handrail.controllers.robot.model import Pose, load_model
+
+MODEL = load_model()
+HOME = np.array(MODEL.description.home)
+PERIOD = 0.05
+GOAL = Pose(MODEL.pose(HOME).position + [0.10, -0.10, 0.15], MODEL.pose(HOME).rotation)
+
+
+class Wisher:
+    """Wants the base moved first, then the hand at the goal, then rests; a script."""
+
+    def __init__(self, base_until=1.0):
+        self._until = base_until
+
+    def reset(self, view):
+        pass
+
+    def wish(self, view):
+        stand = HOME[:3] + [0.2, 0.1, 0.0]
+        hand = np.concatenate([GOAL.position - view.tool.position, np.zeros(3)])
+        focus = "base" if view.state.time < self._until else "hand"
+        return Wish(hand, np.array([0.3, 0.1, 0.0]), focus, target=Target(GOAL, stand, distance=0.02))
+
+
+def first_view() -> View:
+    """Return what an operator sees at the beginning of an episode."""
+    with environment("Reach") as env:
+        env.reset(seed=0)
+        return View(env.state(), env.task_state().tool, 1.0, env.task_state())
+
+
+def drive(view, mode, human, seconds=12.0, script=None, start=HOME):
+    """Integrate what the operator asks for, without physics; return intents and configurations."""
+    mode = find_mode(mode)
+    operator = ScriptedOperator(MODEL, script or Wisher(), mode, human)
+    controller = split_controller(MODEL) if mode.controller == "split" else DirectController(MODEL)
+    q, v, intents, path = start.copy(), np.zeros(MODEL.size), [], [start.copy()]
+    operator.reset(at(view, q, v, 0.0), np.random.default_rng(0))
+    for step in range(int(seconds / PERIOD)):
+        now = at(view, q, v, step * PERIOD)
+        intents.append(operator.act(now))
+        v = controller.update(now.state, intents[-1]).velocity(PERIOD)
+        q = q + PERIOD * v
+        path.append(q)
+    return intents, np.array(path)
+
+
+def at(view, q, v, time) -> View:
+    tool = MODEL.pose(q)
+    task = TaskState(time, tool, 1.0, view.task.episode, view.task.poses)
+    return View(State(q, v, time), tool, 1.0, task)

@@ -1,0 +1,211 @@
+"""Random clutter, movers, and random, rude intents, for the safety fuzz.
+
+The robot is MuJoCo's, driven without the environment's limiter; contacts and distances are MuJoCo's too.
+"""
+
+import itertools
+from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from handrail.collect.simulation.gl import mujoco
+from handrail.collect.simulation.robot import FINGERS
+from handrail.collect.simulation.scene import Scene, SceneObject, View
+from handrail.collect.simulation.simulation import Simulation
+from handrail.collect.tasks.moving import sample_movers
+from handrail.controllers.collision.model import CollisionModel
+from handrail.controllers.collision.slacks import MOVING
+from handrail.controllers.errors import HandrailError
+from handrail.controllers.interface.frames import Frames
+from handrail.controllers.interface.intent import Intent
+from handrail.controllers.mpc.masked_mpc import MaskedMpc
+from handrail.controllers.ocp.problem import Plan, Problem
+from handrail.controllers.robot.model import RobotModel
+from handrail.controllers.robot.shape import Shape
+
+PERIOD = 0.05  # [s]
+CLEARANCE = 0.15  # of the robot at the start [m]
+
+
+@dataclass
+class FuzzResult:
+    """What a run showed."""
+
+    own: list[str] = field(default_factory=list)  # contacts with itself
+    standing: list[str] = field(default_factory=list)  # with what stands still
+    moving: list[str] = field(default_factory=list)  # with movers, which end the run: nothing stops them
+    nearest_own: float = np.inf  # smallest distance of the robot to itself, at the ends of periods [m]
+    statuses: Counter[str] = field(default_factory=Counter)
+    velocity_excess: float = 0.0  # over the limit, relative
+    acceleration_excess: float = 0.0  # between consecutive commands, over the limit, relative
+    travelled: float = 0.0  # way of the tool [m]
+
+
+def cluttered(model: RobotModel, movers: int, rng: np.random.Generator) -> tuple[Scene, np.ndarray]:
+    """Draw a start posture and things around the robot, none nearer than the clearance."""
+    base = len(model.description.base_joints)
+    while True:
+        q = np.array(model.description.home)
+        q[:base] = rng.uniform([-1.5, -1.5, -3.0], [1.5, 1.5, 3.0])
+        q[base:] += rng.uniform(-0.7, 0.7, model.size - base)
+        limits, own = model.description.limits, CollisionModel(model)
+        inside = np.all((q > limits.position_lower) & (q < limits.position_upper))
+        if inside and np.all(own.values(q[None])[0] > np.minimum(own.largest_margin, 0.10)):
+            break
+    objects: list[SceneObject] = sample_movers(movers, model, q, rng)
+    wanted = movers + int(rng.integers(4, 11))
+    view = View((-3, -3, 3), (0, 0, 0.5), 50.0)
+    for _ in range(400):
+        if len(objects) == wanted:
+            break
+        scene = Scene((*objects, _thing(f"thing_{len(objects)}", q, rng)), view)
+        around = CollisionModel(model, scene.obstacles())
+        if np.all(around.values(q[None])[0] > np.minimum(around.largest_margin, CLEARANCE)):
+            objects = list(scene.objects)
+    return Scene(tuple(objects), view), q
+
+
+def _thing(name: str, q: np.ndarray, rng: np.random.Generator) -> SceneObject:
+    angle, distance = rng.uniform(-np.pi, np.pi), rng.uniform(0.5, 2.2)
+    x, y = q[0] + distance * np.cos(angle), q[1] + distance * np.sin(angle)
+    height = rng.uniform(0.2, 1.6)
+    raised = rng.uniform(0.0, 1.0) if rng.random() < 0.3 else 0.0  # a shelf or a lamp in the air
+    if rng.random() < 0.5:
+        shape = Shape("cylinder", [rng.uniform(0.05, 0.25), height])
+    else:
+        shape = Shape("box", [*rng.uniform(0.1, 0.6, 2), height])
+    return SceneObject(name, shape, np.array([x, y, raised + height / 2]), rgba=(0.5, 0.5, 0.5, 1.0))
+
+
+class RudeOperator:
+    """Full-speed, jerky, switching intents; now and then garbage, huge, stale, future, in no known frame."""
+
+    def __init__(self, channels, limits, rng):
+        self._channels, self._limits, self._rng = channels, limits, rng
+        self._groups = [("ee",), ("base",), ("joint",), ("base", "ee"), ("ee.vx", "ee.vy", "ee.vz"), ()]
+        self._groups.append((channels.joints[-3],))
+        self._until = 0.0
+
+    def intent(self, time):
+        rng, size = self._rng, self._channels.size
+        if time >= self._until:
+            self._until = time + rng.uniform(0.05, 2.0)
+            self._mask = (
+                self._channels.mask(*self._groups[rng.integers(len(self._groups))])
+                if rng.random() < 0.8
+                else (rng.random(size) < 0.4)
+            )
+            full = np.concatenate([[1, 1, 0.4], [1, 1, 1, 2, 2, 2], self._limits.velocity])
+            self._values = full * rng.choice([-1.0, 1.0, 0.0, 0.5], size)
+            self._frames = Frames(
+                rng.choice(["base", "world"]), rng.choice(["world", "tool"]), rng.uniform(-0.3, 0.3, 3)
+            )
+        return self._troubled(time)
+
+    def _troubled(self, time):
+        rng, size = self._rng, self._channels.size
+        values, mask, frames, stamp = self._values, self._mask, self._frames, time
+        trouble = rng.random()
+        if trouble < 0.02:
+            values = np.where(rng.random(size) < 0.3, rng.choice([np.nan, np.inf, -np.inf]), values)
+        elif trouble < 0.04:
+            values = values * 1e6
+        elif trouble < 0.05:
+            stamp = time - rng.uniform(0.3, 5.0)
+        elif trouble < 0.06:
+            stamp = time + rng.choice([0.5, 10.0, 1e18, np.nan])
+        elif trouble < 0.07:
+            frames = Frames("moon", "world")
+        elif trouble < 0.08:
+            values, mask = np.zeros(3), np.zeros(3, dtype=bool)
+        elif trouble < 0.20:
+            values = values + rng.normal(0, 0.5, size)
+        return Intent(values, mask, time=stamp, frames=frames)
+
+
+@contextmanager
+def failing(controller: MaskedMpc, seed: int, share: float) -> Iterator[None]:
+    """Let the solver fail at random, now and then for a while."""
+    rng, honest, until = np.random.default_rng([seed, 2]), controller.solver.solve, 0
+
+    def solve(problem: Problem, guess: np.ndarray) -> Plan:
+        nonlocal until
+        if until > 0 or rng.random() < share:
+            until = until - 1 if until else int(rng.integers(0, 20))
+            raise HandrailError("the solver fails on purpose")
+        return honest(problem, guess)
+
+    controller.solver.solve = solve
+    yield
+    controller.solver.solve = honest
+
+
+class OwnDistances:
+    """MuJoCo's distances between the robot's own geoms, those pairs that it may touch itself with."""
+
+    def __init__(self, model, compiled):
+        self._model, gripper = compiled, model.description.gripper
+        geoms = {shape.name: (shape.name,) for shape in model.description.collision}
+        geoms[gripper.shape] = FINGERS  # stand in for the shape around them
+        self._pairs = [
+            (compiled.geom(first).id, compiled.geom(second).id)
+            for pair in model.description.self_pairs
+            for first, second in itertools.product(*(geoms[name] for name in pair))
+        ]
+
+    def smallest(self, data):
+        where = np.zeros(6)
+        near = [mujoco.mj_geomDistance(self._model, data, a, b, 0.5, where) for a, b in self._pairs]
+        return min(near, default=np.inf)
+
+
+class _Around:
+    """Says how near things are, to explain a contact."""
+
+    def __init__(self, model, scene):
+        self._scene, self._collision = scene, CollisionModel(model, scene.obstacles())
+
+    def told(self, state):
+        self._collision.observe(self._scene.obstacles(state.time))
+        distances = self._collision.values(state.q[None])[0]
+        still = distances[self._collision.kinds != MOVING].min()
+        return f"robot at {np.abs(state.v).max():.2f}, nearest that stands {still:.3f} m"
+
+
+def run(model: RobotModel, controller, seed: int, seconds: float, movers: int = 0) -> FuzzResult:
+    """Drive a robot through a scene of a seed with whatever comes; return what happened."""
+    rng = np.random.default_rng([seed, movers])
+    scene, q = cluttered(model, movers, rng)
+    simulation = Simulation(model, scene, q, PERIOD)
+    own = OwnDistances(model, simulation.mujoco_model)
+    around = _Around(model, scene)
+    controller.reset(scene.obstacles(0.0))
+    limits, result = model.description.limits, FuzzResult()
+    rude = RudeOperator(controller.channels, limits, rng)
+    moving = {item.name for item in scene.movers}
+    standing = {item.name for item in scene.objects} - moving | {"floor"}
+    previous = np.zeros(model.size)
+    for _ in range(int(seconds / PERIOD)):
+        state, hand = simulation.state(), simulation.tool.position
+        if movers:
+            controller.observe(scene.obstacles(state.time))
+        command = controller.update(state, rude.intent(state.time))
+        velocity = command.velocity(PERIOD)
+        result.statuses[command.health.status.value] += 1
+        excess = np.abs(velocity) / limits.velocity - 1.0
+        result.velocity_excess = max(result.velocity_excess, float(np.max(excess)))
+        excess = np.abs(velocity - previous) / (limits.acceleration * PERIOD) - 1.0
+        result.acceleration_excess = max(result.acceleration_excess, float(np.max(excess)))
+        previous = velocity
+        for pair in simulation.advance(velocity, 0.0):
+            met = set(pair.split(" – "))
+            kind = result.moving if met & moving else result.standing if met & standing else result.own
+            kind.append(f"{pair} at {state.time:.2f} s: {around.told(state)}, {command.health.status}")
+        if result.moving:
+            break
+        result.nearest_own = min(result.nearest_own, own.smallest(simulation.data))
+        result.travelled += float(np.linalg.norm(simulation.tool.position - hand))
+    return result

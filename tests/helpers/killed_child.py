@@ -1,0 +1,64 @@
+"""A function in a process of its own that dies, as by SIGKILL, at its k-th change below a folder.
+
+A change is an `open` for writing, a rename, a removal, a link or a new folder. Processes are forked from a
+server that has loaded LeRobot and PyTorch once, as those of a study are.
+"""
+
+import importlib
+import multiprocessing
+import os
+import signal
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+from datasets_guillotine import CHANGES, WRITING
+
+_PRELOAD = "handrail.policies.study.execution.preload"
+
+
+def killed(folder: Path, change: int, function: Callable[..., object], *arguments: object) -> bool:
+    """Call a function until it dies at a change; return whether it died.
+
+    Args:
+        folder: changes to what begins with this path count.
+        change: the number of the last one, which is not made.
+        function: to call, with its arguments.
+    """
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload([_PRELOAD])
+    log = folder.parent / "killed.log"
+    process = context.Process(target=_call, args=(str(folder), change, str(log), function, arguments))
+    process.start()
+    process.join()
+    assert process.exitcode in (0, -signal.SIGKILL), log.read_text()[-2000:]
+    return process.exitcode != 0
+
+
+def run_command(module: str, *flags: object) -> None:
+    """Run the command of a module."""
+    sys.argv = [module, *map(str, flags)]
+    importlib.import_module(module).main()
+
+
+def _call(folder: str, remaining: int, log: str, function: Callable[..., object], arguments: tuple) -> None:
+    with open(log, "w") as file:
+        os.dup2(file.fileno(), 1)
+        os.dup2(file.fileno(), 2)
+
+    def audit(event: str, arguments: tuple) -> None:
+        nonlocal remaining
+        opened = event == "open" and bool((arguments[2] or 0) & WRITING)
+        if not opened and event not in (*CHANGES, "os.symlink"):
+            return
+        places = [os.fspath(path) for path in arguments[:2] if isinstance(path, str | os.PathLike)]
+        if any(place.startswith(folder) for place in places):
+            remaining -= 1
+            if not remaining:
+                os.kill(os.getpid(), signal.SIGKILL)
+
+    from handrail.policies.imitation.evaluation import evaluation
+
+    evaluation._SAVE_EVERY = 0.0  # after every rollout, so that there is much to write
+    sys.addaudithook(audit)
+    function(*arguments)

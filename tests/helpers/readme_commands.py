@@ -1,0 +1,89 @@
+"""README's shell commands, in order, and what is made smaller so that a test can run them."""
+
+import re
+import shlex
+
+from places import ROOT
+
+LESS = {  # flag → the value that it gets where the README gives it
+    "handrail-demo": {"--episodes": "1"},
+    "handrail-record": {"--dataset.num_episodes": "2"},
+    "handrail-train": {"--episodes": "1", "--minutes": "0.1"},
+    "handrail-evaluate": {"--episodes": "2", "--workers": "1"},
+    "handrail-trials": {"--episodes": "1"},
+    "handrail-study": {"--workers": "2"},
+    "handrail-benchmark": {"--goals": "2", "--workers": "1"},
+    "lerobot-train": {"--steps": "4", "--batch_size": "4", "--num_workers": "0"},
+}
+MORE = {  # what is added where the README leaves it out
+    "handrail-record": {"--dataset.num_episodes": "2"},
+    "handrail-train": {"--steps": "4", "--batch_size": "4", "--device": "cpu"},
+    "handrail-evaluate": {"--time_limit": "1"},
+    "handrail-showcase": {"--seconds": "1"},
+    "handrail-profile": {"--updates": "10", "--solves": "1"},
+    "handrail-train-rl": {
+        "--steps": "60",
+        "--random_steps": "20",
+        "--save_every": "30",
+        "--goals": "1",
+        "--final_goals": "1",
+        "--layers": "8",
+    },
+}
+INSTEAD = {"quick": "policies/study/presets/quick.toml"}  # where the test has put a smaller design:
+LESS_STUDY = {"rollouts": "2", "persons": "1", "episodes": "2", "minutes": "0.3", "steps": "4"}
+NOT_RUN = {
+    "make": "sets up and tests this very clone",
+    "pip": "needs the network",
+    "apt-get": "needs the network and the administrator",
+    "tensorboard": "runs until Ctrl-C",
+}
+MINUTES = ("lerobot-", "handrail-study", "handrail-profile", "handrail-train-rl", "handrail-benchmark")
+MINUTES_TOO = (
+    "pick_place",
+    "none,mpc",
+    "push:2",
+    "minute",
+    "lerobot_act",
+    "diffusion",
+    "moving",
+    "trials",
+    "showcase",
+    "demo",
+)
+
+
+def readme_commands() -> list[list[str]]:
+    """Return the words of every command, in order."""
+    text = (ROOT / "README.md").read_text()
+    blocks = re.findall(r"^```sh\n(.*?)^```", text, flags=re.DOTALL | re.MULTILINE)
+    lines = "\n".join(blocks).replace("\\\n", " ").splitlines()
+    return [words for line in lines if (words := shlex.split(line, comments=True))]
+
+
+def small_study() -> str:
+    """Return the quick study's design with less of everything."""
+    text = (ROOT / "policies" / "study" / "design" / "presets" / "quick.toml").read_text()
+    for name, value in LESS_STUDY.items():
+        text = re.sub(rf"^{name} = .*", f"{name} = {value}", text, flags=re.MULTILINE)
+    return text
+
+
+def takes_minutes(words: list[str]) -> bool:
+    """Return whether a command takes long even when it is made small."""
+    return words[0].startswith(MINUTES) or any(part in word for word in words for part in MINUTES_TOO)
+
+
+def made_small(words: list[str]) -> list[str]:
+    """Return a command with fewer episodes, steps and the like."""
+    name = words[0]
+    words = [INSTEAD.get(word, word) for word in words]
+    for flag, value in {**MORE.get(name, {}), **LESS.get(name, {})}.items():
+        there = [index for index, word in enumerate(words) if word.split("=")[0] == flag]
+        if there and "=" in words[there[0]]:
+            words = [*words[: there[0]], f"{flag}={value}", *words[there[0] + 1 :]]
+        elif there:
+            words = [*words[: there[0] + 1], value, *words[there[0] + 2 :]]
+        elif flag in MORE.get(name, {}):
+            words = [*words, flag, value]
+    return words

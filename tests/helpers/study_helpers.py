@@ -1,0 +1,121 @@
+"""What the tests of studies share: a small design, and jobs that only leave their files, made up."""
+
+import dataclasses
+import multiprocessing
+import sys
+
+import numpy as np
+from datasets_helpers import create, frame_of
+
+from handrail.datasets.comparison.evaluations import FORMAT
+from handrail.policies.study.design.jobs import Layout, jobs
+from handrail.policies.study.design.load import load_design
+from handrail.policies.study.design.settings import evaluations, fingerprint
+from handrail.policies.study.progress.notes import write_json
+
+DESIGN = """
+modes = ["ee", "direct"]
+baseline = "direct"
+seeds = [0, 1]
+rollouts = 40
+[tasks.reach]
+episodes = 5
+minutes = 0.1
+steps = 10
+[robustness]
+perturbations = ["push"]
+protections = ["filter"]
+rollouts = 20
+seeds = [0, 1]
+[sweep]
+tasks = ["reach"]
+noises = [0.0]
+seeds = [0]
+"""
+
+SMALLEST = """
+modes = ["ee", "direct"]
+baseline = "direct"
+seeds = [0]
+rollouts = 3
+persons = 2
+[tasks.reach]
+episodes = 2
+minutes = 0.3
+rollout_limit = 1.5
+steps = 20
+[robustness]
+perturbations = ["push"]
+protections = ["filter"]
+rollouts = 2
+"""  # of real jobs
+
+
+def make(job, design, layout):
+    """Leave the files that a job leaves, made up: the better the operator, the better the policy."""
+    if job.cell:
+        with create(layout.dataset(job.cell)) as writer:
+            for episode in range(6):
+                for index in range(12):
+                    writer.add_frame(frame_of(episode, index, cameras=False), "reach")
+                writer.save_episode({"success": episode > 0, "failure_reason": "timeout", "seed": episode})
+    if job.arm:
+        rng = np.random.default_rng(job.arm.seed)
+        share = 0.9 if job.arm.cell.mode == "ee" else 0.3
+        write_json(layout.policy(job.arm) / "checkpoints/000010/pretrained_model/handrail.json", {})
+        for what, config in evaluations(job, design).items():
+            rollouts = [
+                {"seed": seed, "success": bool(rng.random() < share), "contacts": seed % 2, "length": 3.0}
+                for seed in config.seeds
+            ]
+            ending = {"nominal": "", "disturbed": " pushed", "protected": " filter"}[what]
+            entry = {"training_seed": job.arm.seed, "rollouts": rollouts}
+            arms = {job.arm.label + ending: [entry]}
+            write_json(layout.evaluation(job.arm, what), {"format": FORMAT, "arms": arms})
+    if job.task:
+        write_json(layout.comparison(job.task) / "report.html", {})
+    result = {"episodes": 6} if job.cell else {}
+    write_json(layout.begun(job), fingerprint(job, design))
+    write_json(layout.done(job), {"settings": fingerprint(job, design), "result": result, "seconds": 0.0})
+
+
+class Ended:
+    """What is left of a process that did its job."""
+
+    exitcode = 0
+
+    def is_alive(self):
+        return False
+
+
+class Starter:
+    """Begins jobs that only leave their files, and remembers which; one may fail, as a real process."""
+
+    def __init__(self, failing=""):
+        self.begun, self.failing = [], failing
+
+    def __call__(self, job, design, layout):
+        needed = [layout.root / "done" / f"{name}.json" for name in job.needs]
+        assert all(path.is_file() for path in needed), f"{job.name} began before what it needs"
+        self.begun.append(job.name)
+        if job.name != self.failing:
+            make(job, design, layout)
+            return Ended()
+        process = multiprocessing.get_context("spawn").Process(target=sys.exit, args=(1,))
+        process.start()
+        return process
+
+
+def everything(tmp_path, preset):
+    """Return the design, layout and jobs of a study of which every job is done."""
+    design, layout = load_design(preset), Layout(tmp_path / "study")
+    for job in jobs(design):
+        make(job, design, layout)
+    return design, layout, jobs(design)
+
+
+def changed(design, **settings):
+    """Return a design with other settings of its task."""
+    return dataclasses.replace(
+        design, tasks={"reach": dataclasses.replace(design.tasks["reach"], **settings)}
+    )

@@ -1,0 +1,84 @@
+"""What the tests of imitation training share: a small dataset such as Handrail records, a tiny policy."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from handrail.collect.config import StoredConfig
+from handrail.controllers.interface.channels import Channels
+from handrail.controllers.robot.description import load_description
+from handrail.datasets.format.schema import Feature
+from handrail.datasets.recording.frames import moment_features
+from handrail.datasets.recording.writer import EpisodeWriter
+from handrail.policies.imitation.config import TrainConfig
+
+FPS = 20
+CHANNELS = Channels.of(load_description("ridgeback_ur10"))
+JOINTS = tuple(name.removeprefix("joint.") for name in CHANNELS.joints)
+POSE = ("x", "y", "z", "qw", "qx", "qy", "qz")
+STATE = (
+    *(f"{joint}.{kind}" for kind in ("pos", "vel") for joint in JOINTS),
+    *(f"tool.{part}" for part in POSE),
+)
+ENVIRONMENT = tuple(f"goal.{part}" for part in POSE)
+TINY = (
+    "chunk_size=4",
+    "n_action_steps=2",
+    "dim_model=16",
+    "n_heads=2",
+    "dim_feedforward=16",
+    "n_encoder_layers=1",
+)
+_COLUMNS = ("observation.state", "observation.environment_state", "action", "teleop.values", "teleop.mask")
+
+
+def features(cameras: Sequence[str] = ()) -> dict[str, Feature]:
+    every = moment_features(STATE, ENVIRONMENT, JOINTS, CHANNELS.names)
+    pictures = {f"observation.images.{name}": Feature("video", (16, 16, 3)) for name in cameras}
+    return {key: every[key] for key in _COLUMNS} | pictures
+
+
+def frame(rng: np.random.Generator, cameras: Sequence[str] = ()) -> dict:
+    pose = np.append(rng.normal(size=3), (turn := rng.normal(size=4)) / np.linalg.norm(turn))
+    mask = np.append(CHANNELS.mask("ee"), True)
+    values = np.where(mask, rng.normal(size=mask.shape), 0.0)
+    pictures = {f"observation.images.{name}": rng.integers(0, 255, (16, 16, 3), np.uint8) for name in cameras}
+    return {
+        "observation.state": np.append(rng.normal(size=len(STATE) - 7), pose),
+        "observation.environment_state": pose,
+        "action": rng.normal(size=len(JOINTS) + 1),
+        "teleop.values": values,
+        "teleop.mask": mask,
+    } | pictures
+
+
+def write_dataset(
+    root: Path,
+    lengths: Sequence[int] = (9, 7, 8),
+    modes: Sequence[str] = (),
+    successes: Sequence[bool] = (),
+    cameras: Sequence[str] = (),
+) -> Path:
+    """Write episodes of random numbers; modes and successes as given, else `ee` and success."""
+    rng = np.random.default_rng(0)
+    with EpisodeWriter.create(root, "handrail/test", FPS, features(cameras), "ridgeback_ur10") as writer:
+        for number, length in enumerate(lengths):
+            for _ in range(length):
+                writer.add_frame(frame(rng, cameras), "reach")
+            mode = modes[number] if modes else "ee"
+            success = successes[number] if successes else True
+            writer.save_episode({"environment": "reach", "mode": mode, "success": success, "seed": number})
+    return root
+
+
+def tiny(root: Path, output: Path, *options: str, **settings) -> TrainConfig:
+    """Return the settings of a training of a moment."""
+    source = StoredConfig("handrail/test", str(root))
+    size = {"steps": 6, "batch_size": 8, "save_freq": 3, "policy_options": (*TINY, *options)} | settings
+    return TrainConfig(source, str(output), **size)
+
+
+def weights(folder):
+    """Return the weights of a policy, as they lie on the disk."""
+    return (folder / "model.safetensors").read_bytes()

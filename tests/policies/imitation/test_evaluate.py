@@ -1,0 +1,263 @@
+"""Evaluation's laws: paired, the same in parallel, never twice, protected where it says so."""
+
+import json
+import os
+import signal
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from command_helpers import command
+from policy_helpers import StandIn, checkpoint, load
+
+from handrail.controllers.errors import HandrailError
+from handrail.datasets.comparison.evaluations import read_evaluations
+from handrail.policies.imitation.evaluation.conditions import arms
+from handrail.policies.imitation.evaluation.config import FIRST_SEED, EvaluateConfig
+from handrail.policies.imitation.evaluation.evaluation import evaluate
+from handrail.policies.imitation.evaluation.table import evaluation_table
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Checkpoints by name."""
+    root = tmp_path_factory.mktemp("policies")
+    checkpoint(root / "chase")
+    checkpoint(root / "chase_1", training_seed=1)
+    checkpoint(root / "chase_realised", actions="realised")
+    checkpoint(root / "random", kind="random")
+    checkpoint(root / "torch", kind="torch")
+    checkpoint(root / "nan", kind="nan")
+    checkpoint(root / "short", kind="short")
+    checkpoint(root / "bold", kind="random", task="pick_place", mode="direct", actions="realised")
+    checkpoint(root / "bold_hand", kind="random", task="pick_place")
+    checkpoint(root / "single", mode="direct_single")
+    return root
+
+
+def config(folder, *names, **settings):
+    settings = {"episodes": 2, "time_limit": 4.0} | settings
+    return EvaluateConfig(policy=tuple(str(folder / name) for name in names), **settings)
+
+
+def rollouts(content, label, policy=0):
+    return content["arms"][label][policy]["rollouts"]
+
+
+def untimed(content):
+    """Return the content without what the clock says."""
+    rows = [row for arm in content["arms"].values() for entry in arm for row in entry["rollouts"]]
+    for row in rows:
+        del row["timing"]
+    return content
+
+
+def test_seeds_are_never_those_of_a_recording():
+    from handrail.collect.commands.record import episode_seed
+
+    recorded = [episode_seed(seed, episode) for seed in (0, 1, 10**6) for episode in range(200)]
+    assert max(recorded) < FIRST_SEED
+    first, second = (EvaluateConfig(seed=seed, episodes=10**6).seeds for seed in (0, 1))
+    assert min(first) == FIRST_SEED
+    assert max(first) < min(second)
+
+
+def test_parallel_rollouts_are_the_serial_ones(folder, tmp_path):
+    both = config(
+        folder, "random", "chase_1", perturbation="none,push+shift+delay", episodes=2, time_limit=2.0
+    )
+    serial = evaluate(both, load=load)
+    parallel = evaluate(replace(both, workers=2, json=str(tmp_path / "e.json")), load=load)
+    assert untimed(parallel) == untimed(serial)
+    assert set(serial["arms"]) == {"ee intent", "ee intent pushed shifted delayed"}
+    assert untimed(json.loads((tmp_path / "e.json").read_text())) == serial
+
+
+def test_what_a_policy_draws_depends_on_the_seed_alone(folder):
+    import torch
+
+    torch.manual_seed(3)
+    expected = torch.rand(1)
+    torch.manual_seed(3)
+    asked = config(folder, "torch", episodes=2, time_limit=0.5)
+    first = rollouts(untimed(evaluate(asked, load=load)), "ee intent")
+    assert torch.rand(1) == expected  # whoever else draws is not disturbed
+    (second,) = rollouts(untimed(evaluate(replace(asked, episodes=1), load=load)), "ee intent")
+    assert second == first[0]
+    assert first[0]["smallest_distance"] != first[1]["smallest_distance"]
+
+
+def test_resume_runs_only_what_is_missing(folder, tmp_path):
+    file = tmp_path / "e.json"
+    asked = config(folder, "chase", json=str(file), time_limit=1.0)
+    first = evaluate(asked, load=load)
+    loads = []
+
+    def counted(path):
+        loads.append(path)
+        return load(path)
+
+    again = evaluate(asked, load=counted)
+    assert again == first
+    assert not loads
+    more = evaluate(replace(asked, policy=(*asked.policy, str(folder / "chase_1")), episodes=3), load=load)
+    assert [[row["seed"] for row in entry["rollouts"]] for entry in more["arms"]["ee intent"]] == [
+        list(range(FIRST_SEED, FIRST_SEED + 3))
+    ] * 2
+    assert rollouts(more, "ee intent")[:2] == rollouts(first, "ee intent")
+    policies = read_evaluations([file])["ee intent"].policies
+    assert [(policy.training_seed, len(policy.rollouts)) for policy in policies] == [(0, 3), (1, 3)]
+    assert policies[0].trained_on == {"episodes": 50.0, "operator_time": 312.5}
+
+
+def test_what_was_done_is_kept_when_a_rollout_fails(folder, tmp_path):
+    class Breaking(StandIn):
+        def act(self, state, environment, images):
+            if len(done) == 4:  # made, and begun three times
+                raise RuntimeError("broken")
+            return super().act(state, environment, images)
+
+        def reset(self):
+            done.append(1)
+            super().reset()
+
+    done = []
+
+    def breaking(path):
+        whole = load(path)
+        return Breaking(whole.interface, "still")
+
+    file = tmp_path / "e.json"
+    with pytest.raises(RuntimeError):
+        evaluate(config(folder, "short", json=str(file), episodes=5, time_limit=0.5), load=breaking)
+    assert len(rollouts(json.loads(file.read_text()), "ee intent")) == 2
+
+
+def killed(path):
+    """Load a policy in a process that is then killed, as one that wants too much memory is."""
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def test_a_killed_worker_is_one_line_and_the_same_command_goes_on(folder, tmp_path):
+    some = config(folder, "short", json=str(tmp_path / "e.json"), time_limit=0.5)
+    evaluate(replace(some, episodes=1), load=load)
+    with pytest.raises(HandrailError, match="a worker was killed") as error:
+        evaluate(replace(some, episodes=3, workers=2), load=killed)
+    assert "\n" not in str(error.value)
+    assert len(rollouts(evaluate(replace(some, episodes=3), load=load), "ee intent")) == 3
+
+
+def test_an_intent_meets_the_controller_of_its_mode(folder):
+    """What the policy asks for in teleop mode is completed as in teleop: the hand goes to the goal."""
+    content = evaluate(
+        config(folder, "chase", "chase_realised", protection="own,none", time_limit=12.0), load=load
+    )
+    assert set(content["arms"]) == {"ee intent", "ee intent unprotected", "ee"}
+    for label in content["arms"]:
+        assert all(row["success"] for row in rollouts(content, label)), label
+        assert all(row["time_to_success"] == row["length"] for row in rollouts(content, label))
+    table = evaluation_table(content)
+    assert len(table.rows) == 3
+
+
+@pytest.mark.parametrize(("name", "protection"), [("bold", "mpc"), ("bold", "filter"), ("bold_hand", "own")])
+def test_protected_policies_touch_nothing_whatever_they_do(folder, name, protection):
+    asked = config(folder, name, protection=protection, episodes=3, time_limit=10.0)
+    label = arms(asked)[0].label
+    for row in rollouts(evaluate(asked, load=load), label):
+        assert row["contacts"] == 0
+        assert row["smallest_distance"] > 0.0
+
+
+def test_without_protection_the_same_policy_does_touch(folder):
+    content = evaluate(config(folder, "bold", episodes=3, time_limit=10.0), load=load)
+    rows = rollouts(content, "direct")
+    assert sum(row["contacts"] for row in rows) > 0
+    assert all(row["contact_time"] > 0 for row in rows if row["contacts"])
+
+
+@pytest.mark.parametrize("protection", ["own", "none"])
+def test_unusable_actions_brake_and_are_counted(folder, protection):
+    asked = config(folder, "nan", protection=protection, episodes=1, time_limit=2.0)
+    (row,) = rollouts(evaluate(asked, load=load), arms(asked)[0].label)
+    assert row["malformed"] == 8  # every fifth of 40 actions
+    assert row["brakes"] >= row["malformed"]
+    assert row["length"] == 2.0
+
+
+def test_a_policy_of_another_size_moves_nothing(folder):
+    (row,) = rollouts(evaluate(config(folder, "short", episodes=1, time_limit=1.0), load=load), "ee intent")
+    assert row["malformed"] == row["brakes"] == 20
+    assert row["failure_reason"] == "timeout"
+
+
+WRONG = {
+    "nobody": ({}, (), "policy: expected one checkpoint folder or more"),
+    "no checkpoint": ({}, ("nothing",), "expected a checkpoint with a config.json, found none"),
+    "episodes": ({"episodes": 0}, ("chase",), "--episodes 0: expected a whole number"),
+    "protection": ({"protection": "prayer"}, ("chase",), "unknown protection 'prayer'"),
+    "perturbation": ({"perturbation": "rain"}, ("chase",), "unknown perturbation 'rain'"),
+    "size": ({"perturbation": "push:-1"}, ("chase",), "--perturbation push:-1: expected a number above 0"),
+    "half a period": (
+        {"perturbation": "delay:1.5"},
+        ("chase",),
+        "expected a whole number of control periods",
+    ),
+    "twice": ({"perturbation": "push+push"}, ("chase",), "expected each of push, shift, delay once"),
+    "filter": ({"protection": "filter"}, ("chase",), "expected a policy that commands every joint"),
+    "rests": ({"protection": "mpc"}, ("single",), "expected a policy that commands every joint"),
+    "tasks": ({}, ("chase", "bold"), "expected policies for one task, got pick_place, reach"),
+    "the same policy": ({}, ("chase", "nan"), "expected each dataset draw and training seed once"),
+    "json": ({"json": "no/such/folder/e.json"}, ("chase",), "expected a .json file in an existing folder"),
+    "video": ({"video": "film.gif"}, ("chase",), "expected a .mp4 file in an existing folder"),
+    "time": ({"time_limit": -1.0}, ("chase",), "--time_limit -1.0: expected 0"),
+}
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_wrong_input_is_one_clear_line(case, folder):
+    settings, names, words = WRONG[case]
+    with pytest.raises(HandrailError) as raised:
+        evaluate(config(folder, *names, **settings), load=load)
+    assert words in str(raised.value)
+    assert "\n" not in str(raised.value)
+
+
+def test_a_file_of_something_else_is_not_added_to(folder, tmp_path):
+    file = tmp_path / "e.json"
+    asked = config(folder, "chase", json=str(file), episodes=1, time_limit=0.5)
+    evaluate(asked, load=load)
+    before = file.read_bytes()
+    for other, words in (
+        (config(folder, "nan", json=str(file), time_limit=0.5), "has another policy with dataset draw"),
+        (config(folder, "bold", json=str(file)), "expected task reach, got pick_place"),
+        (replace(asked, time_limit=1.0), "expected {"),
+    ):
+        with pytest.raises(HandrailError, match=words):
+            evaluate(other, load=load)
+        assert file.read_bytes() == before
+    file.write_text("{}")
+    with pytest.raises(HandrailError, match="expected the format"):
+        evaluate(asked, load=load)
+
+
+def test_the_command_says_one_line():
+    done = command("--policy", "nowhere", name="evaluate")
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1), done.stderr
+    assert "expected a checkpoint with a config.json" in done.stderr
+    assert "--perturbation" in command("--help", name="evaluate").stdout
+
+
+@pytest.mark.needs_gl
+def test_a_rollout_can_be_filmed(folder, tmp_path):
+    import av
+
+    from handrail.policies.imitation.evaluation.video import film
+
+    path = tmp_path / "film.mp4"
+    asked = config(folder, "chase", video=str(path), time_limit=0.5, episodes=1)
+    assert film(asked, evaluate(asked, load=load), load) == ""
+    with av.open(str(path)) as video:
+        pictures = [frame.to_ndarray(format="rgb24") for frame in video.decode(video=0)]
+    assert len(pictures) == 10
+    assert np.std(pictures[0]) > 10

@@ -1,0 +1,207 @@
+"""Policies of plain `lerobot-train` are evaluated, or it is said why not; a bad one stops no other."""
+
+import io
+import json
+import shutil
+
+import pytest
+from command_helpers import command
+from policy_helpers import StandIn, checkpoint, load, untrained_act
+from rich.console import Console
+
+from handrail.controllers.errors import HandrailError
+from handrail.policies.imitation.evaluation.conditions import arms
+from handrail.policies.imitation.evaluation.config import EvaluateConfig
+from handrail.policies.imitation.evaluation.evaluation import UnevaluatedError, evaluate
+from handrail.policies.imitation.evaluation.table import evaluation_table
+from handrail.policies.imitation.evaluation.video import film
+from handrail.policies.imitation.interface.checkpoint import NAME
+
+FEATURES = {
+    "observation.state": {"type": "STATE", "shape": [26]},
+    "observation.environment_state": {"type": "ENV", "shape": [7]},
+}
+
+
+@pytest.fixture(scope="module")
+def honest(tmp_path_factory):
+    """A policy that reads and writes what is recorded in `reach`, as lerobot-train leaves it."""
+    folder = tmp_path_factory.mktemp("lerobot") / "checkpoints" / "000100" / "pretrained_model"
+    untrained_act(folder, "recorded")
+    (folder / NAME).unlink()
+    (folder / "train_config.json").write_text('{"seed": 1000}')
+    return folder
+
+
+@pytest.fixture
+def plain(honest, tmp_path):
+    return shutil.copytree(honest, tmp_path / "plain")
+
+
+def reads(folder, **features):
+    """Let a policy say that it reads something else."""
+    path = folder / "config.json"
+    path.write_text(json.dumps(json.loads(path.read_text()) | {"input_features": features}))
+
+
+def config(*folders, **settings):
+    return EvaluateConfig(policy=tuple(map(str, folders)), **({"episodes": 1, "time_limit": 0.5} | settings))
+
+
+def test_a_policy_of_plain_lerobot_drives(honest):
+    content = evaluate(config(honest.parents[2]))  # the training's folder
+    assert content["task"] == "reach"
+    (entry,) = content["arms"]["act"]
+    assert entry["training_seed"] == 1000
+    (row,) = entry["rollouts"]
+    assert (row["length"], row["malformed"]) == (0.5, 0)
+    conditions = content["conditions"]["act"]
+    assert (conditions["robot"], conditions["fps"], conditions["actions"]) == (
+        "ridgeback_ur10",
+        "20",
+        "recorded",
+    )
+
+
+def test_the_rate_is_the_one_that_is_asked_for(honest):
+    (arm,) = arms(config(honest, fps=50))
+    assert arm.checkpoint.meta.fps == 50
+
+
+@pytest.mark.parametrize(
+    ("size", "movers", "task"),
+    [(7, 0, "reach"), (19, 2, "reach"), (28, 0, "pick_place"), (29, 0, "tray"), (9, 0, "drawer")],
+)
+def test_the_features_say_which_task(size, movers, task, plain):
+    reads(plain, **FEATURES | {"observation.environment_state": {"type": "ENV", "shape": [size]}})
+    (arm,) = arms(config(plain))
+    assert (arm.checkpoint.meta.environment, arm.checkpoint.movers) == (task, movers)
+
+
+def picture(*shape):
+    return {"type": "VISUAL", "shape": shape}
+
+
+def test_without_the_environment_s_state_the_task_has_to_be_said(plain):
+    reads(
+        plain,
+        **{
+            "observation.state": FEATURES["observation.state"],
+            "observation.images.wrist": picture(3, 64, 64),
+        },
+    )
+    with pytest.raises(HandrailError, match="expected --task with one of drawer, pick_place, reach, tray"):
+        arms(config(plain))
+    (arm,) = arms(config(plain, task="tray"))
+    assert (arm.checkpoint.meta.environment, dict(arm.checkpoint.pictures)) == ("tray", {"wrist": (64, 64)})
+
+
+@pytest.mark.parametrize(
+    ("features", "words"),
+    [
+        (
+            {"observation.state": {"type": "STATE", "shape": [6]}},
+            "got state 6, environment_state 7, action 10",
+        ),
+        ({"observation.environment_state": {"type": "ENV", "shape": [8]}}, "environment_state 8"),
+        ({"observation.force": {"type": "STATE", "shape": [6]}}, "observation.force"),
+        ({"observation.images.front": picture(3, 64, 64)}, "camera 'front': expected one of wrist, scene"),
+        ({"observation.images.wrist": picture(64, 64)}, "expected channels, height and width"),
+        ({"observation.state": {"type": "STATE", "shape": [2, 13]}}, "expected one dimension"),
+        ({"observation.state": {"type": "STATE", "shape": ["x"]}}, "whole numbers as shapes"),
+        ({"observation.state": 3}, "expected input_features of LeRobot"),
+    ],
+)
+def test_what_cannot_be_evaluated_says_why_in_one_line(features, words, plain):
+    reads(plain, **FEATURES | features)
+    with pytest.raises(HandrailError, match=words) as raised:
+        evaluate(config(plain))
+    assert "\n" not in str(raised.value)
+    done = command("--policy", plain, name="evaluate")
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1), done.stderr
+
+
+def test_a_task_that_is_not_its_own_is_refused(plain):
+    with pytest.raises(HandrailError, match="expected the features of a task"):
+        arms(config(plain, task="drawer"))
+
+
+def test_what_a_policy_does_not_take_is_one_line(plain):
+    """A state of another size than its weights have."""
+    path = plain / "config.json"
+    content = json.loads(path.read_text())
+    path.write_text(json.dumps(content | {"dim_model": 64}))
+    with pytest.raises(HandrailError, match=r"policy .*size mismatch") as raised:
+        evaluate(config(plain))
+    assert "\n" not in str(raised.value)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    root = tmp_path_factory.mktemp("policies")
+    checkpoint(root / "good")
+    checkpoint(root / "good_1", training_seed=1)
+    checkpoint(root / "mixed", training_seed=2)
+    meta = json.loads((root / "mixed" / NAME).read_text())
+    (root / "mixed" / NAME).write_text(json.dumps(meta | {"mode": "mixed"}))
+    checkpoint(root / "broken", training_seed=3)
+    return root
+
+
+def unable(path):
+    """Load a policy, but for one that cannot be loaded."""
+    if path.name == "broken":
+        raise HandrailError("broken: no weights")
+    return StandIn(load(path).interface, "still")
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_one_bad_policy_is_named_and_the_others_run(workers, folder, tmp_path):
+    file = tmp_path / "e.json"
+    names = ("nothing", "mixed", "broken", "good", "good_1")
+    asked = config(*(folder / name for name in names), json=str(file), workers=workers, episodes=3)
+    with pytest.raises(UnevaluatedError) as raised:
+        evaluate(asked, load=unable)
+    assert [reason.count("\n") for reason in raised.value.reasons] == [0, 0, 0]
+    for name, words in (
+        ("nothing", "found none"),
+        ("mixed", "unknown teleop mode 'mixed'"),
+        ("broken", "no weights"),
+    ):
+        assert any(words in reason for reason in raised.value.reasons), name
+    assert json.loads(file.read_text()) == raised.value.content
+    runs = raised.value.content["arms"]["ee intent"]
+    assert [(run["training_seed"], len(run["rollouts"])) for run in runs] == [(0, 3), (1, 3)]
+
+
+@pytest.mark.needs_gl
+def test_the_first_policy_that_drove_is_filmed(folder, tmp_path):
+    asked = config(folder / "broken", folder / "good", video=str(tmp_path / "film.mp4"))
+    with pytest.raises(UnevaluatedError) as raised:
+        evaluate(asked, load=unable)
+    assert film(asked, raised.value.content, unable) == ""
+    assert (tmp_path / "film.mp4").stat().st_size > 0
+
+
+def test_the_command_names_the_bad_policy_and_ends_with_1(honest, tmp_path):
+    flags = ["--policy", tmp_path / "nothing", honest, "--episodes", 1, "--time_limit", 0.2]
+    done = command(*flags, name="evaluate")
+    assert done.returncode == 1
+    assert [line for line in done.stderr.splitlines() if line.startswith("error: ")] == [
+        f"error: policy '{tmp_path / 'nothing'}': expected a checkpoint with a config.json, found none"
+    ]
+    assert "act" in done.stdout
+
+
+def test_a_label_is_shown_as_it_is(folder, tmp_path):
+    content = evaluate(config(folder / "good", label="[/red]"), load=load)
+    Console(file=(shown := io.StringIO()), width=200).print(evaluation_table(content))
+    assert "[/red]" in shown.getvalue()
+    (tmp_path / "e.json").write_text(json.dumps(content | {"conditions": []}))
+    with pytest.raises(HandrailError, match="expected conditions by arm"):
+        evaluate(config(folder / "good", json=str(tmp_path / "e.json")), load=load)
+
+
+def test_only_bad_policies_are_bad_input(folder):
+    with pytest.raises(HandrailError, match="found none; unknown teleop mode"):
+        evaluate(config(folder / "nothing", folder / "mixed"), load=unable)

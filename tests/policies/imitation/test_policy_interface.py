@@ -1,0 +1,183 @@
+"""What policies read and write: the same everywhere in the world, and nothing lost on the way."""
+
+import dataclasses
+import json
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from handrail.controllers.errors import HandrailError
+from handrail.controllers.interface.channels import Channels
+from handrail.controllers.robot.description import load_description
+from handrail.datasets.format.schema import Feature
+from handrail.policies.imitation.interface.interface import PolicyInterface
+
+CHANNELS = Channels.of(load_description("ridgeback_ur10"))
+JOINTS = [name.removeprefix("joint.") for name in CHANNELS.joints]
+POSE = ("x", "y", "z", "qw", "qx", "qy", "qz")
+STATE = (
+    *(f"{joint}.pos" for joint in JOINTS),
+    *(f"{joint}.vel" for joint in JOINTS),
+    "gripper.opening",
+    *(f"tool.{axis}" for axis in POSE),
+)
+ENVIRONMENT = (
+    *(f"cube.{axis}" for axis in POSE),
+    *(f"bin.{axis}" for axis in "xyz"),
+    "inward.nx",
+    "inward.ny",
+    "drawer.opening",
+    *(f"obstacle_0.{part}" for part in ("x", "y", "radius", "height")),
+    *(f"obstacle_1.{part}" for part in ("x", "y", "radius", "height")),
+)
+FEATURES = {
+    "observation.state": Feature("float32", (len(STATE),), STATE),
+    "observation.environment_state": Feature("float32", (len(ENVIRONMENT),), ENVIRONMENT),
+    "teleop.values": Feature("float32", (CHANNELS.size + 1,), (*CHANNELS.names, "gripper")),
+}
+
+
+def episode(rng, masks, length=6):
+    """A made-up episode; `obstacle_1` is not there."""
+    state = rng.normal(size=(length, len(STATE)))
+    environment = rng.normal(size=(length, len(ENVIRONMENT)))
+    state[:, -4:] = Rotation.random(length, rng=rng).as_quat(scalar_first=True)
+    environment[:, 3:7] = Rotation.random(length, rng=rng).as_quat(scalar_first=True)
+    environment[:, -4:] = 0.0
+    mask = np.array([np.append(CHANNELS.mask(*masks[i % len(masks)]), True) for i in range(length)])
+    values = np.where(mask, rng.normal(size=mask.shape), 0.0)
+    values[:, -1] = rng.integers(0, 2, length)
+    return {
+        "observation.state": state,
+        "observation.environment_state": environment,
+        "action": np.column_stack([rng.normal(size=(length, len(JOINTS))), values[:, -1]]),
+        "teleop.values": values,
+        "teleop.mask": mask,
+    }
+
+
+def moved(columns, shift, angle):
+    """The same episode at another place of the world, turned by an angle."""
+    turn = Rotation.from_euler("z", angle)
+    flat = turn.as_matrix()[:2, :2]
+    out = {key: np.array(column) for key, column in columns.items()}
+    state, environment = out["observation.state"], out["observation.environment_state"]
+    state[:, :2] = state[:, :2] @ flat.T + shift
+    state[:, 2] += angle
+    n = len(JOINTS)
+    state[:, n : n + 2] = state[:, n : n + 2] @ flat.T
+    for numbers, at in ((state, len(STATE) - 7), (environment, 0)):
+        numbers[:, at : at + 2] = numbers[:, at : at + 2] @ flat.T + shift
+        quaternion = Rotation.from_quat(numbers[:, at + 3 : at + 7], scalar_first=True)
+        numbers[:, at + 3 : at + 7] = (turn * quaternion).as_quat(scalar_first=True)
+    for at in (7, 13):  # bin, obstacle_0
+        environment[:, at : at + 2] = environment[:, at : at + 2] @ flat.T + shift
+    environment[:, 10:12] = environment[:, 10:12] @ flat.T
+    values, start = out["teleop.values"], CHANNELS.tool_slice.start
+    for at in (start, start + 3, CHANNELS.joint_slice.start):
+        values[:, at : at + 2] = values[:, at : at + 2] @ flat.T
+    return out
+
+
+@pytest.mark.parametrize("actions", ["realised", "intent"])
+def test_same_everywhere(actions):
+    """A policy sees and writes the same wherever in the world the same thing happens."""
+    rng = np.random.default_rng(0)
+    columns = episode(rng, [("ee",), ("base", "joint")])
+    other = moved(columns, np.array([3.0, -2.0]), 2.1)
+    interface = PolicyInterface.of_dataset(FEATURES, [columns], actions)
+    for seen in zip(
+        interface.observe(columns["observation.state"], columns["observation.environment_state"]),
+        interface.observe(other["observation.state"], other["observation.environment_state"]),
+        strict=True,
+    ):
+        np.testing.assert_allclose(seen[0], seen[1], atol=1e-5)
+    np.testing.assert_allclose(interface.encode(columns), interface.encode(other), atol=1e-5)
+
+
+def test_a_policy_does_not_see_how_fast_the_robot_moves():
+    columns = episode(np.random.default_rng(1), [("ee",)])
+    faster, farther = (np.array(columns["observation.state"]) for _ in range(2))
+    n = len(JOINTS)
+    faster[:, n : 2 * n] *= 3.0
+    farther[:, 5] += 0.1
+    interface = PolicyInterface.of_dataset(FEATURES, [columns], "realised")
+    seen, same, other = (
+        np.column_stack(interface.observe(state, columns["observation.environment_state"]))
+        for state in (columns["observation.state"], faster, farther)
+    )
+    np.testing.assert_array_equal(seen, same)
+    assert not np.array_equal(seen, other)
+
+
+@pytest.mark.parametrize("masks", [[("ee",)], [("base",), ("ee",)], [("joint",)], [("ee.vx", "ee.wz")]])
+def test_intent_comes_back(masks):
+    """The intent that an action stands for is the one that was recorded."""
+    columns = episode(np.random.default_rng(1), masks)
+    interface = PolicyInterface.of_dataset(FEATURES, [columns], "intent")
+    for t, action in enumerate(interface.encode(columns)):
+        intent = interface.decode(action, columns["observation.state"][t])
+        np.testing.assert_allclose(intent.values, columns["teleop.values"][t, :-1], atol=1e-5)
+        assert intent.mask.tolist() == columns["teleop.mask"][t, :-1].tolist()
+        assert intent.gripper == columns["teleop.values"][t, -1]
+
+
+def test_realised_is_the_next_velocity():
+    columns = episode(np.random.default_rng(2), [("ee",)])
+    interface = PolicyInterface.of_dataset(FEATURES, [columns], "realised")
+    state, n = columns["observation.state"], len(JOINTS)
+    for t, action in enumerate(interface.encode(columns)[:-1]):
+        intent = interface.decode(action, state[t])
+        assert intent.mask.tolist() == CHANNELS.mask("joint").tolist()
+        np.testing.assert_allclose(intent.values[CHANNELS.joint_slice], state[t + 1, n : 2 * n], atol=1e-5)
+
+
+def test_at_the_goal_the_errors_vanish():
+    columns = episode(np.random.default_rng(3), [("ee",)])
+    columns["observation.environment_state"][:, :7] = columns["observation.state"][:, -7:]
+    interface = PolicyInterface.of_dataset(FEATURES, [columns], "realised")
+    _, around = interface.observe(columns["observation.state"], columns["observation.environment_state"])
+    names = interface.observation_names[1]
+    rotation = [name.startswith("cube.r") for name in names]
+    offset = [name.startswith("cube.") and not name.startswith("cube.r") for name in names]
+    np.testing.assert_allclose(around[:, offset], 0.0, atol=1e-5)
+    np.testing.assert_allclose(around[:, rotation], np.tile(np.eye(3).ravel(), (len(around), 1)), atol=1e-6)
+
+
+def test_what_is_not_there_stays_zero():
+    columns = episode(np.random.default_rng(4), [("ee",)])
+    interface = PolicyInterface.of_dataset(FEATURES, [columns], "realised")
+    _, around = interface.observe(columns["observation.state"], columns["observation.environment_state"])
+    names = interface.observation_names[1]
+    assert around.shape[1] == len(names)
+    assert not around[:, [name.startswith("obstacle_1") for name in names]].any()
+
+
+@pytest.mark.parametrize("actions", ["realised", "intent"])
+def test_json_round_trip(actions):
+    columns = episode(np.random.default_rng(5), [("base",), ("ee",)])
+    interface = PolicyInterface.of_dataset(FEATURES, [columns], actions)
+    assert PolicyInterface.from_dict(json.loads(json.dumps(interface.to_dict()))) == interface
+
+
+def test_wrong_inputs_are_named():
+    columns = episode(np.random.default_rng(6), [("ee",)])
+    with pytest.raises(HandrailError, match=r"action space.*intent, realised"):
+        PolicyInterface.of_dataset(FEATURES, [columns], "torques")
+    with pytest.raises(HandrailError, match=r"observation\.environment_state"):
+        PolicyInterface.of_dataset(
+            {"observation.state": Feature("float32", (1,), ("a",))}, [columns], "intent"
+        )
+    idle = columns | {"teleop.mask": np.zeros_like(columns["teleop.mask"])}
+    with pytest.raises(HandrailError, match="steers"):
+        PolicyInterface.of_dataset(FEATURES, [idle], "intent")
+    with pytest.raises(HandrailError, match="policy interface"):
+        PolicyInterface.from_dict({"actions": "realised"})
+    lacking = dict(FEATURES)
+    names = tuple("other" if name == "tool.x" else name for name in STATE)
+    lacking["observation.state"] = dataclasses.replace(FEATURES["observation.state"], names=names)
+    with pytest.raises(HandrailError, match=r"tool\.x"):
+        PolicyInterface.of_dataset(lacking, [columns], "realised").observe(
+            columns["observation.state"], columns["observation.environment_state"]
+        )

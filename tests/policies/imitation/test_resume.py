@@ -1,0 +1,137 @@
+"""Training of imitation policies that was cut off, killed or resumed: the same to the bit, or refused."""
+
+import dataclasses
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+from training_helpers import TINY, tiny, weights, write_dataset
+
+from handrail.collect.config import StoredConfig
+from handrail.controllers.errors import HandrailError
+from handrail.policies.imitation.interface.checkpoint import last_checkpoint, read_meta, write_meta
+from handrail.policies.imitation.training import presets
+from handrail.policies.imitation.training.curve import read_curve
+from handrail.policies.imitation.training.source import read_source
+from handrail.policies.imitation.training.training import train
+
+pytestmark = pytest.mark.filterwarnings("ignore:.*(torchcodec|pin_memory|video).*")
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory):
+    return write_dataset(tmp_path_factory.mktemp("data") / "set")
+
+
+@pytest.fixture(scope="module")
+def trained(recorded, tmp_path_factory):
+    """A training that was never interrupted, and its settings."""
+    config = tiny(recorded, tmp_path_factory.mktemp("trained") / "policy")
+    return train(config, quiet=True), config
+
+
+def test_a_resumed_training_is_the_same_to_the_bit(trained, tmp_path):
+    """With dropout, over the end of an epoch: 24 samples are three batches."""
+    folder, config = trained
+    again = dataclasses.replace(config, output=str(tmp_path / "cut"), resume=True)
+    shutil.copytree(config.folder, tmp_path / "cut", symlinks=True)
+    shutil.rmtree(tmp_path / "cut" / "checkpoints" / "000006")
+    assert weights(train(again, quiet=True)) == weights(folder)
+    longer = train(dataclasses.replace(again, steps=8), quiet=True)
+    assert read_meta(longer)[1].steps == 8
+
+
+def cut(config, folder):
+    """Copy a training without its last checkpoint; return the settings that go on with it."""
+    shutil.copytree(config.folder, folder, symlinks=True)
+    shutil.rmtree(folder / "checkpoints" / "000006")
+    return dataclasses.replace(config, output=str(folder), resume=True)
+
+
+def test_a_training_goes_on_with_its_own_episodes_however_the_dataset_grew(recorded, tmp_path):
+    part = tiny(recorded, tmp_path / "whole", episodes=2, draw=3)
+    whole = train(part, quiet=True)
+    grown = StoredConfig(root=str(write_dataset(tmp_path / "grown", lengths=(9, 7, 8, 5, 6))))
+    assert weights(train(cut(part, tmp_path / "cut"), quiet=True)) == weights(whole)
+    later = dataclasses.replace(cut(part, tmp_path / "later"), dataset=grown)
+    chosen = read_source(dataclasses.replace(later, resume=False)).selection
+    before, meta = read_source(part).selection, read_meta(whole)[1]
+    assert [row["episode_index"] for row in before.rows] == meta.episodes
+    assert [row["episode_index"] for row in chosen.rows] != meta.episodes, "a draw that shows nothing"
+    resumed = train(later, quiet=True)
+    assert weights(resumed) == weights(whole)
+    assert read_meta(resumed)[1].trained_on == meta.trained_on
+
+
+def test_a_training_does_not_go_on_with_other_data_fewer_steps_or_other_sizes(
+    trained, recorded, tmp_path, monkeypatch
+):
+    config = cut(trained[1], tmp_path / "cut")
+    longer = write_dataset(tmp_path / "longer", lengths=(9, 8, 7))
+    fewer = write_dataset(tmp_path / "fewer", lengths=(9, 7))
+    for root, said in ((longer, "got others"), (fewer, "has no episode 2")):
+        with pytest.raises(HandrailError, match=said):
+            train(dataclasses.replace(config, dataset=StoredConfig(root=str(root))), quiet=True)
+    with pytest.raises(HandrailError, match="--steps 5: expected 6 or more"):
+        train(dataclasses.replace(config, steps=5), quiet=True)
+    monkeypatch.setitem(presets._ACT_CPU, "dropout", 0.1)
+    with pytest.raises(HandrailError, match=r"dropout 0\.1: expected 0\.0"):
+        train(config, quiet=True)
+
+
+def test_a_checkpoint_of_an_earlier_version_goes_on_with_as_much_data(recorded, tmp_path):
+    config = tiny(recorded, tmp_path / "whole")
+    whole = train(config, quiet=True)
+    for number, root in enumerate((recorded, write_dataset(tmp_path / "more", lengths=(9, 7, 8, 5)))):
+        again = dataclasses.replace(
+            cut(config, tmp_path / f"cut{number}"), dataset=StoredConfig(root=str(root))
+        )
+        interface, meta = read_meta(folder := again.folder / "checkpoints" / "000003" / "pretrained_model")
+        write_meta(folder, interface, dataclasses.replace(meta, episodes=(), data="", sizes={}))
+        if number:
+            with pytest.raises(HandrailError, match="expected the 3 episodes"):
+                train(again, quiet=True)
+        else:
+            assert weights(train(again, quiet=True)) == weights(whole)
+
+
+def test_a_killed_training_goes_on(recorded, tmp_path):
+    steps = 250
+    whole = tiny(recorded, tmp_path / "whole", steps=steps, save_freq=20)
+    killed = dataclasses.replace(whole, output=str(tmp_path / "killed"), resume=True)
+    flags = ["--dataset.root", recorded, "--output", killed.output, "--steps", steps, "--batch_size", 8]
+    flags += ["--save_freq", 20, "--resume", "--policy_options", *TINY]
+    process = subprocess.Popen(
+        [sys.executable, "-m", "handrail.scripts.train", *map(str, flags)],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+    try:
+        while last_checkpoint(killed.folder) is None and process.poll() is None:
+            time.sleep(0.01)
+        time.sleep(np.random.default_rng(0).uniform(0.0, 0.1))
+    finally:
+        os.kill(process.pid, signal.SIGKILL)
+        process.wait()
+    reached = last_checkpoint(killed.folder)
+    assert reached is not None
+    assert reached.name < f"{steps:06d}", "killed too late to see anything"
+    killed = dataclasses.replace(killed, dataset=StoredConfig(root=str(recorded)))
+    assert weights(train(killed, quiet=True)) == weights(train(whole, quiet=True))
+
+
+def test_the_curve_has_a_row_every_fifty_updates_also_after_a_cut(recorded, tmp_path):
+    config = tiny(recorded, tmp_path / "policy", steps=100, save_freq=50)
+    train(config, quiet=True)
+    first = read_curve(config.folder)
+    assert [row["step"] for row in first] == [50, 100]
+    assert first[1]["loss"] < first[0]["loss"]
+    shutil.rmtree(config.folder / "checkpoints" / "000100")
+    train(dataclasses.replace(config, resume=True), quiet=True)
+    again = read_curve(config.folder)
+    assert [(row["step"], row["loss"]) for row in again] == [(row["step"], row["loss"]) for row in first]

@@ -1,0 +1,265 @@
+"""Training of imitation policies: the same numbers as LeRobot's own, the right episodes, nothing lost."""
+
+import dataclasses
+import json
+import os
+import subprocess
+import sys
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+from command_helpers import command
+from training_helpers import FPS, TINY, features, tiny, weights, write_dataset
+
+from handrail.collect.config import StoredConfig
+from handrail.controllers.errors import HandrailError
+from handrail.datasets.reading.reader import read_episodes, read_frames
+from handrail.policies.imitation.config import TrainConfig
+from handrail.policies.imitation.interface.checkpoint import load_policy, read_meta
+from handrail.policies.imitation.interface.interface import PolicyInterface
+from handrail.policies.imitation.training import presets
+from handrail.policies.imitation.training.presets import policy_config
+from handrail.policies.imitation.training.source import read_source, steadied
+from handrail.policies.imitation.training.training import train
+
+pytestmark = pytest.mark.filterwarnings("ignore:.*(torchcodec|pin_memory|video).*")
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory):
+    return write_dataset(tmp_path_factory.mktemp("data") / "set")
+
+
+@pytest.fixture(scope="module")
+def trained(recorded, tmp_path_factory):
+    """A training that was never interrupted, and its settings."""
+    config = tiny(recorded, tmp_path_factory.mktemp("trained") / "policy")
+    return train(config, quiet=True), config
+
+
+@pytest.mark.parametrize("policy", ["act", "diffusion"])
+def test_the_dataset_in_memory_gives_the_same_tensors_as_lerobot_s_own(policy, recorded, tmp_path):
+    from lerobot.datasets.factory import resolve_delta_timestamps
+    from lerobot.datasets.lerobot_dataset import LeRobotDataset
+    from torch.utils.data import default_collate
+
+    options = TINY if policy == "act" else ("horizon=8", "n_action_steps=4")
+    config = dataclasses.replace(
+        tiny(recorded, tmp_path), actions="recorded", policy=policy, policy_options=options
+    )
+    described = policy_config(config)
+    ours = read_source(config).dataset(described)
+    stamps = resolve_delta_timestamps(described, ours.meta)
+    theirs = LeRobotDataset("handrail/test", root=recorded, delta_timestamps=stamps)
+    assert len(ours) == len(theirs)
+    batch = ours.batch(range(len(ours)))
+    for index in range(len(ours)):
+        sample: Any = theirs[index]
+        for key in set(ours.columns) | {f"{key}_is_pad" for key in ours.windows}:
+            assert torch.equal(batch[key][index], sample[key]), key
+            assert torch.equal(ours[index][key], sample[key]), key
+        assert batch["task"][index] == sample["task"]
+    assert any(batch[f"{key}_is_pad"].any() for key in ours.windows)
+    collated = default_collate(ours.__getitems__([3, 1]))
+    assert type(collated) is dict
+    assert torch.equal(collated["action"], batch["action"][[3, 1]])
+
+
+def test_what_is_learnt_is_what_the_interface_makes_of_the_recording(recorded, tmp_path):
+    source = read_source(dataclasses.replace(tiny(recorded, tmp_path), actions="intent"))
+    frames = read_frames(recorded, 1)
+    assert source.interface is not None
+    state, environment = source.interface.observe(
+        frames["observation.state"], frames["observation.environment_state"]
+    )
+    rows = source.columns["episode_index"] == 1
+    np.testing.assert_array_equal(source.columns["observation.state"][rows], state)
+    np.testing.assert_array_equal(source.columns["observation.environment_state"][rows], environment)
+    np.testing.assert_array_equal(source.columns["action"][rows], source.interface.encode(frames))
+
+
+def test_statistics_are_of_the_chosen_episodes_only(recorded, tmp_path):
+    config = tiny(recorded, tmp_path, episodes=1)
+    source = read_source(config)
+    dataset = source.dataset(policy_config(config))
+    np.testing.assert_allclose(
+        dataset.meta.stats["action"]["mean"], source.columns["action"].mean(axis=0), atol=1e-6
+    )
+    assert dataset.num_episodes == 1
+
+
+def test_what_hardly_moved_is_not_blown_up():
+    still = {name: np.array([2.0, 2.0]) for name in ("min", "max", "q01", "q99", "q10", "q90", "mean")}
+    steady = steadied(still | {"std": np.array([0.0, 0.5])})
+    assert 1e-3 <= steady["std"][0] < steady["std"][1] == 0.5
+    np.testing.assert_allclose(steady["max"] - steady["min"], 2 * steady["std"][0])
+    np.testing.assert_allclose((steady["max"] + steady["min"]) / 2, 2.0)
+
+
+def test_a_checkpoint_says_all_that_is_needed(trained, recorded):
+    folder, config = trained
+    interface, meta = read_meta(folder)
+    assert folder.parent.name == "000006"
+    assert os.readlink(folder.parents[1] / "last") == "000006"
+    frames = [read_frames(recorded, row["episode_index"]) for row in read_episodes(recorded)]
+    assert interface == PolicyInterface.of_dataset(features(), frames, "realised")
+    assert (meta.environment, meta.mode, meta.robot, meta.fps) == ("reach", "ee", "ridgeback_ur10", FPS)
+    assert meta.trained_on == {"episodes": 3, "attempts": 3, "operator_time": 24 / FPS}
+    assert (meta.steps, meta.policy, meta.training["batch_size"]) == (6, "act", 8)
+    assert json.loads((config.folder / "training.json").read_text())["steps"] == 6
+
+
+def test_a_loaded_policy_acts_like_lerobot_s(trained, recorded):
+    from lerobot.policies.act.modeling_act import ACTPolicy
+
+    policy = load_policy(trained[0])
+    assert policy.interface is not None
+    frames = read_frames(recorded, 0)
+    seen = policy.interface.observe(
+        frames["observation.state"][0], frames["observation.environment_state"][0]
+    )
+    first = policy.act(*seen)
+    assert first.shape == (len(policy.interface.action_names),)
+    assert first.dtype == np.float32
+    second = policy.act(*seen)
+    policy.reset()
+    np.testing.assert_array_equal(policy.act(*seen), first)
+    assert not np.array_equal(first, second)  # the next of the chunk
+    plain = ACTPolicy.from_pretrained(trained[0])
+    keys = ("observation.state", "observation.environment_state")
+    batch = policy.before({key: torch.from_numpy(part)[None] for key, part in zip(keys, seen, strict=True)})
+    np.testing.assert_array_equal(policy.after(plain.select_action(batch))[0].numpy(), first)
+
+
+def test_the_same_seed_gives_the_same_weights_and_another_seed_others(trained, tmp_path):
+    folder, config = trained
+    again = train(dataclasses.replace(config, output=str(tmp_path / "again")), quiet=True)
+    assert weights(again) == weights(folder)
+    other = train(dataclasses.replace(config, output=str(tmp_path / "other"), seed=1), quiet=True)
+    assert weights(other) != weights(folder)
+
+
+def test_sizes_are_what_the_policy_and_the_training_get(recorded, tmp_path):
+    config = tiny(
+        recorded, tmp_path, policy_options=("chunk_size=7", "n_action_steps=3"), batch_size=0, lr=0.25
+    )
+    sizes, described = presets.resolved(config), vars(policy_config(config))
+    for name, value in sizes.options.items():
+        assert described[name] == value
+    assert described["optimizer_lr"] == described["optimizer_lr_backbone"] == sizes.lr == 0.25
+    assert sizes.batch_size == presets.preset_of(config).batch_size > 0
+    assert sizes.steps == 6
+    assert described["temporal_ensemble_coeff"] is None
+
+
+@pytest.mark.parametrize("option", ["dim_model=130", "dropout=2.0", "feedforward_activation=loud"])
+def test_what_a_policy_cannot_be_built_with_is_one_line_before_there_is_data(option, recorded, tmp_path):
+    config = TrainConfig(policy_options=(option,))
+    with pytest.raises(HandrailError, match="policy act: ") as before:
+        presets.check_policy(config)
+    with pytest.raises(HandrailError) as after:
+        train(
+            dataclasses.replace(config, dataset=StoredConfig(root=str(recorded)), output=str(tmp_path)),
+            quiet=True,
+        )
+    assert str(before.value) == str(after.value)
+    presets.check_policy(TrainConfig())
+
+
+def test_only_what_lerobot_refuses_is_put_into_its_mouth(recorded, tmp_path, monkeypatch):
+    monkeypatch.setattr("handrail.policies.imitation.training.memory.MemoryDataset.__getitems__", _ours)
+    with pytest.raises(ValueError, match=r"^an error of ours$"):
+        train(tiny(recorded, tmp_path), quiet=True)
+
+
+def _ours(self, indices):
+    raise ValueError("an error of ours")
+
+
+@pytest.mark.parametrize("resume", [False, True])
+def test_a_file_in_the_place_of_the_training_is_one_line(resume, recorded, tmp_path):
+    (tmp_path / "file").touch()
+    for place, said in (("file", "found a file"), ("file/below", "file/below: ")):
+        with pytest.raises(HandrailError, match=said):
+            train(tiny(recorded, tmp_path / place, resume=resume), quiet=True)
+
+
+def test_a_policy_sees_cameras_where_it_is_asked_to(tmp_path):
+    root = write_dataset(tmp_path / "set", lengths=(5, 6), cameras=("wrist",))
+    config = tiny(root, tmp_path / "policy", "replace_final_stride_with_dilation=0", steps=1, images=True)
+    folder = train(config, quiet=True)
+    policy = load_policy(folder)
+    assert list(policy.policy.config.image_features) == ["observation.images.wrist"]
+    sizes = [feature.shape[0] for feature in policy.policy.config.input_features.values()]
+    dark, light = (np.full((16, 16, 3), level, np.uint8) for level in (0, 255))
+    acted = []
+    for picture in (dark, light):
+        policy.reset()
+        acted.append(policy.act(np.zeros(sizes[0]), np.zeros(sizes[1]), {"wrist": picture}))
+    assert not np.array_equal(*acted)
+
+
+@pytest.mark.parametrize(
+    ("settings", "said"),
+    [
+        ({"policy": "actt"}, "expected one of act"),
+        ({"policy_options": ("chunk=5",)}, "unknown setting of the policy act 'chunk'"),
+        ({"policy_options": ("chunk_size",)}, "expected key=value"),
+        ({"policy_options": ("chunk_size=many",)}, "policy act: .*chunk_size"),
+        ({"policy_options": ("n_action_steps=500",)}, "policy act: .*n_action_steps"),
+        ({"device": "tpu"}, "expected one of cpu"),
+        ({"images": True}, "expected cameras"),
+        ({"steps": -1}, "expected 0 or more"),
+        ({"threads": 0}, "expected 1 or more"),
+        ({"resume": True, "overwrite": True}, "expected one of them"),
+        ({"dataset": StoredConfig(root="nowhere")}, "expected a folder"),
+    ],
+)
+def test_wrong_settings_are_one_line_and_leave_nothing(settings, said, recorded, tmp_path):
+    config = dataclasses.replace(tiny(recorded, tmp_path / "policy", policy_options=()), **settings)
+    with pytest.raises(HandrailError, match=said) as error:
+        train(config, quiet=True)
+    assert "\n" not in str(error.value)
+    assert not (tmp_path / "policy").exists()
+
+
+def test_what_is_there_is_kept_unless_it_may_go(trained, recorded, tmp_path):
+    folder, config = trained
+    with pytest.raises(HandrailError, match="say --resume or --overwrite"):
+        train(config, quiet=True)
+    with pytest.raises(HandrailError, match="--resume with --seed 5: expected 0"):
+        train(dataclasses.replace(config, resume=True, seed=5), quiet=True)
+    assert train(dataclasses.replace(config, resume=True), quiet=True) == folder  # already there
+    for name in ("thesis.tex", "checkpoints/thesis.tex"):
+        thesis = tmp_path / name.replace("/", "-") / name
+        thesis.parent.mkdir(parents=True)
+        thesis.touch()
+        with pytest.raises(HandrailError, match=f"missing or empty folder, found {name}"):
+            train(tiny(recorded, tmp_path / name.replace("/", "-"), overwrite=True), quiet=True)
+        assert thesis.exists()
+
+
+def test_the_command_says_bad_input_in_one_line():
+    done = command("--dataset.root", "nowhere", name="train")
+    assert done.returncode == 2
+    assert len(done.stderr.splitlines()) == 1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("launcher", "processes"),
+    [
+        ("accelerate.commands.accelerate_cli launch --cpu --num_processes 1", 1),
+        ("torch.distributed.run --nproc_per_node 2", 2),  # what accelerate uses where there are several GPUs
+    ],
+)
+def test_several_processes_train_one_policy(launcher, processes, recorded, tmp_path):
+    options = f"--dataset.root {recorded} --output {tmp_path / 'policy'} --steps 6 --batch_size 4"
+    words = ["-m", *launcher.split(), "-m", "handrail.scripts.train", *options.split()]
+    done = subprocess.run([sys.executable, *words, "--policy_options", *TINY], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr[-2000:]
+    assert load_policy(tmp_path / "policy").meta.steps == 6
+    state = tmp_path / "policy" / "checkpoints" / "last" / "training_state" / "training_step.json"
+    assert json.loads(state.read_text())["num_processes"] == processes

@@ -1,0 +1,129 @@
+"""A study does every job once, goes on where it was, and reports what is there."""
+
+import errno
+import json
+from pathlib import Path
+
+import pytest
+from study_helpers import DESIGN, Starter
+
+from handrail.controllers.errors import HandrailError
+from handrail.policies.study.config import StudyConfig
+from handrail.policies.study.design.jobs import jobs
+from handrail.policies.study.design.load import design_names, load_design
+from handrail.policies.study.execution.run import run_study
+from handrail.policies.study.progress.notes import read_json, write_json
+
+
+@pytest.fixture(autouse=True)
+def impatient(monkeypatch):
+    """Made-up jobs end at once: look at them more often than at real ones."""
+    monkeypatch.setattr("handrail.policies.study.execution.run._ASLEEP", 0.005)
+
+
+@pytest.fixture
+def preset(tmp_path):
+    path = tmp_path / "small.toml"
+    path.write_text(DESIGN)
+    return str(path)
+
+
+def test_every_job_once_then_none_again(tmp_path, preset):
+    config = StudyConfig(preset, str(tmp_path / "study"), workers=3)
+    first, second = Starter(), Starter()
+    assert run_study(config, first) == 0
+    assert sorted(first.begun) == sorted(job.name for job in jobs(load_design(preset)))
+    assert len(set(first.begun)) == len(first.begun)
+    assert run_study(config, second) == 0
+    assert second.begun == []
+
+
+def test_changed_settings_are_done_again_and_nothing_else(tmp_path, preset):
+    config = StudyConfig(preset, str(tmp_path / "study"))
+    assert run_study(config, Starter()) == 0
+    Path(preset).write_text(DESIGN.replace("steps = 10", "steps = 20"))
+    again = Starter()
+    assert run_study(config, again) == 0
+    expected = [job.name for job in jobs(load_design(preset)) if job.kind != "collect"]
+    assert sorted(again.begun) == sorted(expected)
+
+
+def test_a_failure_stops_only_what_needs_it(tmp_path, preset, capsys):
+    config = StudyConfig(preset, str(tmp_path / "study"))
+    starter = Starter(failing="collect/reach/direct")
+    assert run_study(config, starter) == 1
+    done = {
+        path.relative_to(tmp_path / "study/done").with_suffix("").as_posix()
+        for path in (tmp_path / "study/done").rglob("*.json")
+    }
+    assert "policy/reach/ee/intent-time-1" in done
+    assert not any("reach/direct/" in name for name in done)
+    assert "collect/reach/direct" in capsys.readouterr().err
+    assert run_study(config, Starter()) == 0
+
+
+def test_report_says_what_is_in_the_files(tmp_path, preset):
+    page = tmp_path / "page.md"
+    page.write_text("# Ours\n\nBefore.\n\n<!-- study small -->\nold\n<!-- end of study small -->\n\nAfter.\n")
+    config = StudyConfig(preset, str(tmp_path / "study"), page=str(page))
+    assert run_study(config, Starter()) == 0
+    content = json.loads((tmp_path / "study/study.json").read_text())
+    arms = {arm["label"]: arm for arm in content["tasks"]["reach"]["policies"]["arms"]}
+    assert set(arms) == {"ee", "ee intent", "direct"}
+    assert all(arm["rollouts"] == 80 for arm in arms.values())
+    (ee,) = [d for d in content["tasks"]["reach"]["policies"]["differences"] if d["label"] == "ee"]
+    assert ee["rollouts"]["estimate"] == pytest.approx(
+        (arms["ee"]["successes"] - arms["direct"]["successes"]) / 80
+    )
+    assert set(content["tasks"]["reach"]["disturbed"]) == {f"{label} pushed" for label in arms}
+    assert content["tasks"]["reach"]["disturbed"]["ee pushed"]["touched"] == pytest.approx(0.5)
+    assert [point["noise"] for point in content["tasks"]["reach"]["sweep"]["ee"]] == [0.0, 1.0]
+    text = page.read_text()
+    assert text.startswith("# Ours\n\nBefore.")
+    assert text.endswith("After.\n")
+    assert "old" not in text
+    assert f"{arms['direct']['successes']} of 80" in text
+    assert (tmp_path / "page_small_answer.png").read_bytes().startswith(b"\x89PNG")
+    html = (tmp_path / "study/report.html").read_text()
+    assert f"{arms['ee intent']['successes']} of 80" in html
+
+
+def test_report_of_a_study_that_has_hardly_begun(tmp_path, preset):
+    config = StudyConfig(preset, str(tmp_path / "study"), report_only=True)
+    with pytest.raises(HandrailError, match=r"--report_only: expected a study in .*study, found none"):
+        run_study(config, Starter())
+    assert not (tmp_path / "study").exists()
+    (tmp_path / "study" / "begun").mkdir(parents=True)
+    assert run_study(config, Starter()) == 0
+    assert (tmp_path / "study/report.html").is_file()
+
+
+@pytest.mark.parametrize("name", design_names())
+def test_presets_are_whole(name):
+    design = load_design(name)
+    names = [job.name for job in jobs(design)]
+    assert len(set(names)) == len(names)
+    assert {need for job in jobs(design) for need in job.needs} <= set(names)
+
+
+def test_notes_are_whole_or_not_there(tmp_path):
+    path = tmp_path / "a" / "note.json"
+    assert read_json(path) == {}
+    write_json(path, {"a": 1})
+    assert read_json(path) == {"a": 1}
+    path.write_text('{"a": ')
+    assert read_json(path) == {}
+
+
+def test_a_disk_that_is_full_leaves_the_old_file_and_nothing_else(tmp_path, monkeypatch):
+    path = tmp_path / "note.json"
+    write_json(path, {"a": 1})
+
+    def full(descriptor):
+        raise OSError(errno.ENOSPC, "no space")
+
+    monkeypatch.setattr("os.fsync", full)
+    with pytest.raises(OSError, match="no space"):
+        write_json(path, {"a": 2})
+    assert read_json(path) == {"a": 1}
+    assert list(tmp_path.iterdir()) == [path]

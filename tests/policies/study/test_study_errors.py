@@ -1,0 +1,166 @@
+"""Whatever is wrong with a study is one line, before the first recording begins."""
+
+import dataclasses
+from pathlib import Path
+
+import pytest
+from study_helpers import DESIGN, Starter
+
+from handrail.controllers.errors import HandrailError
+from handrail.datasets.storage.lock import DatasetLock
+from handrail.policies.study.config import StudyConfig
+from handrail.policies.study.design import design as design_module
+from handrail.policies.study.design.design import Robustness, StudyDesign, Sweep, TaskDesign
+from handrail.policies.study.design.load import load_design
+from handrail.policies.study.execution.run import _last_words, _mark, run_study
+from handrail.policies.study.report.marks import between_marks
+from handrail.scripts.study import main
+
+
+@pytest.fixture
+def preset(tmp_path):
+    path = tmp_path / "small.toml"
+    path.write_text(DESIGN)
+    return str(path)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (("steps = 10", "stepz = 10"), "stepz"),
+        (("steps = 10", 'steps = "many"'), "many"),
+        (('"direct"]', '"psychic"]'), "unknown mode 'psychic'"),
+        (('baseline = "direct"', 'baseline = "leader"'), "unknown baseline 'leader'"),
+        (("[tasks.reach]", "[tasks.dance]"), "unknown task"),
+        (("minutes = 0.1", ""), "needs minutes"),
+        (("seeds = [0, 1]", "seeds = [0, 0]"), "seeds"),
+        (("minutes = 0.1", "minutes = nan"), "minutes: expected a finite number, got nan"),
+        (("minutes = 0.1", "minutes = 0.1\nrollout_limit = -1.0"), "time_limit -1.0: expected 0"),
+        (("minutes = 0.1", "minutes = 0.1\ntime_limit = {ee = -3.0}"), "collect/reach/ee: --time_limit -3"),
+        (
+            ("minutes = 0.1", "minutes = 0.1\nbatch_size = -4"),
+            "batch_size: expected a whole number, 0 or more, got -4",
+        ),
+        (("minutes = 0.1", 'minutes = 0.1\npolicy_options = ["nonsense"]'), "expected key=value"),
+        (("rollouts = 40", "seed = -1\nrollouts = 40"), "seed: expected a whole number, 0 or more, got -1"),
+        (("seeds = [0, 1]", "seeds = [0, -1]"), "seeds: expected whole numbers, 0 or more"),
+        (("seeds = [0]", "seeds = [-1]"), "seeds: expected whole numbers, 0 or more"),
+        (("rollouts = 40", "rollouts = 2000000"), "--episodes 2000000"),
+        (("rollouts = 20", "rollouts = -5"), "rollouts: expected a whole number, 0 or more, got -5"),
+        (('["push"]', '["pusch"]'), "pusch"),
+        (('["push"]', "[]"), "robustness.perturbations expected some"),
+        (('["filter"]', '["fltr"]'), "unknown protection 'fltr'"),
+        (("rollouts = 20\nseeds = [0, 1]", "seeds = [2]"), "robustness.seeds expected some of"),
+        (("noises = [0.0]", "noises = [-1.0]"), "--noise -1"),
+        (("noises = [0.0]", "noises = []"), "sweep.noises expected some"),
+        (("noises = [0.0]", "noises = [0.3, 0.30000000001]"), "expected every job once"),
+        (("[tasks.reach]", "[tasks.reach"), "not valid TOML"),
+    ],
+)
+def test_a_wrong_design_is_one_line(tmp_path, change, words):
+    path = tmp_path / "wrong.toml"
+    path.write_text(DESIGN.replace(*change))
+    with pytest.raises(HandrailError, match=words) as raised:
+        load_design(str(path))
+    assert "\n" not in str(raised.value)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (('baseline = "direct"', 'baseline = "direct"\npolicy = "atc"'), "expected one of act"),
+        (("minutes = 0.1", 'minutes = 0.1\npolicy_options = ["dim_model=130"]'), "policy act: embed_dim"),
+    ],
+)
+def test_a_policy_that_cannot_be_built_is_known_before_anything_begins(change, words, tmp_path, preset):
+    Path(preset).write_text(DESIGN.replace(*change))
+    starter = Starter()
+    with pytest.raises(HandrailError, match=words):
+        run_study(StudyConfig(preset, str(tmp_path / "study")), starter)
+    assert starter.begun == []
+
+
+def test_every_setting_of_a_design_is_explained_where_people_look():
+    written = design_module.__doc__ or ""
+    for kind in (StudyDesign, TaskDesign, Robustness, Sweep):
+        for entry in dataclasses.fields(kind):
+            described = f"\n{entry.name} = " in written or f"[{entry.name}" in written
+            assert described or entry.name == "name", entry.name
+
+
+def test_a_failed_job_is_told_by_what_it_said_this_time(tmp_path):
+    log = tmp_path / "job.log"
+    log.write_text("error: disk full, last week\n")
+    _mark(log, "collect/reach/ee")
+    assert "without a word (exit code -9" in _last_words(log, -9)
+    with open(log, "a") as file:
+        file.write("warning\nerror: of today\nlast\n")
+    assert _last_words(log, 1).startswith("of today (exit code 1")
+
+
+@pytest.mark.parametrize("marks", ["{0}\nold", "old\n{1}", "{1}\nold\n{0}", "{0}\n{0}\n{1}", "{0}\n{1}\n{1}"])
+def test_a_page_whose_marks_are_no_pair_is_left_alone_before_anything_begins(marks, tmp_path, preset):
+    page, starter = tmp_path / "page.md", Starter()
+    text = (
+        "# Ours\n" + marks.format("<!-- study small -->", "<!-- end of study small -->") + "\nMy own words.\n"
+    )
+    page.write_text(text)
+    with pytest.raises(HandrailError, match="--page: expected"):
+        run_study(StudyConfig(preset, str(tmp_path / "study"), page=str(page)), starter)
+    assert page.read_text() == text
+    assert starter.begun == []
+
+
+def test_a_page_keeps_all_that_is_not_between_the_marks():
+    parts = [f"<!-- study {name} -->\n{name}\n<!-- end of study {name} -->" for name in "ab"]
+    old = "\n".join(["before", parts[0], "between", parts[1], "after"])
+    new = between_marks(old, "a", "new")
+    assert new == old.replace("\na\n", "\n\nnew\n\n")
+    assert between_marks(new, "a", "new") == new
+    assert between_marks("text", "c", "new").startswith("text\n")
+
+
+@pytest.mark.parametrize("place", ["file", "file/below", "/proc/nope"])
+def test_a_folder_that_cannot_be_is_one_line(place, tmp_path, preset):
+    (tmp_path / "file").touch()
+    with pytest.raises(HandrailError, match=r"--output .*: expected a folder"):
+        run_study(StudyConfig(preset, str(tmp_path / place)), Starter())
+
+
+def test_a_second_study_in_a_folder_is_told_what_the_first_is(tmp_path, preset):
+    lock = DatasetLock(tmp_path / "study" / ".study")
+    try:
+        with pytest.raises(HandrailError, match=r"study .* another handrail-study"):
+            run_study(StudyConfig(preset, str(tmp_path / "study")), Starter())
+    finally:
+        lock.release()
+
+
+@pytest.mark.parametrize("missing", ["torch", "accelerate"])
+def test_what_is_not_installed_is_said_before_anything_begins(missing, tmp_path, preset, monkeypatch):
+    monkeypatch.setattr(
+        "handrail.policies.imitation.training.installed.find_spec", lambda name: name != missing or None
+    )
+    starter = Starter()
+    with pytest.raises(HandrailError, match=f"handrail-study: expected {missing}"):
+        run_study(StudyConfig(preset, str(tmp_path / "study")), starter)
+    assert starter.begun == []
+
+
+@pytest.mark.parametrize(
+    ("flags", "words"),
+    [
+        (["--preset", "huge"], "unknown study 'huge'"),
+        (["--workers", "0"], "--workers 0"),
+        (["--page", "nowhere/page.md"], "--page"),
+    ],
+)
+def test_wrong_flags_are_one_line(flags, words, monkeypatch, capsys, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("sys.argv", ["handrail-study", *flags])
+    with pytest.raises(SystemExit) as stop:
+        main()
+    assert stop.value.code == 2
+    said = capsys.readouterr().err
+    assert words in said
+    assert said.count("\n") == 1

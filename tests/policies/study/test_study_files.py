@@ -1,0 +1,85 @@
+"""A study's file from whoever it is: a design, or one line; whatever is put into it."""
+
+import pytest
+from command_helpers import command
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from study_helpers import DESIGN
+from toml_helpers import mutated
+
+from handrail.controllers.errors import HandrailError
+from handrail.policies.study.design.load import load_design
+
+QUICK = settings(max_examples=200, suppress_health_check=[HealthCheck.function_scoped_fixture])
+
+
+def one_line_or_a_design(path) -> None:
+    refusals = []
+    try:
+        load_design(str(path))
+    except HandrailError as error:
+        refusals.append(str(error))
+    assert "\n" not in "".join(refusals)
+
+
+@given(data=st.data())
+@QUICK
+def test_an_entry_of_another_kind_is_one_line(tmp_path, data):
+    path = tmp_path / "study.toml"
+    path.write_text(mutated(DESIGN, data))
+    one_line_or_a_design(path)
+
+
+@given(data=st.data())
+@QUICK
+def test_another_text_is_one_line(tmp_path, data):
+    text = DESIGN.encode()
+    first, last = sorted(data.draw(st.integers(0, len(text))) for _ in range(2))
+    path = tmp_path / "study.toml"
+    path.write_bytes(text[:first] + data.draw(st.binary(max_size=8)) + text[min(last, first + 20) :])
+    one_line_or_a_design(path)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("rollouts = 40", "rollouts = true", "rollouts"),
+        ("rollouts = 40", "rollouts = 4.5", "rollouts"),
+        ("rollouts = 40", 'rollouts = "40"', "rollouts"),
+        ("seeds = [0, 1]", "seeds = [0.5]", "seeds"),
+        ("seeds = [0, 1]", "seeds = [true]", "seeds"),
+        ("seeds = [0, 1]", "seeds = 3", "seeds"),
+        ("steps = 10", f"steps = {10**30}", "steps"),
+        ("minutes = 0.1", "minutes = inf", "minutes"),
+        ("noises = [0.0]", "noises = [nan]", "noise"),
+        ("minutes = 0.1", "minutes = 0.1\ntime_limit = {ee = nan}", "time_limit"),
+        ("minutes = 0.1", "minutes = 0.1\npolicy_options = [3]", "policy_options"),
+        ('modes = ["ee", "direct"]', 'modes = "ee"', "modes"),
+        ("[tasks.reach]", "[[tasks.reach]]", "tasks"),
+        ("[sweep]", "[[sweep]]", "sweep"),
+        ("[sweep]", "[swoop]", "swoop"),
+        ('baseline = "direct"', "", "baseline"),
+        ('baseline = "direct"', 'baseline = "direct"\nname = "../x"', "name"),
+        ("persons = 2", "persons = 0", "persons"),
+    ],
+)
+def test_an_entry_of_another_type_is_named(old, new, words, tmp_path):
+    path = tmp_path / "study.toml"
+    text = DESIGN if old in DESIGN else "persons = 2\n" + DESIGN
+    path.write_text(text.replace(old, new, 1))
+    with pytest.raises(HandrailError, match=words) as raised:
+        load_design(str(path))
+    assert "\n" not in str(raised.value)
+
+
+@pytest.mark.parametrize(
+    "content",
+    [b"\xff\xfe", b"", b"a = " + b"[" * 100_000, b"a = " + b"9" * 10_000, b"#" * 2**21],
+    ids=["bytes", "empty", "deep", "digits", "large"],
+)
+def test_what_is_no_design_is_one_line(content, tmp_path):
+    path = tmp_path / "study.toml"
+    path.write_bytes(content)
+    done = command("--preset", path, "--output", tmp_path / "study", name="study")
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1), done.stderr
+    assert not (tmp_path / "study").exists()

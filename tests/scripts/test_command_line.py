@@ -1,0 +1,183 @@
+"""One command line: folders first, lists by comma or space, a version, hints that lead to the clone."""
+
+import dataclasses
+import io
+import re
+import shlex
+from collections import Counter
+from pathlib import Path
+from typing import get_type_hints
+
+import pytest
+from command_helpers import command
+from configs import CONFIGS
+from hypothesis import given
+from hypothesis import strategies as st
+from places import ROOT
+from rich.console import Console
+
+from handrail.controllers.errors import HandrailError, not_installed
+from handrail.datasets.lists import Names, Numbers, Words, split_list
+from handrail.datasets.presentation.plain_table import PlainTable
+from handrail.policies.imitation.training.installed import check_installed
+from handrail.scripts import cli
+
+SOURCES = [
+    path
+    for room in ("collect", "controllers", "datasets", "policies", "scripts")
+    for path in (ROOT / room).rglob("*.py")
+]
+STORED = ("inspect", "repair", "replay", "train", "record")
+LISTS = (Names, Numbers, Words)
+
+
+@pytest.mark.parametrize("name", CONFIGS)
+def test_every_command_says_its_version(name):
+    done = command("--version", name=name.removeprefix("handrail-").replace("-", "_"))
+    assert (done.returncode, done.stderr) == (0, "")
+    assert re.fullmatch(rf"{name} \d+\.\d+\.\d+\n", done.stdout)
+
+
+@pytest.mark.parametrize("name", STORED)
+def test_a_dataset_is_a_folder_or_lerobot_s_flag_and_never_both(name, monkeypatch):
+    config = CONFIGS[f"handrail-{name}"]
+    monkeypatch.setenv("HF_LEROBOT_HOME", "/hub")
+    ways = (["outputs/a"], ["--dataset.root", "outputs/a"], ["--dataset.root=outputs/a"])
+    assert {cli.parse(config, name, words).dataset.folder for words in ways} == {Path("outputs/a")}
+    named = cli.parse(config, name, ["--dataset.repo_id", "me/a"])
+    assert named.dataset.folder == Path("/hub/me/a")
+    for words, told in ((["a", "--dataset.root", "b"], "got both"), ([], "got neither")):
+        done = command(*words, name=name)
+        assert (done.returncode, done.stderr.count("\n")) == (2, 1), done.stderr
+        assert told in done.stderr
+        assert "--dataset." in done.stderr
+
+
+def test_policies_are_folders_or_the_flag_and_never_both():
+    config = CONFIGS["handrail-evaluate"]
+    ways = ("a b", "a,b", "--policy a b", "--policy a,b --workers 2")
+    assert {cli.parse(config, "evaluate", shlex.split(way)).folders for way in ways} == {
+        (Path("a"), Path("b"))
+    }
+    for words, told in ((["a", "--policy", "b"], "got both"), (["--workers", "2"], "got none")):
+        done = command(*words, name="evaluate")
+        assert (done.returncode, done.stderr.count("\n")) == (2, 1), done.stderr
+        assert told in done.stderr
+
+
+def test_the_demo_s_folder_is_given_either_way():
+    config = CONFIGS["handrail-demo"]
+    folders = [cli.parse(config, "demo", words).folder for words in ([], ["a"], ["--root", "a"])]
+    assert folders == [Path("outputs/demo"), Path("a"), Path("a")]
+    assert cli.parse(config, "demo", ["~/a"]).folder == Path.home() / "a"
+    done = command("a", "--root", "b", name="demo")
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1), done.stderr
+
+
+def list_flags(config: type, prefix: str = "") -> list[str]:
+    """Return the flags and fields of a config that take a list."""
+    found = []
+    for name, hint in get_type_hints(config, include_extras=True).items():
+        if dataclasses.is_dataclass(hint):
+            found += list_flags(hint, f"{prefix}{name}.")
+        elif hint in LISTS:
+            found.append(f"{prefix}{name}")
+    return found
+
+
+FLAGS = [(command, flag) for command, config in CONFIGS.items() for flag in list_flags(config)]
+
+
+def test_there_are_lists_in_many_commands():
+    assert {"--" + flag for _, flag in FLAGS} >= {
+        *("--cameras", "--controllers", "--profile", "--tasks", "--modes", "--protection", "--perturbation"),
+        *("--policy", "--policy_options", "--labels", "--evaluations", "--columns.asked", "--layers"),
+    }
+
+
+@pytest.mark.parametrize(("name", "flag"), FLAGS)
+def test_a_list_is_written_with_commas_or_spaces(name, flag):
+    needed = ["x"] if name == "handrail-compare" else []
+    values = {
+        str(cli.parse(CONFIGS[name], name, [*needed, f"--{flag}", *shlex.split(written)]))
+        for written in ("1 2", "1,2", "1, 2", "'1,2'", "1,2,")
+    }
+    assert len(values) == 1, values
+
+
+def test_no_help_asks_for_commas_but_where_a_space_does_as_well():
+    """A setting of many names is a list, which takes both: none is left that takes commas alone."""
+    for name, config in CONFIGS.items():
+        assert "comma-separated" not in str(command("--help", name=name[9:].replace("-", "_")).stdout), name
+        plain = [
+            hint
+            for hint in get_type_hints(config, include_extras=True).values()
+            if hint in (tuple[str, ...],)
+        ]
+        assert not plain, name
+
+
+def test_brackets_keep_their_commas():
+    words = ["down_dims=[64, 128],n=3", '{"a": [1], "b": [2, 3]}', "x"]
+    assert split_list(words) == ("down_dims=[64, 128]", "n=3", '{"a": [1], "b": [2, 3]}', "x")
+
+
+def test_a_folder_with_a_comma_in_its_name_is_one(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("a,b").mkdir()
+    assert split_list(["a,b", "c,d"]) == ("a,b", "c", "d")
+
+
+def test_install_hints_come_from_one_place_and_lead_to_the_clone():
+    """The package of this name on a public index is somebody else's."""
+    hints = [
+        (path.name, line)
+        for path in SOURCES
+        for line in path.read_text().splitlines()
+        if "pip install" in line
+    ]
+    assert [name for name, _ in hints] == ["errors.py"], hints
+    for extra, what in (("display", "'.[display]'"), ("", ".")):
+        message = str(not_installed("--flag", "module", extra))
+        assert message.endswith(f"in the clone of Handrail: pip install -c constraints.txt {what}")
+        assert "\n" not in message
+    with pytest.raises(HandrailError, match=r"^handrail-x: expected nowhere, found none; .*'\.\[rl\]'$"):
+        check_installed("handrail-x", ("nowhere",), extra="rl")
+
+
+def test_messages_name_flags(tmp_path):
+    """What may be done about a dataset in the way is said in words that can be typed."""
+    folder = tmp_path / "set"
+    (folder / "meta").mkdir(parents=True)
+    (folder / "meta" / "info.json").write_text("{}")
+    done = command(folder, "--task", "reach")
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1), done.stderr
+    assert {"--resume", "--overwrite"} <= set(done.stderr.split())
+
+
+def shown(table: PlainTable) -> str:
+    out = io.StringIO()
+    Console(width=80, file=out).print(table)
+    return out.getvalue()
+
+
+CELL = st.text(st.sampled_from("abcdefghij 0123456789[]±"), max_size=30)
+
+
+@given(st.lists(st.lists(CELL, min_size=9, max_size=9), min_size=2, max_size=5), st.integers(2, 9))
+def test_a_table_fits_in_80_columns_and_loses_nothing(cells, size):
+    headings, *rows = [row[:size] for row in cells]
+    text = shown(PlainTable(headings, rows, "title [s]", "caption [m]"))
+    assert max(map(len, text.splitlines())) <= 80
+    given_letters = Counter("".join(cell for row in [headings, *rows] for cell in row).replace(" ", ""))
+    assert given_letters <= Counter(text)
+
+
+def test_a_table_keeps_units_and_words_whole():
+    headings = (
+        *("episode", "mode", "success", "why not", "length [s]"),
+        *("smallest distance [m]", "smoothness", "contacts"),
+    )
+    row = ("0", "direct_filtered", "no", "timeout", "30.0", "0.088", "-2.20", "0")
+    words = shown(PlainTable(headings, [row])).split()
+    assert {*" ".join(headings).split(), *row} <= set(words)

@@ -1,0 +1,285 @@
+"""The commands' laws: one clear line for wrong input, nothing written; what is recorded replays."""
+
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+from command_helpers import command
+
+from handrail.datasets.reading.reader import read_episodes, read_frames, read_info
+
+RECORD = [sys.executable, "-m", "handrail.scripts.record"]
+REACH = ["--task", "reach", "--dataset.num_episodes", "2"]
+
+
+def in_its_own_process(*arguments):
+    return subprocess.run([*RECORD, *map(str, arguments)], capture_output=True, text=True, timeout=300)
+
+
+def digest(root):
+    return {path.name: path.stat().st_mtime_ns for path in root.rglob("*") if path.is_file()}
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory):
+    root = tmp_path_factory.mktemp("recorded") / "reach"
+    done = in_its_own_process(*REACH, "--dataset.root", root)
+    assert done.returncode == 0, done.stderr
+    return root
+
+
+WRONG = {
+    "task": (["--task", "juggle"], "unknown task 'juggle': expected one of drawer, pick_place, reach, tray"),
+    "mode": (["--mode", "telepathy"], "unknown mode 'telepathy': expected one of base"),
+    "operator": (["--operator", "cat"], "unknown operator 'cat'"),
+    "camera": (["--cameras", "wrist,roof"], "unknown camera 'roof'"),
+    "mask size": (["--mask", "0101"], "expected 18 characters 0 or 1"),
+    "fps 0": (["--dataset.fps", "0"], "--dataset.fps 0: expected 10 to 100"),
+    "fps text": (["--dataset.fps", "fast"], "--dataset.fps"),
+    "no episodes": (["--dataset.num_episodes", "0"], "expected 1 or more"),
+    "nan noise": (["--noise", "nan"], "--noise nan: expected a number"),
+    "negative human": (["--human.delay", "-1"], "--human.delay: expected a finite number >= 0"),
+    "seed": (["--seed", "-3"], "--seed -3: expected a whole number"),
+    "image size": (["--image_size", "33"], "expected an even number"),
+    "robot": (["--robot", "spot"], "unknown robot 'spot'"),
+    "flag": (["--speed", "9"], "--speed"),
+    "repo id": (["--dataset.repo_id", "no spaces/please/ever"], "repo_id"),
+    "too many movers": (
+        ["--task", "reach", "--moving_obstacles", "5"],
+        "expected a whole number from 0 to 4",
+    ),
+    "movers elsewhere": (
+        ["--moving_obstacles", "1"],
+        "--moving_obstacles: expected --task reach, got --task",
+    ),
+    "both": (["--resume", "--overwrite"], "expected one of them"),
+    "rrd": (["--display_save", "movie.mp4"], "expected a file that ends in .rrd"),
+}
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_wrong_input_is_one_clear_line_and_nothing_written(case, tmp_path):
+    arguments, words = WRONG[case]
+    root = tmp_path / "dataset"
+    done = command(*arguments, "--dataset.root", root)
+    assert done.returncode == 2, done.stderr
+    assert words in done.stderr
+    assert done.stderr.startswith("error: ")
+    assert done.stderr.count("\n") == 1, done.stderr
+    assert not root.exists()
+
+
+def test_a_shell_gets_the_same_line_and_code(tmp_path):
+    arguments = ["--task", "juggle", "--dataset.root", tmp_path / "dataset"]
+    shell, here = in_its_own_process(*arguments), command(*arguments)
+    assert (shell.returncode, shell.stdout, shell.stderr) == (here.returncode, here.stdout, here.stderr)
+
+
+def test_an_existing_dataset_is_never_overwritten(recorded):
+    before = digest(recorded)
+    done = command(*REACH, "--dataset.root", recorded)
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1), done.stderr
+    assert "--overwrite" in done.stderr or "overwrite" in done.stderr
+    assert digest(recorded) == before
+
+
+def test_resume_of_another_recording_is_refused(recorded):
+    before = digest(recorded)
+    done = command("--task", "pick_place", "--dataset.root", recorded, "--resume")
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1), done.stderr
+    assert digest(recorded) == before
+
+
+def test_resume_of_nothing_is_refused(tmp_path):
+    done = command(*REACH, "--dataset.root", tmp_path / "none", "--resume")
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1), done.stderr
+    assert not (tmp_path / "none").exists()
+
+
+def test_a_folder_that_cannot_be_written_is_refused(tmp_path):
+    in_the_way = tmp_path / "file"
+    in_the_way.write_text("not a folder")
+    done = command(*REACH, "--dataset.root", in_the_way / "dataset")
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1), done.stderr
+    assert in_the_way.read_text() == "not a folder"
+
+
+def test_help_loads_nothing_heavy():
+    code = (
+        "import sys\nfrom handrail.scripts import record\nsys.argv = ['handrail-record', '--help']\n"
+        "try: record.main()\nexcept SystemExit: pass\n"
+        "heavy = {'torch', 'lerobot', 'mujoco', 'casadi', 'pinocchio', 'coal', 'datasets', 'rerun'}\n"
+        "print(sorted(heavy & set(sys.modules)), file=sys.stderr)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    assert done.stderr.strip() == "[]"
+    assert "--dataset.repo_id" in done.stdout
+
+
+def test_flags_are_written_as_lerobot_users_write_them(tmp_path):
+    root = tmp_path / "d"
+    done = command(
+        "--task=reach",
+        "--dataset.num_episodes=1",
+        f"--dataset.root={root}",
+        "--realtime=false",
+        "--resume=false",
+    )
+    assert done.returncode == 0, done.stderr
+    assert read_info(root).episodes == 1
+
+
+def test_what_is_recorded_says_how_it_came_about(recorded):
+    rows = read_episodes(recorded)
+    assert [row["episode_index"] for row in rows] == [0, 1]
+    for row in rows:
+        assert {"success", "failure_reason", "operator", "mode", "seed", "wall_time", "versions"} <= set(row)
+        assert row["success"]
+        assert json.loads(row["versions"])["mujoco"]
+    assert rows[0]["seed"] != rows[1]["seed"]
+    frames = read_frames(recorded, 0)
+    assert np.all(np.diff(frames["wall_clock"]) > 0)
+    assert np.all(frames["controller.solve_time"] > 0)
+    assert frames["teleop.mask"].shape[1] == 19
+
+
+def test_a_replay_repeats_the_recording_exactly(recorded):
+    from handrail.collect.commands.replay import replay_episode
+
+    for episode in (0, 1):
+        replay, _ = replay_episode(recorded, episode)
+        assert replay.largest == 0.0
+        assert replay.success == replay.recorded_success
+    done = command("--dataset.root", recorded, name="replay")
+    assert done.returncode == 0
+    assert "0.00e+00" in done.stdout
+
+
+def test_moving_obstacles_move_again_in_a_replay(tmp_path):
+    from handrail.collect.commands.replay import replay_episode
+
+    root = tmp_path / "d"
+    done = command(
+        "--task", "reach", "--moving_obstacles", 1, "--dataset.num_episodes", 1, "--dataset.root", root
+    )
+    assert done.returncode == 0, done.stderr
+    assert json.loads(read_episodes(root)[0]["settings"])["moving_obstacles"] == 1
+    assert "mover_0.vx" in (read_info(root).features["observation.environment_state"].names or ())
+    assert replay_episode(root, 0)[0].largest == 0.0
+    refused = command("--task", "reach", "--dataset.root", root, "--resume")
+    assert refused.returncode == 2
+
+
+def test_a_replay_shows_when_the_commands_differ(recorded, monkeypatch):
+    """The deviation is measured, not assumed."""
+    from handrail.collect.commands import replay
+
+    honest = replay.read_frames
+
+    def tampered(*arguments):
+        frames = honest(*arguments)
+        return frames | {"action": frames["action"] * np.float32(0.9)}
+
+    monkeypatch.setattr(replay, "read_frames", tampered)
+    assert replay.replay_episode(recorded, 0)[0].largest > 0.01
+
+
+def test_inspect_prints_every_episode(recorded):
+    done = command("--dataset.root", recorded, name="inspect")
+    assert done.returncode == 0, done.stderr
+    assert "2 episodes, 2 succeeded" in done.stdout
+    assert len(re.findall(r"^ *\d+  ee", done.stdout, re.MULTILINE)) == 2
+    more = command("--dataset.root", recorded, "--quality", name="inspect")
+    assert len(re.findall(r"^ *\d+  ee", more.stdout, re.MULTILINE)) == 4
+
+
+def test_resume_goes_on_with_new_seeds(recorded, tmp_path):
+    import shutil
+
+    root = tmp_path / "copy"
+    shutil.copytree(recorded, root)
+    done = command(*REACH, "--dataset.root", root, "--resume", "--mode", "switching")
+    assert done.returncode == 0, done.stderr
+    rows = read_episodes(root)
+    assert len({row["seed"] for row in rows}) == len(rows) == 4
+    assert [row["mode"] for row in rows] == ["ee", "ee", "switching", "switching"]
+
+
+def test_the_same_seed_records_the_same_data(recorded, tmp_path):
+    """Here as in the process of its own that recorded the first."""
+    done = command(*REACH, "--dataset.root", tmp_path / "again")
+    assert done.returncode == 0
+    first, again = read_frames(recorded, 1), read_frames(tmp_path / "again", 1)
+    for key in set(first) - {"controller.solve_time", "wall_clock"}:
+        np.testing.assert_array_equal(first[key], again[key], err_msg=key)
+
+
+def saved_after(root, number, process):
+    """Wait until a recording has saved some episodes."""
+    deadline = time.monotonic() + 120
+    while time.monotonic() < deadline and process.poll() is None:
+        if len(list(root.glob("meta/episodes/*/*.parquet"))) >= number:
+            return
+        time.sleep(0.02)
+    raise AssertionError(f"no {number} episodes came; exit code {process.poll()}")
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupt_keeps_the_saved_episodes(number, tmp_path):
+    root = tmp_path / "d"
+    process = subprocess.Popen(
+        [*RECORD, "--task", "reach", "--dataset.num_episodes", "500", "--dataset.root", str(root)],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    saved_after(root, 2, process)
+    process.send_signal(number)
+    _, said = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert "Traceback" not in said
+    assert "interrupted" in said
+    assert read_info(root).episodes == len(read_episodes(root)) >= 2
+
+
+@pytest.mark.slow
+def test_kill_at_random_moments_loses_at_most_the_open_episode(tmp_path):
+    """The real command, killed 20 times, resumed each time."""
+    rng = np.random.default_rng(0)
+    root, kept, saved = tmp_path / "d", {}, 0
+    arguments = [*RECORD, "--task", "reach", "--dataset.num_episodes", "500", "--dataset.root", str(root)]
+    for kill in range(20):
+        process = subprocess.Popen(
+            [*arguments, *(["--resume"] if kill else [])],
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+        try:
+            saved_after(root, saved + 1, process)
+            time.sleep(rng.uniform(0.0, 0.6))
+        finally:
+            os.kill(process.pid, signal.SIGKILL)
+            process.wait()
+        rows = sorted(root.glob("meta/episodes/*/*.parquet"))
+        assert len(rows) > saved
+        saved = len(rows)
+        for path, content in kept.items():
+            assert path.read_bytes() == content
+        kept = {
+            path: path.read_bytes() for path in [*rows, *sorted(root.glob("data/*/*.parquet"))[: len(rows)]]
+        }
+    done = command(*REACH, "--dataset.root", root, "--resume")
+    assert done.returncode == 0, done.stderr
+    episodes = read_episodes(root)
+    assert [row["episode_index"] for row in episodes] == list(range(len(episodes)))
+    assert read_info(root).frames == sum(row["length"] for row in episodes)
+    for row in episodes:
+        np.testing.assert_array_equal(
+            read_frames(root, row["episode_index"], ["frame_index"])["frame_index"], np.arange(row["length"])
+        )

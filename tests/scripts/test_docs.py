@@ -1,0 +1,168 @@
+"""What the documents say is true: commands parse, links lead somewhere, tables are complete."""
+
+import json
+import re
+import shlex
+import subprocess
+import sys
+import tomllib
+from collections.abc import Sequence
+from dataclasses import fields, is_dataclass
+
+import pytest
+from configs import CONFIGS
+from places import ROOT
+
+from handrail.collect.config import (
+    RecordConfig,
+    SessionConfig,
+)
+from handrail.collect.experiments.benchmark.baselines import CONTENDERS
+from handrail.collect.experiments.benchmark.config import CONTROLLERS, PROFILES
+from handrail.collect.operators.modes import MODES
+from handrail.collect.perturbations.perturbations import DEFAULTS
+from handrail.collect.session.build import build_env, session_features
+from handrail.controllers.interface.command import Status
+from handrail.datasets.quality.catalogue import METRICS
+from handrail.policies.imitation.evaluation.config import PROTECTIONS
+from handrail.policies.rl.baseline import RL_CONTENDERS
+from handrail.scripts import cli
+
+DOCUMENTS = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "SECURITY.md")
+ROOMS = "controllers|datasets|collect|policies|scripts|tests|docs"
+_LEROBOT = """
+import json, sys
+import draccus
+from lerobot.configs.train import TrainPipelineConfig
+from lerobot.policies.act.configuration_act import ACTConfig
+from lerobot.policies.diffusion.configuration_diffusion import DiffusionConfig
+for arguments in json.loads(sys.argv[1]):
+    policy = draccus.parse(TrainPipelineConfig, args=arguments).policy
+    assert "ENV" in policy.normalization_mapping, "the environment's state would not be normalised"
+    assert not policy.push_to_hub
+"""
+
+
+def text(document: str) -> str:
+    return (ROOT / document).read_text()
+
+
+def command_lines(document: str) -> Sequence[str]:
+    """Return the lines of the shell blocks, continued lines joined, comments left out."""
+    blocks = re.findall(r"^```(?:sh|bash|console)\n(.*?)^```", text(document), flags=re.DOTALL | re.MULTILINE)
+    return "\n".join(blocks).replace("\\\n", " ").splitlines()
+
+
+def commands(prefix: str) -> list[list[str]]:
+    lines = [shlex.split(line, comments=True) for document in DOCUMENTS for line in command_lines(document)]
+    return [words for words in lines if words and words[0].startswith(prefix)]
+
+
+def table(heading: str) -> set[str]:
+    """Return the code words of the first column of the README's table under a heading."""
+    section = text("README.md").split(f"\n## {heading}\n")[1].split("\n## ")[0]
+    return {
+        name
+        for row in re.findall(r"^\| (`.*?) \|", section, re.MULTILINE)
+        for name in re.findall("`(.*?)`", row)
+    }
+
+
+def test_every_command_is_known_and_shown():
+    scripts = tomllib.loads(text("pyproject.toml"))["project"]["scripts"]
+    assert set(CONFIGS) == set(scripts)
+    assert {words[0] for words in commands("handrail-")} == set(scripts)
+
+
+@pytest.mark.parametrize("words", commands("handrail-"), ids=" ".join)
+def test_commands_parse(words):
+    config = cli.parse(CONFIGS[words[0]], words[0], words[1:])
+    if isinstance(config, SessionConfig):
+        config.check()
+
+
+def test_lerobot_s_own_parser_takes_the_training_commands():
+    training = [words[1:] for words in commands("lerobot-train")]
+    kinds = {word for words in training for word in words if word.startswith("--policy.type=")}
+    assert kinds == {"--policy.type=act", "--policy.type=diffusion"}
+    command = [sys.executable, "-c", _LEROBOT, json.dumps(training)]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr[-2000:]
+
+
+def test_make_targets_exist():
+    targets = set(re.findall(r"^([a-z]+):", text("Makefile"), re.MULTILINE))
+    assert {"setup", "demo", "test", "check", "format"} <= targets
+    named = {words[1] for words in commands("make") if len(words) > 1}
+    assert {"demo", "test"} <= named <= targets
+
+
+@pytest.mark.parametrize("document", DOCUMENTS)
+def test_links_lead_somewhere(document):
+    links = re.findall(r"\]\(([^)#]+)\)|src=\"([^\"]+)\"", text(document))
+    for link in ("".join(pair) for pair in links):
+        assert link.startswith(("http", "mailto")) or (ROOT / link).exists(), link
+
+
+@pytest.mark.parametrize("document", DOCUMENTS)
+def test_files_that_are_named_are_there(document):
+    named = re.findall(rf"`((?:{ROOMS})/[\w/.]+)`", text(document))
+    assert [path for path in named if not (ROOT / path).exists()] == []
+
+
+def test_modes_and_tasks_are_all_there():
+    assert table("Teleop modes") == set(MODES)
+    from handrail.collect.config import CAMERAS, MODE_NAMES, TASKS
+
+    assert set(MODE_NAMES) == set(MODES)
+    assert table("Tasks") == set(TASKS)
+    assert all(f"`{camera}`" in text("README.md") for camera in CAMERAS)
+
+
+def test_controllers_and_profiles_of_the_benchmark_are_all_there():
+    assert table("Goal reaching against rivals") == set(CONTROLLERS) | set(PROFILES)
+    assert set(CONTROLLERS) == {*CONTENDERS, *RL_CONTENDERS}
+    source = (ROOT / "collect" / "experiments" / "benchmark" / "config.py").read_text()
+    helped = re.findall(r'^    """(.*?)"""', source, re.MULTILINE | re.DOTALL)
+    assert all(re.search(rf"\b{name}\b", " ".join(helped)) for name in (*CONTROLLERS, *PROFILES))
+
+
+def test_protections_and_perturbations_are_all_there():
+    assert table("Evaluate") == {*PROTECTIONS, *DEFAULTS, "none"}
+
+
+def test_metrics_are_all_there():
+    assert table("Quality metrics") == {metric.name for metric in METRICS}
+
+
+def flags(config: type, prefix: str = "") -> set[str]:
+    names = set()
+    for entry in fields(config):
+        nested = entry.default_factory if is_dataclass(entry.default_factory) else None
+        flag = "FOLDER" if entry.name == "place" else f"--{prefix}{entry.name}"
+        names |= flags(nested, f"{prefix}{entry.name}.") if nested else {flag}
+    return names
+
+
+def test_flags_are_all_there():
+    shown = {name.split(" ")[0] for name in table("Flags of `handrail-record`")}
+    human = {name for name in flags(RecordConfig) if name.startswith("--human.")}
+    assert shown == flags(RecordConfig) - human | {"--human.*"}
+
+
+def test_columns_are_all_there():
+    env = build_env(SessionConfig(task="reach"), 20)
+    columns = {*session_features(env), "observation.images.*"}
+    env.close()
+    assert table("What is recorded") == columns
+
+
+def test_exit_codes_and_statuses_are_all_there():
+    codes = {"0", str(cli.FAILED), str(cli.BAD_INPUT), str(cli.INTERRUPTED)}
+    assert table("Exit codes") == codes
+    assert all(f"`{status.value}`" in text("README.md") for status in Status)
+
+
+def test_the_version_is_in_the_changelog():
+    version = tomllib.loads(text("pyproject.toml"))["project"]["version"]
+    assert f"\n## {version}" in text("CHANGELOG.md")

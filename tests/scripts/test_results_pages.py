@@ -1,0 +1,133 @@
+"""What the pages of results say in words agrees with the JSON beside them; limits come before rankings."""
+
+import json
+import re
+
+import pytest
+from places import ROOT
+
+from handrail.datasets.statistics.proportions import holm
+
+RESULTS = ROOT / "docs" / "results"
+LIMITS = (
+    "input and controller",
+    "chosen on `ee`",
+    "base plans",
+    "not declared before",
+    "training seeds of one recording",
+)
+
+
+def words(text):
+    """Return a text without the parts that commands write, on one line."""
+    written = r"<!-- (?P<label>[^>]+) -->.*?<!-- end (?:of )?(?P=label) -->"
+    return " ".join(re.sub(written, "", text, flags=re.DOTALL).split())
+
+
+TEXT = words((RESULTS / "goal_reaching.md").read_text())
+
+
+def runs():
+    """Return what the goal-reaching page keeps, by kind of run."""
+    files = sorted(RESULTS.glob("goal_reaching_*.json"))
+    return {file.stem.removeprefix("goal_reaching_"): json.loads(file.read_text()) for file in files}
+
+
+def nominal(seed, name, metric, digits):
+    return f"{runs()[f'nominal_seed_{seed}']['controllers'][name][metric]['mean']:.{digits}f}"
+
+
+def test_limits_of_the_study_come_before_its_figures():
+    page = words((RESULTS / "teleop_modes.md").read_text())
+    readme = words((ROOT / "README.md").read_text())
+    before = (
+        page.split("## What came out")[0],
+        readme.split("## A whole study")[1].split("[what came out]")[0],
+    )
+    for text in before:
+        assert [limit for limit in LIMITS if limit not in text.lower()] == []
+    assert "97 %" not in before[0]  # what `ee` has
+
+
+def test_the_families_of_p_values_follow_from_the_study_s_json():
+    """Holm over all nine, the six like for like, the three of `ee` and `direct`: the table in the page."""
+    tasks = json.loads((RESULTS / "teleop_modes_full.json").read_text())["tasks"]
+    raw = {
+        (task, each["label"]): each["p"] for task in tasks for each in tasks[task]["policies"]["differences"]
+    }
+    shown = [
+        ("reach", "ee"),
+        ("tray", "ee"),
+        ("pick_place", "ee"),
+        ("reach", "leader"),
+        ("pick_place", "leader"),
+    ]
+    page = (RESULTS / "teleop_modes.md").read_text().replace("**", "")
+    for kept in (("ee", "leader", "ee intent"), ("ee", "leader"), ("ee",)):
+        family = [key for key in raw if key[1] in kept]
+        adjusted = dict(zip(family, holm([raw[key] for key in family]), strict=True))
+        cells = [f"{adjusted[key]:.2g}" if key in adjusted else "–" for key in shown]
+        assert f" {len(family)} " in page
+        assert f"| {' | '.join(cells)} |" in page
+
+
+@pytest.mark.parametrize(
+    ("metric", "digits", "called"),
+    [
+        ("arm_effort", 1, "Arm effort"),
+        ("jerkiness", 3, "jerkiness"),
+        ("base_path", 2, "base path"),
+    ],
+)
+def test_the_mpc_s_figures_are_those_of_the_tables(metric, digits, called):
+    one, two, three = (nominal(seed, "mpc", metric, digits) for seed in (1, 2, 3))
+    assert f"{called} {one}, {two} and {three}" in TEXT
+
+
+def test_the_paper_s_horizon_is_told_as_it_came_out():
+    found = {
+        metric: nominal(1, "mpc_paper", metric, digits)
+        for metric, digits in (("arm_effort", 1), ("jerkiness", 3), ("base_path", 2), ("length", 0))
+    }
+    assert (
+        f"effort {found['arm_effort']}, jerkiness {found['jerkiness']}, base path {found['base_path']} m,"
+        f" {found['length']} steps (published"
+    ) in TEXT
+
+
+def test_the_miss_of_the_closed_loop_is_told():
+    mpc = runs()["nominal_closed_loop_whole_seed_1"]["controllers"]["mpc"]
+    before, after = mpc["planned_position_error"], mpc["final_position_error"]
+    missed = f"{mpc['beyond_aim']['planned_position_error']} of {mpc['episodes']} goals beyond 10 mm"
+    assert (
+        f"{1e3 * before['mean']:.1f} mm off in the mean and {1e3 * before['max']:.1f} mm at worst, {missed}"
+        in TEXT
+    )
+    assert f"it is {1e3 * after['mean']:.1f} mm and {1e3 * after['max']:.1f} mm" in TEXT
+    assert ("the mean has grown while settling" in TEXT) == (after["mean"] > before["mean"])
+
+
+def test_time_is_told_by_the_update_and_its_rate():
+    took = [nominal(1, name, "update_ms_median", 2) for name in ("mpc", "rl")]
+    rates = [nominal(1, name, "updates_per_s", 0) for name in ("mpc", "rl")]
+    assert f"{took[0]} against {took[1]} ms" in TEXT
+    assert f"{rates[0]} against {rates[1]} a second" in TEXT
+    for document in (*RESULTS.glob("*.md"), ROOT / "README.md", ROOT / "CHANGELOG.md"):
+        assert not re.search(r"% of the actor's (wall )?time", words(document.read_text()))
+
+
+def test_what_the_low_pass_does_for_rivals_is_told():
+    profiles = runs()["steps_noise_quantised_seed_1"]["profiles"]
+    for profile in ("steps", "quantised"):
+        for rival in ("mink", "rl"):
+            bare, smooth = (
+                f"{100 * profiles[profile][name]['success']['mean']:.0f}"
+                for name in (rival, f"{rival}_low_pass")
+            )
+            assert f"`{rival}` {smooth} instead of {bare} of 100 goals ({profile})" in TEXT
+
+
+def test_a_page_of_several_runs_says_so():
+    """Runs of before the updates' rate was measured are old; once all are anew the page says so no more."""
+    mixed = {"updates_per_s" in run["controllers"]["mpc"] for run in runs().values()} == {True, False}
+    assert ("Not all tables are of one run" in TEXT) == mixed
