@@ -33,7 +33,7 @@ from handrail.controllers.objectives.objective import Objective
 from handrail.controllers.objectives.tray import tray_levelling
 from handrail.controllers.robot.model import RobotModel
 from handrail.datasets.format.schema import Feature
-from handrail.datasets.recording.frames import moment_features
+from handrail.datasets.recording.frames import frame_features
 
 ENVIRONMENTS = {
     "drawer": "handrail/Drawer-v0",
@@ -167,7 +167,7 @@ def build_mode(config: SessionConfig, model: RobotModel) -> TeleopMode:
 
 def session_features(env: HandrailEnv) -> dict[str, Feature]:
     """Return the dataset's columns of an environment."""
-    return moment_features(
+    return frame_features(
         state=env.agent_names,
         environment=env.state_names,
         joints=env.model.joints,

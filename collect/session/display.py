@@ -10,7 +10,7 @@ from handrail.collect.envs.env import HandrailEnv
 from handrail.collect.session.rerun_drawing import Drawing
 from handrail.collect.session.viewer import Viewer
 from handrail.controllers.errors import HandrailError, message_of, not_installed
-from handrail.datasets.recording.frames import Moment
+from handrail.datasets.recording.frames import Frame
 
 _PERIOD = 0.2  # between two transfers to the viewer [s]
 _PATIENCE = 10.0  # with rerun's own writing [s]
@@ -69,9 +69,9 @@ class Display:
         """Draw the scene of a new episode."""
         self._attempt(lambda: self._drawing.begin(env))
 
-    def see(self, moment: Moment) -> None:
+    def see(self, frame: Frame) -> None:
         """Log one moment."""
-        self._attempt(lambda: self._drawing.see(moment))
+        self._attempt(lambda: self._drawing.see(frame))
         if time.monotonic() > self._sent + _PERIOD:
             self._attempt(self._pass_on)
 

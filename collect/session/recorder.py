@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 from handrail.collect.envs.env import HandrailEnv
 from handrail.collect.session.session import Outcome
-from handrail.datasets.recording.frames import Moment, moment_row
+from handrail.datasets.recording.frames import Frame, frame_row
 from handrail.datasets.recording.writer import EpisodeWriter, Scalar
 
 
@@ -27,9 +27,9 @@ class Recorder:
         if self._writer.open_frames:
             self._writer.discard_episode()
 
-    def see(self, moment: Moment) -> None:
+    def see(self, frame: Frame) -> None:
         """Add a frame."""
-        self._writer.add_frame(moment_row(moment), self._task)
+        self._writer.add_frame(frame_row(frame), self._task)
 
     def save(self, outcome: Outcome) -> int:
         """Save the episode with how it went; return its number.

@@ -7,7 +7,7 @@ import numpy as np
 from handrail.collect.envs.env import HandrailEnv
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.robot.shape import Obstacle
-from handrail.datasets.recording.frames import Moment
+from handrail.datasets.recording.frames import Frame
 
 _ROBOT = (235, 190, 40)
 _SCENE = (150, 160, 170)
@@ -40,7 +40,7 @@ class Drawing:
         for obstacle in env.episode.scene.obstacles():
             self._log_shape(f"world/scene/{obstacle.name}", obstacle)
 
-    def see(self, moment: Moment) -> None:
+    def see(self, frame: Frame) -> None:
         """Log one moment."""
         rr = self._rr
         time = self._frame * self._period
@@ -48,18 +48,18 @@ class Drawing:
         self._frame += 1
         for mover in self._movers:
             self._log_shape(f"world/scene/{mover.name}", mover.obstacle(time))
-        q = moment.state[: self._model.size].astype(float)
-        v = moment.state[self._model.size : 2 * self._model.size].astype(float)
+        q = frame.state[: self._model.size].astype(float)
+        v = frame.state[self._model.size : 2 * self._model.size].astype(float)
         self._log_robot(q)
-        self._log_tracking(moment, q, v)
-        for name, image in moment.images.items():
+        self._log_tracking(frame, q, v)
+        for name, image in frame.images.items():
             rr.log(f"camera/{name}", rr.Image(image))
-        health = moment.health
-        rr.log("distance/smallest", rr.Scalars(_finite(health.smallest_distance)))
-        rr.log("distance/work", rr.Scalars(_finite(health.work_distance)))
-        rr.log("controller/solve_time_ms", rr.Scalars(1e3 * health.solve_time))
-        rr.log("controller/slack", rr.Scalars(health.slack))
-        rr.log("controller/status", rr.TextLog(f"{moment.intent.mode}: {health.status.value}"))
+        diagnostics = frame.diagnostics
+        rr.log("distance/smallest", rr.Scalars(_finite(diagnostics.smallest_distance)))
+        rr.log("distance/work", rr.Scalars(_finite(diagnostics.work_distance)))
+        rr.log("controller/solve_time_ms", rr.Scalars(1e3 * diagnostics.solve_time))
+        rr.log("controller/slack", rr.Scalars(diagnostics.slack))
+        rr.log("controller/status", rr.TextLog(f"{frame.intent.mode}: {diagnostics.status.value}"))
 
     def _log_robot(self, q: np.ndarray) -> None:
         """Draw the robot's collision shapes where they are."""
@@ -70,12 +70,12 @@ class Drawing:
             shape = Obstacle(placed.name, placed.shape, position, rotation)
             self._log_shape(f"world/robot/{placed.name}", shape, _ROBOT)
 
-    def _log_tracking(self, moment: Moment, q: np.ndarray, v: np.ndarray) -> None:
+    def _log_tracking(self, frame: Frame, q: np.ndarray, v: np.ndarray) -> None:
         """Plot what is asked on each owned channel against what happens."""
         rr, channels = self._rr, self._channels
         realised = np.concatenate([self._base_twist(q, v), self._model.jacobian(q) @ v, v])
         for name, asked, owned, real in zip(
-            channels.names, moment.intent.values, moment.intent.mask, realised, strict=True
+            channels.names, frame.intent.values, frame.intent.mask, realised, strict=True
         ):
             rr.log(f"motion/{name}/realised", rr.Scalars(real))
             if owned and np.isfinite(asked):

@@ -16,7 +16,7 @@ from handrail.controllers.interface.controller import Controller
 from handrail.controllers.numerics.threads import single_threaded
 from handrail.controllers.robot.model import RobotModel
 from handrail.datasets.quality.safety import contacts_begun
-from handrail.datasets.recording.frames import Moment
+from handrail.datasets.recording.frames import Frame
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ class Observer(Protocol):
         """Take note that an episode begins."""
         ...
 
-    def see(self, moment: Moment) -> None:
+    def see(self, frame: Frame) -> None:
         """Take one moment."""
         ...
 
@@ -137,14 +137,14 @@ class Session:
                     disturbance.act(self.env.simulation)
                 following, _, terminated, truncated, info = self.env.step(action)
             done = terminated or truncated
-            moment = Moment(
+            frame = Frame(
                 state=observation["agent_pos"],
                 environment=observation["environment_state"],
                 images=observation.get("pixels", {}),
                 intent=intent,
                 action=info["sent"],
                 command=action,
-                health=command.health,
+                diagnostics=command.diagnostics,
                 contacts=info["contacts"],
                 success=bool(info["is_success"]),
                 done=done,
@@ -152,8 +152,8 @@ class Session:
             )
             with tally.timed("observers"):
                 for observer in self._observers:
-                    observer.see(moment)
-            tally.add(moment)
+                    observer.see(frame)
+            tally.add(frame)
             observation = following
             if self._realtime:
                 tally.pace()
@@ -181,7 +181,7 @@ class _Surroundings:
         """Say where things are now, if that can have changed."""
         before, self._holding = self._holding, bool(self._env.simulation.held())
         if self._moving or self._holding or before:
-            self._controller.observe(self._env.obstacles())
+            self._controller.update_scene(self._env.obstacles())
 
 
 class _Tally:
@@ -209,11 +209,11 @@ class _Tally:
         yield
         self._spent[part] = self._spent.get(part, 0.0) + time.perf_counter() - start
 
-    def add(self, moment: Moment) -> None:
+    def add(self, frame: Frame) -> None:
         self._frames += 1
-        self._brakes += Status(moment.health.status).brakes
-        self._contacts.append(moment.contacts)
-        self._smallest = min(self._smallest, moment.health.smallest_distance)
+        self._brakes += Status(frame.diagnostics.status).brakes
+        self._contacts.append(frame.contacts)
+        self._smallest = min(self._smallest, frame.diagnostics.smallest_distance)
 
     def pace(self) -> None:
         """Wait for the end of the period, or note that it is over."""

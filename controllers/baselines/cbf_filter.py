@@ -11,10 +11,10 @@ from handrail.controllers.collision.margins import Margins
 from handrail.controllers.collision.surroundings import Surroundings
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.channels import Channels
-from handrail.controllers.interface.command import Command, Health, Status
+from handrail.controllers.interface.command import Command, Diagnostics, Status
 from handrail.controllers.interface.controller import State
 from handrail.controllers.interface.intent import Intent
-from handrail.controllers.interface.validation import InputGuard
+from handrail.controllers.interface.validation import InputValidator
 from handrail.controllers.mpc.last_command import Followed, following, sent_velocity
 from handrail.controllers.robot.model import RobotModel
 from handrail.controllers.robot.shape import Obstacle
@@ -87,7 +87,7 @@ class CbfFilter:
         self._period = period
         self._settings = settings or CbfSettings()
         self.channels = Channels.of(model.description)
-        self._guard = InputGuard(self.channels, self._settings.intent_timeout)
+        self._validator = InputValidator(self.channels, self._settings.intent_timeout)
         self._limiter = Limiter(model.description)
         self._weights = model.description.limits.velocity**-2.0
         self.reset()
@@ -96,13 +96,13 @@ class CbfFilter:
         """Forget the last command; take the obstacles of a new episode."""
         self._surroundings = Surroundings(self._model, obstacles)
         self._margins = self._wanted_margins()
-        self._guard.reset()
+        self._validator.reset()
         self._followed: Followed | None = None
         self._gripper = 0.0
 
-    def observe(self, obstacles: tuple[Obstacle, ...]) -> None:
+    def update_scene(self, obstacles: tuple[Obstacle, ...]) -> None:
         """Take where the obstacles are now, how fast they move, and what the hand holds."""
-        if self._surroundings.observe(obstacles):
+        if self._surroundings.update_scene(obstacles):
             self._margins = self._wanted_margins(self._margins)
 
     def _wanted_margins(self, before: Margins | None = None) -> Margins:
@@ -113,23 +113,23 @@ class CbfFilter:
     def update(self, state: State, intent: Intent) -> Command:
         """Return the command from now on; brakes on a bad input or a failed solve."""
         start = perf_counter()
-        status = self._guard.check(state, intent, self._surroundings)
+        status = self._validator.check(state, intent, self._surroundings)
         previous = sent_velocity(state, self._followed, self._model.description.limits)
         if state.is_of(self._model.size):
-            velocity, health = self._filtered(state.q, previous, intent, status)
+            velocity, diagnostics = self._filtered(state.q, previous, intent, status)
         else:
             velocity, _ = self._limiter.limit(previous, np.zeros(self._model.size), self._period)
-            health = Health(status)
+            diagnostics = Diagnostics(status)
         velocities = self._limiter.to_rest(np.stack([previous, velocity]), self._period)
-        health = replace(health, solve_time=perf_counter() - start)
-        command = Command(velocities, self._period, self._gripper, health)
+        diagnostics = replace(diagnostics, solve_time=perf_counter() - start)
+        command = Command(velocities, self._period, self._gripper, diagnostics)
         self._followed = following(self._followed, command, state.time, self._period)
         return command
 
     def _filtered(
         self, q: FloatArray, previous: FloatArray, intent: Intent, status: Status
-    ) -> tuple[FloatArray, Health]:
-        """Return the velocity to command, (n,), and the health but for its time."""
+    ) -> tuple[FloatArray, Diagnostics]:
+        """Return the velocity to command, (n,), and the diagnostics but for its time."""
         barriers = self._barriers(q)
         asked, wanted, slack = np.zeros(self._model.size), np.zeros(self._model.size), 0.0
         if status is Status.OK:
@@ -141,7 +141,7 @@ class CbfFilter:
             status = Status.OK if solved else Status.SOLVER_FAILED
         velocity, _ = self._limiter.limit(previous, wanted, self._period, q)
         work = self._surroundings.collision.work
-        return velocity, Health(
+        return velocity, Diagnostics(
             status=status,
             slack=slack,
             smallest_distance=float(np.min(barriers.distances[~work], initial=np.inf)),

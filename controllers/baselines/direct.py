@@ -37,9 +37,9 @@ class DirectController:
         """Forget the last command; take the obstacles whose distance is reported."""
         self._reactive.reset(obstacles)
 
-    def observe(self, obstacles: tuple[Obstacle, ...]) -> None:
+    def update_scene(self, obstacles: tuple[Obstacle, ...]) -> None:
         """Take where the obstacles are now, and what the hand holds."""
-        self._reactive.observe(obstacles)
+        self._reactive.update_scene(obstacles)
 
     def update(self, state: State, intent: Intent) -> Command:
         """Return the command from now on; brakes when an input is invalid or stale."""

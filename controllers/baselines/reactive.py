@@ -1,4 +1,4 @@
-"""The shell of every controller that looks at this moment only: checks, limits, health."""
+"""The shell of every controller that looks at this moment only: checks, limits, diagnostics."""
 
 from collections.abc import Callable
 from time import perf_counter
@@ -8,10 +8,10 @@ import numpy as np
 from handrail.controllers.arrays import BoolArray, FloatArray
 from handrail.controllers.collision.surroundings import Surroundings
 from handrail.controllers.interface.channels import Channels
-from handrail.controllers.interface.command import Command, Health, Status
+from handrail.controllers.interface.command import Command, Diagnostics, Status
 from handrail.controllers.interface.controller import State
 from handrail.controllers.interface.intent import Intent
-from handrail.controllers.interface.validation import InputGuard
+from handrail.controllers.interface.validation import InputValidator
 from handrail.controllers.mpc.last_command import Followed, following, sent_velocity
 from handrail.controllers.robot.model import RobotModel
 from handrail.controllers.robot.shape import Obstacle
@@ -47,7 +47,7 @@ class ReactiveController:
         self._model = model
         self._ask = ask
         self._limiter = Limiter(model.description)
-        self._guard = InputGuard(self.channels, intent_timeout)
+        self._validator = InputValidator(self.channels, intent_timeout)
         self._period = period
         self._foreign = np.zeros(self.channels.size, dtype=bool) if understood is None else ~understood
         self.reset()
@@ -55,18 +55,18 @@ class ReactiveController:
     def reset(self, obstacles: tuple[Obstacle, ...] = ()) -> None:
         """Forget the last command; take the obstacles whose distance is reported."""
         self._surroundings = Surroundings(self._model, obstacles)
-        self._guard.reset()
+        self._validator.reset()
         self._followed: Followed | None = None
         self._gripper = 0.0
 
-    def observe(self, obstacles: tuple[Obstacle, ...]) -> None:
+    def update_scene(self, obstacles: tuple[Obstacle, ...]) -> None:
         """Take where the obstacles are now, and what the hand holds."""
-        self._surroundings.observe(obstacles)
+        self._surroundings.update_scene(obstacles)
 
     def update(self, state: State, intent: Intent) -> Command:
         """Return the command from now on."""
         start = perf_counter()
-        status = self._guard.check(state, intent, self._surroundings)
+        status = self._validator.check(state, intent, self._surroundings)
         if status is Status.OK and np.any(intent.mask & self._foreign):
             status = Status.INVALID_INTENT
         previous = sent_velocity(state, self._followed, self._model.description.limits)
@@ -79,19 +79,19 @@ class ReactiveController:
         if status is Status.OK and clipped:
             status = Status.CLIPPED
         velocities = self._limiter.to_rest(np.stack([previous, velocity]), self._period)
-        health = self._health(state, status, start)
-        command = Command(velocities, self._period, self._gripper, health)
+        diagnostics = self._diagnostics(state, status, start)
+        command = Command(velocities, self._period, self._gripper, diagnostics)
         self._followed = following(self._followed, command, state.time, self._period)
         return command
 
-    def _health(self, state: State, status: Status, start: float) -> Health:
+    def _diagnostics(self, state: State, status: Status, start: float) -> Diagnostics:
         solve_time = perf_counter() - start
         if not state.is_of(self._model.size):
-            return Health(status, solve_time)
+            return Diagnostics(status, solve_time)
         collision = self._surroundings.collision
         distances = collision.values(state.q[None, :])[0]
         work = collision.work
-        return Health(
+        return Diagnostics(
             status=status,
             solve_time=solve_time,
             smallest_distance=float(np.min(distances[~work], initial=np.inf)),

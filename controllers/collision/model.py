@@ -66,7 +66,7 @@ class CollisionModel:
         self._all, self._along, self._after = (
             PairData(self._model, self._data, self._geometry, neutral) for _ in range(3)
         )
-        self.observe(obstacles)
+        self.update_scene(obstacles)
 
     @property
     def size(self) -> int:
@@ -186,7 +186,7 @@ class CollisionModel:
         for obstacle in self._moving:
             self._shapes.place(obstacle, time)
 
-    def observe(self, obstacles: tuple[Obstacle, ...]) -> None:
+    def update_scene(self, obstacles: tuple[Obstacle, ...]) -> None:
         """Take where the obstacles are now and how fast they move.
 
         Raises:
@@ -196,7 +196,7 @@ class CollisionModel:
             expected, got = (", ".join(kept.name for kept in kind) for kind in (self._kept, _kept(obstacles)))
             raise HandrailError(f"obstacles: expected {expected} as they were, got {got}")
         self._last: tuple[FloatArray, FloatArray] | None = None
-        self._shapes.observe(obstacles)
+        self._shapes.update_scene(obstacles)
         self._moving = [obstacle for obstacle in obstacles if obstacle.velocity.any()]
         speeds = {obstacle.name: float(np.linalg.norm(obstacle.velocity)) for obstacle in obstacles}
         self._speeds = np.array([speeds.get(second, 0.0) for _, second in self.pairs])
@@ -211,7 +211,7 @@ class CollisionModel:
         """
         if _kept(obstacles) != self._kept:
             return CollisionModel(self._robot, obstacles)
-        self.observe(obstacles)
+        self.update_scene(obstacles)
         return self
 
 

@@ -64,9 +64,9 @@ class ShapePairs:
         self._rows = {name: [row for row, pair in enumerate(self.names) if name in pair] for name in held}
         self.held = np.array([row for rows in self._rows.values() for row in rows], dtype=int)
         self._measure_levers(range(len(self.names)))
-        self.observe(obstacles)
+        self.update_scene(obstacles)
 
-    def observe(self, obstacles: tuple[Obstacle, ...]) -> None:
+    def update_scene(self, obstacles: tuple[Obstacle, ...]) -> None:
         """Put every obstacle where it is now; a thing may have slipped in the hand, and reach farther."""
         for obstacle in obstacles:
             self.place(obstacle)

@@ -25,7 +25,7 @@ class Surroundings:
         self.collision = CollisionModel(model, obstacles)
         self.make_sense = True
 
-    def observe(self, obstacles: tuple[Obstacle, ...]) -> bool:
+    def update_scene(self, obstacles: tuple[Obstacle, ...]) -> bool:
         """Take the obstacles as they are now; return whether there are other pairs than before."""
         before = self.collision
         try:

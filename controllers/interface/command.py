@@ -29,7 +29,7 @@ class Status(StrEnum):
 
 
 @dataclass(frozen=True)
-class Health:
+class Diagnostics:
     """How the controller fared in one update.
 
     Attributes:
@@ -59,14 +59,14 @@ class Command:
         velocities: generalised velocities at times 0, dt, 2 dt, … since the first knot, (k, n) [m/s, rad/s].
         dt: time between knots [s].
         gripper: 0 open, 1 closed.
-        health: how the controller fared.
+        diagnostics: how the controller fared.
         elapsed: how long ago the first knot was [s]; zero but where an earlier plan is being followed.
     """
 
     velocities: FloatArray
     dt: float
     gripper: float = 0.0
-    health: Health = field(default_factory=Health)
+    diagnostics: Diagnostics = field(default_factory=Diagnostics)
     elapsed: float = 0.0
 
     def __post_init__(self) -> None:

@@ -62,7 +62,7 @@ class Controller(Protocol):
         """Forget the past (warm start, last command) and take the scene of a new episode."""
         ...
 
-    def observe(self, obstacles: tuple[Obstacle, ...]) -> None:
+    def update_scene(self, obstacles: tuple[Obstacle, ...]) -> None:
         """Take what stands around now, where, how fast it moves, and what the hand holds.
 
         Things may appear and vanish; what was commanded is not forgotten. Where the scene makes no sense (two

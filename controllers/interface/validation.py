@@ -12,7 +12,7 @@ _LEAD = 0.05  # by which an intent's stamp may be ahead of the state's clock: on
 _TICK = 1e-4  # by which the state's clock advances from update to update at least [s]
 
 
-class InputGuard:
+class InputValidator:
     """Says whether an update's inputs may move the robot; remembers when they came.
 
     An intent is new if its stamp is later than all before. With t the state's time, t_s the stamp and t_a the

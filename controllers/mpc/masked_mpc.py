@@ -10,12 +10,12 @@ from handrail.controllers.collision.margins import Margins
 from handrail.controllers.collision.surroundings import Surroundings
 from handrail.controllers.errors import HandrailError, unknown_name
 from handrail.controllers.interface.channels import Channels
-from handrail.controllers.interface.command import Command, Health, Status
+from handrail.controllers.interface.command import Command, Diagnostics, Status
 from handrail.controllers.interface.controller import State
 from handrail.controllers.interface.intent import Intent
 from handrail.controllers.interface.prediction import Prediction, constant
 from handrail.controllers.interface.trajectory import Trajectory
-from handrail.controllers.interface.validation import InputGuard
+from handrail.controllers.interface.validation import InputValidator
 from handrail.controllers.mpc.last_command import Followed, following, sent_velocity
 from handrail.controllers.objectives.objective import Objective
 from handrail.controllers.objectives.regularisation import (
@@ -67,7 +67,7 @@ class MaskedMpc:
         self._tolerance = self.settings.velocity_tolerance * model.description.limits.velocity
         self._predict = predict
         self._times = self.settings.dt * np.arange(1, horizon + 1)
-        self._guard = InputGuard(self.channels, self.settings.intent_timeout)
+        self._validator = InputValidator(self.channels, self.settings.intent_timeout)
         self._weights: dict[bytes, FloatArray] = {}
         self._largest = self._largest_intent()
         self._reference = np.tile(self.residuals.reference, (horizon, 1))
@@ -87,12 +87,12 @@ class MaskedMpc:
         self._parameters = self.residuals.parameters
         self._plan: Plan | None = None
         self._followed: Followed | None = None
-        self._guard.reset()
+        self._validator.reset()
         getattr(self._predict, "reset", lambda: None)()
 
-    def observe(self, obstacles: tuple[Obstacle, ...]) -> None:
+    def update_scene(self, obstacles: tuple[Obstacle, ...]) -> None:
         """Take what stands around now, where, how fast it moves, and what the hand holds."""
-        if self._surroundings.observe(obstacles):
+        if self._surroundings.update_scene(obstacles):
             self._keep_apart(self._margins)
             self._backup.measure_by(self._certificate)
 
@@ -122,7 +122,7 @@ class MaskedMpc:
     def update(self, state: State, intent: Intent) -> Command:
         """Return the command from now on: the plan, or what `Backup` has instead; it ends at rest."""
         start = perf_counter()
-        status = self._guard.check(state, intent, self._surroundings)
+        status = self._validator.check(state, intent, self._surroundings)
         plan = self._solve(state, intent) if status is Status.OK else None
         if status is Status.OK and plan is None:
             status = Status.SOLVER_FAILED
@@ -132,8 +132,10 @@ class MaskedMpc:
         motion, planned = self._motion(state, plan, distances, status)
         if plan is not None and not planned:
             status = Status.BACKUP
-        health = self._health(status, plan, distances, start)
-        command = Command(motion.velocities, motion.dt, self._gripper(intent, status), health, motion.elapsed)
+        diagnostics = self._diagnostics(status, plan, distances, start)
+        command = Command(
+            motion.velocities, motion.dt, self._gripper(intent, status), diagnostics, motion.elapsed
+        )
         self._plan = plan if planned else None
         self._followed = following(self._followed, command, state.time, self.settings.dt)
         return command
@@ -235,15 +237,17 @@ class MaskedMpc:
             return None
         return self._collision.values(state.q[None, :])[0] if plan is None else plan.distances
 
-    def _health(
+    def _diagnostics(
         self, status: Status, plan: Plan | None, distances: FloatArray | None, start: float
-    ) -> Health:
+    ) -> Diagnostics:
         if distances is None:
-            return Health(status, perf_counter() - start)
+            return Diagnostics(status, perf_counter() - start)
         smallest, at_work = smallest_distances(distances, self._collision.work)
         if plan is None:
-            return Health(status, perf_counter() - start, smallest_distance=smallest, work_distance=at_work)
-        return Health(
+            return Diagnostics(
+                status, perf_counter() - start, smallest_distance=smallest, work_distance=at_work
+            )
+        return Diagnostics(
             status,
             solve_time=perf_counter() - start,
             smallest_distance=smallest,

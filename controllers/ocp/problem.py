@@ -70,7 +70,7 @@ class Plan:
         q: positions at the nodes, (N + 1, n).
         v: velocities at the nodes, (N + 1, n).
         u: accelerations of the stages, (N, n).
-        collision_slack: largest shortfall of a distance against its margin in the plan [m].
+        collision_slack: largest violation of a distance against its margin in the plan [m].
         limit_slack: largest excess over a position limit, relative to half its range; velocity limits share
             it with a thousandth of its size.
         distances: signed distances now, (P,).

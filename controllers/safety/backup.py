@@ -8,7 +8,7 @@ import numpy as np
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.interface.trajectory import Trajectory
 from handrail.controllers.ocp.problem import Plan
-from handrail.controllers.safety.certificate import Shortfall, StopCertificate
+from handrail.controllers.safety.certificate import StopCertificate, Violation
 from handrail.controllers.safety.limiter import Limiter
 
 _SAMPLES = 2  # of a plan's stage
@@ -33,17 +33,17 @@ class Situation:
 
 
 @dataclass(frozen=True)
-class Way:
+class Candidate:
     """Something that the robot may do now.
 
     Attributes:
         motion: what is done for sure, unless a later update finds something better; then a full stop.
-        shortfall: of its safety.
+        violation: of its safety.
         planned: whether it begins with the new plan.
     """
 
     motion: Trajectory
-    shortfall: Shortfall
+    violation: Violation
     planned: bool = False
 
 
@@ -77,7 +77,7 @@ class Backup:
         """Measure by other pairs from now on: something was grasped or let go."""
         self._certificate = certificate
 
-    def choose(self, situation: Situation, plan: Plan | None, halt: bool = False) -> Way:
+    def choose(self, situation: Situation, plan: Plan | None, halt: bool = False) -> Candidate:
         """Return the way to take, and store it.
 
         Args:
@@ -85,13 +85,13 @@ class Backup:
             plan: of this update; None when there is none.
             halt: whether a full stop is wanted, rather than what is stored.
         """
-        refused: list[Way] = []
+        refused: list[Candidate] = []
         for way in self._ways(situation, plan, halt):
-            if way.shortfall.all <= 0.0:
+            if way.violation.all <= 0.0:
                 break
             refused.insert(0, way)
         else:
-            way = min(refused, key=lambda refused: refused.shortfall)  # of equals the one farther down
+            way = min(refused, key=lambda refused: refused.violation)  # of equals the one farther down
         self._stored = way.motion
         return way
 
@@ -100,36 +100,36 @@ class Backup:
         self._stored = self._braking(velocity)
         return self._stored
 
-    def _ways(self, situation: Situation, plan: Plan | None, halt: bool) -> Iterator[Way]:
+    def _ways(self, situation: Situation, plan: Plan | None, halt: bool) -> Iterator[Candidate]:
         now = situation.q, situation.distances
         if plan is not None:
-            shortfall = self._certificate.shortfall(plan.q[1], plan.v[1], now, self._dt)
-            yield Way(Trajectory(plan.v[:2], self._dt), shortfall, planned=True)
+            violation = self._certificate.violation(plan.q[1], plan.v[1], now, self._dt)
+            yield Candidate(Trajectory(plan.v[:2], self._dt), violation, planned=True)
             yield from self._farther(plan, now)
         if halt:
             yield self._stop(situation)
         if self._stored is not None:
             rest = self._stopping(self._stored).after(situation.elapsed)
             if np.allclose(situation.v, rest.velocity(0.0), rtol=0.0, atol=_SAME):
-                yield Way(rest, self._certificate.until_rest(*rest.path(situation.q), now))
+                yield Candidate(rest, self._certificate.until_rest(*rest.path(situation.q), now))
         if not halt:
             yield self._stop(situation)
 
-    def _farther(self, plan: Plan, now: tuple[FloatArray, FloatArray]) -> Iterator[Way]:
+    def _farther(self, plan: Plan, now: tuple[FloatArray, FloatArray]) -> Iterator[Candidate]:
         """Yield the plan as far as its own path is safe, then a full stop; half as far; and so on."""
         path = Trajectory(plan.v, self._dt).path(plan.q[0], _SAMPLES)
-        shortfalls = self._certificate.along(*path, now)[:, 1]
-        unsafe = np.flatnonzero(shortfalls > 0.0)
+        violations = self._certificate.along(*path, now)[:, 1]
+        unsafe = np.flatnonzero(violations > 0.0)
         stages = len(plan.u) if not len(unsafe) else (int(unsafe[0]) - 1) // _SAMPLES
         while stages > 1:
-            shortfall = self._certificate.shortfall(plan.q[stages], plan.v[stages], now, self._dt * stages)
-            yield Way(Trajectory(plan.v[: stages + 1], self._dt), shortfall, planned=True)
+            violation = self._certificate.violation(plan.q[stages], plan.v[stages], now, self._dt * stages)
+            yield Candidate(Trajectory(plan.v[: stages + 1], self._dt), violation, planned=True)
             stages //= 2
 
-    def _stop(self, situation: Situation) -> Way:
+    def _stop(self, situation: Situation) -> Candidate:
         now = situation.q, situation.distances
-        shortfall = self._certificate.shortfall(situation.q, situation.v, now)
-        return Way(self._braking(situation.v), shortfall)
+        violation = self._certificate.violation(situation.q, situation.v, now)
+        return Candidate(self._braking(situation.v), violation)
 
     def _braking(self, velocity: FloatArray) -> Trajectory:
         """Return a full stop from a velocity, (n,)."""

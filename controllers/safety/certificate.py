@@ -19,7 +19,7 @@ _HARD = 0.5  # hard floor of the robot with itself and with what stands still, a
 _BEYOND = 0.01  # of its range that a joint may come to rest [m, rad]
 
 
-class Shortfall(NamedTuple):
+class Violation(NamedTuple):
     """How far a motion falls short of safety; of two the smaller is safer. 0 when it is safe [m, rad].
 
     Attributes:
@@ -63,9 +63,9 @@ class StopCertificate:
         self._limits = limits
         self._span = span
 
-    def shortfall(
+    def violation(
         self, q: FloatArray, v: FloatArray, now: tuple[FloatArray, FloatArray], delay: float = 0.0
-    ) -> Shortfall:
+    ) -> Violation:
         """Return how far the full stop from (q, v) falls short of safety.
 
         At full deceleration of every joint: `q_j(t) = q_j + v_j t - ½ sign(v_j) a_j t²` until `|v_j| / a_j`.
@@ -81,7 +81,7 @@ class StopCertificate:
 
     def until_rest(
         self, path: FloatArray, times: FloatArray, now: tuple[FloatArray, FloatArray]
-    ) -> Shortfall:
+    ) -> Violation:
         """Return the same of a motion that ends at rest, through positions (K, n) at times from now, (K,).
 
         Where obstacles move, the robot has to be safe for some time, moving or waiting.
@@ -91,18 +91,18 @@ class StopCertificate:
             path = np.vstack([path, np.broadcast_to(path[-1], (len(_SAMPLES), path.shape[1]))])
             times = np.append(times, times[-1] + left * _SAMPLES)
         hard, all_floors = self.along(path, times, now).max(axis=0).tolist()
-        return Shortfall(hard, all_floors)
+        return Violation(hard, all_floors)
 
     def along(self, path: FloatArray, times: FloatArray, now: tuple[FloatArray, FloatArray]) -> FloatArray:
         """Return the same at every point of a motion, hard and of all floors, (K, 2)."""
         floors = self._floor * self._margins.values
         distances = self._collision.values(path, times, now, floors)
         bounds = self._limits.position_lower, self._limits.position_upper
-        return _shortfalls(path, distances, *now, floors, self._collision.kinds, *bounds)
+        return _violations(path, distances, *now, floors, self._collision.kinds, *bounds)
 
 
 @jit
-def _shortfalls(path, distances, start, now, floors, kinds, lower, upper):
+def _violations(path, distances, start, now, floors, kinds, lower, upper):
     short = np.zeros((len(path), 2))
     for k in range(len(path)):
         for p in range(len(floors)):

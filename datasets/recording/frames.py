@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray
-from handrail.controllers.interface.command import Health
+from handrail.controllers.interface.command import Diagnostics
 from handrail.controllers.interface.intent import Intent
 from handrail.datasets.format.schema import Feature
 
@@ -16,7 +16,7 @@ MOST = 1e6  # [m/s, rad/s, …] what any other number is cut to
 
 
 @dataclass(frozen=True)
-class Moment:
+class Frame:
     """One control period: what was observed, asked, commanded, and how the controller fared.
 
     Attributes:
@@ -26,7 +26,7 @@ class Moment:
         intent: what the operator asked for.
         action: what was sent to the robot: velocities at the end of the period and the gripper, (n + 1,).
         command: what the controller asked for, (n + 1,); the robot's own limits may have cut it.
-        health: of the controller.
+        diagnostics: of the controller.
         contacts: forbidden contacts in the period.
         success: whether the task is done at the end of the period.
         done: whether the episode ends with it.
@@ -39,14 +39,14 @@ class Moment:
     intent: Intent
     action: FloatArray
     command: FloatArray
-    health: Health
+    diagnostics: Diagnostics
     contacts: int
     success: bool
     done: bool
     wall_clock: float
 
 
-def moment_features(
+def frame_features(
     state: Sequence[str],
     environment: Sequence[str],
     joints: Sequence[str],
@@ -95,34 +95,34 @@ def moment_features(
     }
 
 
-def moment_row(moment: Moment) -> dict[str, Any]:
-    """Return a moment as a frame of `moment_features`.
+def frame_row(frame: Frame) -> dict[str, Any]:
+    """Return a moment as a frame of `frame_features`.
 
     What stands beside a policy's inputs and outputs is finite too: no tool's statistics may become NaN.
     """
-    intent, raw, health = moment.intent, moment.intent.raw.values, moment.health
-    pictures = {f"observation.images.{name}": image for name, image in moment.images.items()}
+    intent, raw, diagnostics = frame.intent, frame.intent.raw.values, frame.diagnostics
+    pictures = {f"observation.images.{name}": image for name, image in frame.images.items()}
     return {
-        "observation.state": moment.state,
-        "observation.environment_state": moment.environment,
+        "observation.state": frame.state,
+        "observation.environment_state": frame.environment,
         **pictures,
-        "action": moment.action,
+        "action": frame.action,
         "teleop.values": _finite(np.append(np.where(intent.mask, intent.values, 0.0), intent.gripper)),
         "teleop.mask": np.append(intent.mask, True),
         "teleop.mode": intent.mode,
         "teleop.raw": _finite(raw if raw.size else np.zeros(len(intent.values))),
         "teleop.axes": intent.raw.axes,
         "teleop.switches": intent.raw.switches,
-        "controller.command": moment.command,
-        "controller.solve_time": health.solve_time,
-        "controller.status": health.status.value,
-        "controller.slack": _finite(health.slack),
-        "controller.smallest_distance": _distance(health.smallest_distance),
-        "controller.work_distance": _distance(health.work_distance),
-        "safety.contacts": moment.contacts,
-        "next.success": moment.success,
-        "next.done": moment.done,
-        "wall_clock": moment.wall_clock,
+        "controller.command": frame.command,
+        "controller.solve_time": diagnostics.solve_time,
+        "controller.status": diagnostics.status.value,
+        "controller.slack": _finite(diagnostics.slack),
+        "controller.smallest_distance": _distance(diagnostics.smallest_distance),
+        "controller.work_distance": _distance(diagnostics.work_distance),
+        "safety.contacts": frame.contacts,
+        "next.success": frame.success,
+        "next.done": frame.done,
+        "wall_clock": frame.wall_clock,
     }
 
 

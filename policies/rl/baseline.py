@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import cast
 
-from handrail.collect.experiments.benchmark.baselines import Contender, SmoothedHandIntent
+from handrail.collect.experiments.benchmark.baselines import Baseline, SmoothedHandIntent
 from handrail.collect.tasks.goal_reaching import Goal
 from handrail.controllers.interface.controller import Controller
 from handrail.controllers.robot.model import RobotModel
@@ -19,10 +19,10 @@ def _aim(controller: Controller, goal: Goal) -> None:
     cast(RlController, controller).aim(goal)
 
 
-RL_CONTENDERS: Mapping[str, Contender] = {
-    contender.name: contender
-    for contender in (
-        Contender("rl", "reinforcement-learning baseline (SAC)", _build, aim=_aim),
-        Contender("rl_low_pass", "SAC behind the MPC's low-pass", _build, SmoothedHandIntent, aim=_aim),
+RL_BASELINES: Mapping[str, Baseline] = {
+    baseline.name: baseline
+    for baseline in (
+        Baseline("rl", "reinforcement-learning baseline (SAC)", _build, aim=_aim),
+        Baseline("rl_low_pass", "SAC behind the MPC's low-pass", _build, SmoothedHandIntent, aim=_aim),
     )
 }

@@ -117,9 +117,9 @@ class RlController:
         self._completion.reset()
         self._inner.reset(obstacles)
 
-    def observe(self, obstacles: tuple[Obstacle, ...]) -> None:
+    def update_scene(self, obstacles: tuple[Obstacle, ...]) -> None:
         """Take where the obstacles are now, and what the hand holds."""
-        self._inner.observe(obstacles)
+        self._inner.update_scene(obstacles)
 
     def aim(self, goal: Goal) -> None:
         """Say where the twists of this episode lead; without it, the present twist is followed onward."""

@@ -88,7 +88,7 @@ def test_the_robot_drives_on_where_its_own_path_is_safe_and_a_full_stop_is_not(h
     stops = []
     for _ in range(100):
         command = robot.update(AHEAD(robot.time))
-        assert command.health.status is Status.OK
+        assert command.diagnostics.status is Status.OK
         stops.append(full_stop(robot))
     assert min(stops) < FLOOR
     assert robot.smallest > FLOOR
@@ -112,7 +112,9 @@ def test_what_was_stored_is_followed_where_a_full_stop_is_not_safe(monkeypatch, 
         monkeypatch.setattr(MPC.solver, "solve", unsolved)
     for _ in range(50):
         command = robot.update(AHEAD(robot.time - (trouble == "stale")))
-        assert command.health.status is (Status.STALE_INTENT if trouble == "stale" else Status.SOLVER_FAILED)
+        assert command.diagnostics.status is (
+            Status.STALE_INTENT if trouble == "stale" else Status.SOLVER_FAILED
+        )
     assert robot.smallest > FLOOR
     np.testing.assert_allclose(robot.v, 0.0, atol=1e-3)
     assert_within_limits(robot)
@@ -130,7 +132,7 @@ def test_a_solver_that_fails_for_good_leaves_the_robot_at_rest_without_contact(m
         robot.update(intent(robot.time))
     monkeypatch.setattr(MPC.solver, "solve", FAILURES[seed % len(FAILURES)])
     while np.abs(robot.v).max() > 1e-9:
-        assert robot.update(intent(robot.time)).health.status is Status.SOLVER_FAILED
+        assert robot.update(intent(robot.time)).diagnostics.status is Status.SOLVER_FAILED
         assert len(robot.commands) < updates + 45  # one stage and one stop, or a plan and one
     assert robot.smallest > 0.0
     assert_within_limits(robot)
@@ -156,7 +158,7 @@ def test_no_change_of_mind_exceeds_a_limit(monkeypatch, period):
         if 0.15 < trouble < 0.2 and k > 1:  # a period is known
             state = replace(robot.state, time=np.nan)
         robot.update(intent(stamp), state)
-    statuses = {command.health.status for command in robot.commands}
+    statuses = {command.diagnostics.status for command in robot.commands}
     assert {Status.OK, Status.SOLVER_FAILED, Status.STALE_INTENT, Status.INVALID_STATE} <= statuses
     assert robot.smallest > 0.0
     assert_within_limits(robot)
@@ -249,7 +251,7 @@ def test_a_solver_that_ignores_velocity_limits_is_cut_to_them(monkeypatch):
     monkeypatch.setattr(MPC.solver, "solve", reckless(joint=0))
     robot = Robot(MPC)
     for _ in range(25):
-        assert robot.update(AHEAD(robot.time)).health.status is Status.OK
+        assert robot.update(AHEAD(robot.time)).diagnostics.status is Status.OK
     np.testing.assert_allclose(robot.v[0], LIMITS.velocity[0], rtol=2e-3)
     assert_within_limits(robot)
 
@@ -262,7 +264,7 @@ def test_a_solver_that_ignores_the_range_of_a_joint_is_stopped_in_it(monkeypatch
     robot = Robot(MPC, q=q)
     for _ in range(60):
         robot.update(AHEAD(robot.time))
-    assert robot.commands[-1].health.status is Status.BACKUP
+    assert robot.commands[-1].diagnostics.status is Status.BACKUP
     assert abs(robot.q[8] - LIMITS.position_upper[8]) < 0.1
     assert robot.q[8] < LIMITS.position_upper[8] + 0.02
 
@@ -278,7 +280,7 @@ def test_where_nothing_is_safe_the_least_bad_is_done(monkeypatch):
     for _ in range(5):
         before = robot.v[0]
         assert before > LIMITS.acceleration[0] * PERIOD
-        assert robot.update(AHEAD(robot.time)).health.status is Status.BACKUP
+        assert robot.update(AHEAD(robot.time)).diagnostics.status is Status.BACKUP
         assert robot.v[0] == pytest.approx(before - LIMITS.acceleration[0] * PERIOD, abs=1e-9)
 
 
@@ -292,6 +294,6 @@ def test_where_obstacles_move_rest_is_not_safe_for_ever():
         collision = CollisionModel(MODEL, (pillar,))
         certificate = StopCertificate(LIMITER, collision, Margins(collision, 0.1, 0.1), 0.3, LIMITS, span=1.0)
         now = collision.values(HOME[None])[0]
-        shortfall = certificate.shortfall(HOME, np.zeros(9), (HOME, now))
-        assert shortfall.all == pytest.approx(0.0 if safe else 0.5 - away + 0.03, abs=1e-6)
-        assert shortfall.hard == 0.0  # a pillar that comes by itself is nobody's fault
+        violation = certificate.violation(HOME, np.zeros(9), (HOME, now))
+        assert violation.all == pytest.approx(0.0 if safe else 0.5 - away + 0.03, abs=1e-6)
+        assert violation.hard == 0.0  # a pillar that comes by itself is nobody's fault

@@ -91,7 +91,7 @@ def test_what_was_far_of_an_obstacle_is_forgotten_when_it_has_moved():
     far, near = (Obstacle("ball", Shape("sphere", [0.1]), [x, 0.0, 0.14]) for x in (9.0, -0.8))
     collision, path = CollisionModel(MODEL, (far,)), np.tile(MODEL.description.home, (3, 1))
     assert not np.any(collision.distances(path, reach=0.3).values[:, -1] < 0.3)
-    collision.observe((near,))
+    collision.update_scene((near,))
     exact = collision.values(path)
     distances = collision.distances(path, reach=0.3)
     np.testing.assert_allclose(distances.values[exact < 0.3], exact[exact < 0.3], atol=1e-5)
@@ -108,12 +108,12 @@ def test_moving_obstacles_are_where_they_will_be():
     np.testing.assert_allclose(collision.values(q, times)[:, row], expected, atol=1e-6)
     np.testing.assert_allclose(collision.distances(q, np.inf, times).values[:, row], expected, atol=1e-6)
     nearer = Obstacle("ball", ball.shape, [1.0, 0.0, 0.14])
-    collision.observe((nearer,))
+    collision.update_scene((nearer,))
     np.testing.assert_allclose(collision.values(q, times)[:, row], expected[0] - 1.0, atol=1e-6)
     with pytest.raises(HandrailError, match="obstacles: expected ball as they were, got none"):
-        collision.observe((Obstacle("none", ball.shape, [1, 0, 0]),))
+        collision.update_scene((Obstacle("none", ball.shape, [1, 0, 0]),))
     with pytest.raises(HandrailError, match="obstacles: expected ball as they were, got ball"):
-        collision.observe((Obstacle("ball", Shape("sphere", [0.2]), [1, 0, 0]),))
+        collision.update_scene((Obstacle("ball", Shape("sphere", [0.2]), [1, 0, 0]),))
 
 
 def test_the_distance_to_a_wall_is_the_gap():

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from handrail.collect.experiments.benchmark.baselines import CONTENDERS
+from handrail.collect.experiments.benchmark.baselines import BASELINES
 from handrail.collect.tasks.goal_reaching import STEP
 from handrail.controllers.baselines.arm_completion import WeldedBaseCompletion
 from handrail.controllers.baselines.blended_completion import BlendedCompletion
@@ -34,13 +34,13 @@ REST = np.zeros(9)
 TWISTS = arrays(float, 6, elements=st.floats(-0.2, 0.2))
 NEAR_HOME = arrays(float, 9, elements=st.floats(-0.3, 0.3)).map(lambda change: HOME + change)
 ANY_TWIST = arrays(float, 6, elements=st.floats(-10, 10))
-RIVALS = [name for name in CONTENDERS if name not in ("mpc", "safety_filter")]
+RIVALS = [name for name in BASELINES if name not in ("mpc", "safety_filter")]
 
 
 def controller(name):
     if name == "mink":
         pytest.importorskip("mink")
-    return CONTENDERS[name].build(MODEL)
+    return BASELINES[name].build(MODEL)
 
 
 def hand_intent(twist, time=0.0, frames=None):
@@ -154,7 +154,7 @@ def test_a_rival_follows_the_hand(name):
 def test_a_rival_stays_inside_the_limits(name, twists):
     """Whatever is asked, velocity and acceleration stay inside, and a garbled message brakes."""
     rival, v, q = controller(name), REST, HOME.copy()
-    operator = CONTENDERS[name].operator(MODEL)
+    operator = BASELINES[name].operator(MODEL)
     for step, twist in enumerate(twists):
         state = State(q, v, step * STEP)
         after = rival.update(state, operator(twist, state, state.time)).velocity(STEP)
@@ -164,7 +164,7 @@ def test_a_rival_stays_inside_the_limits(name, twists):
     state = State(q, v, 4 * STEP)
     garbled = replace(operator(np.full(6, 0.1), state, state.time), time=np.nan)
     command = rival.update(state, garbled)
-    assert command.health.status is Status.INVALID_INTENT
+    assert command.diagnostics.status is Status.INVALID_INTENT
     assert np.all(np.abs(command.velocity(STEP)) <= np.abs(v) + 1e-9)
 
 
@@ -172,11 +172,11 @@ def test_a_rival_stays_inside_the_limits(name, twists):
 def test_a_rival_says_how_it_fares(name):
     rival = controller(name)
     state = State(HOME, REST, 1.0)
-    stale = CONTENDERS[name].operator(MODEL)(np.full(6, 0.1), state, 0.5)
+    stale = BASELINES[name].operator(MODEL)(np.full(6, 0.1), state, 0.5)
     command = rival.update(state, stale)
-    assert command.health.status is Status.STALE_INTENT
-    assert command.health.solve_time > 0
-    assert 0.05 < command.health.smallest_distance < 0.2
+    assert command.diagnostics.status is Status.STALE_INTENT
+    assert command.diagnostics.solve_time > 0
+    assert 0.05 < command.diagnostics.smallest_distance < 0.2
     np.testing.assert_array_equal(command.velocity(STEP), 0.0)
 
 
@@ -184,7 +184,7 @@ def test_a_rival_says_how_it_fares(name):
 def test_who_completes_twists_refuses_other_channels(name):
     intent = Intent(np.full(CHANNELS.size, 0.1), CHANNELS.mask("ee", "base"))
     command = controller(name).update(State(HOME, REST), intent)
-    assert command.health.status is Status.INVALID_INTENT
+    assert command.diagnostics.status is Status.INVALID_INTENT
     np.testing.assert_array_equal(command.velocity(STEP), 0.0)
 
 
@@ -192,7 +192,7 @@ def test_nobody_steers_nothing_moves():
     command = twist_controller(MODEL, WholeBodyCompletion(MODEL)).update(
         State(HOME, REST), Intent.idle(CHANNELS)
     )
-    assert command.health.status is Status.OK
+    assert command.diagnostics.status is Status.OK
     np.testing.assert_array_equal(command.velocities, 0.0)
 
 
@@ -208,7 +208,7 @@ def test_mink_keeps_its_distance():
             command = rival.update(State(q, v, step * STEP), hand_intent(twist, step * STEP))
             after = command.velocity(STEP)
             q, v = q + 0.5 * STEP * (v + after), after
-            smallest[name] = min(smallest.get(name, np.inf), command.health.smallest_distance)
+            smallest[name] = min(smallest.get(name, np.inf), command.diagnostics.smallest_distance)
     assert smallest["dls"] < 0.02
     assert smallest["mink"] > 0.04
 

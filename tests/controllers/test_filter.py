@@ -68,7 +68,7 @@ def test_a_feasible_command_passes(make, seed):
     velocities = feasible(np.random.default_rng(seed))
     _, sent, commands = roll(make(ALONE, PERIOD), velocities)
     assert np.abs((sent - velocities) / LIMITS.velocity).max() < 1e-3
-    assert {command.health.status for command in commands} == {Status.OK}
+    assert {command.diagnostics.status for command in commands} == {Status.OK}
 
 
 @pytest.mark.parametrize("make", FILTERS)
@@ -170,12 +170,12 @@ def test_the_cbf_filter_projects_onto_the_barriers():
         command = controller.update(State(q, v), asked(wanted))
         u = command.velocity(PERIOD)
         left, gradients = barriers(q, settings)
-        assert np.all(gradients @ u >= -settings.alpha * left - command.health.slack - 1e-5)
+        assert np.all(gradients @ u >= -settings.alpha * left - command.diagnostics.slack - 1e-5)
         corrected += np.abs(u - wanted).max() > 1e-3
         step = LIMITS.acceleration * PERIOD
         others = np.clip(v + rng.uniform(-1, 1, (3000, 9)) * step, -LIMITS.velocity, LIMITS.velocity)
         allowed = others[np.all(others @ gradients.T >= -settings.alpha * left, axis=1)]
-        assert command.health.slack > 1e-6 or np.all((allowed - u) @ (weights * (u - wanted)) >= -1e-6)
+        assert command.diagnostics.slack > 1e-6 or np.all((allowed - u) @ (weights * (u - wanted)) >= -1e-6)
     assert corrected > 10
 
 
@@ -186,8 +186,8 @@ def test_the_cbf_filter_says_when_the_acceleration_is_not_enough():
     near[0] = POST.position[0] - 0.2 - 0.48 - 0.15
     controller.reset((POST,))
     command = controller.update(State(near, np.eye(9)[0]), asked(AHEAD))
-    assert command.health.status is Status.OK
-    assert command.health.slack > 0.1
+    assert command.diagnostics.status is Status.OK
+    assert command.diagnostics.slack > 0.1
     np.testing.assert_allclose(command.velocity(PERIOD)[0], 1.0 - LIMITS.acceleration[0] * PERIOD, atol=1e-6)
 
 
@@ -198,9 +198,9 @@ def test_the_cbf_filter_gives_way_to_what_comes():
     for step in range(80):
         place = POST.position - np.array([comes * step * PERIOD, 0.0, 0.0])
         seen = replace(POST, position=place, velocity=[-comes, 0.0, 0.0])
-        controller.observe((seen,))
+        controller.update_scene((seen,))
         command = controller.update(State(q, v, step * PERIOD), asked(np.zeros(9), step * PERIOD))
-        smallest = min(smallest, command.health.smallest_distance)
+        smallest = min(smallest, command.diagnostics.smallest_distance)
         after = command.velocity(PERIOD)
         q, v = q + PERIOD * 0.5 * (v + after), after
     assert q[0] < HOME[0] - 0.2
@@ -214,7 +214,7 @@ def test_a_failed_qp_brakes(monkeypatch):
     _, sent, _ = roll(controller, [0.3 * AHEAD] * 5)
     monkeypatch.setattr(cbf_filter.daqp, "solve", lambda *_: (np.zeros(10), 0.0, -1, {}))
     command = controller.update(State(HOME, sent[-1], 0.25), asked(AHEAD, 0.25))
-    assert command.health.status is Status.SOLVER_FAILED
+    assert command.diagnostics.status is Status.SOLVER_FAILED
     assert np.all(np.abs(command.velocity(PERIOD)) <= np.abs(sent[-1]))
 
 

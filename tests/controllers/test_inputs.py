@@ -37,7 +37,7 @@ def driven(name, obstacles=()):
     build, ask = CONTROLLERS[name]
     robot = Robot(build(MODEL), obstacles)
     for _ in range(10):
-        assert not robot.update(ask(robot.time)).health.status.brakes
+        assert not robot.update(ask(robot.time)).diagnostics.status.brakes
     assert robot.v[0] > 0.25
     return robot, ask
 
@@ -47,7 +47,7 @@ def assert_braked(robot, trouble, expected, periods=6):
     fastest, statuses = np.abs(robot.v).max(), []
     for k in range(periods):
         before = robot.v
-        statuses.append(robot.update(*trouble(k)).health.status)
+        statuses.append(robot.update(*trouble(k)).diagnostics.status)
         assert np.all(np.abs(robot.v - before) <= LIMITS.acceleration * PERIOD + 1e-9)
     assert statuses[-1] is expected
     assert np.abs(robot.v).max() < fastest
@@ -85,7 +85,7 @@ def test_a_state_clock_that_does_not_advance_is_a_fault(name, clock):
     for k in range(8):  # and from when it runs on, all is well again, for as long as new intents come
         time = now + k * PERIOD
         command = robot.update(ask(time), replace(robot.state, time=time))
-    assert not command.health.status.brakes
+    assert not command.diagnostics.status.brakes
 
 
 @pytest.mark.parametrize("name", CONTROLLERS)
@@ -95,7 +95,7 @@ def test_a_clock_that_keeps_jumping_back_does_not_keep_an_intent_fresh(name):
     last, start = ask(robot.time), robot.time
     for k in range(24):
         command = robot.update(last, replace(robot.state, time=start + 0.1 * ((k % 3) - 1)))
-    assert command.health.status.brakes
+    assert command.diagnostics.status.brakes
     np.testing.assert_allclose(robot.v, 0.0, atol=1e-12)
 
 
@@ -116,7 +116,7 @@ def test_who_is_not_listened_to_does_not_open_the_hand(name):
     robot.update(replace(ask(robot.time), gripper=1.0))
     for stamp in (robot.time + 10.0, robot.time - 10.0):
         assert robot.update(ask(stamp)).gripper == 1.0
-    robot.controller.observe((WALL, WALL))
+    robot.controller.update_scene((WALL, WALL))
     assert robot.controller.update(robot.state, ask(robot.time)).gripper == 1.0
     robot.time += PERIOD
     assert robot.update(ask(robot.time)).gripper == 0.0
@@ -127,7 +127,7 @@ def test_what_the_robot_says_it_was_sent_is_checked(name):
     robot, ask = driven(name)
     for bad in (np.full(9, np.nan), np.zeros(4)):
         state = replace(robot.state, commanded=bad)
-        assert robot.update(ask(robot.time), state).health.status is Status.INVALID_STATE
+        assert robot.update(ask(robot.time), state).diagnostics.status is Status.INVALID_STATE
 
 
 @pytest.mark.parametrize("name", CONTROLLERS)
@@ -136,7 +136,7 @@ def test_obstacles_come_and_go_and_nothing_is_forgotten(name):
     for scene in ((WALL,), (), (WALL, replace(WALL, name="other")), (replace(WALL, name="other"),)):
         robot.put(*scene)
         before, command = robot.v, robot.update(ask(robot.time))
-        assert not command.health.status.brakes
+        assert not command.diagnostics.status.brakes
         np.testing.assert_allclose(command.velocity(0.0), before, atol=1e-12)
     assert robot.v[0] > 0.25
 
@@ -147,12 +147,12 @@ def test_a_scene_that_makes_no_sense_brakes(name):
     bad = [(WALL, WALL), (replace(WALL, frame="nowhere"),), (replace(WALL, name="floor"),)]
     bad.append((replace(WALL, name="fingers"),))  # as a shape of the robot is called
     for scene in bad:
-        robot.controller.observe(scene)
+        robot.controller.update_scene(scene)
         before, command = robot.v, robot.controller.update(robot.state, ask(robot.time))
-        assert command.health.status is Status.INVALID_SCENE
+        assert command.diagnostics.status is Status.INVALID_SCENE
         assert np.abs(command.velocity(PERIOD)).max() < np.abs(before).max()
         robot.time += PERIOD
-    assert not robot.update(ask(robot.time)).health.status.brakes
+    assert not robot.update(ask(robot.time)).diagnostics.status.brakes
 
 
 def test_a_wall_that_appears_is_kept_from():

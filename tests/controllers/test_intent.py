@@ -222,7 +222,7 @@ def test_the_tool_twist_is_meant_in_its_frame_and_at_its_point():
 def test_a_frame_that_does_not_exist_brakes(frames):
     MPC.reset()
     command = MPC.update(State(HOME, np.zeros(9)), intent(np.full(18, 0.2), "ee", frames=frames))
-    assert command.health.status is Status.INVALID_INTENT
+    assert command.diagnostics.status is Status.INVALID_INTENT
     with pytest.raises(HandrailError):
         frames.check()
 
@@ -237,7 +237,7 @@ def test_an_over_determined_command_is_a_compromise():
     command = MPC.update(State(q, v, 1.5), both(1.5))
     hand = (MODEL.jacobian(q) @ v)[0]
     assert 0.02 < hand < 0.19
-    assert command.health.tracking_error > 0.01
+    assert command.diagnostics.tracking_error > 0.01
 
 
 def test_a_feasible_command_has_no_tracking_error():
@@ -246,7 +246,7 @@ def test_a_feasible_command_has_no_tracking_error():
     values[3] = 0.1
     q, v = roll(MPC, lambda time: intent(values, "ee", time=time))
     command = MPC.update(State(q, v, 1.5), intent(values, "ee", time=1.5))
-    assert command.health.tracking_error < 0.002
+    assert command.diagnostics.tracking_error < 0.002
 
 
 def test_the_certificate_measures_the_stop():
@@ -260,11 +260,11 @@ def test_the_certificate_measures_the_stop():
         margins = Margins(collision, 0.1, 0.1)
         certificate = StopCertificate(limiter, collision, margins, 0.3, MODEL.description.limits, span=1.0)
         now = collision.values(HOME[None])[0]
-        shortfall = certificate.shortfall(HOME, v, (HOME, now))
-        assert (shortfall.all == 0.0) is safe
+        violation = certificate.violation(HOME, v, (HOME, now))
+        assert (violation.all == 0.0) is safe
         if not safe:
-            assert shortfall.all == pytest.approx(0.32 - 0.2 + 0.03, abs=5e-3)
-            assert shortfall.hard == pytest.approx(0.32 - 0.2 + 0.015, abs=5e-3)
+            assert violation.all == pytest.approx(0.32 - 0.2 + 0.03, abs=5e-3)
+            assert violation.hard == pytest.approx(0.32 - 0.2 + 0.015, abs=5e-3)
 
 
 def test_an_unsafe_plan_is_replaced_by_a_full_stop(monkeypatch):
@@ -289,7 +289,7 @@ def test_an_unsafe_plan_is_replaced_by_a_full_stop(monkeypatch):
         command = mpc.update(State(q, v, 0.05 * k), intent(np.full(18, 0.5), "base", time=0.05 * k))
         after = command.velocity(0.05)
         q, v = q + 0.05 * 0.5 * (v + after), after
-        statuses.append(command.health.status)
+        statuses.append(command.diagnostics.status)
     assert Status.BACKUP in statuses
     assert mpc._collision.values(q[None])[0].min() > 0.02
 

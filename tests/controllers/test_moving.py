@@ -28,8 +28,8 @@ def meet(obstacle, values, groups, seconds=8.0):
     for k in range(int(seconds / PERIOD)):
         time = k * PERIOD
         seen = replace(obstacle, position=obstacle.position + time * obstacle.velocity)
-        mpc.observe((seen,))
-        truth.observe((replace(seen, velocity=np.zeros(3)),))
+        mpc.update_scene((seen,))
+        truth.update_scene((replace(seen, velocity=np.zeros(3)),))
         smallest = min(smallest, truth.values(q[None])[0].min())
         after = mpc.update(State(q, v, time), Intent(values, mask, time=time)).velocity(PERIOD)
         q, v = q + PERIOD * 0.5 * (v + after), after

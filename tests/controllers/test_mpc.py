@@ -100,7 +100,7 @@ def test_a_bad_intent_brakes(intent, status):
     MPC.reset()
     v = 0.5 * LIMITS.velocity
     command = MPC.update(State(HOME, v, 9.0), intent)
-    assert command.health.status is status
+    assert command.diagnostics.status is status
     assert status.brakes
     speeds = np.abs(command.velocities)
     assert np.all(np.diff(speeds, axis=0) <= 0)
@@ -114,7 +114,7 @@ def test_a_bad_state_brakes_from_the_last_command(state):
     asked = asking(np.full(18, 0.3), "ee")
     roll(MPC, [asked] * 10)
     command = MPC.update(state, asked(0.5))
-    assert command.health.status is Status.INVALID_STATE
+    assert command.diagnostics.status is Status.INVALID_STATE
     assert np.all(np.isfinite(command.velocities))
     assert np.all(np.abs(command.velocities[-1]) <= np.abs(command.velocities[0]))
 
@@ -132,7 +132,7 @@ def test_a_failed_solve_brakes(monkeypatch):
     monkeypatch.setattr(active_set, "solve", infeasible)
     beyond = asking(np.full(18, -2.0), "ee")
     command = MPC.update(State(positions[-1], velocities[-1], 0.5), beyond(0.5))
-    assert command.health.status is Status.SOLVER_FAILED
+    assert command.diagnostics.status is Status.SOLVER_FAILED
     np.testing.assert_allclose(command.velocity(0.0), velocities[-1], atol=1e-9)
     np.testing.assert_allclose(command.velocities[-1], 0.0, atol=1e-9)
 
@@ -166,7 +166,7 @@ def test_switching_modes_is_smooth():
     _, velocities, commands = roll(MPC, intents)
     steps = np.abs(np.diff(velocities, axis=0))
     assert np.all(steps <= LIMITS.acceleration * PERIOD * (1 + 1e-6) + 1e-9)
-    assert all(command.health.status is Status.OK for command in commands)
+    assert all(command.diagnostics.status is Status.OK for command in commands)
 
 
 def test_the_base_goes_round_an_obstacle_while_the_hand_keeps_its_course():
@@ -181,7 +181,7 @@ def test_the_base_goes_round_an_obstacle_while_the_hand_keeps_its_course():
         for q, v in zip(positions, velocities, strict=True)
     ]
     assert np.mean(errors[20:]) < 0.01 * 0.3
-    chassis = min(command.health.smallest_distance for command in commands)
+    chassis = min(command.diagnostics.smallest_distance for command in commands)
     assert chassis > 0.05
     assert np.max(np.abs(positions[:, 1])) > 0.1  # it did go round
 
@@ -194,7 +194,7 @@ def test_a_blocked_base_stops_at_the_margin():
     folded = np.array(HOME)
     folded[3:] = [1.57, -2.0, 2.4, -0.4, 1.57, 1.31]
     _, velocities, commands = roll(MPC, [asking(values, "base")] * 120, q=folded)
-    assert min(command.health.smallest_distance for command in commands) > 0.05
+    assert min(command.diagnostics.smallest_distance for command in commands) > 0.05
     assert np.abs(velocities[-1][0]) < 0.02
 
 

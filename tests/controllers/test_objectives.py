@@ -66,7 +66,7 @@ def roll(objectives, groups, ask, q=HOME, steps=80, settings=None):
         for name, value in ask(time).items():
             values[CHANNELS.names.index(name)] = value
         command = mpc.update(State(positions[-1], velocities[-1], time), Intent(values, mask, time=time))
-        assert not command.health.status.brakes
+        assert not command.diagnostics.status.brakes
         after = command.velocity(PERIOD)
         positions.append(positions[-1] + 0.5 * PERIOD * (velocities[-1] + after))
         velocities.append(after)

@@ -8,7 +8,7 @@ from handrail.controllers.interface.controller import State
 from handrail.controllers.mpc.masked_mpc import MaskedMpc
 from handrail.controllers.robot.shape import Obstacle, Shape
 from handrail.controllers.safety.backup import Backup, Situation
-from handrail.controllers.safety.certificate import Shortfall
+from handrail.controllers.safety.certificate import Violation
 from handrail.controllers.safety.limiter import Limiter
 
 OWN = len(MODEL.description.self_pairs)
@@ -39,11 +39,11 @@ def test_what_comes_too_near_buys_no_slack_to_the_robot_itself(speed):
 class Judge:
     """Says that a full stop is unsafe to the robot itself; what is stored, more so, but only to a mover."""
 
-    def shortfall(self, q, v, now, delay=0.0):
-        return Shortfall(hard=0.01, all=0.01)
+    def violation(self, q, v, now, delay=0.0):
+        return Violation(hard=0.01, all=0.01)
 
     def until_rest(self, path, times, now):
-        return Shortfall(hard=0.0, all=0.05)
+        return Violation(hard=0.0, all=0.05)
 
 
 @pytest.mark.parametrize("halt", [True, False])
@@ -51,4 +51,4 @@ def test_of_two_ways_that_are_not_safe_the_one_is_taken_that_keeps_from_itself(h
     backup, moving = Backup(Judge(), Limiter(MODEL.description), 0.1), 0.3 * LIMITS.velocity  # pyright: ignore
     backup.brake(moving)
     way = backup.choose(Situation(HOME, moving, np.zeros(OWN), 0.0), None, halt)
-    assert way.shortfall == (0.0, 0.05)
+    assert way.violation == (0.0, 0.05)

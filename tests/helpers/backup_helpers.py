@@ -33,7 +33,7 @@ class Robot:
         return State(self.q, self.v, self.time)
 
     def observe(self):
-        self.controller.observe(self._seen(self.time))
+        self.controller.update_scene(self._seen(self.time))
 
     def update(self, intent, state=None):
         """Let the controller see a state, the true one if None; move for one period."""

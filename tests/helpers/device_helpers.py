@@ -3,7 +3,7 @@
 import numpy as np
 from collect_helpers import environment
 
-from handrail.collect.operators.human.motion_goal import Target, Wish
+from handrail.collect.operators.human.motion_goal import MotionGoal, Target
 from handrail.collect.operators.modes import find_mode
 from handrail.collect.operators.operator import View
 from handrail.collect.operators.scripts.scripted import ScriptedOperator
@@ -28,11 +28,11 @@ class Wisher:
     def reset(self, view):
         pass
 
-    def wish(self, view):
+    def motion_goal(self, view):
         stand = HOME[:3] + [0.2, 0.1, 0.0]
         hand = np.concatenate([GOAL.position - view.tool.position, np.zeros(3)])
         focus = "base" if view.state.time < self._until else "hand"
-        return Wish(hand, np.array([0.3, 0.1, 0.0]), focus, target=Target(GOAL, stand, distance=0.02))
+        return MotionGoal(hand, np.array([0.3, 0.1, 0.0]), focus, target=Target(GOAL, stand, distance=0.02))
 
 
 def first_view() -> View:

@@ -169,7 +169,7 @@ class _Around:
         self._scene, self._collision = scene, CollisionModel(model, scene.obstacles())
 
     def told(self, state):
-        self._collision.observe(self._scene.obstacles(state.time))
+        self._collision.update_scene(self._scene.obstacles(state.time))
         distances = self._collision.values(state.q[None])[0]
         still = distances[self._collision.kinds != MOVING].min()
         return f"robot at {np.abs(state.v).max():.2f}, nearest that stands {still:.3f} m"
@@ -191,10 +191,10 @@ def run(model: RobotModel, controller, seed: int, seconds: float, movers: int = 
     for _ in range(int(seconds / PERIOD)):
         state, hand = simulation.state(), simulation.tool.position
         if movers:
-            controller.observe(scene.obstacles(state.time))
+            controller.update_scene(scene.obstacles(state.time))
         command = controller.update(state, rude.intent(state.time))
         velocity = command.velocity(PERIOD)
-        result.statuses[command.health.status.value] += 1
+        result.statuses[command.diagnostics.status.value] += 1
         excess = np.abs(velocity) / limits.velocity - 1.0
         result.velocity_excess = max(result.velocity_excess, float(np.max(excess)))
         excess = np.abs(velocity - previous) / (limits.acceleration * PERIOD) - 1.0
@@ -203,7 +203,7 @@ def run(model: RobotModel, controller, seed: int, seconds: float, movers: int = 
         for pair in simulation.advance(velocity, 0.0):
             met = set(pair.split(" – "))
             kind = result.moving if met & moving else result.standing if met & standing else result.own
-            kind.append(f"{pair} at {state.time:.2f} s: {around.told(state)}, {command.health.status}")
+            kind.append(f"{pair} at {state.time:.2f} s: {around.told(state)}, {command.diagnostics.status}")
         if result.moving:
             break
         result.nearest_own = min(result.nearest_own, own.smallest(simulation.data))

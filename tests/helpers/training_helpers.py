@@ -9,7 +9,7 @@ from handrail.collect.config import StoredConfig
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.robot.description import load_description
 from handrail.datasets.format.schema import Feature
-from handrail.datasets.recording.frames import moment_features
+from handrail.datasets.recording.frames import frame_features
 from handrail.datasets.recording.writer import EpisodeWriter
 from handrail.policies.imitation.config import TrainConfig
 
@@ -34,7 +34,7 @@ _COLUMNS = ("observation.state", "observation.environment_state", "action", "tel
 
 
 def features(cameras: Sequence[str] = ()) -> dict[str, Feature]:
-    every = moment_features(STATE, ENVIRONMENT, JOINTS, CHANNELS.names)
+    every = frame_features(STATE, ENVIRONMENT, JOINTS, CHANNELS.names)
     pictures = {f"observation.images.{name}": Feature("video", (16, 16, 3)) for name in cameras}
     return {key: every[key] for key in _COLUMNS} | pictures
 

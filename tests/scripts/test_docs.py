@@ -17,7 +17,7 @@ from handrail.collect.config import (
     RecordConfig,
     SessionConfig,
 )
-from handrail.collect.experiments.benchmark.baselines import CONTENDERS
+from handrail.collect.experiments.benchmark.baselines import BASELINES
 from handrail.collect.experiments.benchmark.config import CONTROLLERS, PROFILES
 from handrail.collect.operators.modes import MODES
 from handrail.collect.perturbations.perturbations import DEFAULTS
@@ -25,7 +25,7 @@ from handrail.collect.session.build import build_env, session_features
 from handrail.controllers.interface.command import Status
 from handrail.datasets.quality.catalogue import METRICS
 from handrail.policies.imitation.evaluation.config import PROTECTIONS
-from handrail.policies.rl.baseline import RL_CONTENDERS
+from handrail.policies.rl.baseline import RL_BASELINES
 from handrail.scripts import cli
 
 DOCUMENTS = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "SECURITY.md")
@@ -121,7 +121,7 @@ def test_modes_and_tasks_are_all_there():
 
 def test_controllers_and_profiles_of_the_benchmark_are_all_there():
     assert table("Goal reaching against rivals") == set(CONTROLLERS) | set(PROFILES)
-    assert set(CONTROLLERS) == {*CONTENDERS, *RL_CONTENDERS}
+    assert set(CONTROLLERS) == {*BASELINES, *RL_BASELINES}
     source = (ROOT / "collect" / "experiments" / "benchmark" / "config.py").read_text()
     helped = re.findall(r'^    """(.*?)"""', source, re.MULTILINE | re.DOTALL)
     assert all(re.search(rf"\b{name}\b", " ".join(helped)) for name in (*CONTROLLERS, *PROFILES))

@@ -153,7 +153,7 @@ def _no_aim(controller: Controller, goal: Goal) -> None:
 
 
 @dataclass(frozen=True)
-class Contender:
+class Baseline:
     """One entry of the benchmark; its functions are a module's own, so that worker processes find them.
 
     Attributes:
@@ -215,20 +215,20 @@ def _filter(model: RobotModel) -> Controller:
     return safety_filter(model, _FILTER_PERIOD)
 
 
-CONTENDERS: Mapping[str, Contender] = {
-    contender.name: contender
-    for contender in (
-        Contender("mpc", "masked MPC", _mpc, period=MPC_PERIOD),
-        Contender("mpc_paper", "masked MPC, the paper's horizon", _mpc_paper, period=MPC_PERIOD),
-        Contender("mink", "differential IK with collision avoidance (mink)", _mink),
-        Contender("mink_low_pass", "mink behind the MPC's low-pass", _mink, SmoothedHandIntent),
-        Contender("dls", "damped least squares, whole body", _whole_body),
-        Contender("dls_arm", "damped least squares on the arm, nominal base", _nominal_base),
-        Contender("decoupled", "decoupled base and arm", _decoupled),
-        Contender("blended", "blended control, α = 0.5", _blended),
-        Contender("direct", "direct joint control", _direct, JointIntent),
-        Contender("cbf_filter", "CBF safety filter on joint commands", _cbf, JointIntent),
-        Contender(
+BASELINES: Mapping[str, Baseline] = {
+    baseline.name: baseline
+    for baseline in (
+        Baseline("mpc", "masked MPC", _mpc, period=MPC_PERIOD),
+        Baseline("mpc_paper", "masked MPC, the paper's horizon", _mpc_paper, period=MPC_PERIOD),
+        Baseline("mink", "differential IK with collision avoidance (mink)", _mink),
+        Baseline("mink_low_pass", "mink behind the MPC's low-pass", _mink, SmoothedHandIntent),
+        Baseline("dls", "damped least squares, whole body", _whole_body),
+        Baseline("dls_arm", "damped least squares on the arm, nominal base", _nominal_base),
+        Baseline("decoupled", "decoupled base and arm", _decoupled),
+        Baseline("blended", "blended control, α = 0.5", _blended),
+        Baseline("direct", "direct joint control", _direct, JointIntent),
+        Baseline("cbf_filter", "CBF safety filter on joint commands", _cbf, JointIntent),
+        Baseline(
             "safety_filter",
             "multi-step safety filter on joint commands",
             _filter,

@@ -7,7 +7,7 @@ from typing import Any
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from handrail.collect.experiments.benchmark.baselines import Contender
+from handrail.collect.experiments.benchmark.baselines import Baseline
 from handrail.collect.experiments.benchmark.config import BenchmarkConfig
 from handrail.collect.experiments.benchmark.episode import Conditions
 from handrail.collect.experiments.benchmark.figures import figures
@@ -22,14 +22,12 @@ from handrail.controllers.errors import HandrailError
 from handrail.controllers.robot.model import load_model
 
 
-def benchmark(
-    config: BenchmarkConfig, contenders: Mapping[str, Contender], console: Console
-) -> dict[str, Any]:
+def benchmark(config: BenchmarkConfig, baselines: Mapping[str, Baseline], console: Console) -> dict[str, Any]:
     """Run the benchmark, write what is asked for, return the results.
 
     Args:
         config: what to run and write.
-        contenders: all that there are, by name.
+        baselines: all that there are, by name.
         console: for the progress bar and what was left out.
 
     Raises:
@@ -37,7 +35,7 @@ def benchmark(
     """
     config.check()
     report = _folder(config)
-    present, skipped = available(contenders, config)
+    present, skipped = available(baselines, config)
     for name, reason in skipped.items():
         console.print(f"without {name}: {reason}", highlight=False)
     episodes = _run(config, present, console)
@@ -55,7 +53,7 @@ def benchmark(
     return results
 
 
-def _run(config: BenchmarkConfig, present: tuple[Contender, ...], console: Console) -> list[Episode]:
+def _run(config: BenchmarkConfig, present: tuple[Baseline, ...], console: Console) -> list[Episode]:
     total = config.goals * len(config.profile_names) * len(present)
     columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
     episodes: list[Episode] = []
@@ -79,8 +77,8 @@ def _folder(config: BenchmarkConfig) -> Path | None:
 
 
 def _example(
-    config: BenchmarkConfig, present: tuple[Contender, ...], console: Console
-) -> tuple[Conditions, list[tuple[Contender, Trace]]] | None:
+    config: BenchmarkConfig, present: tuple[Baseline, ...], console: Console
+) -> tuple[Conditions, list[tuple[Baseline, Trace]]] | None:
     """Return what the first two controllers do on the first goal; None without OpenGL, which is said."""
     if not (config.report or config.page):
         return None
@@ -92,7 +90,7 @@ def _example(
     return runs[0][1][0], [(who, trace) for who, (_, trace) in runs]
 
 
-def _video(example: tuple[Conditions, list[tuple[Contender, Trace]]] | None, folder: Path) -> Path | None:
+def _video(example: tuple[Conditions, list[tuple[Baseline, Trace]]] | None, folder: Path) -> Path | None:
     """Film the example, if there is one."""
     if example is None:
         return None

@@ -5,7 +5,7 @@ from time import perf_counter, process_time
 
 import numpy as np
 
-from handrail.collect.experiments.benchmark.baselines import Contender, IntentMap
+from handrail.collect.experiments.benchmark.baselines import Baseline, IntentMap
 from handrail.collect.experiments.benchmark.metrics import Trace
 from handrail.collect.experiments.benchmark.plants import Plant, build_plant
 from handrail.collect.experiments.benchmark.profiles import NOTHING_YET, SPEEDS, Commands, profile_commands
@@ -46,24 +46,24 @@ class Conditions:
 
 
 def run_episode(
-    model: RobotModel, contender: Contender, controller: Controller, conditions: Conditions
+    model: RobotModel, baseline: Baseline, controller: Controller, conditions: Conditions
 ) -> Trace:
     """Run a controller under some conditions and return what happened.
 
     Args:
         model: of the robot.
-        contender: how the controller is asked.
+        baseline: how the controller is asked.
         controller: what its `build` returned; is reset.
         conditions: goal, scene, commands.
     """
     start = perf_counter(), process_time()
     plant = build_plant(model, conditions.scene, conditions.physics)
     controller.reset(conditions.scene.obstacles())
-    contender.aim(controller, conditions.goal)
-    operator = _Operator(conditions, plant.tool, contender.operator(model))
+    baseline.aim(controller, conditions.goal)
+    operator = _Operator(conditions, plant.tool, baseline.operator(model))
     tally = _Tally(plant, conditions.goal)
     last = T_MAX if conditions.early_stop else min(T_MAX, operator.end + _SETTLING)
-    drive = _Drive(controller, contender.period)
+    drive = _Drive(controller, baseline.period)
     for step in range(last):
         operator.send(step, tally.state, tally.tool)
         velocity = drive.velocity(step, tally.state, operator)
@@ -159,8 +159,8 @@ class _Tally:
             errors=np.array(self._errors),
             hand=np.array(self._hand),
             contacts=self._contacts,
-            statuses=[command.health.status for command in drive.commands],
-            solve_times=[command.health.solve_time for command in drive.commands],
+            statuses=[command.diagnostics.status for command in drive.commands],
+            solve_times=[command.diagnostics.solve_time for command in drive.commands],
             end=end,
             wall_time=spent[0],
             cpu_time=spent[1],

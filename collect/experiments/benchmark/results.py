@@ -13,7 +13,7 @@ import numpy as np
 from handrail.collect.experiments.benchmark.baselines import (
     TAKE_UP,
     TAKE_UP_TURN,
-    Contender,
+    Baseline,
     goal_reaching_settings,
     paper_settings,
 )
@@ -36,7 +36,7 @@ _VERSIONED = ("casadi", "coal", "daqp", "mujoco", "numpy", "pin", "scipy")
 
 
 def summarise(
-    rows: Sequence[Row], config: BenchmarkConfig, contenders: Sequence[Contender], skipped: Mapping[str, str]
+    rows: Sequence[Row], config: BenchmarkConfig, baselines: Sequence[Baseline], skipped: Mapping[str, str]
 ) -> dict[str, Any]:
     """Return the results of a run.
 
@@ -46,10 +46,10 @@ def summarise(
     Args:
         rows: one an episode.
         config: what was run.
-        contenders: who took part.
+        baselines: who took part.
         skipped: who did not, and why.
     """
-    names, profiles = [contender.name for contender in contenders], config.profile_names
+    names, profiles = [baseline.name for baseline in baselines], config.profile_names
     by_profile = {
         profile: {name: _summary(_of(rows, profile, name)) for name in names} for profile in profiles
     }
@@ -57,7 +57,7 @@ def summarise(
         "controllers": by_profile[profiles[0]],
         "profiles": by_profile,
         "paired": {profile: _paired(rows, profile, names, config.seed) for profile in profiles},
-        "titles": {contender.name: contender.title for contender in contenders},
+        "titles": {baseline.name: baseline.title for baseline in baselines},
         "skipped": dict(skipped),
         "config": {name: value for name, value in asdict(config).items() if name not in _PLACES},
         "mpc_settings": asdict(goal_reaching_settings()) | {"take_up": TAKE_UP, "take_up_turn": TAKE_UP_TURN},

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from handrail.collect.experiments.benchmark.baselines import Contender
+from handrail.collect.experiments.benchmark.baselines import Baseline
 from handrail.collect.experiments.benchmark.config import BenchmarkConfig
 from handrail.collect.experiments.benchmark.episode import Conditions, run_episode
 from handrail.collect.experiments.benchmark.metrics import Trace, measure
@@ -34,7 +34,7 @@ class Job:
     index: int
     profile: str
     config: BenchmarkConfig
-    contenders: tuple[Contender, ...]
+    baselines: tuple[Baseline, ...]
 
 
 @dataclass(frozen=True)
@@ -70,12 +70,12 @@ def conditions(config: BenchmarkConfig, index: int, profile: str) -> Conditions:
 
 
 def available(
-    contenders: Mapping[str, Contender], config: BenchmarkConfig
-) -> tuple[tuple[Contender, ...], dict[str, str]]:
+    baselines: Mapping[str, Baseline], config: BenchmarkConfig
+) -> tuple[tuple[Baseline, ...], dict[str, str]]:
     """Return who can take part, and why the others cannot: with `all`, what is not installed is left out.
 
     Args:
-        contenders: all that there are, by name.
+        baselines: all that there are, by name.
         config: who was asked for.
 
     Raises:
@@ -84,8 +84,8 @@ def available(
     present, skipped = [], {}
     for name in config.controller_names:
         try:
-            _controller(contenders[name])
-            present.append(contenders[name])
+            _controller(baselines[name])
+            present.append(baselines[name])
         except HandrailError as error:
             if config.controllers.strip() != "all":
                 raise
@@ -95,15 +95,15 @@ def available(
     return tuple(present), skipped
 
 
-def run(config: BenchmarkConfig, contenders: tuple[Contender, ...]) -> Iterator[list[Episode]]:
+def run(config: BenchmarkConfig, baselines: tuple[Baseline, ...]) -> Iterator[list[Episode]]:
     """Run everything; yield the episodes of a goal under a profile as they are done, in any order.
 
     Args:
         config: what to run.
-        contenders: who takes part.
+        baselines: who takes part.
     """
     jobs = [
-        Job(index, profile, config, contenders)
+        Job(index, profile, config, baselines)
         for index in range(config.goals)
         for profile in config.profile_names
     ]
@@ -124,39 +124,39 @@ def run_job(job: Job) -> list[Episode]:
     """Run all controllers on one goal under one profile."""
     model = load_model()
     given = conditions(job.config, job.index, job.profile)
-    _warm_up(job.contenders, given.physics)
+    _warm_up(job.baselines, given.physics)
     collision = CollisionModel(model, given.scene.obstacles())
     episodes = []
     with single_threaded():
-        for contender in job.contenders:
-            trace = run_episode(model, contender, _controller(contender), given)
-            row = {"goal": job.index, "profile": job.profile, "controller": contender.name}
+        for baseline in job.baselines:
+            trace = run_episode(model, baseline, _controller(baseline), given)
+            row = {"goal": job.index, "profile": job.profile, "controller": baseline.name}
             row |= measure(trace, collision, len(model.description.base_joints))
             episodes.append(Episode(row, *_paths(trace, job.index)))
     return episodes
 
 
-def trace_of(config: BenchmarkConfig, contender: Contender, index: int) -> tuple[Conditions, Trace]:
+def trace_of(config: BenchmarkConfig, baseline: Baseline, index: int) -> tuple[Conditions, Trace]:
     """Return what a controller does on one goal under the first profile, for a closer look."""
     given = conditions(config, index, config.profile_names[0])
     with single_threaded():
-        return given, run_episode(load_model(), contender, _controller(contender), given)
+        return given, run_episode(load_model(), baseline, _controller(baseline), given)
 
 
 @lru_cache(maxsize=32)
-def _controller(contender: Contender) -> Controller:
-    """Return a contender's controller, built once a process."""
-    return contender.build(load_model())
+def _controller(baseline: Baseline) -> Controller:
+    """Return a baseline's controller, built once a process."""
+    return baseline.build(load_model())
 
 
 @lru_cache(maxsize=32)
-def _warm_up(contenders: tuple[Contender, ...], physics: bool) -> None:
+def _warm_up(baselines: tuple[Baseline, ...], physics: bool) -> None:
     """Let everything that is built at its first use be built, outside of any measured time."""
     model = load_model()
     here = model.pose(model.description.home)
     at_home = Conditions(Goal(here.position, here.rotation), Scene(), physics=physics)
-    for contender in contenders:
-        run_episode(model, contender, _controller(contender), at_home)
+    for baseline in baselines:
+        run_episode(model, baseline, _controller(baseline), at_home)
 
 
 def _paths(trace: Trace, index: int) -> tuple[FloatArray | None, FloatArray | None]:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
-from handrail.collect.experiments.benchmark.baselines import Contender
+from handrail.collect.experiments.benchmark.baselines import Baseline
 from handrail.collect.experiments.benchmark.episode import Conditions
 from handrail.collect.experiments.benchmark.metrics import Trace
 from handrail.collect.session.contact_sheet import contact_sheet
@@ -34,7 +34,7 @@ _REST = 10  # pictures after the end
 def film(
     model: RobotModel,
     conditions: Conditions,
-    runs: Sequence[tuple[Contender, Trace]],
+    runs: Sequence[tuple[Baseline, Trace]],
     path: Path,
 ) -> None:
     """Write the video of some runs under the same conditions.
@@ -56,7 +56,7 @@ def film(
             video.add(np.hstack([_panel(*stage, who, trace, step) for who, trace in runs]))
 
 
-def strip(model: RobotModel, conditions: Conditions, runs: Sequence[tuple[Contender, Trace]]) -> bytes:
+def strip(model: RobotModel, conditions: Conditions, runs: Sequence[tuple[Baseline, Trace]]) -> bytes:
     """Return some runs under the same conditions as one PNG: a row each, from left to right in step.
 
     Args:
@@ -93,7 +93,7 @@ def _stage(
 
 
 def _panel(
-    simulation: Simulation, painter: Painter, who: Contender, trace: Trace, step: int
+    simulation: Simulation, painter: Painter, who: Baseline, trace: Trace, step: int
 ) -> NDArray[np.uint8]:
     """Return the picture of a run at a step, over a bar that says who it is and how far from the goal."""
     index = min(step, len(trace.q) - 1)

@@ -92,9 +92,9 @@ class MinkController:
         self._limits = [*limits, *self._avoidance(around)]
         self._reactive.reset(obstacles)
 
-    def observe(self, obstacles: tuple[Obstacle, ...]) -> None:
+    def update_scene(self, obstacles: tuple[Obstacle, ...]) -> None:
         """Take where the obstacles are now; mink does not avoid what the hand holds."""
-        self._reactive.observe(obstacles)
+        self._reactive.update_scene(obstacles)
         for obstacle in obstacles:
             if not obstacle.held:
                 self._shapes.geom(obstacle.name).pos[:] = obstacle.position

@@ -10,7 +10,7 @@ import numpy as np
 
 from handrail.collect.experiments.profiling.config import ProfileConfig
 from handrail.collect.experiments.profiling.rivals import Converged, Mink
-from handrail.collect.experiments.profiling.timing_loop import Case, Lane, Update
+from handrail.collect.experiments.profiling.timing_loop import Case, TimingLoop, Update
 from handrail.controllers.numerics.threads import single_threaded
 from handrail.controllers.ocp.settings import MpcSettings
 from handrail.datasets.storage.atomic import write_whole
@@ -45,7 +45,7 @@ class Profile:
     def __init__(self, config: ProfileConfig) -> None:
         self._config = config
         cases = (*_MAIN, *(_GROWTH if config.growth else ()))
-        self._lanes = {case.name: Lane(case, config.seed) for case in cases}
+        self._lanes = {case.name: TimingLoop(case, config.seed) for case in cases}
         self._updates: dict[str, list[Update]] = {name: [] for name in self._lanes}
         self._rivals: dict[str, list[Converged | Mink]] = {name: [] for name in self._lanes}
         if config.rivals:
@@ -70,7 +70,7 @@ class Profile:
         for reach in (settings.reach, _SHORT_REACH):
             self._rivals["pairs_30"].append(Mink(lane, settings.margin + reach))
 
-    def _turn(self, name: str, lane: Lane, warm_up: bool) -> None:
+    def _turn(self, name: str, lane: TimingLoop, warm_up: bool) -> None:
         if lane.at_new_scene:
             lane.begin()
             for rival in self._rivals[name]:

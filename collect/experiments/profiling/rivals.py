@@ -11,7 +11,7 @@ from handrail.collect.experiments.mink.scene import (
     shape_model,
     standing_pairs,
 )
-from handrail.collect.experiments.profiling.timing_loop import PERIOD, Lane, Update
+from handrail.collect.experiments.profiling.timing_loop import PERIOD, TimingLoop, Update
 from handrail.controllers.ocp.settings import MpcSettings
 from handrail.controllers.solvers.reference.converged import ConvergedSolver
 
@@ -25,7 +25,7 @@ class Converged:
         every: solve only one of so many.
     """
 
-    def __init__(self, lane: Lane, backend: str, every: int) -> None:
+    def __init__(self, lane: TimingLoop, backend: str, every: int) -> None:
         settings, self.name = lane.mpc.settings, backend
         arguments = (lane.mpc.residuals, settings.horizon, lane.model.size, settings.dt)
         self._solver = ConvergedSolver(*arguments, backend=backend)
@@ -34,7 +34,7 @@ class Converged:
         self.ours: list[float] = []  # of the controller on the same problems
         self.failed = 0
 
-    def begin(self, lane: Lane) -> None:
+    def begin(self, lane: TimingLoop) -> None:
         """Take a new scene: it comes with the problems."""
 
     def run(self, updates: list[Update]) -> None:
@@ -73,7 +73,7 @@ class Mink:
 
     name = "mink"
 
-    def __init__(self, lane: Lane, reach: float) -> None:
+    def __init__(self, lane: TimingLoop, reach: float) -> None:
         self._mink = import_mink()
         self._solvers = qp_solvers()
         self._reach = reach
@@ -92,7 +92,7 @@ class Mink:
         """Times of its steps [s]."""
         return self._by_solver[self.solver]
 
-    def begin(self, lane: Lane) -> None:
+    def begin(self, lane: TimingLoop) -> None:
         """Build MuJoCo's model of a new scene, and mink's tasks and limits."""
         mink, model = self._mink, shape_model(lane.model, lane.obstacles)
         self._configuration = mink.Configuration(model)

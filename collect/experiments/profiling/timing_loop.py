@@ -68,7 +68,7 @@ class _Watched:
         return getattr(self._solver, name)
 
 
-class Lane:
+class TimingLoop:
     """A closed loop of one case: warm-started updates, intents that change, scenes that change.
 
     Args:
@@ -113,4 +113,4 @@ class Lane:
         after = command.velocity(PERIOD)
         self._state = State(state.q + 0.5 * PERIOD * (state.v + after), after, state.time + PERIOD)
         self._count += 1
-        return Update(seconds, state, intent, *self._watched.last, command.health.status.value)
+        return Update(seconds, state, intent, *self._watched.last, command.diagnostics.status.value)

@@ -24,7 +24,7 @@ from handrail.controllers.objectives.switch import switchable, switched
 from handrail.controllers.ocp.settings import MpcSettings
 from handrail.controllers.robot.model import Pose, RobotModel
 from handrail.controllers.robot.shape import Obstacle
-from handrail.datasets.recording.frames import Moment
+from handrail.datasets.recording.frames import Frame
 
 FPS = 20
 _WINDOW, _FADE = 0.2, 1.0  # of the intent's prediction [s]
@@ -151,9 +151,9 @@ class Parametrised:
         for objective, values in self._values.items():
             self._mpc.set_parameters(objective, values)
 
-    def observe(self, obstacles: tuple[Obstacle, ...]) -> None:
+    def update_scene(self, obstacles: tuple[Obstacle, ...]) -> None:
         """Tell the controller where the obstacles are, and what the hand holds."""
-        self._mpc.observe(obstacles)
+        self._mpc.update_scene(obstacles)
 
     def update(self, state: State, intent: Intent) -> Command:
         """Return the controller's command."""
@@ -174,9 +174,9 @@ class _Tracer:
         """Take note of the scene."""
         self._env = env
 
-    def see(self, moment: Moment) -> None:
+    def see(self, frame: Frame) -> None:
         """Note the state after the period."""
-        self._rows.append((self._env.state(), moment.health.solve_time))
+        self._rows.append((self._env.state(), frame.diagnostics.solve_time))
 
     def trace(self, outcome: Outcome) -> Trace:
         """Return what was seen."""

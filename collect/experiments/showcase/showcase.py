@@ -17,7 +17,7 @@ from handrail.collect.simulation.gl import graphics_trouble
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.mpc.masked_mpc import MaskedMpc
 from handrail.controllers.robot.model import load_model
-from handrail.datasets.recording.frames import Moment
+from handrail.datasets.recording.frames import Frame
 from handrail.datasets.storage.atomic import write_whole
 
 
@@ -55,10 +55,10 @@ def _run(case: Case, mpc: MaskedMpc, config: ShowcaseConfig, film: bool) -> Trac
         return run_case(case, env, mpc, filmers)
 
 
-def _words(case: Case, moment: Moment) -> str:
+def _words(case: Case, frame: Frame) -> str:
     """Say what is steered and how near things are."""
-    health = moment.health
+    diagnostics = frame.diagnostics
     return (
-        f"{moment.intent.time:5.1f} s     commanded: {', '.join(case.channels)}     "
-        f"nearest: {health.smallest_distance:.3f} m     update: {1e3 * health.solve_time:.1f} ms"
+        f"{frame.intent.time:5.1f} s     commanded: {', '.join(case.channels)}     "
+        f"nearest: {diagnostics.smallest_distance:.3f} m     update: {1e3 * diagnostics.solve_time:.1f} ms"
     )

@@ -17,7 +17,7 @@ from handrail.collect.session.build import (
     leave_to_objectives,
 )
 from handrail.collect.session.session import Session
-from handrail.datasets.recording.frames import Moment
+from handrail.datasets.recording.frames import Frame
 
 _FPS = 20  # [Hz]
 
@@ -96,8 +96,8 @@ class _Hands:
         self._mask = b""
         self.switches = self.away = 0
 
-    def see(self, moment: Moment) -> None:
-        mask = moment.intent.mask.tobytes()
+    def see(self, frame: Frame) -> None:
+        mask = frame.intent.mask.tobytes()
         self.switches += self._mask not in (b"", mask)
-        self.away += moment.intent.time < self._operator.free_at
+        self.away += frame.intent.time < self._operator.free_at
         self._mask = mask

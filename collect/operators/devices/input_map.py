@@ -1,4 +1,4 @@
-"""Input maps: how a wish becomes values on the channels of a mode; nothing else differs between modes."""
+"""Input maps: how a goal becomes values on the channels of a mode; nothing else differs between modes."""
 
 from typing import Protocol
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from handrail.collect.operators.devices.large_turn import LargeTurn
 from handrail.collect.operators.human.human import HumanSettings
-from handrail.collect.operators.human.motion_goal import Focus, Wish
+from handrail.collect.operators.human.motion_goal import Focus, MotionGoal
 from handrail.collect.operators.human.steering import Gains
 from handrail.collect.operators.modes import TeleopMode
 from handrail.collect.operators.operator import View
@@ -23,7 +23,7 @@ _RETURN = 0.5  # how fast it would go back there [1/s]
 
 
 class InputMap(Protocol):
-    """What lies between a wish and an intent.
+    """What lies between a goal and an intent.
 
     Attributes:
         channels: of the robot.
@@ -40,7 +40,7 @@ class InputMap(Protocol):
         """Begin an episode with a person."""
         ...
 
-    def wanted(self, wish: Wish, state: State) -> tuple[BoolArray, FloatArray]:
+    def wanted(self, goal: MotionGoal, state: State) -> tuple[BoolArray, FloatArray]:
         """Return the channels that the operator owns now, (m,), and how far he wants each input, (m,)."""
         ...
 
@@ -92,14 +92,14 @@ class StickMap:
         """Return the channels that the operator owns, (m,)."""
         return self.channels.mask(*self.mode.groups(focus))
 
-    def wanted(self, wish: Wish, state: State) -> tuple[BoolArray, FloatArray]:
-        """Return the mask, and the wish on every channel of the mode, within full stick, (m,)."""
-        mask = self.mask(wish.focus)
+    def wanted(self, goal: MotionGoal, state: State) -> tuple[BoolArray, FloatArray]:
+        """Return the mask, and the goal on every channel of the mode, within full stick, (m,)."""
+        mask = self.mask(goal.focus)
         values = np.zeros(self.channels.size)
-        values[self.channels.base_slice] = wish.base[: len(self.channels.base)]
-        values[self.channels.tool_slice] = wish.hand
+        values[self.channels.base_slice] = goal.base[: len(self.channels.base)]
+        values[self.channels.tool_slice] = goal.hand
         if mask[self.channels.joint_slice].any():
-            values[self.channels.joint_slice] = self._joint_velocities(wish, state.q)
+            values[self.channels.joint_slice] = self._joint_velocities(goal, state.q)
         return mask, np.clip(np.where(mask, values, 0.0), -self.full, self.full)
 
     def sent(self, moved: FloatArray, state: State) -> FloatArray:
@@ -110,35 +110,35 @@ class StickMap:
         """Return the deflections."""
         return moved / self.full
 
-    def _joint_velocities(self, wish: Wish, q: FloatArray) -> FloatArray:
-        """Return what the expert makes of a wish on all joints, (n,), within full stick."""
-        if wish.target is not None and self._turn.is_ahead(wish.target, q):
-            base = wish.target.base[: len(self.channels.base)]
-            arm = self._turn.arm_velocity(wish.target, q, base)
-            return np.concatenate([self._base_world(wish, q), arm])
-        return self._inner_kinematics(wish, q)
+    def _joint_velocities(self, goal: MotionGoal, q: FloatArray) -> FloatArray:
+        """Return what the expert makes of a goal on all joints, (n,), within full stick."""
+        if goal.target is not None and self._turn.is_ahead(goal.target, q):
+            base = goal.target.base[: len(self.channels.base)]
+            arm = self._turn.arm_velocity(goal.target, q, base)
+            return np.concatenate([self._base_world(goal, q), arm])
+        return self._inner_kinematics(goal, q)
 
-    def _inner_kinematics(self, wish: Wish, q: FloatArray) -> FloatArray:
+    def _inner_kinematics(self, goal: MotionGoal, q: FloatArray) -> FloatArray:
         """Return the expert's inner inverse kinematics, (n,): the hand first, the base when it can."""
         jacobian = self._model.jacobian(q + self._imagined)
-        base = self._base_world(wish, q)
+        base = self._base_world(goal, q)
         weights = np.full(self._model.size, _DAMPING) / self._model.description.limits.velocity
         home = self._model.description.home - q
         home[: len(self.channels.base)] = 0.0
-        posture = _POSTURE * np.any(wish.hand) * np.eye(self._model.size)[len(self.channels.base) :]
+        posture = _POSTURE * np.any(goal.hand) * np.eye(self._model.size)[len(self.channels.base) :]
         rows = [jacobian, np.diag(weights), posture]
-        targets = [wish.hand, np.zeros(self._model.size), posture @ (_RETURN * home)]
+        targets = [goal.hand, np.zeros(self._model.size), posture @ (_RETURN * home)]
         if len(base):
             rows.append(_BASE_WEIGHT * np.eye(len(base), self._model.size))
             targets.append(_BASE_WEIGHT * base)
         solution: FloatArray = np.linalg.lstsq(np.vstack(rows), np.concatenate(targets), rcond=None)[0]
         return solution / max(1.0, float(np.max(np.abs(solution) / self.full[self.channels.joint_slice])))
 
-    def _base_world(self, wish: Wish, q: FloatArray) -> FloatArray:
+    def _base_world(self, goal: MotionGoal, q: FloatArray) -> FloatArray:
         if not self.channels.base:
             return np.zeros(0)
         c, s = np.cos(q[2]), np.sin(q[2])
-        vx, vy, wz = wish.base
+        vx, vy, wz = goal.base
         return np.array([c * vx - s * vy, s * vx + c * vy, wz])
 
 

@@ -41,7 +41,7 @@ class LargeTurn:
         self._thought = b""
 
     def is_ahead(self, target: Target | None, q: FloatArray) -> bool:
-        """Return whether the hand has to turn far to where a wish leads."""
+        """Return whether the hand has to turn far to where a goal leads."""
         if target is None:
             return False
         turn = target.hand.rotation @ self._model.pose(q).rotation.T
@@ -51,7 +51,7 @@ class LargeTurn:
         """Return the velocity straight to where the arm's joints belong, (n − b,) [rad/s].
 
         Args:
-            target: where the wish leads.
+            target: where the goal leads.
             q: joint positions, (n,).
             base: of the base, from where the operator thinks the hand reaches the target, (b,).
         """

@@ -5,7 +5,7 @@ import numpy as np
 from handrail.collect.operators.devices.input_map import full_stick
 from handrail.collect.operators.devices.large_turn import LargeTurn
 from handrail.collect.operators.human.human import HumanSettings
-from handrail.collect.operators.human.motion_goal import Wish
+from handrail.collect.operators.human.motion_goal import MotionGoal
 from handrail.collect.operators.human.steering import Gains
 from handrail.collect.operators.human.wander import Wander
 from handrail.collect.operators.operator import View
@@ -58,13 +58,13 @@ class LeaderArmMap:
         self._still = self._wander.at(view.state.time).copy()  # the tremor counts from how the hand took hold
         self._time = view.state.time
 
-    def wanted(self, wish: Wish, state: State) -> tuple[BoolArray, FloatArray]:
+    def wanted(self, goal: MotionGoal, state: State) -> tuple[BoolArray, FloatArray]:
         """Return the mask, base stick and arm together, and how fast the leader shall be moved."""
         values = np.zeros(self.channels.size)
-        if wish.focus == "base":
-            values[self.channels.base_slice] = wish.base[: self._base]
+        if goal.focus == "base":
+            values[self.channels.base_slice] = goal.base[: self._base]
         else:
-            values[self._arm] = self._taken_along(wish, state.q)
+            values[self._arm] = self._taken_along(goal, state.q)
         return self.channels.mask(*(("base",) if self._base else ()), "arm"), values
 
     def sent(self, moved: FloatArray, state: State) -> FloatArray:
@@ -83,11 +83,11 @@ class LeaderArmMap:
         raw[self._arm] = self._leader
         return raw
 
-    def _taken_along(self, wish: Wish, q: FloatArray) -> FloatArray:
+    def _taken_along(self, goal: MotionGoal, q: FloatArray) -> FloatArray:
         """Return how fast the operator moves the leader's joints, (n − b,) [rad/s]."""
-        if wish.target is not None and self._turn.is_ahead(wish.target, q):
-            return self._turn.arm_velocity(wish.target, q, q[: self._base])
-        return self._mechanics.arm_velocity(q, np.zeros(self._base), wish.hand)
+        if goal.target is not None and self._turn.is_ahead(goal.target, q):
+            return self._turn.arm_velocity(goal.target, q, q[: self._base])
+        return self._mechanics.arm_velocity(q, np.zeros(self._base), goal.hand)
 
     def _limits(self) -> tuple[FloatArray, FloatArray]:
         limits = self._model.description.limits

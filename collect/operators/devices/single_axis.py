@@ -5,7 +5,7 @@ import numpy as np
 from handrail.collect.operators.devices.input_map import full_stick
 from handrail.collect.operators.devices.joint_order import plan_joints, sweep_clearance
 from handrail.collect.operators.human.human import HumanSettings
-from handrail.collect.operators.human.motion_goal import Target, Wish
+from handrail.collect.operators.human.motion_goal import MotionGoal, Target
 from handrail.collect.operators.human.steering import Gains
 from handrail.collect.operators.operator import View
 from handrail.controllers.arrays import BoolArray, FloatArray
@@ -61,15 +61,15 @@ class SingleAxisMap:
         self._order: list[int] = []
         self._care = 1.0  # share of the usual tolerance: less after each attempt that was not good enough
 
-    def wanted(self, wish: Wish, state: State) -> tuple[BoolArray, FloatArray]:
+    def wanted(self, goal: MotionGoal, state: State) -> tuple[BoolArray, FloatArray]:
         """Return the mask of the axis chosen, and how far the stick shall be pushed."""
         values = np.zeros(self.channels.size)
-        if wish.target is not None:
-            self._think(wish.target, state)
-            errors, tolerances = self._errors(wish, wish.target, state.q)
-            axis = self._choose(wish.target, errors, tolerances, state.q)
+        if goal.target is not None:
+            self._think(goal.target, state)
+            errors, tolerances = self._errors(goal, goal.target, state.q)
+            axis = self._choose(goal.target, errors, tolerances, state.q)
             if axis is not None:
-                speed = self._fastest(wish.target, state.q)[axis]
+                speed = self._fastest(goal.target, state.q)[axis]
                 values[axis] = self._push(errors[axis] - self._left, speed, self._least * self.full[axis])
         return np.arange(self.channels.size) == (self._axis or 0), values
 
@@ -165,10 +165,10 @@ class SingleAxisMap:
         linear, angular = self._levers(q)
         return self._care * _NEAR * np.minimum(target.distance / linear, target.angle / angular)
 
-    def _errors(self, wish: Wish, target: Target, q: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def _errors(self, goal: MotionGoal, target: Target, q: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return how far each axis is from where it belongs, (m,), and how near is near enough, (m,)."""
         errors, tolerances = np.zeros(self.channels.size), np.ones(self.channels.size)
-        if wish.focus == "base" and self._base:
+        if goal.focus == "base" and self._base:
             c, s = np.cos(q[2]), np.sin(q[2])
             x, y = target.base[:2] - q[:2]
             turn = np.arctan2(np.sin(target.base[2] - q[2]), np.cos(target.base[2] - q[2]))

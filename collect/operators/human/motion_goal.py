@@ -13,7 +13,7 @@ Focus = Literal["hand", "base"]
 
 @dataclass(frozen=True)
 class Target:
-    """Where a wish leads.
+    """Where a goal leads.
 
     Attributes:
         hand: pose of the tool.
@@ -39,7 +39,7 @@ class Target:
 
 
 @dataclass(frozen=True)
-class Wish:
+class MotionGoal:
     """What an operator wants the robot to do now, whatever the mode.
 
     Attributes:
@@ -57,6 +57,6 @@ class Wish:
     target: Target | None = None
 
     @classmethod
-    def rest(cls, focus: Focus = "hand", gripper: float = 0.0) -> "Wish":
-        """Return the wish that nothing moves."""
+    def rest(cls, focus: Focus = "hand", gripper: float = 0.0) -> "MotionGoal":
+        """Return the goal that nothing moves."""
         return cls(np.zeros(6), np.zeros(3), focus, gripper)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from handrail.collect.operators.human.human import HumanSettings
-from handrail.collect.operators.human.motion_goal import Wish
+from handrail.collect.operators.human.motion_goal import MotionGoal
 from handrail.collect.operators.human.wander import Wander
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.robot.model import Pose
@@ -25,18 +25,18 @@ class Perception:
         self._share = settings.misjudgement
         self._wander = Wander((9,), settings.correlation, rng)
 
-    def see(self, wish: Wish, tool: Pose, time: float) -> Wish:
-        """Return the wish as it comes out of what is seen at a time [s]."""
+    def see(self, goal: MotionGoal, tool: Pose, time: float) -> MotionGoal:
+        """Return the goal as it comes out of what is seen at a time [s]."""
         wander = self._share * self._wander.at(time)
         if not self._share:
-            return wish
-        hand = np.concatenate([_off(wish.hand[:3], wander[:3]), _off(wish.hand[3:], wander[3:6])])
-        base = np.concatenate([_off(wish.base[:2], wander[6:8]), _off(wish.base[2:], wander[8:])])
-        target = wish.target
+            return goal
+        hand = np.concatenate([_off(goal.hand[:3], wander[:3]), _off(goal.hand[3:], wander[3:6])])
+        base = np.concatenate([_off(goal.base[:2], wander[6:8]), _off(goal.base[2:], wander[8:])])
+        target = goal.target
         if target is not None:
             away = _off(target.hand.position - tool.position, wander[:3])
             target = replace(target, hand=Pose(tool.position + away, target.hand.rotation))
-        return replace(wish, hand=hand, base=base, target=target)
+        return replace(goal, hand=hand, base=base, target=target)
 
 
 def _off(vector: FloatArray, share: FloatArray) -> FloatArray:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from handrail.collect.operators.human.motion_goal import Wish
+from handrail.collect.operators.human.motion_goal import MotionGoal
 from handrail.collect.operators.human.steering import Gains
 from handrail.collect.operators.operator import View
 from handrail.collect.operators.scripts.base_placement import standing_within_reach
@@ -39,9 +39,9 @@ class DrawerScript:
         """Look at the scene and plan."""
         self._runner.start(self._phases(view), view.state.time)
 
-    def wish(self, view: View) -> Wish:
+    def motion_goal(self, view: View) -> MotionGoal:
         """Return what is wanted now."""
-        return self._runner.wish(view)
+        return self._runner.motion_goal(view)
 
     def _redo(self, view: View, name: str) -> int | None:
         """Begin again at the handle when the drawer did not come along; leave it as long as it is near."""

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from handrail.collect.operators.human.motion_goal import Focus, Target, Wish
+from handrail.collect.operators.human.motion_goal import Focus, MotionGoal, Target
 from handrail.collect.operators.human.steering import Gains, base_twist, hand_twist, pose_errors
 from handrail.collect.operators.operator import View
 from handrail.controllers.arrays import FloatArray
@@ -67,16 +67,16 @@ class PhaseRunner:
         """The phase now."""
         return self._phases[min(self._index, len(self._phases) - 1)]
 
-    def wish(self, view: View) -> Wish:
+    def motion_goal(self, view: View) -> MotionGoal:
         """Return what is wanted now, and go to the next phase when this one is done."""
         self._advance(view)
         phase = self.phase
         if self._index >= len(self._phases) or self._reached_at is not None:
-            return Wish.rest(phase.focus, phase.gripper)
+            return MotionGoal.rest(phase.focus, phase.gripper)
         hand = hand_twist(view.tool, phase.hand, self._gains, phase.pace)
         base = base_twist(view.state.q, phase.base, self._gains)
         target = Target(phase.hand, phase.base, phase.distance, phase.angle, phase.pace, phase.tilt)
-        return Wish(hand, base, phase.focus, phase.gripper, target)
+        return MotionGoal(hand, base, phase.focus, phase.gripper, target)
 
     def _enter(self, index: int, time: float) -> None:
         self._index = index

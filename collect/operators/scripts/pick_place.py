@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from handrail.collect.operators.human.motion_goal import Wish
+from handrail.collect.operators.human.motion_goal import MotionGoal
 from handrail.collect.operators.human.steering import Gains, pose_errors
 from handrail.collect.operators.operator import View
 from handrail.collect.operators.scripts.phases import Phase, PhaseRunner
@@ -47,9 +47,9 @@ class PickPlaceScript:
         """Look at the scene and plan."""
         self._runner.start(self._phases(view), view.state.time)
 
-    def wish(self, view: View) -> Wish:
+    def motion_goal(self, view: View) -> MotionGoal:
         """Return what is wanted now."""
-        return self._runner.wish(view)
+        return self._runner.motion_goal(view)
 
     def _redo(self, view: View, name: str) -> int | None:
         """Grasp again when the cube stayed behind."""

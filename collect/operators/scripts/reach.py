@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from handrail.collect.operators.human.motion_goal import Wish
+from handrail.collect.operators.human.motion_goal import MotionGoal
 from handrail.collect.operators.human.steering import Gains
 from handrail.collect.operators.operator import View
 from handrail.collect.operators.scripts.base_placement import standing_pose
@@ -28,6 +28,6 @@ class ReachScript:
             phases.insert(0, Phase("drive", goal, base, focus="base", distance=0.15, angle=0.2))
         self._runner.start(phases, view.state.time)
 
-    def wish(self, view: View) -> Wish:
+    def motion_goal(self, view: View) -> MotionGoal:
         """Return what is wanted now."""
-        return self._runner.wish(view)
+        return self._runner.motion_goal(view)

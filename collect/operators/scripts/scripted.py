@@ -8,7 +8,7 @@ import numpy as np
 from handrail.collect.operators.devices.devices import input_map
 from handrail.collect.operators.human.hand import HumanHand
 from handrail.collect.operators.human.human import HumanSettings
-from handrail.collect.operators.human.motion_goal import Wish
+from handrail.collect.operators.human.motion_goal import MotionGoal
 from handrail.collect.operators.human.perception import Perception
 from handrail.collect.operators.modes import TeleopMode
 from handrail.collect.operators.operator import View
@@ -24,7 +24,7 @@ class Script(Protocol):
         """Look at the scene and make up the mind."""
         ...
 
-    def wish(self, view: View) -> Wish:
+    def motion_goal(self, view: View) -> MotionGoal:
         """Return what is wanted now."""
         ...
 
@@ -33,7 +33,7 @@ class ScriptedOperator:
     """Follows a script in a teleop mode; an operator.
 
     ```
-    script ─ wish ─▶ perception ─▶ input map ─ wanted ─▶ hand ─▶ input map ─ sent ─▶ intent
+    script ─ goal ─▶ perception ─▶ input map ─ wanted ─▶ hand ─▶ input map ─ sent ─▶ intent
                      (misjudges)   (of the mode)         (late, intermittent, noisy)
     ```
     Only the input map differs between modes.
@@ -73,16 +73,16 @@ class ScriptedOperator:
         self._free_at = -np.inf
 
     def act(self, view: View) -> Intent:
-        """Return the intent now: the wish in this mode's channels, as the hand manages it."""
+        """Return the intent now: the goal in this mode's channels, as the hand manages it."""
         time = view.state.time
-        wish = self._perception.see(self._script.wish(view), view.tool, time)
-        mask, wanted = self._map.wanted(wish, view.state)
+        goal = self._perception.see(self._script.motion_goal(view), view.tool, time)
+        mask, wanted = self._map.wanted(goal, view.state)
         self._switch(mask, time)
         moved = self._hand.move(np.zeros_like(wanted) if time < self._free_at else wanted, time)
         moved = np.where(mask, moved, 0.0)
         values = np.where(mask, self._map.sent(moved, view.state), 0.0)
         raw = RawInput(self._map.raw(moved), int(np.count_nonzero(moved)), self._switches)
-        return Intent(values, mask, wish.gripper, self._mode.name, time, raw=raw)
+        return Intent(values, mask, goal.gripper, self._mode.name, time, raw=raw)
 
     def _switch(self, mask: BoolArray, time: float) -> None:
         """Take the hand off the input for a moment when it acts on other channels from now on."""

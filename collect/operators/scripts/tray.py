@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from handrail.collect.operators.human.motion_goal import Wish
+from handrail.collect.operators.human.motion_goal import MotionGoal
 from handrail.collect.operators.human.steering import Gains
 from handrail.collect.operators.operator import View
 from handrail.collect.operators.scripts.phases import Phase, PhaseRunner
@@ -38,9 +38,9 @@ class TrayScript:
         """Look at the scene and plan."""
         self._runner.start(self._phases(view), view.state.time)
 
-    def wish(self, view: View) -> Wish:
+    def motion_goal(self, view: View) -> MotionGoal:
         """Return what is wanted now."""
-        return self._runner.wish(view)
+        return self._runner.motion_goal(view)
 
     def _phases(self, view: View) -> list[Phase]:
         task, route = view.task, Route(self._model, view.task)

@@ -18,7 +18,7 @@ class Evaluation:
 
     Attributes:
         tracking: weighted squared errors of all objectives.
-        collision_slack: largest shortfall of a distance against its bound [m].
+        collision_slack: largest violation of a distance against its bound [m].
         limit_slack: that the velocity and position limits need, relative.
         cost: all of it, with the penalties of the slacks.
     """
@@ -72,7 +72,7 @@ def distance_bounds(problem: Problem, now: FloatArray, count: int) -> FloatArray
 
 
 def distance_slacks(problem: Problem, q: FloatArray, v: FloatArray) -> FloatArray:
-    """Return the largest shortfall of a distance of each kind at the nodes after now, (3,) [m]."""
+    """Return the largest violation of a distance of each kind at the nodes after now, (3,) [m]."""
     nodes = Nodes(problem, q, v)
     values = problem.collision.values(nodes.q, nodes.times)
     short = (distance_bounds(problem, values[0], len(values)) - values)[1:]

@@ -19,7 +19,7 @@ from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import Controller
 from handrail.datasets.quality.safety import contacts_begun
-from handrail.datasets.recording.frames import Moment
+from handrail.datasets.recording.frames import Frame
 from handrail.policies.imitation.evaluation.conditions import Arm
 from handrail.policies.imitation.evaluation.operator import Policy, PolicyOperator
 from handrail.policies.imitation.evaluation.protection import build_protection
@@ -111,9 +111,9 @@ class _Watch:
         """Begin."""
         self.contacts: list[int] = []
 
-    def see(self, moment: Moment) -> None:
+    def see(self, frame: Frame) -> None:
         """Note how many there were in the period."""
-        self.contacts.append(moment.contacts)
+        self.contacts.append(frame.contacts)
 
 
 def _row(outcome: Outcome, watch: _Watch, malformed: int) -> Row:

@@ -6,7 +6,7 @@ from typing import Any
 
 from handrail.collect.session.film import SIZE, Filmer
 from handrail.collect.simulation.gl import graphics_trouble
-from handrail.datasets.recording.frames import Moment
+from handrail.datasets.recording.frames import Frame
 from handrail.policies.imitation.evaluation.conditions import arms
 from handrail.policies.imitation.evaluation.config import EvaluateConfig
 from handrail.policies.imitation.evaluation.evaluation import load_trained
@@ -34,10 +34,10 @@ def film(config: EvaluateConfig, content: Mapping[str, Any], load: Load = load_t
     return ""
 
 
-def _words(moment: Moment) -> str:
+def _words(frame: Frame) -> str:
     """Say when it is, how near things are and how the controller fares."""
-    health = moment.health
+    diagnostics = frame.diagnostics
     return (
-        f"{moment.intent.time:5.1f} s     nearest: {health.smallest_distance:.3f} m     "
-        f"contacts: {moment.contacts}     controller: {health.status.value}"
+        f"{frame.intent.time:5.1f} s     nearest: {diagnostics.smallest_distance:.3f} m     "
+        f"contacts: {frame.contacts}     controller: {diagnostics.status.value}"
     )

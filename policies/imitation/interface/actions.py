@@ -14,7 +14,7 @@ from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.intent import Intent
-from handrail.policies.imitation.interface.relative import Frame, RelativeView
+from handrail.policies.imitation.interface.relative import RelativeView, RobotPose
 
 Columns = Mapping[str, np.ndarray]
 Mask = tuple[bool, ...]
@@ -33,7 +33,7 @@ class Actions(Protocol):
         """Return the actions of an episode, (T, a)."""
         ...
 
-    def decode(self, action: FloatArray, frame: Frame) -> Intent:
+    def decode(self, action: FloatArray, frame: RobotPose) -> Intent:
         """Return what an action (a,) asks for, where the robot is now (T = 1)."""
         ...
 
@@ -64,7 +64,7 @@ class RealisedActions:
             [self.view.to_base(self.view.frame(state), following), columns["action"][:, -1]]
         )
 
-    def decode(self, action: FloatArray, frame: Frame) -> Intent:
+    def decode(self, action: FloatArray, frame: RobotPose) -> Intent:
         """Return an intent on every joint."""
         values = np.zeros(self.channels.size)
         values[self.channels.joint_slice] = self.view.to_world(frame, action[None, :-1])[0]
@@ -102,7 +102,7 @@ class IntentActions:
         flags = [(rows == mask).all(axis=1) for mask in self.masks] if len(self.masks) > 1 else []
         return np.column_stack([asked[:, self._owned], *flags, gripper])
 
-    def decode(self, action: FloatArray, frame: Frame) -> Intent:
+    def decode(self, action: FloatArray, frame: RobotPose) -> Intent:
         """Return the intent on the channels of the likeliest mask."""
         values = np.zeros((1, self.channels.size))
         values[0, self._owned] = action[: len(self._owned)]

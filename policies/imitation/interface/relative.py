@@ -55,7 +55,7 @@ class Group:
 
 
 @dataclass(frozen=True)
-class Frame:
+class RobotPose:
     """Where the robot is, at T moments.
 
     Attributes:
@@ -78,7 +78,7 @@ class Frame:
 
     def turned_back(self, vectors: FloatArray) -> FloatArray:
         """Return vectors in the base's axes in the world's; z stays, (T, 2 or 3)."""
-        return Frame(self.base, self.heading * [1.0, -1.0], self.tool, self.rotation).turned(vectors)
+        return RobotPose(self.base, self.heading * [1.0, -1.0], self.tool, self.rotation).turned(vectors)
 
     def conjugated(self, rotations: FloatArray) -> FloatArray:
         """Return `R_wbᵀ R R_wb`, (T, 9)."""
@@ -151,7 +151,7 @@ class RelativeView:
         around = np.column_stack(seen) if seen else np.zeros((len(state), 0))
         return np.column_stack(own).astype(np.float32), around.astype(np.float32)
 
-    def frame(self, state: FloatArray) -> Frame:
+    def frame(self, state: FloatArray) -> RobotPose:
         """Return where the robot is, from recorded states, (T, s)."""
         if self.mobile:
             base = state[:, [self._at(f"{joint}.pos") for joint in self.joints[:3]]]
@@ -160,19 +160,19 @@ class RelativeView:
         tool = state[:, [self._at(name) for name in _TOOL]]
         rotation = Rotation.from_quat(tool[:, 3:], scalar_first=True).as_matrix()
         heading = np.column_stack([np.cos(base[:, 2]), np.sin(base[:, 2])])
-        return Frame(base[:, :2], heading, tool[:, :3], rotation)
+        return RobotPose(base[:, :2], heading, tool[:, :3], rotation)
 
     def velocities(self, state: FloatArray) -> FloatArray:
         """Return the joint velocities in recorded states, (T, n)."""
         return state[:, self._velocities]
 
-    def to_base(self, frame: Frame, velocities: FloatArray) -> FloatArray:
+    def to_base(self, frame: RobotPose, velocities: FloatArray) -> FloatArray:
         """Return joint velocities with the base's in its own axes, (T, n)."""
         if not self.mobile:
             return velocities
         return np.column_stack([frame.turned(velocities[:, :2]), velocities[:, 2:]])
 
-    def to_world(self, frame: Frame, velocities: FloatArray) -> FloatArray:
+    def to_world(self, frame: RobotPose, velocities: FloatArray) -> FloatArray:
         """Return joint velocities with the base's in the world's axes, as channels have them, (T, n)."""
         if not self.mobile:
             return velocities
@@ -230,7 +230,7 @@ def _parts(group: Group) -> tuple[str, ...]:
     return group.parts
 
 
-def _seen(group: Group, numbers: FloatArray, frame: Frame) -> FloatArray:
+def _seen(group: Group, numbers: FloatArray, frame: RobotPose) -> FloatArray:
     """Return a group as seen from the robot, (T, k)."""
     if group.parts[:3] == _POSITION and group.parts in (_POSE, _POSITION):
         offset = _at_scales(frame.turned(numbers[:, :3] - frame.tool))

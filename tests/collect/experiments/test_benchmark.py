@@ -11,7 +11,7 @@ import pytest
 from command_helpers import command
 from rich.console import Console
 
-from handrail.collect.experiments.benchmark.baselines import CONTENDERS
+from handrail.collect.experiments.benchmark.baselines import BASELINES
 from handrail.collect.experiments.benchmark.benchmark import benchmark
 from handrail.collect.experiments.benchmark.config import CONTROLLERS, BenchmarkConfig
 from handrail.collect.experiments.benchmark.metrics import METRICS
@@ -29,7 +29,7 @@ QUICK = BenchmarkConfig(controllers="mpc,dls", goals=2, physics=False, video=Fal
 
 
 def rows(config, *names):
-    who = tuple(CONTENDERS[name] for name in names)
+    who = tuple(BASELINES[name] for name in names)
     found = [episode.row for some in run(config, who) for episode in some]
     found.sort(key=lambda row: (row["goal"], row["profile"], row["controller"]))
     return [{key: value for key, value in row.items() if key not in TIMED} for row in found]
@@ -45,7 +45,7 @@ def written(tmp_path_factory):
         page=str(folder / "page.md"),
         profile="nominal,fast3",
     )
-    return folder, benchmark(config, CONTENDERS, QUIET)
+    return folder, benchmark(config, BASELINES, QUIET)
 
 
 def test_the_json_has_every_controller_measure_and_episode(written):
@@ -98,7 +98,7 @@ def test_the_page_keeps_what_others_wrote(written):
 def test_page_report_and_terminal_hold_a_closed_loop_to_its_aim(tmp_path):
     places = {"report": str(tmp_path / "report"), "page": str(tmp_path / "page.md")}
     config = BenchmarkConfig(controllers="dls", goals=1, physics=False, video=False, **places)
-    results = benchmark(replace(config, early_stop=False, closed_loop=True), CONTENDERS, QUIET)
+    results = benchmark(replace(config, early_stop=False, closed_loop=True), BASELINES, QUIET)
     console = Console(width=200, record=True, file=StringIO())
     console.print(benchmark_tables(results))
     html = (tmp_path / "report" / "benchmark.html").read_text()
@@ -174,7 +174,7 @@ def test_physics_and_ideal_robot_tell_the_same_story():
 
 def test_an_update_is_asked_for_at_its_period():
     """10 Hz against steps of 0.03 s: after 0, 4, 7, 10, 14, … steps."""
-    _, trace = trace_of(replace(QUICK, goals=1), CONTENDERS["mpc"], 0)
+    _, trace = trace_of(replace(QUICK, goals=1), BASELINES["mpc"], 0)
     assert len(trace.statuses) == int(np.ceil(len(trace.v) * 0.03 / 0.1))
 
 
@@ -191,13 +191,13 @@ def _fails(model):
 
 
 def test_with_all_what_is_missing_is_left_out_and_said():
-    broken = replace(CONTENDERS["mink"], build=_fails)
-    contenders = dict.fromkeys(CONTROLLERS, CONTENDERS["dls"]) | {"mink": broken}
-    present, skipped = available(contenders, BenchmarkConfig(controllers="all"))
+    broken = replace(BASELINES["mink"], build=_fails)
+    baselines = dict.fromkeys(CONTROLLERS, BASELINES["dls"]) | {"mink": broken}
+    present, skipped = available(baselines, BenchmarkConfig(controllers="all"))
     assert len(present) == len(CONTROLLERS) - 1
     assert skipped == {"mink": "robot missing"}
     with pytest.raises(HandrailError, match="robot missing"):
-        available(contenders, BenchmarkConfig(controllers="dls,mink"))
+        available(baselines, BenchmarkConfig(controllers="dls,mink"))
 
 
 WRONG = {
@@ -231,7 +231,7 @@ def test_wrong_input_is_one_clear_line(case):
 @pytest.mark.needs_gl
 def test_the_report_has_a_video(tmp_path):
     config = replace(QUICK, goals=1, video=True, report=str(tmp_path / "report"))
-    benchmark(config, CONTENDERS, QUIET)
+    benchmark(config, BASELINES, QUIET)
     html = (tmp_path / "report" / "benchmark.html").read_text()
     assert 'src="data:video/mp4;base64,' in html
     assert (tmp_path / "report" / "benchmark.mp4").stat().st_size > 10_000

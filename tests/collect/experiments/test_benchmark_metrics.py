@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from handrail.collect.experiments.benchmark.baselines import CONTENDERS
+from handrail.collect.experiments.benchmark.baselines import BASELINES
 from handrail.collect.experiments.benchmark.config import BenchmarkConfig
 from handrail.collect.experiments.benchmark.format import paired_table, settles, settling_table
 from handrail.collect.experiments.benchmark.metrics import METRICS, Trace, arm_effort, jerkiness, measure
@@ -80,7 +80,7 @@ def test_a_summary_is_over_the_episodes_and_pairs_are_by_goal():
     config = BenchmarkConfig(controllers="mpc,dls", goals=3)
     rows = [row(goal, "mpc", arm_effort=float(goal)) for goal in (2, 0, 1)]
     rows += [row(goal, "dls", arm_effort=10.0 + goal, success=goal > 0) for goal in (1, 2, 0)]
-    results = summarise(rows, config, [CONTENDERS["mpc"], CONTENDERS["dls"]], {})
+    results = summarise(rows, config, [BASELINES["mpc"], BASELINES["dls"]], {})
     mpc = results["controllers"]["mpc"]
     assert set(METRICS) <= set(mpc)
     assert all(set(mpc[metric]) >= {"mean", "std", "min", "max"} for metric in METRICS)
@@ -98,7 +98,7 @@ def test_what_an_update_costs_is_compared_on_the_same_goals():
     rows = [row(goal, "mpc", update_ms_median=0.5 + goal) for goal in (0, 1, 2)]
     rows += [row(goal, "dls", update_ms_median=0.25 + goal) for goal in (2, 1, 0)]
     config = BenchmarkConfig(controllers="mpc,dls", goals=3)
-    results = summarise(rows, config, [CONTENDERS["mpc"], CONTENDERS["dls"]], {})
+    results = summarise(rows, config, [BASELINES["mpc"], BASELINES["dls"]], {})
     assert results["paired"]["nominal"]["dls"]["update_ms_median"]["mean"] == pytest.approx(0.25)
     headings, ((*_, cell),) = paired_table(results, ("update_ms_median",), "nominal")
     assert headings[1] == "update ms"
@@ -113,7 +113,7 @@ def test_a_planner_that_sees_the_hand_is_held_to_its_aim():
         for goal, (one, two) in enumerate(errors)
     ]
     whole = BenchmarkConfig(controllers="mpc", goals=3, closed_loop=True, early_stop=False)
-    results = summarise(rows, whole, [CONTENDERS["mpc"]], {})
+    results = summarise(rows, whole, [BASELINES["mpc"]], {})
     assert settles(results)
     headings, found = settling_table(results, "nominal")
     assert headings[-1] == "beyond 10 mm"
@@ -122,4 +122,4 @@ def test_a_planner_that_sees_the_hand_is_held_to_its_aim():
         ["mpc", "4 s later", "8.0", "12.0", "1 of 3"],
     ]
     for other in (BenchmarkConfig(closed_loop=True), BenchmarkConfig(early_stop=False)):
-        assert not settles(summarise(rows, other, [CONTENDERS["mpc"]], {}))
+        assert not settles(summarise(rows, other, [BASELINES["mpc"]], {}))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from handrail.collect.experiments.benchmark.baselines import (
-    CONTENDERS,
+    BASELINES,
     TAKE_UP,
     TAKE_UP_TURN,
     HandIntent,
@@ -20,7 +20,7 @@ from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import State
 from handrail.controllers.mpc.masked_mpc import MaskedMpc
 from handrail.controllers.robot.model import load_model
-from handrail.policies.rl.baseline import RL_CONTENDERS
+from handrail.policies.rl.baseline import RL_BASELINES
 
 MODEL = load_model()
 CHANNELS = Channels.of(MODEL.description)
@@ -54,7 +54,7 @@ def test_the_low_pass_takes_a_step_up_in_its_time_and_keeps_the_way():
 
 
 def test_who_has_the_low_pass_differs_from_their_twin_in_nothing_else():
-    everyone = {**CONTENDERS, **RL_CONTENDERS}
+    everyone = {**BASELINES, **RL_BASELINES}
     for name in ("mink", "rl"):
         bare, smooth = everyone[name], everyone[f"{name}_low_pass"]
         assert smooth.operator is SmoothedHandIntent
@@ -62,7 +62,7 @@ def test_who_has_the_low_pass_differs_from_their_twin_in_nothing_else():
 
 
 def test_behind_the_low_pass_keys_jerk_less():
-    bare = CONTENDERS["dls"]
+    bare = BASELINES["dls"]
     smooth = replace(bare, operator=SmoothedHandIntent)
     rough, smoothed = (trace_of(KEYS, who, 0)[1] for who in (bare, smooth))
     jerks = [np.linalg.norm(np.diff(trace.v, axis=0), axis=1).mean() for trace in (rough, smoothed)]
@@ -70,17 +70,17 @@ def test_behind_the_low_pass_keys_jerk_less():
 
 
 def test_the_low_pass_begins_at_rest_in_every_episode():
-    who = replace(CONTENDERS["dls"], operator=SmoothedHandIntent)
+    who = replace(BASELINES["dls"], operator=SmoothedHandIntent)
     first, second = (trace_of(KEYS, who, 0)[1] for _ in range(2))
     np.testing.assert_array_equal(first.v, second.v)
 
 
 def test_the_paper_s_horizon_is_the_paper_s():
     """N = 10, dt = 0.1 s, γ = 1, the command held constant, no posture and no terminal cost."""
-    contender = CONTENDERS["mpc_paper"]
-    mpc = contender.build(MODEL)
+    baseline = BASELINES["mpc_paper"]
+    mpc = baseline.build(MODEL)
     assert isinstance(mpc, MaskedMpc)
-    assert (mpc.settings.horizon, mpc.settings.dt, contender.period) == (10, 0.1, 0.1)
+    assert (mpc.settings.horizon, mpc.settings.dt, baseline.period) == (10, 0.1, 0.1)
     intent = HandIntent(MODEL)(np.full(6, 0.1), STATE, 0.0)
     problem = mpc.problem(STATE, intent)
     tool = CHANNELS.tool_slice
@@ -92,6 +92,6 @@ def test_the_paper_s_horizon_is_the_paper_s():
 
 @pytest.mark.parametrize("name", ["mpc_paper", "mpc"])
 def test_both_horizons_arrive(name):
-    _, trace = trace_of(IDEAL, CONTENDERS[name], 0)
+    _, trace = trace_of(IDEAL, BASELINES[name], 0)
     assert trace.errors[-1, 0] <= 0.1
     assert not any(trace.contacts)

@@ -9,7 +9,7 @@ from device_helpers import GOAL, HOME, MODEL, PERIOD, Wisher, drive, first_view
 from handrail.collect.operators.devices.devices import input_map
 from handrail.collect.operators.devices.joint_order import clear_order, sweep_clearance
 from handrail.collect.operators.human.human import HumanSettings
-from handrail.collect.operators.human.motion_goal import Wish
+from handrail.collect.operators.human.motion_goal import MotionGoal
 from handrail.collect.operators.modes import find_mode
 from handrail.collect.operators.operator import View
 from handrail.controllers.baselines.split_controller import split_controller
@@ -73,8 +73,8 @@ def test_a_leader_starts_without_a_jump_and_never_outruns_its_operator(view):
 
 def test_a_still_leader_holds_the_arm(view):
     class Rest(Wisher):
-        def wish(self, view):
-            return Wish.rest()
+        def motion_goal(self, view):
+            return MotionGoal.rest()
 
     _, path = drive(view, "leader", HumanSettings(), seconds=5.0, script=Rest())
     assert np.max(np.abs(path - HOME)) < 0.03
@@ -86,7 +86,7 @@ def test_the_split_controller_coordinates_nothing():
     sticks = input_map(MODEL, mode)
     controller = split_controller(MODEL)
     state = State(HOME, np.zeros(MODEL.size))
-    operator_wish = Wish(np.array([0.1, 0.0, 0.1, 0.0, 0.1, 0.0]), np.array([0.2, 0.1, 0.1]))
+    operator_wish = MotionGoal(np.array([0.1, 0.0, 0.1, 0.0, 0.1, 0.0]), np.array([0.2, 0.1, 0.1]))
     for focus, resting in (("hand", slice(0, 3)), ("base", slice(3, None))):
         controller.reset()
         mask, values = sticks.wanted(replace(operator_wish, focus=focus), state)

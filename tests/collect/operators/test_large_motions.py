@@ -10,7 +10,7 @@ from handrail.collect.commands.record import episode_seed
 from handrail.collect.config import SessionConfig
 from handrail.collect.operators.devices.arm_solutions import REACHED, arm_solutions, straight_solution
 from handrail.collect.operators.human.human import HumanSettings
-from handrail.collect.operators.human.motion_goal import Target, Wish
+from handrail.collect.operators.human.motion_goal import MotionGoal, Target
 from handrail.collect.operators.human.steering import Gains, hand_twist, pose_errors
 from handrail.collect.operators.operator import View
 from handrail.collect.operators.scripts.drawer import before_driving
@@ -32,12 +32,12 @@ class Bring:
     def reset(self, view):
         pass
 
-    def wish(self, view):
+    def motion_goal(self, view):
         distance, angle = pose_errors(view.tool, self._goal)
         if distance < 0.02 and angle < 0.1:
-            return Wish.rest()
+            return MotionGoal.rest()
         target = Target(self._goal, view.state.q[:3], distance=0.02, angle=0.2, tilt=self._tilt)
-        return Wish(hand_twist(view.tool, self._goal, Gains()), np.zeros(3), target=target)
+        return MotionGoal(hand_twist(view.tool, self._goal, Gains()), np.zeros(3), target=target)
 
 
 @pytest.fixture(scope="module")

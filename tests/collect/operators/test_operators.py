@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from handrail.collect.operators.devices.input_map import StickMap
 from handrail.collect.operators.human.hand import HumanHand, minimum_jerk
 from handrail.collect.operators.human.human import HumanSettings
-from handrail.collect.operators.human.motion_goal import Wish
+from handrail.collect.operators.human.motion_goal import MotionGoal
 from handrail.collect.operators.human.perception import Perception
 from handrail.collect.operators.human.steering import Gains, base_twist, hand_twist
 from handrail.collect.operators.modes import MODES, find_mode
@@ -150,7 +150,7 @@ def test_what_is_near_is_judged_well():
     errors = {}
     for length in (0.05, 0.5):
         perception = Perception(human(misjudgement=0.1), np.random.default_rng(0))
-        wanted = Wish(np.array([length, 0, 0, 0, 0, 0.0]), np.zeros(3))
+        wanted = MotionGoal(np.array([length, 0, 0, 0, 0, 0.0]), np.zeros(3))
         seen = np.array([perception.see(wanted, MODEL.pose(HOME), 0.0).hand for _ in range(3)])
         errors[length] = (seen - wanted.hand)[0, :3]
         assert np.all(seen[:, 3:] == 0.0)
@@ -162,15 +162,15 @@ def state(q=HOME, time=0.0):
     return State(q, np.zeros(MODEL.size), time)
 
 
-def wish(focus="hand"):
-    return Wish(np.array([0.1, -0.05, 0.1, 0.1, 0.0, -0.2]), np.array([0.2, 0.1, 0.1]), focus)
+def motion_goal(focus="hand"):
+    return MotionGoal(np.array([0.1, -0.05, 0.1, 0.1, 0.0, -0.2]), np.array([0.2, 0.1, 0.1]), focus)
 
 
 @pytest.mark.parametrize("name", STICKS)
 @pytest.mark.parametrize("focus", ["hand", "base"])
 def test_a_mode_speaks_only_on_its_channels(name, focus):
     inputs = StickMap(MODEL, find_mode(name), Gains())
-    mask, values = inputs.wanted(wish(focus), state())
+    mask, values = inputs.wanted(motion_goal(focus), state())
     np.testing.assert_array_equal(mask, inputs.mask(focus))
     assert np.any(values[mask])
     np.testing.assert_array_equal(values[~mask], 0.0)
@@ -185,9 +185,9 @@ def test_switching_follows_the_focus():
 
 def test_joint_inputs_move_the_hand_as_wished():
     inputs = StickMap(MODEL, find_mode("direct"), Gains())
-    velocities = inputs.wanted(wish(), state())[1][inputs.channels.joint_slice]
+    velocities = inputs.wanted(motion_goal(), state())[1][inputs.channels.joint_slice]
     twist = MODEL.jacobian(HOME) @ velocities
-    np.testing.assert_allclose(twist, wish().hand, atol=0.02)
+    np.testing.assert_allclose(twist, motion_goal().hand, atol=0.02)
 
 
 def test_steering_points_at_the_goal():

@@ -84,7 +84,7 @@ def test_a_viewer_that_dies_or_stalls_never_stops_a_recording(trouble, tmp_path,
 
     monkeypatch.setattr(viewer.Viewer, "send", troubled)
     draw, drawn = Drawing.see, []
-    monkeypatch.setattr(Drawing, "see", lambda self, moment: (drawn.append(moment), draw(self, moment)))
+    monkeypatch.setattr(Drawing, "see", lambda self, frame: (drawn.append(frame), draw(self, frame)))
     saved = tmp_path / "seen.rrd"
     done = command(*REACH, "--display_web", "--display_save", saved, tmp_path / "set")
     assert done.returncode == 0, done.stderr
@@ -98,7 +98,7 @@ def test_a_viewer_that_dies_or_stalls_never_stops_a_recording(trouble, tmp_path,
 def test_what_goes_wrong_in_drawing_is_said_once_and_no_more(monkeypatch):
     said = []
     display = Display(say=said.append)
-    monkeypatch.setattr(display._drawing, "see", lambda moment: 1 / 0)
+    monkeypatch.setattr(display._drawing, "see", lambda frame: 1 / 0)
     config = SessionConfig(task="reach", time_limit=1.0)
     build_session(config, build_env(config, 20), [display]).run(2)
     display.close()

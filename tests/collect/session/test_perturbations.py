@@ -50,8 +50,8 @@ class Watcher:
     def begin(self, env, seed):
         self.states = []
 
-    def see(self, moment):
-        self.states.append(moment.state)
+    def see(self, frame):
+        self.states.append(frame.state)
 
 
 def path(env, seed, disturbances=(), controller=None):

@@ -22,7 +22,7 @@ from handrail.controllers.interface.intent import Intent
 from handrail.controllers.mpc.masked_mpc import MaskedMpc
 from handrail.controllers.mpc.safety_filter import filter_settings, safety_filter
 from handrail.datasets.format.schema import check_frame
-from handrail.datasets.recording.frames import moment_row
+from handrail.datasets.recording.frames import frame_row
 
 CLOCKED = ("controller.solve_time", "wall_clock")
 
@@ -34,8 +34,8 @@ class Watcher:
     def begin(self, env, seed):
         self.moments = []
 
-    def see(self, moment):
-        self.moments.append(moment)
+    def see(self, frame):
+        self.moments.append(frame)
 
 
 def run(seed=3, **settings):
@@ -53,7 +53,7 @@ def test_pick_and_place_succeeds_without_contact(mode):
     assert outcome.contacts == 0
     assert outcome.brakes == 0
     assert outcome.smallest_distance >= 0.05
-    masks = {moment.intent.mask.tobytes() for moment in moments}
+    masks = {frame.intent.mask.tobytes() for frame in moments}
     assert len(masks) == (2 if mode == "switching" else 1)
 
 
@@ -64,7 +64,7 @@ def test_every_mode_reaches(mode):
     outcome, moments, _ = run(task="reach", mode=mode, seed=2, time_limit=limit)
     assert outcome.success, outcome
     assert MODES[mode].controller in ("direct", "split") or outcome.contacts == 0
-    assert all(moment.intent.mode == mode for moment in moments)
+    assert all(frame.intent.mode == mode for frame in moments)
 
 
 def test_base_mode_moves_the_base_alone():
@@ -79,7 +79,7 @@ def test_the_same_seed_is_the_same_episode():
     rows = []
     for _ in range(2):
         _, moments, _ = run(task="reach", mode="ee", seed=5)
-        rows.append([moment_row(moment) for moment in moments])
+        rows.append([frame_row(frame) for frame in moments])
     assert len(rows[0]) == len(rows[1])
     for first, again in zip(*rows, strict=True):
         for key in set(first) - set(CLOCKED):
@@ -89,14 +89,14 @@ def test_the_same_seed_is_the_same_episode():
 def test_moments_fit_the_schema():
     _, moments, env = run(task="reach", mode="ee", seed=5)
     features = session_features(env)
-    for moment in moments:
-        check_frame(moment_row(moment), features)
+    for frame in moments:
+        check_frame(frame_row(frame), features)
 
 
 def test_noise_zero_is_smoother():
     def jerk(noise):
         _, moments, _ = run(task="reach", mode="ee", seed=7, noise=noise)
-        return np.mean(np.abs(np.diff([moment.action[:9] for moment in moments], n=2, axis=0)))
+        return np.mean(np.abs(np.diff([frame.action[:9] for frame in moments], n=2, axis=0)))
 
     assert jerk(0.0) < jerk(1.0)
 
@@ -131,11 +131,11 @@ def test_garbage_brakes_and_is_counted(kind):
     controller = kind(env.model)
     watcher = Watcher()
     outcome = Session(env, controller, Unruly(controller.channels), [watcher]).run(0)
-    statuses = [moment.health.status for moment in watcher.moments]
+    statuses = [frame.diagnostics.status for frame in watcher.moments]
     assert outcome.brakes == sum(status.brakes for status in statuses) > 0
     assert {Status.INVALID_INTENT, Status.STALE_INTENT} <= set(statuses)
-    assert all(np.all(np.isfinite(moment.action)) for moment in watcher.moments)
-    actions = np.array([moment.action[:9] for moment in watcher.moments])
+    assert all(np.all(np.isfinite(frame.action)) for frame in watcher.moments)
+    actions = np.array([frame.action[:9] for frame in watcher.moments])
     limits = env.model.description.limits
     assert np.all(np.abs(np.diff(actions, axis=0)) <= limits.acceleration / 20 * 1.001 + 1e-5)
 
@@ -147,7 +147,7 @@ def test_a_mask_of_ones_own():
     session = build_session(SessionConfig(task="reach", mask=mask), env, [watcher := Watcher()])
     session.run(0)
     assert mode.groups("hand") == ("ee.vx", "ee.vy", "ee.vz")
-    assert {"".join(map(str, moment.intent.mask.astype(int))) for moment in watcher.moments} == {mask}
+    assert {"".join(map(str, frame.intent.mask.astype(int))) for frame in watcher.moments} == {mask}
     with pytest.raises(HandrailError, match="expected 18 characters 0 or 1"):
         build_mode(SessionConfig(mask="0101"), env.model)
 
@@ -219,8 +219,8 @@ def test_what_is_recorded_is_what_was_sent(mode):
 
     env.step = stepped
     session.run(3)
-    actions = np.array([moment.action for moment in watcher.moments])
-    commands = np.array([moment.command for moment in watcher.moments])
+    actions = np.array([frame.action for frame in watcher.moments])
+    commands = np.array([frame.command for frame in watcher.moments])
     np.testing.assert_array_equal(actions, sent)
     limits = env.model.description.limits
     steps = np.abs(np.diff(actions[:, :-1], axis=0, prepend=np.zeros((1, env.model.size))))

@@ -84,9 +84,9 @@ class Watch:
         self.told.clear()
         self.inner.reset(obstacles)
 
-    def observe(self, obstacles):
+    def update_scene(self, obstacles):
         self.told.append(tuple(obstacle.name for obstacle in obstacles if obstacle.held))
-        self.inner.observe(obstacles)
+        self.inner.update_scene(obstacles)
 
     def update(self, state, intent):
         return self.inner.update(state, intent)
@@ -128,8 +128,8 @@ class Closing:
         self.env, self.offsets, self.turns = env, [], []
         self.closing = False
 
-    def see(self, moment):
-        state, closing = self.env.task_state(), moment.action[-1] > 0.5
+    def see(self, frame):
+        state, closing = self.env.task_state(), frame.action[-1] > 0.5
         if closing and not self.closing:
             cube = state.pose("cube")
             self.offsets.append(state.tool.rotation.T @ (cube.position - state.tool.position))

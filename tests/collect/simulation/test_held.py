@@ -109,7 +109,7 @@ def towards_the_base(controller, held, seconds=8.0, period=0.05):
     goal = MODEL.pose(q, "planar_base").position + [0.2, 0.0, 1.0]
     rows, smallest, statuses = held_rows(truth), np.inf, []
     for k in range(int(seconds / period)):
-        controller.observe((BOX,) if held else ())
+        controller.update_scene((BOX,) if held else ())
         direction = goal - MODEL.pose(q).position
         values = np.zeros(controller.channels.size)
         values[controller.channels.tool_slice][:3] = 0.3 * direction / max(np.linalg.norm(direction), 0.1)
@@ -117,7 +117,7 @@ def towards_the_base(controller, held, seconds=8.0, period=0.05):
         after = command.velocity(period)
         q, v = q + period * 0.5 * (v + after), after
         smallest = min(smallest, truth.values(q[None])[0, rows].min())
-        statuses.append(command.health.status)
+        statuses.append(command.diagnostics.status)
     return smallest, statuses
 
 
@@ -145,7 +145,7 @@ def test_a_grasp_beside_an_obstacle_moves_nothing_and_the_thing_may_come_away(bu
     controller.reset((wall,))
     q, v, gaps, hand = np.array(HOME), np.zeros(MODEL.size), [], []
     for k in range(160):
-        controller.observe((wall, rod))
+        controller.update_scene((wall, rod))
         rate = 0.0 if k < 40 else -0.05 if k < 100 else 0.05  # rest, away, back
         mask, values = controller.channels.mask(group), np.zeros(controller.channels.size)
         twist = np.append(rate * ahead, np.zeros(3))
@@ -173,11 +173,11 @@ def test_a_grasp_on_the_way_does_not_jerk_the_robot(build):
     mask = channels.mask("joint")
     q, v = np.array(HOME), np.zeros(MODEL.size)
     for k in range(30):
-        controller.observe((POST, BOX) if 10 <= k < 20 else (POST,))
+        controller.update_scene((POST, BOX) if 10 <= k < 20 else (POST,))
         command = controller.update(State(q, v, k * period), Intent(values, mask, time=k * period))
         after = command.velocity(period)
         assert np.all(np.abs(after - v) <= limits.acceleration * period * (1 + 1e-6) + 1e-9)
-        assert not command.health.status.brakes
+        assert not command.diagnostics.status.brakes
         q, v = q + period * 0.5 * (v + after), after
 
 
@@ -194,7 +194,7 @@ def test_bounds_hold_for_a_thing_that_has_slipped():
     """A thing that sits otherwise in the hand than when it was grasped may reach farther from some joints."""
     rng, cube = np.random.default_rng(3), Shape("box", [0.05, 0.05, 0.05])
     collision = CollisionModel(MODEL, (POST, Obstacle("box", cube, [0.0, 0.0, 0.0], frame="tool")))
-    collision.observe((POST, Obstacle("box", cube, [0.0, 0.0, 0.6], frame="tool")))
+    collision.update_scene((POST, Obstacle("box", cube, [0.0, 0.0, 0.6], frame="tool")))
     for _ in range(60):
         q = rng.uniform(-1.5, 1.5, MODEL.size)
         path = q + np.outer(np.linspace(0.0, 0.4, 30), np.eye(MODEL.size)[rng.integers(6, 8)])  # a wrist

@@ -129,8 +129,8 @@ def test_a_robot_that_nobody_steers_steps_aside(kind, touched):
 @pytest.mark.parametrize("count", [0, 1])
 def test_the_controller_observes_before_every_update_if_anything_moves(count):
     class Witness(DirectController):
-        def observe(self, obstacles):
-            super().observe(obstacles)
+        def update_scene(self, obstacles):
+            super().update_scene(obstacles)
             seen.append((obstacles, float(env.simulation.data.time)))
 
         def update(self, state, intent):

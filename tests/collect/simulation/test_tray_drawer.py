@@ -30,9 +30,9 @@ class Watcher:
     def begin(self, env, seed):
         self.env = env
 
-    def see(self, moment):
+    def see(self, frame):
         poses = self.env.task_state().poses
-        self.masks.add(moment.intent.mask.tobytes())
+        self.masks.add(frame.intent.mask.tobytes())
         if "tray" in poses:
             self.tilt = max(self.tilt, float(np.arccos(min(poses["tray"].rotation[2, 2], 1.0))))
         else:

@@ -139,14 +139,14 @@ def test_a_really_full_disk(tmp_path):
         subprocess.run(["umount", "-l", str(disk)], check=True)
 
 
-@pytest.mark.parametrize("moment", ["a picture", "the end"])
-def test_a_failing_encoder(tmp_path, monkeypatch, moment):
+@pytest.mark.parametrize("when", ["a picture", "the end"])
+def test_a_failing_encoder(tmp_path, monkeypatch, when):
     root = tmp_path / "set"
     with create(root, cameras=True) as writer:
         record_one(writer, cameras=True)
         content = tree(root)
         with monkeypatch.context() as patch:
-            if moment == "a picture":
+            if when == "a picture":
                 patch.setattr(video, "image_levels", lambda image: 1 / 0)
             else:
                 patch.setattr(video, "count_frames", lambda path: 3)

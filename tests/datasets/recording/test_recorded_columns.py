@@ -13,12 +13,12 @@ from handrail.collect.config import SessionConfig
 from handrail.collect.operators.human.human import HumanSettings
 from handrail.collect.session.recorded_settings import recorded_settings, settings_json
 from handrail.controllers.errors import HandrailError
-from handrail.controllers.interface.command import Health, Status
+from handrail.controllers.interface.command import Diagnostics, Status
 from handrail.controllers.interface.intent import Intent, RawInput
 from handrail.datasets.format.schema import check_frame
 from handrail.datasets.quality.summary import summarize
 from handrail.datasets.reading.reader import read_episodes, read_frames, read_info
-from handrail.datasets.recording.frames import FARTHEST, MOST, Moment, moment_features, moment_row
+from handrail.datasets.recording.frames import FARTHEST, MOST, Frame, frame_features, frame_row
 from handrail.datasets.recording.writer import EpisodeWriter
 
 MASK = "000111000000000000"
@@ -144,16 +144,16 @@ def test_no_column_is_ever_infinite(number):
     channels = ("base.vx", "ee.vx", "joint.a")
     bad = np.full(3, number)
     intent = Intent(bad, np.array([True, False, True]), gripper=number, raw=RawInput(bad))
-    health = Health(Status.INVALID_STATE, slack=abs(number))
+    diagnostics = Diagnostics(Status.INVALID_STATE, slack=abs(number))
     still = np.zeros(2)
-    moment = Moment(still, np.zeros(1), {}, intent, still, still, health, 0, False, False, 0.0)
-    frame = check_frame(moment_row(moment), moment_features("ab", "e", "a", channels))
+    frame = Frame(still, np.zeros(1), {}, intent, still, still, diagnostics, 0, False, False, 0.0)
+    frame = check_frame(frame_row(frame), frame_features("ab", "e", "a", channels))
     numbers = {key: value for key, value in frame.items() if not isinstance(value, str)}
     assert all(np.isfinite(value).all() for value in numbers.values())
     assert numbers["controller.work_distance"] == numbers["controller.smallest_distance"] == FARTHEST
     assert abs(numbers["teleop.values"]).max() in (0.0, MOST)
-    near = replace(moment, health=Health(work_distance=0.25, smallest_distance=-0.01))
-    row = moment_row(near)
+    near = replace(frame, diagnostics=Diagnostics(work_distance=0.25, smallest_distance=-0.01))
+    row = frame_row(near)
     assert (row["controller.work_distance"], row["controller.smallest_distance"]) == (0.25, -0.01)
 
 

@@ -46,7 +46,7 @@ def test_the_controller_moves_like_the_environment(controller):
             observation, *_ = env.step(actor(observation))
             v = command.velocity(STEP)
             robot.advance(v, 0.0)
-            assert command.health.status is Status.OK
+            assert command.diagnostics.status is Status.OK
             assert np.allclose(v, env.velocity, atol=1e-5)
         assert np.abs(v[:3]).max() > 0.01
 
@@ -70,7 +70,7 @@ def test_bad_input_brakes_within_the_limits(controller, spoil, status):
         before, time = v, k * STEP
         command = controller.update(State(q, v, time), spoil(intent(np.zeros(6), time)))
         v = command.velocity(STEP)
-        assert command.health.status is status
+        assert command.diagnostics.status is status
         assert np.all(np.abs(v - before) <= MODEL.description.limits.acceleration * STEP + 1e-9)
         assert np.linalg.norm(v) < speed
     assert not command.velocities.any()
