@@ -14,14 +14,16 @@ def _run(code: str) -> str:
     return subprocess.run(command, capture_output=True, text=True, check=True, cwd=ROOT).stdout.strip()
 
 
-@pytest.mark.parametrize("module", ["writer", "repair", "reader", "summary", "pack"])
+@pytest.mark.parametrize(
+    "module", ["recording.writer", "recording.repair", "reading.reader", "quality.summary", "recording.pack"]
+)
 def test_nothing_heavy_is_imported(module):
     assert _run(f"import sys, handrail.datasets.{module}; print({HEAVY} & set(sys.modules))") == "set()"
 
 
 def test_nothing_heavy_is_imported_while_recording_and_reading(tmp_path):
     code = f"""
-import sys; sys.path.insert(0, 'tests')
+import sys; sys.path.insert(0, 'tests/helpers')
 from datasets_helpers import *
 from handrail.datasets.quality.summary import summarize
 root = Path({str(tmp_path)!r}) / 'set'
@@ -36,7 +38,7 @@ def test_datasets_is_hugging_face_s():
 
 
 def test_the_encoder_is_silent(tmp_path):
-    code = "import sys; sys.path.insert(0, 'tests'); from datasets_helpers import *; "
+    code = "import sys; sys.path.insert(0, 'tests/helpers'); from datasets_helpers import *; "
     code += "record(Path(sys.argv[1]), 1, cameras=True)"
     command = [sys.executable, "-c", code, str(tmp_path / "set")]
     done = subprocess.run(command, capture_output=True, text=True, check=True, cwd=ROOT)

@@ -8,6 +8,7 @@ from scipy.spatial.transform import Rotation
 from handrail.collect.config import SessionConfig
 from handrail.collect.operators.modes import find_mode
 from handrail.collect.session.build import build_env
+from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.robot.model import load_model
 from handrail.policies.imitation.interface.checkpoint import PolicyMeta, read_meta, write_meta
@@ -143,3 +144,10 @@ def untrained_act(folder, actions):
     meta = PolicyMeta("reach", "ee", "ridgeback_ur10", 20, actions, 0, 0, {"episodes": 1}, "act", 0)
     write_meta(folder, None if actions == "recorded" else interface, meta)
     return str(folder)
+
+
+def unable(path):
+    """Load a policy, but for one that cannot be loaded."""
+    if path.name == "broken":
+        raise HandrailError("broken: no weights")
+    return StandIn(load(path).interface, "still")

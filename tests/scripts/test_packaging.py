@@ -1,6 +1,5 @@
 """The package's laws: it leaves nothing out, shadows nobody, pins everything, imports downwards."""
 
-import ast
 import importlib
 import os
 import re
@@ -15,30 +14,14 @@ import pytest
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 from places import ROOT
+from rooms import FLOORS, imported, sources
 
-FLOORS = ("controllers", "datasets", "collect", "policies", "scripts")  # from the ground up
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
 SETUPTOOLS = PROJECT["tool"]["setuptools"]
 FORBIDDEN = {
     "controllers": {"mujoco", "gymnasium", "torch", "lerobot", "rerun", "datasets"},
     "datasets": {"mujoco", "gymnasium", "torch", "rerun"},
 }
-
-
-def sources(floor: str) -> list[Path]:
-    return sorted(path for path in (ROOT / floor).rglob("*.py") if "__pycache__" not in path.parts)
-
-
-def imported(path: Path) -> set[str]:
-    """Return the full names of all modules that a file imports, wherever in the file."""
-    names = set()
-    for node in ast.walk(ast.parse(path.read_text())):
-        if isinstance(node, ast.Import):
-            names |= {alias.name for alias in node.names}
-        elif isinstance(node, ast.ImportFrom):
-            assert node.level == 0, f"{path}: relative import"
-            names |= {node.module or ""} | {f"{node.module}.{alias.name}" for alias in node.names}
-    return names
 
 
 def test_every_package_is_listed():

@@ -120,11 +120,11 @@ def settling_table(results: Mapping[str, Any], profile: str) -> Table:
     moments = {"planned_position_error": "the planner's last step", "final_position_error": "4 s later"}
     rows = []
     for name, summary in results["profiles"][profile].items():
-        for metric, frame in moments.items():
+        for metric, moment in moments.items():
             if metric in summary:
                 ends = [f"{1e3 * summary[metric][end]:.1f}" for end in ("mean", "max")]
                 missed = f"{summary['beyond_aim'][metric]} of {summary['episodes']}"
-                rows.append([name, frame, *ends, missed])
+                rows.append([name, moment, *ends, missed])
     return ["controller", "position error at", "mean mm", "worst mm", f"beyond {1e3 * AIM:.0f} mm"], rows
 
 

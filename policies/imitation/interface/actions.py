@@ -33,7 +33,7 @@ class Actions(Protocol):
         """Return the actions of an episode, (T, a)."""
         ...
 
-    def decode(self, action: FloatArray, frame: RobotPose) -> Intent:
+    def decode(self, action: FloatArray, pose: RobotPose) -> Intent:
         """Return what an action (a,) asks for, where the robot is now (T = 1)."""
         ...
 
@@ -61,13 +61,13 @@ class RealisedActions:
         velocities = self.view.velocities(state)
         following = np.concatenate([velocities[1:], velocities[-1:]])
         return np.column_stack(
-            [self.view.to_base(self.view.frame(state), following), columns["action"][:, -1]]
+            [self.view.to_base(self.view.pose(state), following), columns["action"][:, -1]]
         )
 
-    def decode(self, action: FloatArray, frame: RobotPose) -> Intent:
+    def decode(self, action: FloatArray, pose: RobotPose) -> Intent:
         """Return an intent on every joint."""
         values = np.zeros(self.channels.size)
-        values[self.channels.joint_slice] = self.view.to_world(frame, action[None, :-1])[0]
+        values[self.channels.joint_slice] = self.view.to_world(pose, action[None, :-1])[0]
         return Intent(values, self.channels.mask("joint"), gripper=float(action[-1] > _HALF))
 
 
@@ -95,19 +95,19 @@ class IntentActions:
         """Return the operator's command with tool twists in the base's axes, (T, a)."""
         values = columns["teleop.values"].astype(float)
         asked, gripper = values[:, :-1].copy(), values[:, -1]
-        frame = self.view.frame(columns["observation.state"].astype(float))
+        pose = self.view.pose(columns["observation.state"].astype(float))
         for pair in self._pairs:
-            asked[:, pair] = frame.turned(asked[:, pair])
+            asked[:, pair] = pose.turned(asked[:, pair])
         rows = columns["teleop.mask"][:, : self.channels.size].astype(bool)
         flags = [(rows == mask).all(axis=1) for mask in self.masks] if len(self.masks) > 1 else []
         return np.column_stack([asked[:, self._owned], *flags, gripper])
 
-    def decode(self, action: FloatArray, frame: RobotPose) -> Intent:
+    def decode(self, action: FloatArray, pose: RobotPose) -> Intent:
         """Return the intent on the channels of the likeliest mask."""
         values = np.zeros((1, self.channels.size))
         values[0, self._owned] = action[: len(self._owned)]
         for pair in self._pairs:
-            values[:, pair] = frame.turned_back(values[:, pair])
+            values[:, pair] = pose.turned_back(values[:, pair])
         flags = action[len(self._owned) : -1]
         mask = np.array(self.masks[int(np.argmax(flags)) if len(flags) else 0], dtype=bool)
         return Intent(values[0], mask, gripper=float(action[-1] > _HALF))

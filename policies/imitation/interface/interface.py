@@ -92,8 +92,8 @@ class PolicyInterface:
 
     def decode(self, action: FloatArray, state: FloatArray) -> Intent:
         """Return what an action (a,) asks for in an observed state (s,)."""
-        frame = self._view.frame(np.asarray(state, float)[None])
-        return self._space.decode(np.asarray(action, float), frame)
+        pose = self._view.pose(np.asarray(state, float)[None])
+        return self._space.decode(np.asarray(action, float), pose)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the interface as JSON has it."""

@@ -139,19 +139,19 @@ class RelativeView:
             environment: as recorded, (T, e).
         """
         state, environment = np.asarray(state, float), np.asarray(environment, float)
-        frame = self.frame(state)
-        place = np.column_stack([frame.tool[:, :2] - frame.base, frame.tool[:, 2]])
+        pose = self.pose(state)
+        place = np.column_stack([pose.tool[:, :2] - pose.base, pose.tool[:, 2]])
         own = (
             state[:, self._positions],
             state[:, self._others],
-            frame.turned(place),
-            (frame.matrices().transpose(0, 2, 1) @ frame.rotation).reshape(-1, 9),
+            pose.turned(place),
+            (pose.matrices().transpose(0, 2, 1) @ pose.rotation).reshape(-1, 9),
         )
-        seen = [_seen(group, environment[:, group.start : group.end], frame) for group in self._groups]
+        seen = [_seen(group, environment[:, group.start : group.end], pose) for group in self._groups]
         around = np.column_stack(seen) if seen else np.zeros((len(state), 0))
         return np.column_stack(own).astype(np.float32), around.astype(np.float32)
 
-    def frame(self, state: FloatArray) -> RobotPose:
+    def pose(self, state: FloatArray) -> RobotPose:
         """Return where the robot is, from recorded states, (T, s)."""
         if self.mobile:
             base = state[:, [self._at(f"{joint}.pos") for joint in self.joints[:3]]]
@@ -166,17 +166,17 @@ class RelativeView:
         """Return the joint velocities in recorded states, (T, n)."""
         return state[:, self._velocities]
 
-    def to_base(self, frame: RobotPose, velocities: FloatArray) -> FloatArray:
+    def to_base(self, pose: RobotPose, velocities: FloatArray) -> FloatArray:
         """Return joint velocities with the base's in its own axes, (T, n)."""
         if not self.mobile:
             return velocities
-        return np.column_stack([frame.turned(velocities[:, :2]), velocities[:, 2:]])
+        return np.column_stack([pose.turned(velocities[:, :2]), velocities[:, 2:]])
 
-    def to_world(self, frame: RobotPose, velocities: FloatArray) -> FloatArray:
+    def to_world(self, pose: RobotPose, velocities: FloatArray) -> FloatArray:
         """Return joint velocities with the base's in the world's axes, as channels have them, (T, n)."""
         if not self.mobile:
             return velocities
-        return np.column_stack([frame.turned_back(velocities[:, :2]), velocities[:, 2:]])
+        return np.column_stack([pose.turned_back(velocities[:, :2]), velocities[:, 2:]])
 
     @property
     def _arm(self) -> tuple[str, ...]:
@@ -230,19 +230,19 @@ def _parts(group: Group) -> tuple[str, ...]:
     return group.parts
 
 
-def _seen(group: Group, numbers: FloatArray, frame: RobotPose) -> FloatArray:
+def _seen(group: Group, numbers: FloatArray, pose: RobotPose) -> FloatArray:
     """Return a group as seen from the robot, (T, k)."""
     if group.parts[:3] == _POSITION and group.parts in (_POSE, _POSITION):
-        offset = _at_scales(frame.turned(numbers[:, :3] - frame.tool))
+        offset = _at_scales(pose.turned(numbers[:, :3] - pose.tool))
         if group.parts == _POSITION:
             return offset
         turn = Rotation.from_quat(numbers[:, 3:], scalar_first=True).as_matrix()
-        return np.column_stack([offset, frame.conjugated(turn @ frame.rotation.transpose(0, 2, 1))])
+        return np.column_stack([offset, pose.conjugated(turn @ pose.rotation.transpose(0, 2, 1))])
     if group.parts == _DIRECTION:
-        return frame.turned(numbers)
+        return pose.turned(numbers)
     if group.parts[:2] == ("x", "y"):
         there = numbers.any(axis=1, keepdims=True)  # what is not there stays zero
-        place = frame.turned(numbers[:, :2] - frame.base)
+        place = pose.turned(numbers[:, :2] - pose.base)
         return np.column_stack([np.where(there, place, 0.0), numbers[:, 2:]])
     return numbers
 

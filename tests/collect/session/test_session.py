@@ -29,13 +29,13 @@ CLOCKED = ("controller.solve_time", "wall_clock")
 
 class Watcher:
     def __init__(self):
-        self.moments = []
+        self.frames = []
 
     def begin(self, env, seed):
-        self.moments = []
+        self.frames = []
 
     def see(self, frame):
-        self.moments.append(frame)
+        self.frames.append(frame)
 
 
 def run(seed=3, **settings):
@@ -43,7 +43,7 @@ def run(seed=3, **settings):
     config = SessionConfig(**settings)
     env = build_env(config, 20)
     outcome = build_session(config, env, [watcher]).run(seed)
-    return outcome, watcher.moments, env
+    return outcome, watcher.frames, env
 
 
 @pytest.mark.parametrize("mode", ["ee", "switching"])
@@ -131,11 +131,11 @@ def test_garbage_brakes_and_is_counted(kind):
     controller = kind(env.model)
     watcher = Watcher()
     outcome = Session(env, controller, Unruly(controller.channels), [watcher]).run(0)
-    statuses = [frame.diagnostics.status for frame in watcher.moments]
+    statuses = [frame.diagnostics.status for frame in watcher.frames]
     assert outcome.brakes == sum(status.brakes for status in statuses) > 0
     assert {Status.INVALID_INTENT, Status.STALE_INTENT} <= set(statuses)
-    assert all(np.all(np.isfinite(frame.action)) for frame in watcher.moments)
-    actions = np.array([frame.action[:9] for frame in watcher.moments])
+    assert all(np.all(np.isfinite(frame.action)) for frame in watcher.frames)
+    actions = np.array([frame.action[:9] for frame in watcher.frames])
     limits = env.model.description.limits
     assert np.all(np.abs(np.diff(actions, axis=0)) <= limits.acceleration / 20 * 1.001 + 1e-5)
 
@@ -147,7 +147,7 @@ def test_a_mask_of_ones_own():
     session = build_session(SessionConfig(task="reach", mask=mask), env, [watcher := Watcher()])
     session.run(0)
     assert mode.groups("hand") == ("ee.vx", "ee.vy", "ee.vz")
-    assert {"".join(map(str, frame.intent.mask.astype(int))) for frame in watcher.moments} == {mask}
+    assert {"".join(map(str, frame.intent.mask.astype(int))) for frame in watcher.frames} == {mask}
     with pytest.raises(HandrailError, match="expected 18 characters 0 or 1"):
         build_mode(SessionConfig(mask="0101"), env.model)
 
@@ -171,9 +171,9 @@ def test_a_second_robot_is_a_new_description_and_nothing_else(tmp_path):
     outcome = build_session(SessionConfig(task="reach", robot=str(path)), env, [watcher := Watcher()]).run(2)
     assert outcome.brakes == 0
     assert outcome.contacts == 0
-    goal = watcher.moments[0].environment[:3]
+    goal = watcher.frames[0].environment[:3]
     tool = [list(env.agent_names).index(f"tool.{axis}") for axis in "xyz"]
-    start, end = (np.linalg.norm(watcher.moments[k].state[tool] - goal) for k in (0, -1))
+    start, end = (np.linalg.norm(watcher.frames[k].state[tool] - goal) for k in (0, -1))
     assert end < 0.5 * start
 
 
@@ -219,8 +219,8 @@ def test_what_is_recorded_is_what_was_sent(mode):
 
     env.step = stepped
     session.run(3)
-    actions = np.array([frame.action for frame in watcher.moments])
-    commands = np.array([frame.command for frame in watcher.moments])
+    actions = np.array([frame.action for frame in watcher.frames])
+    commands = np.array([frame.command for frame in watcher.frames])
     np.testing.assert_array_equal(actions, sent)
     limits = env.model.description.limits
     steps = np.abs(np.diff(actions[:, :-1], axis=0, prepend=np.zeros((1, env.model.size))))

@@ -147,8 +147,8 @@ def test_no_column_is_ever_infinite(number):
     diagnostics = Diagnostics(Status.INVALID_STATE, slack=abs(number))
     still = np.zeros(2)
     frame = Frame(still, np.zeros(1), {}, intent, still, still, diagnostics, 0, False, False, 0.0)
-    frame = check_frame(frame_row(frame), frame_features("ab", "e", "a", channels))
-    numbers = {key: value for key, value in frame.items() if not isinstance(value, str)}
+    row = check_frame(frame_row(frame), frame_features("ab", "e", "a", channels))
+    numbers = {key: value for key, value in row.items() if not isinstance(value, str)}
     assert all(np.isfinite(value).all() for value in numbers.values())
     assert numbers["controller.work_distance"] == numbers["controller.smallest_distance"] == FARTHEST
     assert abs(numbers["teleop.values"]).max() in (0.0, MOST)

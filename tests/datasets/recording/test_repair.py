@@ -199,42 +199,6 @@ def test_leftovers_of_a_save_that_was_never_committed_are_removed(root):
     assert not layout.data(4).exists()
 
 
-@pytest.mark.parametrize("asked", [False, True])
-def test_lost_lines_of_metadata_never_cost_data(root, asked):
-    """If the lines of saved episodes vanish, their files are no leftovers of a crash."""
-    before = {content for path, content in tree(root).items() if path.startswith(("data", "videos"))}
-    shutil.rmtree(root / "meta" / "episodes")
-    Layout(root).info.unlink()
-    report = repair(root, asked)
-    assert report.episodes == (0 if asked else 4)
-    assert all("is missing" in fault for fault in report.damage or report.lost)
-    assert before <= set(tree(root / ".damaged" if asked else root).values())
-    assert not report.removed
-
-
-@pytest.mark.parametrize("episodes", [1, 3])
-@pytest.mark.parametrize("info", [None, "{"])
-def test_the_last_line_and_the_count_gone_cost_no_data(tmp_path, episodes, info):
-    """A crash leaves `info.json` whole: without it, the files of the last episode are no leftovers."""
-    root = record(tmp_path / "set", episodes)
-    layout, rows = Layout(root), Layout(root).data(episodes - 1).read_bytes()
-    layout.row(episodes - 1).unlink()
-    layout.info.unlink() if info is None else layout.info.write_text(info)
-    with pytest.raises(HandrailError, match=f"episode {episodes - 1}: meta/.* is missing"):
-        resume(root)
-    assert not repair(root).removed
-    assert layout.data(episodes - 1).read_bytes() == rows
-
-
-def test_the_last_line_gone_is_noticed_by_the_count(root):
-    Layout(root).row(3).unlink()
-    report = repair(root)
-    assert report.damage == ("episode 3: meta/episodes/chunk-000/file-003.parquet is missing",)
-    assert not report.removed
-    assert len(repair(root, set_aside_damaged=True).lost) == 1
-    assert len(tree(root / ".damaged")) == 3
-
-
 def test_a_dataset_copied_in_part_is_named_as_such(root):
     layout = Layout(root)
     for path in files_of(root, 3, cameras=True):

@@ -6,7 +6,7 @@ import shutil
 
 import pytest
 from command_helpers import command
-from policy_helpers import StandIn, checkpoint, load, untrained_act
+from policy_helpers import checkpoint, load, unable, untrained_act
 from rich.console import Console
 
 from handrail.controllers.errors import HandrailError
@@ -146,13 +146,6 @@ def folder(tmp_path_factory):
     (root / "mixed" / NAME).write_text(json.dumps(meta | {"mode": "mixed"}))
     checkpoint(root / "broken", training_seed=3)
     return root
-
-
-def unable(path):
-    """Load a policy, but for one that cannot be loaded."""
-    if path.name == "broken":
-        raise HandrailError("broken: no weights")
-    return StandIn(load(path).interface, "still")
 
 
 @pytest.mark.parametrize("workers", [1, 2])

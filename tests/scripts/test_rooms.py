@@ -1,0 +1,31 @@
+"""The house: a room is a folder of few files, arrows go one way, and the page draws what is there."""
+
+import networkx
+from rooms import FLOORS, ROOT, arrows, drawing, drawn, rooms
+
+MOST_FILES = 20
+MOST_LINES = 300
+
+
+def test_rooms_are_small():
+    assert not {room: len(files) for room, files in rooms().items() if len(files) > MOST_FILES}
+
+
+def test_files_are_short():
+    files = [path for files in rooms().values() for path in files] + list((ROOT / "tests").rglob("*.py"))
+    assert not {str(path): n for path in files if (n := len(path.read_text().splitlines())) > MOST_LINES}
+
+
+def test_no_cycle():
+    assert not list(networkx.simple_cycles(arrows()))
+
+
+def test_no_arrow_upwards():
+    def level(room: str) -> int:
+        return FLOORS.index(room.split(".")[0])
+
+    assert not [(room, target) for room, target in arrows().edges if level(target) > level(room)]
+
+
+def test_the_page_draws_the_house_as_it_is():
+    assert drawn() == drawing(), "draw it anew: python tests/helpers/rooms.py"
