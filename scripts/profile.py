@@ -1,4 +1,4 @@
-"""`handrail-profile`: time the controller's update against IPOPT, FATROP and mink."""
+"""`handrail-profile`: time the controller's update against IPOPT and mink."""
 
 from handrail.collect.experiments.profiling.config import ProfileConfig
 from handrail.scripts import cli

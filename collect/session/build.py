@@ -28,7 +28,7 @@ from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import Controller
 from handrail.controllers.mpc.masked_mpc import MaskedMpc
 from handrail.controllers.mpc.safety_filter import safety_filter
-from handrail.controllers.objectives.limit_centring import narrow_joint_centring
+from handrail.controllers.objectives.narrow_joints import narrow_joint_centring
 from handrail.controllers.objectives.objective import Objective
 from handrail.controllers.objectives.tray import tray_levelling
 from handrail.controllers.robot.model import RobotModel

@@ -22,21 +22,6 @@ def constant(intent: Intent, times: FloatArray) -> FloatArray:
     return np.broadcast_to(intent.values, (len(times), len(intent.values)))
 
 
-class Decaying:
-    """Let the command die away, `û(t) = exp(-t / τ) u`.
-
-    Args:
-        time_constant: τ [s].
-    """
-
-    def __init__(self, time_constant: float = 0.5) -> None:
-        self._time_constant = time_constant
-
-    def __call__(self, intent: Intent, times: FloatArray) -> FloatArray:
-        """Return the predicted values, (N, m)."""
-        return np.exp(-times / self._time_constant)[:, None] * intent.values
-
-
 class Extrapolated:
     """Go on with the recent trend, `û(t) = u + s τ (1 - exp(-t / τ))`.
 
@@ -170,18 +155,3 @@ def _taken_up(values, mask, before, level, left):
             command[channel] = values[channel]
             now[channel] = before[channel] + left[channel] * (level[channel] - before[channel])
     return command, now
-
-
-class Preview:
-    """Follow a plan that is known, `û(t) = plan(now + t)`.
-
-    Args:
-        plan: time [s] → values on every channel, (m,).
-    """
-
-    def __init__(self, plan: Callable[[float], FloatArray]) -> None:
-        self._plan = plan
-
-    def __call__(self, intent: Intent, times: FloatArray) -> FloatArray:
-        """Return the predicted values, (N, m)."""
-        return np.array([self._plan(intent.time + time) for time in times])

@@ -26,9 +26,3 @@ def leaves_freedom(channels: Channels, mask: BoolArray) -> bool:
 def leaves_hand(channels: Channels, mask: BoolArray) -> bool:
     """Whether the hand's pose is not fully commanded: not all of its twist, nor all joints."""
     return leaves_freedom(channels, mask) and not bool(mask[channels.tool_slice].all())
-
-
-def leaves_arm(channels: Channels, mask: BoolArray) -> bool:
-    """Whether the arm's shape is not fully commanded: not every arm joint, nor all freedom."""
-    arm = commanded_joints(channels, mask)[len(channels.base) :]
-    return leaves_freedom(channels, mask) and not bool(arm.all())

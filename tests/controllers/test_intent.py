@@ -12,9 +12,7 @@ from handrail.controllers.interface.frames import Frames
 from handrail.controllers.interface.intent import Intent
 from handrail.controllers.interface.prediction import (
     Bounded,
-    Decaying,
     Extrapolated,
-    Preview,
     Smoothed,
     constant,
 )
@@ -48,12 +46,6 @@ def roll(controller, command, steps=30, period=0.05, q=HOME):
 def test_constant_holds():
     asked = intent(np.arange(18.0), "ee", "base")
     np.testing.assert_array_equal(constant(asked, TIMES), np.tile(asked.values, (10, 1)))
-
-
-def test_decaying_dies_away():
-    asked = intent(np.ones(18), "ee")
-    predicted = Decaying(0.5)(asked, TIMES)
-    np.testing.assert_allclose(predicted[:, 3], np.exp(-TIMES / 0.5))
 
 
 @pytest.mark.parametrize("speed", [0.05, 0.5, 1.0, 50.0])
@@ -146,27 +138,6 @@ def test_turns_may_be_followed_less_closely_than_the_way():
     assert errors[0].max() < 0.01
     assert errors[1][:3].max() < 0.01
     assert errors[1][3:].max() > 0.02
-
-
-def test_preview_looks_ahead_and_tracks_better():
-    """A sine that the controller knows is followed with less error than one that it has to guess."""
-
-    def plan(time):
-        values = np.zeros(18)
-        values[3] = 0.3 * np.sin(3.0 * time)
-        return values
-
-    def error(predict):
-        mpc, total = MaskedMpc(MODEL, predict=predict), 0.0
-        q, v = np.array(HOME), np.zeros(9)
-        for k in range(80):
-            time = 0.05 * k
-            after = mpc.update(State(q, v, time), intent(plan(time), "ee", time=time)).velocity(0.05)
-            q, v = q + 0.05 * 0.5 * (v + after), after
-            total += abs((MODEL.jacobian(q) @ v)[0] - plan(time + 0.05)[3])
-        return total
-
-    assert error(Preview(plan)) < 0.5 * error(constant)
 
 
 def test_any_callable_predicts():

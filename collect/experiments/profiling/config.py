@@ -8,18 +8,18 @@ from handrail.controllers.errors import HandrailError
 
 @dataclass(frozen=True)
 class ProfileConfig:
-    """Measure the controller's update against IPOPT, FATROP and mink, all in one interleaved run."""
+    """Measure the controller's update against IPOPT and mink, all in one interleaved run."""
 
     updates: int = 400
     """Timed updates of every case."""
     seed: int = 0
     """Of scenes and intents."""
     rivals: bool = True
-    """Also measure IPOPT, FATROP and mink."""
+    """Also measure IPOPT and mink."""
     growth: bool = True
     """Also measure longer horizons, more pairs and another robot."""
     solves: int = 40
-    """Converged solves of IPOPT and FATROP a case."""
+    """Converged solves of IPOPT a case."""
     json: str = ""
     """Write everything measured to this file."""
 

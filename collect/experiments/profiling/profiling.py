@@ -65,7 +65,7 @@ class Profile:
         settings = MpcSettings()
         for name, solves in (("no_collision", self._config.solves), ("pairs_30", self._config.solves // 4)):
             lane, every = self._lanes[name], max(self._config.updates // max(solves, 1), 1)
-            self._rivals[name] += [Converged(lane, backend, every) for backend in ("ipopt", "fatrop")]
+            self._rivals[name].append(Converged(lane, every))
         lane = self._lanes["pairs_30"]
         for reach in (settings.reach, _SHORT_REACH):
             self._rivals["pairs_30"].append(Mink(lane, settings.margin + reach))
@@ -146,11 +146,8 @@ def _rival(rival: Converged | Mink) -> dict[str, Any]:
 def _ratios(rivals: dict[str, list[dict[str, Any]]]) -> dict[str, float | None]:
     """Return our median over theirs on the same problems; None for a rival that was not measured."""
     names = {
-        "no_collision": ("ratio_vs_ipopt", "ratio_vs_fatrop"),
-        "pairs_30": (
-            *("ratio_vs_ipopt_pairs_30", "ratio_vs_fatrop_pairs_30"),
-            *("ratio_vs_mink", "ratio_vs_mink_short_reach"),
-        ),
+        "no_collision": ("ratio_vs_ipopt",),
+        "pairs_30": ("ratio_vs_ipopt_pairs_30", "ratio_vs_mink", "ratio_vs_mink_short_reach"),
     }
     return {
         name: rivals[case][index]["ratio"] if case in rivals else None

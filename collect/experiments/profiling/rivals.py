@@ -1,4 +1,4 @@
-"""What the controller is measured against: converged solvers on its problem, and mink."""
+"""What the controller is measured against: the converged solver on its problem, and mink."""
 
 from time import perf_counter
 
@@ -17,18 +17,18 @@ from handrail.controllers.solvers.reference.converged import ConvergedSolver
 
 
 class Converged:
-    """IPOPT or FATROP, converged, on problems of a lane, begun from the same guess.
+    """IPOPT, converged, on problems of a lane, begun from the same guess.
 
     Args:
         lane: whose problems.
-        backend: `ipopt` or `fatrop`.
         every: solve only one of so many.
     """
 
-    def __init__(self, lane: TimingLoop, backend: str, every: int) -> None:
-        settings, self.name = lane.mpc.settings, backend
-        arguments = (lane.mpc.residuals, settings.horizon, lane.model.size, settings.dt)
-        self._solver = ConvergedSolver(*arguments, backend=backend)
+    name = "ipopt"
+
+    def __init__(self, lane: TimingLoop, every: int) -> None:
+        settings = lane.mpc.settings
+        self._solver = ConvergedSolver(lane.mpc.residuals, settings.horizon, lane.model.size, settings.dt)
         self._every, self._count, self._built = every, 0, False
         self.seconds: list[float] = []  # of the solves that converged
         self.ours: list[float] = []  # of the controller on the same problems

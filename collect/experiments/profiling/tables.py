@@ -9,9 +9,7 @@ from handrail.datasets.presentation.plain_table import PlainTable
 _TIMES = ("median_ms", "p95_ms", "p99_ms", "worst_ms")
 _RATIOS = {
     "ratio_vs_ipopt": "IPOPT converged, no collisions",
-    "ratio_vs_fatrop": "FATROP converged, no collisions",
     "ratio_vs_ipopt_pairs_30": "IPOPT converged, 30 pairs",
-    "ratio_vs_fatrop_pairs_30": "FATROP converged, 30 pairs",
     "ratio_vs_mink": "one step of mink, same pairs, reach",
     "ratio_vs_mink_short_reach": "the same, reach 0.05 m",
 }

@@ -1,4 +1,4 @@
-"""The converged solver: IPOPT or FATROP on the very problem that the real-time solver takes one step on."""
+"""The converged solver: IPOPT on the very problem that the real-time solver takes one step on."""
 
 from dataclasses import dataclass
 from time import perf_counter
@@ -6,12 +6,11 @@ from time import perf_counter
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray
-from handrail.controllers.errors import unknown_name
 from handrail.controllers.ocp.problem import Plan, Problem
 from handrail.controllers.ocp.residuals import StageResiduals
 from handrail.controllers.solvers.reference.evaluation import Evaluator
 from handrail.controllers.solvers.reference.linear_distances import LinearDistances, linear_distances
-from handrail.controllers.solvers.reference.multistage import BACKENDS, STOPS, MultistageProgram, Solution
+from handrail.controllers.solvers.reference.multistage import STOPS, MultistageProgram, Solution
 
 _LARGEST_TRUST = 2.0  # of the acceleration limit: no restriction
 _SMALLEST_TRUST = 1e-4
@@ -41,12 +40,8 @@ class ConvergedSolver:
         horizon: stages N.
         size: coordinates n.
         dt: length of a stage [s].
-        backend: `ipopt` or `fatrop`.
         tolerance: promised improvement of the cost, relative, at which it stops.
         rounds: of linearising the distances, at most.
-
-    Raises:
-        HandrailError: unknown backend.
     """
 
     def __init__(
@@ -55,14 +50,10 @@ class ConvergedSolver:
         horizon: int,
         size: int,
         dt: float,
-        backend: str = "ipopt",
         tolerance: float = 1e-5,
         rounds: int = 50,
     ) -> None:
-        if backend not in BACKENDS:
-            raise unknown_name("backend of the converged solver", backend, BACKENDS)
         self._arguments = (residuals, horizon, size, dt)
-        self._backend = backend
         self._tolerance = tolerance
         self._rounds = rounds
         self._programs: dict[int, MultistageProgram] = {}
@@ -118,7 +109,7 @@ class ConvergedSolver:
 
     def _program(self, rows: int) -> MultistageProgram:
         if rows not in self._programs:
-            self._programs[rows] = MultistageProgram(*self._arguments, rows, self._backend)
+            self._programs[rows] = MultistageProgram(*self._arguments, rows)
         return self._programs[rows]
 
     def _plan(self, problem: Problem, here: _Iterate, solved: bool, iterations: int, seconds: float) -> Plan:

@@ -1,4 +1,4 @@
-"""The optimal control problem as a nonlinear program of stages, for solvers that iterate to convergence."""
+"""The optimal control problem as a nonlinear program of stages, for IPOPT, which iterates to convergence."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -16,21 +16,20 @@ from handrail.controllers.solvers.reference.linear_distances import LinearDistan
 
 _INSIDE = 1e-3  # how far within the bounds the slacks begin
 STOPS = 2  # nodes of the final stop, measured after the last stage
-BACKENDS = ("ipopt", "fatrop")
 
-_QUIET = {"print_time": False, "record_time": False, "error_on_fail": False, "expand": True}
-_OPTIONS: dict[str, dict[str, object]] = {
+_OPTIONS = {
+    "print_time": False,
+    "record_time": False,
+    "error_on_fail": False,
+    "expand": True,
     "ipopt": {
-        "ipopt": {
-            "print_level": 0,
-            "sb": "yes",
-            "tol": 1e-7,
-            "bound_relax_factor": 0.0,
-            "nlp_scaling_method": "none",  # the penalties would scale the cost, and its tolerance, by 1e-3
-            "mu_strategy": "adaptive",  # the fastest here
-        }
+        "print_level": 0,
+        "sb": "yes",
+        "tol": 1e-7,
+        "bound_relax_factor": 0.0,
+        "nlp_scaling_method": "none",  # the penalties would scale the cost, and its tolerance, by 1e-3
+        "mu_strategy": "adaptive",  # the fastest here
     },
-    "fatrop": {"fatrop": {"print_level": 0, "tol": 1e-8}, "structure_detection": "auto"},
 }
 
 
@@ -57,23 +56,13 @@ class MultistageProgram:
         size: coordinates n.
         dt: length of a stage [s].
         rows: distance rows at a node R.
-        backend: `ipopt` or `fatrop`.
-
-    Raises:
-        HandrailError: CasADi has no such solver.
     """
 
-    def __init__(
-        self, residuals: StageResiduals, horizon: int, size: int, dt: float, rows: int, backend: str
-    ) -> None:
+    def __init__(self, residuals: StageResiduals, horizon: int, size: int, dt: float, rows: int) -> None:
         self._shape = (horizon, size)
         self._rows = rows
         symbols = _Symbols(residuals, horizon, size, rows)
-        nlp, self._equality = _program(symbols, residuals.expression, dt)
-        options = {**_QUIET, **_OPTIONS[backend]}
-        if backend == "fatrop":
-            options["equality"] = self._equality.tolist()
-        self._solver = _translated(lambda: ca.nlpsol("program", backend, nlp, options))
+        self._solver = ca.nlpsol("program", "ipopt", _program(symbols, residuals.expression, dt), _OPTIONS)
 
     def solve(
         self, problem: Problem, guess: FloatArray, distances: LinearDistances, trust: FloatArray
@@ -124,8 +113,7 @@ class MultistageProgram:
 
     def _constraint_bounds(self, distances: LinearDistances) -> tuple[FloatArray, FloatArray]:
         horizon, size = self._shape
-        upper = np.zeros(len(self._equality))
-        lower = np.zeros(len(self._equality))
+        lower, upper = (np.zeros(self._solver.size1_out("g")) for _ in range(2))
         start = 2 * (2 * size + SLACKS) - SLACKS  # gap and initial state of the first stage
         for stage in range(1, horizon + 1):
             start += 2 * size + SLACKS if stage < horizon else 0
@@ -189,36 +177,29 @@ def _penalty(problem: Problem, slack: FloatArray) -> float:
     return float(problem.slack_linear * slack.sum() + 0.5 * problem.slack_quadratic * slack @ slack)
 
 
-def _program(symbols: _Symbols, residual: ca.Function, dt: float) -> tuple[dict[str, ca.MX], np.ndarray]:
-    """Return the nonlinear program and which of its constraints are equalities."""
+def _program(symbols: _Symbols, residual: ca.Function, dt: float) -> dict[str, ca.MX]:
+    """Return the nonlinear program."""
     horizon, size = symbols.horizon, symbols.size
     states = [ca.MX.sym(f"x{k}", 2 * size + SLACKS) for k in range(horizon + 1)]
     inputs = [ca.MX.sym(f"u{k}", size) for k in range(horizon)]
     step, cost = _step(size, dt), _stage_cost(residual, size)
-    objective, constraints, equality = ca.MX(0), [], []
-
-    def add(expression: ca.MX, equal: bool) -> None:
-        constraints.append(expression)
-        equality.extend([equal] * expression.shape[0])
-
+    objective, constraints = ca.MX(0), []
     for k in range(horizon):
         after = step(states[k], inputs[k])
         z = ca.vertcat(after[: 2 * size], inputs[k])
         objective += cost(z, symbols.parameters, symbols.reference[:, k], symbols.weights[:, k])
-        add(states[k + 1] - after, True)  # FATROP wants this sign
+        constraints.append(states[k + 1] - after)
         if k == 0:
-            add(states[0][: 2 * size] - symbols.state, True)
+            constraints.append(states[0][: 2 * size] - symbols.state)
         else:
-            add(symbols.limit_rows(states[k]), False)
-            add(symbols.distance_rows(k - 1, states[k]), False)
-    add(symbols.limit_rows(states[-1]), False)
-    for node in range(horizon - 1, horizon + STOPS):
-        add(symbols.distance_rows(node, states[-1]), False)
+            constraints += [symbols.limit_rows(states[k]), symbols.distance_rows(k - 1, states[k])]
+    constraints.append(symbols.limit_rows(states[-1]))
+    constraints += [symbols.distance_rows(node, states[-1]) for node in range(horizon - 1, horizon + STOPS)]
     slack = states[-1][2 * size :]
     objective += symbols.penalties[0] * ca.sum1(slack) + 0.5 * symbols.penalties[1] * ca.sumsqr(slack)
     variables = [part for pair in zip(states, inputs, strict=False) for part in pair]
     nlp = {"x": ca.vertcat(*variables, states[-1]), "f": objective, "g": ca.vertcat(*constraints)}
-    return {**nlp, "p": symbols.vector}, np.array(equality)
+    return {**nlp, "p": symbols.vector}
 
 
 def _step(size: int, dt: float) -> ca.Function:
