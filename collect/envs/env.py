@@ -24,6 +24,7 @@ from handrail.controllers.robot.shape import Obstacle
 
 Observation = dict[str, Any]
 RENDER_SIZE = (480, 640)  # height, width [px]
+_NOTHING = np.zeros(0, dtype=np.float32)
 
 
 class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
@@ -35,13 +36,14 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
 
     Args:
         task: a `Task`, or the name of its class as `module:Class`.
-        robot: name of a robot, or its description file.
+        robot: name of a robot, its description file, or its model.
         fps: steps a second, 10 to 100.
         plant: makes the robot in its world, as the class `Simulation` does: MuJoCo's, or another.
         cameras: which of `wrist`, `scene` to show as `pixels`.
         image_size: height and width of `pixels` [px].
         render_mode: `rgb_array` or None.
         render_size: height and width of what `render` returns [px].
+        observes: whether there is anything in observations; without, steps are quicker.
 
     Attributes:
         task: what is to be done.
@@ -59,7 +61,7 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     def __init__(
         self,
         task: Task | str,
-        robot: str | Path = "ridgeback_ur10",
+        robot: str | Path | RobotModel = "ridgeback_ur10",
         *,
         fps: float = 20,
         plant: Callable[..., Plant] = Simulation,
@@ -67,10 +69,11 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         image_size: tuple[int, int] = (128, 128),
         render_mode: str | None = None,
         render_size: tuple[int, int] = RENDER_SIZE,
+        observes: bool = True,
     ) -> None:
         _check(fps, cameras, render_mode)
         self.task: Task = load_env_creator(task)() if isinstance(task, str) else task  # pyright: ignore
-        self.model: RobotModel = load_model(robot)
+        self.model: RobotModel = robot if isinstance(robot, RobotModel) else load_model(robot)
         self.fps = fps
         self.cameras = tuple(cameras)
         self.image_size = (int(image_size[0]), int(image_size[1]))
@@ -78,7 +81,7 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self.render_size = (int(render_size[0]), int(render_size[1]))
         self.metadata = {**type(self).metadata, "render_fps": fps}
         self._max_episode_steps = math.ceil(self.task.horizon * fps)
-        self._build = plant
+        self._build, self._observes = plant, observes
         self._agent = AgentObservation(self.model)
         self.agent_names = self._agent.names
         self.state_names = self.task.state_names
@@ -180,7 +183,7 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         """Return the truth of this moment."""
         now = self.world
         return TaskState(
-            time=self.state().time,
+            time=now.time,
             tool=now.tool,
             opening=now.opening,
             episode=self.episode,
@@ -223,6 +226,8 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         return self._observe(state), float(outcome.success), outcome.over and not truncated, truncated, info
 
     def _observe(self, state: TaskState) -> Observation:
+        if not self._observes:
+            return {"agent_pos": _NOTHING, "environment_state": _NOTHING}
         observation: Observation = {
             "agent_pos": self._agent.read(self.state(), state.tool, state.opening),
             "environment_state": bounded(self.task.features(state)),

@@ -83,7 +83,7 @@ class Pusher:
 
     def act(self) -> None:
         """Set the forces of the control period that begins now."""
-        now, forces = self._simulation.state().time, {True: np.zeros(3), False: np.zeros(3)}
+        now, forces = self._simulation.time, {True: np.zeros(3), False: np.zeros(3)}
         for push in self._pushes:
             if push.start <= now < push.end:
                 forces[push.hand] += push.direction * self._strength(push)

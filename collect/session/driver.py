@@ -6,7 +6,7 @@ from handrail.collect.envs.env import HandrailEnv
 from handrail.collect.session.rates import Rate
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.interface.command import Command
-from handrail.controllers.interface.controller import Controller
+from handrail.controllers.interface.controller import Controller, State
 from handrail.controllers.interface.intent import Intent
 
 
@@ -32,12 +32,12 @@ class Driver:
         self._asked = 0
         controller.reset(env.world.obstacles())
 
-    def drive(self, step: int, intent: Intent) -> bool:
+    def drive(self, step: int, state: State, intent: Intent) -> bool:
         """Ask the controller if it is due at a step; return whether it was."""
         if not self._rate.due(step * self._env.period):
             return False
         self._observe()
-        self.command = self._controller.update(self._env.robot.state(), intent)
+        self.command = self._controller.update(state, intent)
         self._asked = step
         self._rate.take()
         return True

@@ -139,7 +139,9 @@ class Session:
         """Ask the operator; while they do not steer, what the controller hears is stale, and it brakes."""
         self._wall_clock, before = self._tally.elapsed, self._event
         with self._tally.timed("operator"):
-            asked = self._operator.act(self._view())
+            view = self._view()
+            asked = self._operator.act(view)
+        self._state = view.state
         if isinstance(asked, EpisodeEvent):
             self._event = asked
             self._intent = replace(self._intent, mask=np.zeros_like(self._intent.mask), time=_LONG_AGO)
@@ -152,7 +154,7 @@ class Session:
         """Move the robot for one of its periods; return what happened."""
         env, tally, observation = self.env, self._tally, self._observation
         with tally.timed("controller"):
-            if self._driver.drive(tally.frames, self._intent):
+            if self._driver.drive(tally.frames, self._state, self._intent):
                 tally.updated(self._driver.command)
             action = self._driver.action(tally.frames)
         with tally.timed("environment"):
@@ -189,7 +191,7 @@ class Session:
 
     @property
     def _rests(self) -> bool:
-        return not np.any(self.env.robot.state().commanded)
+        return not np.any(self._state.commanded)
 
     def _view(self) -> View:
         task = self.env.task_state()

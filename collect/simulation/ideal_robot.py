@@ -55,8 +55,7 @@ class IdealRobot:
 
     def state(self) -> State:
         """Return position, velocity and time."""
-        velocity = self._gate.velocity
-        return State(self._q, velocity, self._steps * self._step, velocity)
+        return State(self._q, self._gate.velocity, self.time, self._gate.velocity)
 
     def send(self, command: ArrayLike) -> NDArray[np.floating]:
         """Move by `½ h (v + v⁺)`; return what was sent."""
@@ -76,6 +75,11 @@ class IdealRobot:
         self._gate.bring_to_rest(self)
 
     @property
+    def time(self) -> float:
+        """Since the episode began [s]."""
+        return self._steps * self._step
+
+    @property
     def tool(self) -> Pose:
         """The pose of the tool point."""
         return self._model.pose(self._q)
@@ -93,7 +97,7 @@ class IdealRobot:
 
     def obstacles(self) -> tuple[Obstacle, ...]:
         """Return what stands around, where it is now."""
-        return self._scene.obstacles(self._steps * self._step)
+        return self._scene.obstacles(self.time)
 
     def held(self) -> tuple[Obstacle, ...]:
         """Return nothing: it holds nothing."""
@@ -101,9 +105,8 @@ class IdealRobot:
 
     def poses(self) -> Mapping[str, Pose]:
         """Return where every scene object is now, by name."""
-        time = self._steps * self._step
         return {
-            item.name: Pose(item.patrol.position(time) if item.patrol else item.position, item.rotation)
+            item.name: Pose(item.patrol.position(self.time) if item.patrol else item.position, item.rotation)
             for item in self._scene.objects
         }
 

@@ -37,6 +37,11 @@ class World(Protocol):
     """What is around the robot, and the truth by which a task judges."""
 
     @property
+    def time(self) -> float:
+        """Since the episode began [s]."""
+        ...
+
+    @property
     def tool(self) -> Pose:
         """The pose of the tool point."""
         ...

@@ -180,6 +180,11 @@ class Simulation:
         return State(data.qpos[self._q_index], data.qvel[self._v_index], data.time, self._gate.velocity)
 
     @property
+    def time(self) -> float:
+        """Since the episode began [s]."""
+        return float(self.data.time)
+
+    @property
     def tool(self) -> Pose:
         """The pose of the tool point."""
         rotation = self.data.site_xmat[self._tool].reshape(3, 3).copy()
@@ -213,7 +218,7 @@ class Simulation:
 
     def obstacles(self) -> tuple[Obstacle, ...]:
         """Return what stands around, where it is now, and what the fingers hold, fixed to the tool."""
-        return (*self._scene.obstacles(float(self.data.time)), *self.held())
+        return (*self._scene.obstacles(self.time), *self.held())
 
     def held(self) -> tuple[Obstacle, ...]:
         """Return what the fingers hold, fixed to the tool as it is now."""
