@@ -26,7 +26,8 @@ from handrail.collect.session.display import Display
 from handrail.collect.session.recorded_settings import COLUMN as SETTINGS
 from handrail.collect.session.recorded_settings import settings_json
 from handrail.collect.session.recorder import Recorder
-from handrail.collect.session.session import Outcome, Session
+from handrail.collect.session.outcome import Outcome
+from handrail.collect.session.session import Session
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.recording.writer import EpisodeWriter
 

@@ -1,7 +1,7 @@
 """The Gymnasium environment: a robot, a task, velocities in, observations out."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +12,7 @@ from gymnasium.envs.registration import load_env_creator
 from numpy.typing import ArrayLike, NDArray
 
 from handrail.collect.envs.observation import AgentObservation, bounded, box_space, image_space
+from handrail.collect.simulation.protocols import Plant, Robot, World
 from handrail.collect.simulation.rendering import CAMERAS, FAST, PRETTY, Painter
 from handrail.collect.simulation.simulation import Simulation
 from handrail.collect.tasks.task import Episode, Outcome, Task, TaskState
@@ -20,27 +21,29 @@ from handrail.controllers.errors import HandrailError, unknown_name
 from handrail.controllers.interface.controller import State
 from handrail.controllers.robot.model import RobotModel, load_model
 from handrail.controllers.robot.shape import Obstacle
-from handrail.controllers.safety.limiter import Limiter
 
 Observation = dict[str, Any]
 RENDER_SIZE = (480, 640)  # height, width [px]
+_NOTHING = np.zeros(0, dtype=np.float32)
 
 
 class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     """A robot does a task.
 
     Action, (n + 1,) float32: the generalised velocities that the robot shall have at the end of the step
-    [m/s, rad/s], reached linearly from those commanded before, and the gripper (0 open, 1 closed). Every
-    action passes the `Limiter`; one that is not finite brakes.
+    [m/s, rad/s], reached linearly from those commanded before, and the gripper (0 open, 1 closed). What is
+    sent is inside the robot's limits; an action that is not finite brakes.
 
     Args:
         task: a `Task`, or the name of its class as `module:Class`.
-        robot: name of a robot, or its description file.
+        robot: name of a robot, its description file, or its model.
         fps: steps a second, 10 to 100.
+        plant: makes the robot in its world, as the class `Simulation` does: MuJoCo's, or another.
         cameras: which of `wrist`, `scene` to show as `pixels`.
         image_size: height and width of `pixels` [px].
         render_mode: `rgb_array` or None.
         render_size: height and width of what `render` returns [px].
+        observes: whether there is anything in observations; without, steps are quicker.
 
     Attributes:
         task: what is to be done.
@@ -58,17 +61,19 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     def __init__(
         self,
         task: Task | str,
-        robot: str | Path = "ridgeback_ur10",
+        robot: str | Path | RobotModel = "ridgeback_ur10",
         *,
-        fps: int = 20,
+        fps: float = 20,
+        plant: Callable[..., Plant] = Simulation,
         cameras: Sequence[str] = (),
         image_size: tuple[int, int] = (128, 128),
         render_mode: str | None = None,
         render_size: tuple[int, int] = RENDER_SIZE,
+        observes: bool = True,
     ) -> None:
         _check(fps, cameras, render_mode)
         self.task: Task = load_env_creator(task)() if isinstance(task, str) else task  # pyright: ignore
-        self.model: RobotModel = load_model(robot)
+        self.model: RobotModel = robot if isinstance(robot, RobotModel) else load_model(robot)
         self.fps = fps
         self.cameras = tuple(cameras)
         self.image_size = (int(image_size[0]), int(image_size[1]))
@@ -76,7 +81,7 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self.render_size = (int(render_size[0]), int(render_size[1]))
         self.metadata = {**type(self).metadata, "render_fps": fps}
         self._max_episode_steps = math.ceil(self.task.horizon * fps)
-        self._limiter = Limiter(self.model.description)
+        self._build, self._observes = plant, observes
         self._agent = AgentObservation(self.model)
         self.agent_names = self._agent.names
         self.state_names = self.task.state_names
@@ -84,9 +89,8 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self.observation_space = self._observation_space()
         self._painters: dict[str, Painter] = {}
         self._episode: Episode | None = None
-        self._simulation: Simulation | None = None
+        self._plant: Plant | None = None
         self._steps = 0
-        self._gripper = 0.0
 
     def _action_space(self) -> spaces.Space[Any]:
         limit = np.append(self.model.description.limits.velocity, 1.0).astype(np.float32)
@@ -109,15 +113,44 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         return self.task.description
 
     @property
-    def simulation(self) -> Simulation:
-        """The physics of this episode.
+    def period(self) -> float:
+        """From one step to the next [s]."""
+        return 1.0 / self.fps
+
+    @property
+    def robot(self) -> Robot:
+        """The robot of this episode.
 
         Raises:
             HandrailError: `reset` was not called.
         """
-        if self._simulation is None:
+        return self._present
+
+    @property
+    def world(self) -> World:
+        """What is around it, and the truth by which the task judges.
+
+        Raises:
+            HandrailError: `reset` was not called.
+        """
+        return self._present
+
+    @property
+    def simulation(self) -> Simulation:
+        """The physics of this episode, to be drawn or pushed.
+
+        Raises:
+            HandrailError: `reset` was not called, or there are no physics.
+        """
+        if not isinstance(self._present, Simulation):
+            raise HandrailError(f"environment {self.task.name}: expected physics, got an ideal robot")
+        return self._present
+
+    @property
+    def _present(self) -> Plant:
+        if self._plant is None:
             raise HandrailError(f"environment {self.task.name}: call reset() before anything else")
-        return self._simulation
+        return self._plant
 
     @property
     def episode(self) -> Episode:
@@ -133,24 +166,24 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     @property
     def commanded_velocity(self) -> FloatArray:
         """The velocity commanded at the end of the last step, (n,) [m/s, rad/s]."""
-        return self.simulation.commanded.copy()
+        return np.array(self.state().commanded)
 
     def state(self) -> State:
         """Return the measured positions, velocities and time."""
-        return self.simulation.state()
+        return self.robot.state()
 
     def obstacles(self) -> tuple[Obstacle, ...]:
         """Return what a controller has to avoid besides the floor, where it is now and how fast it moves.
 
         What the fingers hold is among it; its position and rotation are in the frame that it names.
         """
-        return (*self.episode.scene.obstacles(float(self.simulation.data.time)), *self.simulation.held())
+        return self.world.obstacles()
 
     def task_state(self) -> TaskState:
         """Return the truth of this moment."""
-        now = self.simulation
+        now = self.world
         return TaskState(
-            time=float(now.data.time),
+            time=now.time,
             tool=now.tool,
             opening=now.opening,
             episode=self.episode,
@@ -171,42 +204,32 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         super().reset(seed=seed)
         episode: Episode = (options or {}).get("episode") or self.task.sample(self.model, self.np_random)
         meshes = bool(self.cameras or self.render_mode)
-        self._simulation = Simulation(
-            self.model, episode.scene, episode.q, 1.0 / self.fps, meshes=meshes, grip=episode.grip
+        self._plant = self._build(
+            self.model, episode.scene, episode.q, self.period, meshes=meshes, grip=episode.grip
         )
         self._episode = episode
         self._steps = 0
-        self._gripper = float(episode.grip is not None)
         state = self.task_state()
-        rest = np.append(np.zeros(self.model.size), self._gripper).astype(np.float32)
-        return self._observe(state), self._info(state, Outcome(), rest, contacts=())
+        rest = np.append(np.zeros(self.model.size), float(episode.grip is not None)).astype(np.float32)
+        return self._observe(state), self._info(state, Outcome(), rest)
 
     def step(self, action: ArrayLike) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Move for 1/fps seconds; the reward is 1 at success. `info["sent"]` is the action that was sent."""
-        sent = self._limit(np.asarray(action, dtype=np.float64).ravel())
-        contacts = self.simulation.advance(sent[:-1].astype(np.float64), float(sent[-1]))
+        sent = self.robot.send(action)
         self._steps += 1
         state = self.task_state()
         outcome = self.task.outcome(state) if state.stable else Outcome(failure="unstable")
         truncated = not outcome.over and self._steps >= self._max_episode_steps
         if truncated:
             outcome = Outcome(failure="timeout")
-        info = self._info(state, outcome, sent, contacts)
+        info = self._info(state, outcome, sent)
         return self._observe(state), float(outcome.success), outcome.over and not truncated, truncated, info
 
-    def _limit(self, action: FloatArray) -> NDArray[np.float32]:
-        """Return what is sent instead of an action, (n + 1,): within the limits, as it can be recorded."""
-        size, now = self.model.size, self.simulation
-        gripper = float(action[size]) if action.size == size + 1 else math.nan
-        usable = math.isfinite(gripper)
-        self._gripper = min(max(gripper, 0.0), 1.0) if usable else self._gripper
-        target = action[:size] if usable else np.full(size, np.nan)
-        velocity, _ = self._limiter.limit(now.commanded, target, 1.0 / self.fps, now.state().q)
-        return np.append(velocity, self._gripper).astype(np.float32)
-
     def _observe(self, state: TaskState) -> Observation:
+        if not self._observes:
+            return {"agent_pos": _NOTHING, "environment_state": _NOTHING}
         observation: Observation = {
-            "agent_pos": self._agent.read(self.simulation),
+            "agent_pos": self._agent.read(self.state(), state.tool, state.opening),
             "environment_state": bounded(self.task.features(state)),
         }
         if self.cameras:
@@ -214,8 +237,9 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         return observation
 
     def _info(
-        self, state: TaskState, outcome: Outcome, sent: NDArray[np.float32], contacts: tuple[str, ...]
+        self, state: TaskState, outcome: Outcome, sent: NDArray[np.floating[Any]]
     ) -> dict[str, Any]:
+        contacts = self.world.contacts
         return {
             "is_success": outcome.success,
             "failure_reason": outcome.failure,
@@ -242,7 +266,7 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             self._painters.popitem()[1].close()
 
 
-def _check(fps: int, cameras: Sequence[str], render_mode: str | None) -> None:
+def _check(fps: float, cameras: Sequence[str], render_mode: str | None) -> None:
     if not 10 <= fps <= 100:
         raise HandrailError(f"fps {fps}: expected 10 to 100 steps a second")
     for camera in cameras:

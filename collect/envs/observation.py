@@ -6,10 +6,10 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from handrail.collect.simulation.simulation import Simulation
 from handrail.controllers.arrays import FloatArray
+from handrail.controllers.interface.controller import State
 from handrail.controllers.numerics.rotation import quaternion_from_matrix
-from handrail.controllers.robot.model import RobotModel
+from handrail.controllers.robot.model import Pose, RobotModel
 
 _TOOL = ("tool.x", "tool.y", "tool.z", "tool.qw", "tool.qx", "tool.qy", "tool.qz")
 _BOUND = 100.0  # nothing here is larger, in any unit
@@ -32,13 +32,12 @@ class AgentObservation:
         )
         self._home = quaternion_from_matrix(model.pose(model.description.home).rotation)
 
-    def read(self, simulation: Simulation) -> NDArray[np.float32]:
+    def read(self, state: State, tool: Pose, opening: float) -> NDArray[np.float32]:
         """Return the numbers, in the order of `names`."""
-        state, tool = simulation.state(), simulation.tool
         quaternion = quaternion_from_matrix(tool.rotation)
         if quaternion @ self._home < 0:
             quaternion = -quaternion
-        numbers = (state.q, state.v, [simulation.opening], tool.position, quaternion)
+        numbers = (state.q, state.v, [opening], tool.position, quaternion)
         return bounded(np.concatenate(numbers))
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from enum import StrEnum
 from typing import Any, Protocol
 
 import numpy as np
@@ -31,6 +32,21 @@ class View:
     observation: Mapping[str, Any] = field(default_factory=dict)
 
 
+class EpisodeEvent(StrEnum):
+    """What a person says of the episode instead of steering; scripts and policies never do."""
+
+    SUCCESS = "success"  # it is done
+    FAILURE = "failure"  # it is done, and went wrong
+    DISCARD = "discard"  # throw it away, go on with another one
+    RESTART = "restart"  # throw it away, begin the same one again
+    PAUSE = "pause"  # stand still; said at every call until it goes on
+
+    @property
+    def judges(self) -> bool:
+        """Whether it ends an episode that is kept."""
+        return self in (EpisodeEvent.SUCCESS, EpisodeEvent.FAILURE)
+
+
 class Operator(Protocol):
     """Whoever steers: a script, a person, a trained policy."""
 
@@ -43,6 +59,6 @@ class Operator(Protocol):
         """Begin an episode."""
         ...
 
-    def act(self, view: View) -> Intent:
-        """Return the intent now."""
+    def act(self, view: View) -> Intent | EpisodeEvent:
+        """Return the intent now, or what becomes of the episode."""
         ...

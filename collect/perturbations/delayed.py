@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from handrail.collect.operators.operator import Operator, View
+from handrail.collect.operators.operator import EpisodeEvent, Operator, View
 from handrail.controllers.interface.intent import Intent
 
 
@@ -34,7 +34,8 @@ class DelayedOperator:
         self._views = deque([view] * self._periods)
         self._operator.reset(view, rng)
 
-    def act(self, view: View) -> Intent:
+    def act(self, view: View) -> Intent | EpisodeEvent:
         """Return what is asked for now, after what was seen k periods ago."""
         self._views.append(view)
-        return replace(self._operator.act(self._views.popleft()), time=view.state.time)
+        asked = self._operator.act(self._views.popleft())
+        return asked if isinstance(asked, EpisodeEvent) else replace(asked, time=view.state.time)

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from handrail.collect.envs.env import HandrailEnv
-from handrail.collect.simulation.simulation import Simulation
 from handrail.controllers.arrays import FloatArray, frozen
 
 _STREAM = 2  # of the episode's seed; 1 is the operator's
@@ -75,19 +74,20 @@ class Pusher:
 
     def begin(self, env: HandrailEnv, seed: int) -> None:
         """Draw the pushes of an episode."""
+        self._simulation = env.simulation
         self._pushes = sample_pushes(seed, env.task.horizon)
         effort, base = env.model.description.limits.effort, len(env.model.description.base_joints)
         self._base = float(np.min(effort[: min(base, 2)], initial=np.inf)) * (1.0 + _BASE_EXCESS * self._size)
         self._hand = float(np.max(effort[base:])) * (_HAND_HELD + _HAND_EXCESS * self._size)
         self._movable = base > 0
 
-    def act(self, simulation: Simulation) -> None:
+    def act(self) -> None:
         """Set the forces of the control period that begins now."""
-        now, forces = float(simulation.data.time), {True: np.zeros(3), False: np.zeros(3)}
+        now, forces = self._simulation.time, {True: np.zeros(3), False: np.zeros(3)}
         for push in self._pushes:
             if push.start <= now < push.end:
                 forces[push.hand] += push.direction * self._strength(push)
-        simulation.push(forces[False], forces[True])
+        self._simulation.push(forces[False], forces[True])
 
     def _strength(self, push: Push) -> float:
         """Return how strong a push is [N]; a robot that stands fixed is pushed at its hand only."""

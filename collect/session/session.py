@@ -1,57 +1,31 @@
-"""The one loop that runs task, operator, controller and recorder: observe, ask, complete, act, record."""
+"""The one loop that runs task, operator, controller and recorder: observe, ask, complete, act, record.
 
-import contextlib
-import time
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, Protocol
+```
+view ─▶ operator ─ intent ─▶ controller ─ command ─▶ env.step ─▶ robot.send   at the robot's rate,
+          │                  (at its own rate)          │                     along the command's trajectory
+          └ event: end, throw away, begin again, pause  └─▶ frame ─▶ observers (at the recording rate)
+```
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Protocol
 
 import numpy as np
 
 from handrail.collect.envs.env import HandrailEnv
-from handrail.collect.operators.operator import Operator, View
-from handrail.collect.simulation.simulation import Simulation
-from handrail.controllers.interface.command import Command, Status
+from handrail.collect.operators.operator import EpisodeEvent, Operator, View
+from handrail.collect.session.driver import Driver
+from handrail.collect.session.outcome import Outcome, Tally
+from handrail.collect.session.rates import Rate
+from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import Controller
+from handrail.controllers.interface.intent import Intent
 from handrail.controllers.numerics.threads import single_threaded
 from handrail.controllers.robot.model import RobotModel
-from handrail.datasets.quality.safety import contacts_begun
 from handrail.datasets.recording.frames import Frame
 
-
-@dataclass(frozen=True)
-class Outcome:
-    """How an episode went.
-
-    Attributes:
-        seed: of the environment.
-        success: whether the task was done.
-        failure_reason: why not; empty after a success.
-        frames: control periods.
-        seconds: simulated time [s].
-        wall_time: time it took [s].
-        brakes: updates in which the controller braked the robot.
-        late: periods that a real-time loop overran.
-        contacts: forbidden contacts that began.
-        contact_periods: control periods with a forbidden contact.
-        smallest_distance: smallest signed distance, tool against work surfaces left out [m].
-        spent: where the wall time went, by part of the loop [s].
-        started: Unix time at its beginning [s].
-    """
-
-    seed: int
-    success: bool
-    failure_reason: str
-    frames: int
-    seconds: float
-    wall_time: float
-    brakes: int
-    late: int
-    contacts: int
-    contact_periods: int
-    smallest_distance: float
-    spent: Mapping[str, float]
-    started: float
+_LONG_AGO = -1e6  # when nobody who steers has asked last [s]
 
 
 class Observer(Protocol):
@@ -73,21 +47,26 @@ class Disturbance(Protocol):
         """Take note that an episode begins."""
         ...
 
-    def act(self, simulation: Simulation) -> None:
-        """Act during the control period that begins now."""
+    def act(self) -> None:
+        """Act during the period that begins now."""
         ...
 
 
 class Session:
     """Runs episodes.
 
+    The robot is sent a command every step of the environment; a controller that is asked less often says what
+    to send in between.
+
     Args:
-        env: a Handrail environment.
+        env: a robot, its world and a task.
         controller: completes the intent.
         operator: whoever steers.
-        observers: shown every moment.
+        observers: shown every frame.
         realtime: pace the loop by the wall clock.
         disturbances: what acts on the robot from outside.
+        control_period: of the controller [s]; the robot's by default.
+        record_period: of the frames [s]; the robot's by default.
     """
 
     def __init__(
@@ -98,6 +77,8 @@ class Session:
         observers: Sequence[Observer] = (),
         realtime: bool = False,
         disturbances: Sequence[Disturbance] = (),
+        control_period: float | None = None,
+        record_period: float | None = None,
     ) -> None:
         self.env = env
         self._controller = controller
@@ -105,137 +86,126 @@ class Session:
         self._observers = observers
         self._realtime = realtime
         self._disturbances = disturbances
+        self._control_period = control_period or env.period
+        self._record_period = record_period or env.period
 
     @property
     def model(self) -> RobotModel:
         """The robot's model."""
         return self.env.model
 
-    def run(self, seed: int) -> Outcome:
-        """Run one episode and return how it went; the same seed gives the same episode."""
-        with single_threaded():
-            return self._run(seed)
+    def run(self, seed: int, tell_paused: Callable[[bool], None] = lambda paused: None) -> Outcome:
+        """Run one episode and return how it went; the same seed gives the same episode.
 
-    def _run(self, seed: int) -> Outcome:
-        observation, info = self.env.reset(seed=seed)
-        around = _Surroundings(self.env, self._controller)
-        self._operator.reset(self._view(observation), np.random.default_rng([seed, 1]))
+        However it ends, the robot is stopped. An episode that the operator throws away or begins again is
+        over at once; one that they end lasts one period more, in which the robot begins to brake.
+
+        Args:
+            seed: of the episode.
+            tell_paused: is told when the operator pauses, and when they go on.
+        """
+        with single_threaded():
+            self._begin(seed)
+            try:
+                while not self._done:
+                    self._listen(tell_paused)
+                    if self._event in (EpisodeEvent.DISCARD, EpisodeEvent.RESTART):
+                        break
+                    if self._event is EpisodeEvent.PAUSE and self._rests:
+                        self._tally.held()
+                    else:
+                        self._show(self._step())
+                    if self._realtime:
+                        self._tally.pace()
+            finally:
+                self.env.robot.stop()
+            paused = self._event is EpisodeEvent.PAUSE
+            return self._tally.outcome(self._info, None if paused else self._event)
+
+    def _begin(self, seed: int) -> None:
+        self._observation, self._info = self.env.reset(seed=seed)
+        self._driver = Driver(self._controller, self.env, self._control_period)
+        self._operator.reset(self._view(), np.random.default_rng([seed, 1]))
         for other in (*self._observers, *self._disturbances):
             other.begin(self.env, seed)
-        tally = _Tally(seed, 1.0 / self.env.fps)
-        done = False
-        while not done:
-            wall_clock = tally.elapsed
-            with tally.timed("operator"):
-                intent = self._operator.act(self._view(observation))
-            with tally.timed("controller"):
-                around.observe()
-                command = self._controller.update(self.env.state(), intent)
-            action = action_of(command, 1.0 / self.env.fps)
-            with tally.timed("environment"):
-                for disturbance in self._disturbances:
-                    disturbance.act(self.env.simulation)
-                following, _, terminated, truncated, info = self.env.step(action)
-            done = terminated or truncated
-            frame = Frame(
-                state=observation["agent_pos"],
-                environment=observation["environment_state"],
-                images=observation.get("pixels", {}),
-                intent=intent,
-                action=info["sent"],
-                command=action,
-                diagnostics=command.diagnostics,
-                contacts=info["contacts"],
-                success=bool(info["is_success"]),
-                done=done,
-                wall_clock=wall_clock,
-            )
-            with tally.timed("observers"):
-                for observer in self._observers:
-                    observer.see(frame)
-            tally.add(frame)
-            observation = following
-            if self._realtime:
-                tally.pace()
-        return tally.outcome(info)
+        self._tally, self._recording = Tally(seed, self.env.period), Rate(self._record_period)
+        self._recording.take()
+        self._intent = Intent.idle(Channels.of(self.model.description))
+        self._event: EpisodeEvent | None = None
+        self._frame: Frame | None = None
+        self._done = False
 
-    def _view(self, observation: Mapping[str, Any]) -> View:
-        task = self.env.task_state()
-        return View(self.env.state(), task.tool, task.opening, task, observation)
+    def _listen(self, tell_paused: Callable[[bool], None]) -> None:
+        """Ask the operator; while they do not steer, what the controller hears is stale, and it brakes."""
+        self._wall_clock, before = self._tally.elapsed, self._event
+        with self._tally.timed("operator"):
+            view = self._view()
+            asked = self._operator.act(view)
+        self._state = view.state
+        if isinstance(asked, EpisodeEvent):
+            self._event = asked
+            self._intent = replace(self._intent, mask=np.zeros_like(self._intent.mask), time=_LONG_AGO)
+        else:
+            self._event, self._intent = None, asked
+        if EpisodeEvent.PAUSE in (before, self._event) and before is not self._event:
+            tell_paused(self._event is EpisodeEvent.PAUSE)
 
+    def _step(self) -> Frame:
+        """Move the robot for one of its periods; return what happened."""
+        env, tally, observation = self.env, self._tally, self._observation
+        with tally.timed("controller"):
+            if self._driver.drive(tally.frames, self._state, self._intent):
+                tally.updated(self._driver.command)
+            action = self._driver.action(tally.frames)
+        with tally.timed("environment"):
+            for disturbance in self._disturbances:
+                disturbance.act()
+            self._observation, _, terminated, truncated, self._info = env.step(action)
+        tally.moved(self._info["contacts"])
+        judged = self._event is not None and self._event.judges
+        self._done = terminated or truncated or judged
+        return Frame(
+            state=observation["agent_pos"],
+            environment=observation["environment_state"],
+            images=observation.get("pixels", {}),
+            intent=self._intent,
+            action=self._info["sent"],
+            command=action.astype(np.float32),
+            diagnostics=self._driver.command.diagnostics,
+            contacts=self._info["contacts"],
+            success=self._event is EpisodeEvent.SUCCESS if judged else bool(self._info["is_success"]),
+            done=self._done,
+            wall_clock=self._wall_clock,
+        )
 
-def action_of(command: Command, period: float) -> np.ndarray:
-    """Return the env's action: velocity at the end of the period and gripper, (n + 1,) float32."""
-    return np.append(command.velocity(period), command.gripper).astype(np.float32)
-
-
-class _Surroundings:
-    """Tells a controller what there is to avoid: at the beginning, and while it moves or is held."""
-
-    def __init__(self, env: HandrailEnv, controller: Controller) -> None:
-        self._env, self._controller = env, controller
-        self._moving, self._holding = bool(env.episode.scene.movers), bool(env.simulation.held())
-        controller.reset(env.obstacles())
-
-    def observe(self) -> None:
-        """Say where things are now, if that can have changed."""
-        before, self._holding = self._holding, bool(self._env.simulation.held())
-        if self._moving or self._holding or before:
-            self._controller.update_scene(self._env.obstacles())
-
-
-class _Tally:
-    """Counts along an episode and keeps its pace."""
-
-    def __init__(self, seed: int, period: float) -> None:
-        self._seed = seed
-        self._period = period
-        self._started = time.time()
-        self._start = time.perf_counter()
-        self._frames = self._brakes = self._late = 0
-        self._contacts: list[int] = []
-        self._smallest = np.inf
-        self._spent: dict[str, float] = {}
+    def _show(self, frame: Frame) -> None:
+        """Show the observers a frame when its time is over."""
+        self._frame = frame if self._frame is None else _lasting(self._frame, frame)
+        if not (self._done or self._recording.due(self._tally.frames * self.env.period)):
+            return
+        with self._tally.timed("observers"):
+            for observer in self._observers:
+                observer.see(self._frame)
+        self._recording.take()
+        self._frame = None
 
     @property
-    def elapsed(self) -> float:
-        """Wall time since the episode began [s]."""
-        return time.perf_counter() - self._start
+    def _rests(self) -> bool:
+        return not np.any(self._state.commanded)
 
-    @contextlib.contextmanager
-    def timed(self, part: str) -> Iterator[None]:
-        """Add the time of a block to a part of the loop."""
-        start = time.perf_counter()
-        yield
-        self._spent[part] = self._spent.get(part, 0.0) + time.perf_counter() - start
+    def _view(self) -> View:
+        task = self.env.task_state()
+        return View(self.env.robot.state(), task.tool, task.opening, task, self._observation)
 
-    def add(self, frame: Frame) -> None:
-        self._frames += 1
-        self._brakes += Status(frame.diagnostics.status).brakes
-        self._contacts.append(frame.contacts)
-        self._smallest = min(self._smallest, frame.diagnostics.smallest_distance)
 
-    def pace(self) -> None:
-        """Wait for the end of the period, or note that it is over."""
-        ahead = self._start + self._frames * self._period - time.perf_counter()
-        if ahead > 0:
-            time.sleep(ahead)
-        else:
-            self._late += 1
-
-    def outcome(self, info: dict) -> Outcome:
-        return Outcome(
-            seed=self._seed,
-            success=bool(info["is_success"]),
-            failure_reason=str(info["failure_reason"]),
-            frames=self._frames,
-            seconds=self._frames * self._period,
-            wall_time=self.elapsed,
-            brakes=self._brakes,
-            late=self._late,
-            contacts=int(contacts_begun(self._contacts)),
-            contact_periods=int(np.count_nonzero(self._contacts)),
-            smallest_distance=float(self._smallest),
-            spent=dict(self._spent),
-            started=self._started,
-        )
+def _lasting(first: Frame, last: Frame) -> Frame:
+    """Return the frame of some periods: observed and asked at the first one, sent at the last one."""
+    return replace(
+        last,
+        state=first.state,
+        environment=first.environment,
+        images=first.images,
+        intent=first.intent,
+        wall_clock=first.wall_clock,
+        contacts=max(first.contacts, last.contacts),
+    )

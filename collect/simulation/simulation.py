@@ -3,15 +3,17 @@
 import math
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from handrail.collect.simulation.contacts import ContactMonitor, GraspMonitor
+from handrail.collect.simulation.gate import Gate
 from handrail.collect.simulation.gl import mujoco
 from handrail.collect.simulation.robot import BASE_BODY, FINGERS, RobotSpec, build_robot
 from handrail.collect.simulation.scene import Scene, add_scene
+from handrail.collect.simulation.twist import Twist
 from handrail.collect.simulation.world import set_stage
 from handrail.controllers.arrays import FloatArray, IntArray
 from handrail.controllers.errors import HandrailError
@@ -23,21 +25,8 @@ from handrail.controllers.robot.shape import Obstacle
 _TIMESTEP = 0.002  # [s]
 
 
-@dataclass(frozen=True)
-class Twist:
-    """Linear [m/s] and angular [rad/s] velocity in the world, each (3,)."""
-
-    linear: FloatArray
-    angular: FloatArray
-
-    @property
-    def is_still(self) -> bool:
-        """Whether it moves slower than 2 cm/s and 0.2 rad/s."""
-        return bool(np.linalg.norm(self.linear) < 0.02 and np.linalg.norm(self.angular) < 0.2)
-
-
 class Simulation:
-    """A fresh MuJoCo model and data; nothing of an earlier episode can remain in it.
+    """A fresh MuJoCo model and data; nothing of an earlier episode can remain in it. A robot and a world.
 
     Args:
         model: of the robot.
@@ -48,6 +37,7 @@ class Simulation:
         grip: width of what the gripper is closed around at the beginning [m]; None where it is open.
         grips: whether the gripper can move; else it stays open.
         timestep: longest step of the integrator [s].
+        precision: of the numbers that are sent.
 
     Raises:
         HandrailError: the gripper is closed around something, and cannot move.
@@ -56,7 +46,6 @@ class Simulation:
         mujoco_model: the compiled model.
         data: its state.
         substeps: integration steps in one control step.
-        commanded: velocity commanded last, (n,) [m/s, rad/s].
     """
 
     def __init__(
@@ -69,6 +58,7 @@ class Simulation:
         grip: float | None = None,
         grips: bool = True,
         timestep: float = _TIMESTEP,
+        precision: DTypeLike = np.float32,
     ) -> None:
         if grip is not None and not grips:
             raise HandrailError(f"grip of a simulation: expected none without grips, got {grip}")
@@ -91,7 +81,7 @@ class Simulation:
         portable = [item.name for item in scene.movables if item.portable]
         self._grasp = GraspMonitor(self.mujoco_model, fingers, portable)
         self._index()
-        self.commanded = np.zeros(model.size)
+        self._gate = Gate(model, step, float(grip is not None), precision)
         self._place(q, grip)
 
     def _index(self) -> None:
@@ -126,18 +116,17 @@ class Simulation:
         mujoco.mj_kinematics(self.mujoco_model, self.data)
         mujoco.mj_camlight(self.mujoco_model, self.data)
 
-    def advance(self, velocity: FloatArray, gripper: float) -> tuple[str, ...]:
-        """Reach a velocity linearly over one control step; return the forbidden contacts on the way.
+    def send(self, command: ArrayLike) -> NDArray[np.floating]:
+        """Reach velocities linearly over one step, the gripper at its own speed; return what was sent.
 
         Args:
-            velocity: commanded at the end of the step, (n,) [m/s, rad/s].
-            gripper: 0 open, 1 closed; approached at the gripper's speed.
+            command: velocities at the end of the step [m/s, rad/s] and gripper, (n + 1,).
         """
-        contacts, patrols = self._contacts, self._patrols
+        contacts, patrols, before = self._contacts, self._patrols, self._gate.velocity
         contacts.clear()
         model, data, control = self.mujoco_model, self.data, self.data.ctrl
-        self.commanded, before = np.array(velocity, dtype=np.float64), self.commanded
-        for control[:] in self._ramp(before, gripper):
+        sent = self._gate.limit(command, data.qpos[self._q_index])
+        for control[:] in self._ramp(before, float(sent[-1])):
             if patrols:
                 self._move_obstacles()
             mujoco.mj_step(model, data)
@@ -146,6 +135,15 @@ class Simulation:
         self._move_obstacles()
         mujoco.mj_kinematics(model, data)
         mujoco.mj_camlight(model, data)
+        return sent
+
+    def stop(self) -> None:
+        """Brake until the robot is sent rest."""
+        self._gate.bring_to_rest(self)
+
+    @property
+    def contacts(self) -> tuple[str, ...]:
+        """The forbidden contacts of the last step."""
         return self._contacts.names
 
     def push(self, base: FloatArray, hand: FloatArray) -> None:
@@ -165,7 +163,7 @@ class Simulation:
     def _ramp(self, before: FloatArray, gripper: float) -> FloatArray:
         """Return what the servos are sent at every substep: linear to the command, (substeps, servos)."""
         fingers = self._gripper_servo, self._gripper_target(gripper), self._speed * self._step
-        return _ramp(self.data.ctrl, before, self.commanded, self._shares, self._servo_index, fingers)
+        return _ramp(self.data.ctrl, before, self._gate.velocity, self._shares, self._servo_index, fingers)
 
     def _gripper_target(self, gripper: float) -> float:
         """Return the opening that the gripper's servo is sent to [m]; closed is a little beyond touching."""
@@ -179,7 +177,12 @@ class Simulation:
     def state(self) -> State:
         """Return the measured positions and velocities, and what was commanded last."""
         data = self.data
-        return State(data.qpos[self._q_index], data.qvel[self._v_index], data.time, self.commanded)
+        return State(data.qpos[self._q_index], data.qvel[self._v_index], data.time, self._gate.velocity)
+
+    @property
+    def time(self) -> float:
+        """Since the episode began [s]."""
+        return float(self.data.time)
 
     @property
     def tool(self) -> Pose:
@@ -212,6 +215,10 @@ class Simulation:
     def twists(self) -> dict[str, Twist]:
         """Return how every movable object moves now, by name."""
         return {item.name: self._twist(item.name) for item in self._scene.movables}
+
+    def obstacles(self) -> tuple[Obstacle, ...]:
+        """Return what stands around, where it is now, and what the fingers hold, fixed to the tool."""
+        return (*self._scene.obstacles(self.time), *self.held())
 
     def held(self) -> tuple[Obstacle, ...]:
         """Return what the fingers hold, fixed to the tool as it is now."""

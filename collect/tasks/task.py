@@ -7,7 +7,7 @@ from typing import Protocol
 import numpy as np
 
 from handrail.collect.simulation.scene import Scene, SceneObject
-from handrail.collect.simulation.simulation import Twist
+from handrail.collect.simulation.twist import Twist
 from handrail.controllers.arrays import FloatArray, frozen
 from handrail.controllers.errors import unknown_name
 from handrail.controllers.robot.model import Pose, RobotModel

@@ -9,7 +9,7 @@ import gymnasium
 import numpy as np
 from gymnasium import spaces
 
-from handrail.collect.experiments.benchmark.plants import build_plant
+from handrail.collect.experiments.benchmark.plants import plant
 from handrail.collect.experiments.benchmark.scenes import empty_floor
 from handrail.collect.tasks.goal_reaching import (
     ORIENTATION_TOLERANCE,
@@ -108,7 +108,8 @@ class GoalReachingEnv(gymnasium.Env[FloatArray, FloatArray]):
         """Put the robot home and draw a goal; forget the previous action."""
         super().reset(seed=seed)
         goal = (options or {}).get("goal") or self._draw()
-        self._plant = build_plant(self.model, empty_floor(), self._physics)
+        home = self.model.description.home
+        self._plant = plant(self._physics)(self.model, empty_floor(), home, STEP)
         self.command = np.zeros(self.model.size)
         self._measure()
         self.planner = StraightPlanner.plan(*self._pose, goal, speed=self._speed)
@@ -121,7 +122,8 @@ class GoalReachingEnv(gymnasium.Env[FloatArray, FloatArray]):
         action = np.clip(np.asarray(action, dtype=np.float64), -1.0, 1.0)
         base, twist = base_velocity(action, self.q[2]), clamp_twist(self.planner.twist(self._time))
         self.command = self._arm.velocity(self.q, self.command, base, twist, STEP)
-        touches = bool(self._plant.advance(self.command, 0.0))
+        self._plant.send(np.append(self.command, 0.0))
+        touches = bool(self._plant.contacts)
         self._measure()
         self._time += 1
         d, r = pose_error(*self._pose, Goal(*self.planner.pose(self._time)))

@@ -1,22 +1,30 @@
-"""One episode of the benchmark: planner, command profile, controller, robot."""
+"""One episode of the benchmark: planner, command profile, controller, robot, through the one session."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from time import perf_counter, process_time
+from time import process_time
 
 import numpy as np
 
+from handrail.collect.envs.env import HandrailEnv
 from handrail.collect.experiments.benchmark.baselines import Baseline, IntentMap
 from handrail.collect.experiments.benchmark.metrics import Trace
-from handrail.collect.experiments.benchmark.plants import Plant, build_plant
+from handrail.collect.experiments.benchmark.plants import plant
 from handrail.collect.experiments.benchmark.profiles import NOTHING_YET, SPEEDS, Commands, profile_commands
+from handrail.collect.operators.operator import View
+from handrail.collect.session.outcome import Outcome
+from handrail.collect.session.session import Session
 from handrail.collect.simulation.scene import Scene
 from handrail.collect.tasks.goal_reaching import STEP, T_MAX, Goal, StraightPlanner, pose_error, reached
+from handrail.collect.tasks.task import Episode, TaskState
+from handrail.collect.tasks.task import Outcome as Verdict
 from handrail.controllers.arrays import FloatArray
-from handrail.controllers.interface.command import Command
+from handrail.controllers.interface.command import Diagnostics
 from handrail.controllers.interface.controller import Controller, State
 from handrail.controllers.interface.intent import Intent
 from handrail.controllers.numerics.rotation import rotation_vector
 from handrail.controllers.robot.model import Pose, RobotModel
+from handrail.datasets.recording.frames import Frame
 
 _GAIN = 1.0  # of a planner that sees the hand [1/s]
 _SETTLING = 134  # steps after the planner's last one, without early stop (4 s)
@@ -56,102 +64,110 @@ def run_episode(
         controller: what its `build` returned; is reset.
         conditions: goal, scene, commands.
     """
-    start = perf_counter(), process_time()
-    plant = build_plant(model, conditions.scene, conditions.physics)
-    controller.reset(conditions.scene.obstacles())
-    baseline.aim(controller, conditions.goal)
-    operator = _Operator(conditions, plant.tool, baseline.operator(model))
-    tally = _Tally(plant, conditions.goal)
-    last = T_MAX if conditions.early_stop else min(T_MAX, operator.end + _SETTLING)
-    drive = _Drive(controller, baseline.period)
-    for step in range(last):
-        operator.send(step, tally.state, tally.tool)
-        velocity = drive.velocity(step, tally.state, operator)
-        tally.add(plant.advance(velocity, 0.0))
-        if conditions.early_stop and tally.reached:
-            break
-    spent = perf_counter() - start[0], process_time() - start[1]
-    return tally.trace(drive, operator.end, spent)
+    start = process_time()
+    operator = _Planner(
+        conditions, baseline.operator(model), lambda: baseline.aim(controller, conditions.goal)
+    )
+    task, build = _Task(conditions, operator), plant(conditions.physics)
+    env = HandrailEnv(task, model, fps=1.0 / STEP, plant=build, observes=False)
+    tracer = _Tracer(conditions.goal)
+    outcome = Session(env, controller, operator, [tracer], control_period=baseline.period).run(seed=0)
+    return tracer.trace(operator.end, outcome, process_time() - start)
 
 
-class _Operator:
+class _Planner:
     """The planner behind a command profile: sends a message a step, of which the profile delivers some."""
 
-    def __init__(self, conditions: Conditions, tool: Pose, intents: IntentMap) -> None:
-        speed = SPEEDS.get(conditions.profile, 1.0)
-        self._planner = StraightPlanner.plan(tool.position, tool.rotation, conditions.goal, speed=speed)
-        rng = np.random.default_rng(conditions.seed)
-        self._commands: Commands = profile_commands(conditions.profile, self._planner, rng)
-        self._closed = conditions.closed_loop
-        self._intents = intents
+    name = "planner"
+
+    def __init__(self, conditions: Conditions, intents: IntentMap, aim: Callable[[], None]) -> None:
+        self._conditions, self._intents, self._aim = conditions, intents, aim
+
+    def reset(self, view: View, rng: np.random.Generator) -> None:
+        """Plan the way from here, and say where it leads to a controller that has to know."""
+        given, tool = self._conditions, view.tool
+        speed = SPEEDS.get(given.profile, 1.0)
+        self._planner = StraightPlanner.plan(tool.position, tool.rotation, given.goal, speed=speed)
+        noise = np.random.default_rng(given.seed)
+        self._commands: Commands = profile_commands(given.profile, self._planner, noise)
         self._sent: list[tuple[FloatArray, State]] = []
+        self._aim()
 
     @property
     def end(self) -> int:
         """First step from which on the planner asks for nothing but rest."""
         return self._commands.end
 
-    def send(self, step: int, state: State, tool: Pose) -> None:
-        """Decide on this step's twist; with closed loop, on top of it `k` times the pose error."""
-        twist = self._commands.twists[step]
-        if self._closed:
-            position, rotation = self._planner.pose(self._commands.progress[step])
-            turn = rotation_vector(rotation @ tool.rotation.T)
-            twist = twist + _GAIN * np.concatenate([position - tool.position, turn])
-        self._sent.append((twist, state))
-
-    def intent(self, step: int) -> Intent:
-        """Return the newest message that has arrived, with the time at which it was sent."""
+    def act(self, view: View) -> Intent:
+        """Send this step's twist; return the newest message that has arrived, stamped when it was sent."""
+        step = len(self._sent)
+        self._sent.append((self._twist(step, view.tool), view.state))
         index = int(self._commands.delivered[step])
         if index == NOTHING_YET:
             return self._intents(np.zeros(6), self._sent[0][1], step * STEP)
         twist, state = self._sent[index]
         return self._intents(twist, state, index * STEP)
 
-
-class _Drive:
-    """Asks the controller when its time has come and follows the command's trajectory in between."""
-
-    def __init__(self, controller: Controller, period: float) -> None:
-        self._controller, self._period = controller, period
-        self._due, self._asked = 0.0, 0
-        self.commands: list[Command] = []
-
-    def velocity(self, step: int, state: State, operator: _Operator) -> FloatArray:
-        """Return the velocity at the end of a step: interpolated on the predicted trajectory, (n,)."""
-        if step * STEP >= self._due - 1e-9:
-            self.commands.append(self._controller.update(state, operator.intent(step)))
-            self._asked = step
-            self._due += self._period
-        return self.commands[-1].velocity((step + 1 - self._asked) * STEP)
+    def _twist(self, step: int, tool: Pose) -> FloatArray:
+        """Return a step's twist; with closed loop, on top of it `k` times the pose error, (6,)."""
+        twist = self._commands.twists[step]
+        if not self._conditions.closed_loop:
+            return twist
+        position, rotation = self._planner.pose(self._commands.progress[step])
+        turn = rotation_vector(rotation @ tool.rotation.T)
+        return twist + _GAIN * np.concatenate([position - tool.position, turn])
 
 
-class _Tally:
-    """Notes what happens, step by step; knows where the robot is now."""
+@dataclass(frozen=True)
+class _Task:
+    """Reaching the goal from home: over at the first success, or some time after the planner's end."""
 
-    def __init__(self, plant: Plant, goal: Goal) -> None:
-        self._plant, self._goal = plant, goal
-        self.state, self.tool = plant.state(), plant.tool
-        self._q, self._hand = [self.state.q], [self.tool.position]
+    conditions: Conditions
+    planner: _Planner
+    name: str = "GoalReaching"
+    description: str = "Reach the goal."
+    horizon: float = (T_MAX - 0.5) * STEP
+    state_names: tuple[str, ...] = ()
+
+    def sample(self, model: RobotModel, rng: np.random.Generator) -> Episode:
+        return Episode(self.conditions.scene, model.description.home)
+
+    def features(self, state: TaskState) -> FloatArray:
+        return np.zeros(0)
+
+    def outcome(self, state: TaskState) -> Verdict:
+        success = reached(*pose_error(state.tool.position, state.tool.rotation, self.conditions.goal))
+        if self.conditions.early_stop:
+            return Verdict(success)
+        over = state.time > (self.planner.end + _SETTLING - 0.5) * STEP
+        return Verdict(success and over, "missed" if over and not success else "")
+
+
+class _Tracer:
+    """Notes what happens, step by step; an observer."""
+
+    def __init__(self, goal: Goal) -> None:
+        self._goal = goal
+
+    def begin(self, env: HandrailEnv, seed: int) -> None:
+        self._env = env
+        self._q, self._hand = [env.robot.state().q], [env.world.tool.position]
         self._v: list[FloatArray] = []
         self._errors: list[tuple[float, float]] = []
         self._contacts: list[tuple[str, ...]] = []
+        self._updates: list[Diagnostics] = []
 
-    @property
-    def reached(self) -> bool:
-        """Whether the hand is at the goal."""
-        return reached(*self._errors[-1])
-
-    def add(self, contacts: tuple[str, ...]) -> None:
-        """Note where the robot is after a step."""
-        self.state, self.tool = state, tool = self._plant.state(), self._plant.tool
+    def see(self, frame: Frame) -> None:
+        state, tool = self._env.robot.state(), self._env.world.tool
         self._q.append(state.q)
         self._v.append(state.v)
         self._hand.append(tool.position)
         self._errors.append(pose_error(tool.position, tool.rotation, self._goal))
-        self._contacts.append(contacts)
+        self._contacts.append(self._env.world.contacts)
+        if not self._updates or frame.diagnostics is not self._updates[-1]:
+            self._updates.append(frame.diagnostics)
 
-    def trace(self, drive: _Drive, end: int, spent: tuple[float, float]) -> Trace:
+    def trace(self, end: int, outcome: Outcome, cpu_time: float) -> Trace:
         """Return what was noted."""
         return Trace(
             q=np.array(self._q),
@@ -159,9 +175,9 @@ class _Tally:
             errors=np.array(self._errors),
             hand=np.array(self._hand),
             contacts=self._contacts,
-            statuses=[command.diagnostics.status for command in drive.commands],
-            solve_times=[command.diagnostics.solve_time for command in drive.commands],
+            statuses=[update.status for update in self._updates],
+            solve_times=[update.solve_time for update in self._updates],
             end=end,
-            wall_time=spent[0],
-            cpu_time=spent[1],
+            wall_time=outcome.wall_time,
+            cpu_time=cpu_time,
         )

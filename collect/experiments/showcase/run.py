@@ -8,7 +8,8 @@ import numpy as np
 from handrail.collect.envs.env import HandrailEnv
 from handrail.collect.experiments.showcase.cases import Case
 from handrail.collect.operators.operator import View
-from handrail.collect.session.session import Observer, Outcome, Session
+from handrail.collect.session.outcome import Outcome
+from handrail.collect.session.session import Observer, Session
 from handrail.collect.tasks.task import Episode, TaskState
 from handrail.collect.tasks.task import Outcome as Verdict
 from handrail.controllers.arrays import BoolArray, FloatArray

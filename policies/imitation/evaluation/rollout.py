@@ -14,7 +14,8 @@ from handrail.collect.perturbations.delayed import DelayedOperator
 from handrail.collect.perturbations.push import Pusher
 from handrail.collect.perturbations.shift import ShiftedTask
 from handrail.collect.session.build import build_env, build_task
-from handrail.collect.session.session import Observer, Outcome, Session
+from handrail.collect.session.outcome import Outcome
+from handrail.collect.session.session import Observer, Session
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import Controller

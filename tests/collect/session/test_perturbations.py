@@ -87,7 +87,7 @@ def test_a_push_moves_the_robot_and_more_strength_moves_it_more():
                 pusher, start = Pusher(size), env.simulation.tool.position
                 pusher.begin(env, seed)
                 while env.simulation.data.time < sample_pushes(seed, 30.0)[0].end + 0.5:
-                    pusher.act(env.simulation)
+                    pusher.act()
                     env.step(action(env))
                 away.append(np.linalg.norm(env.simulation.tool.position - start))
             moved[size] = float(np.median(away))

@@ -193,11 +193,12 @@ class Grip:
     """Holds the robot fast for two seconds, whatever its servos do; a disturbance."""
 
     def begin(self, env, seed):
+        self._simulation = env.simulation
         self._free = env.simulation.mujoco_model.dof_damping.copy()
 
-    def act(self, simulation):
-        held = 2.0 <= simulation.data.time < 4.0
-        simulation.mujoco_model.dof_damping[:] = 1e9 if held else self._free
+    def act(self):
+        held = 2.0 <= self._simulation.data.time < 4.0
+        self._simulation.mujoco_model.dof_damping[:] = 1e9 if held else self._free
 
 
 @pytest.mark.parametrize("mode", ["ee", "direct"])

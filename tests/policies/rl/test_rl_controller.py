@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from rl_helpers import random_actor
 
-from handrail.collect.experiments.benchmark.plants import IdealRobot
+from handrail.collect.simulation.ideal_robot import IdealRobot
 from handrail.collect.simulation.scene import Scene
 from handrail.collect.tasks.goal_reaching import STEP, Goal
 from handrail.controllers.interface.channels import Channels
@@ -40,12 +40,12 @@ def test_the_controller_moves_like_the_environment(controller):
         observation, _ = env.reset(seed=seed)
         controller.reset()
         controller.aim(env.planner.goal)
-        robot = IdealRobot(MODEL, Scene(), home)
+        robot = IdealRobot(MODEL, Scene(), home, STEP, precision=np.float64)
         for t in range(80):
             command = controller.update(robot.state(), intent(env.planner.twist(t), t * STEP))
             observation, *_ = env.step(actor(observation))
             v = command.velocity(STEP)
-            robot.advance(v, 0.0)
+            robot.send(np.append(v, 0.0))
             assert command.diagnostics.status is Status.OK
             assert np.allclose(v, env.velocity, atol=1e-5)
         assert np.abs(v[:3]).max() > 0.01

@@ -1,0 +1,133 @@
+"""How an episode went, and the counting along it."""
+
+import contextlib
+import time
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from handrail.collect.operators.operator import EpisodeEvent
+from handrail.controllers.interface.command import Command, Status
+from handrail.datasets.quality.safety import contacts_begun
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How an episode went.
+
+    Attributes:
+        seed: of the environment.
+        success: whether the task was done.
+        failure_reason: why not; empty after a success.
+        frames: periods of the robot.
+        seconds: simulated time [s].
+        wall_time: time it took [s].
+        brakes: updates in which the controller braked the robot.
+        late: periods that a real-time loop overran.
+        contacts: forbidden contacts that began.
+        contact_periods: periods with a forbidden contact.
+        smallest_distance: smallest signed distance, tool against work surfaces left out [m].
+        spent: where the wall time went, by part of the loop [s].
+        started: Unix time at its beginning [s].
+        ended_by: what the operator said to end it; None where the task was the judge.
+        paused: time for which the operator had the robot stand still, the braking not counted [s].
+    """
+
+    seed: int
+    success: bool
+    failure_reason: str
+    frames: int
+    seconds: float
+    wall_time: float
+    brakes: int
+    late: int
+    contacts: int
+    contact_periods: int
+    smallest_distance: float
+    spent: Mapping[str, float]
+    started: float
+    ended_by: EpisodeEvent | None = None
+    paused: float = 0.0
+
+    @property
+    def kept(self) -> bool:
+        """Whether it is to be saved: neither thrown away nor begun again."""
+        return self.ended_by is None or self.ended_by.judges
+
+
+class Tally:
+    """Counts along an episode and keeps its pace.
+
+    Args:
+        seed: of the episode.
+        period: of the robot [s].
+    """
+
+    def __init__(self, seed: int, period: float) -> None:
+        self._seed, self._period = seed, period
+        self._started, self._start = time.time(), time.perf_counter()
+        self.frames = 0
+        self._brakes = self._late = self._held = 0
+        self._contacts: list[int] = []
+        self._smallest = np.inf
+        self._spent: dict[str, float] = {}
+
+    @property
+    def elapsed(self) -> float:
+        """Wall time since the episode began [s]."""
+        return time.perf_counter() - self._start
+
+    @contextlib.contextmanager
+    def timed(self, part: str) -> Iterator[None]:
+        """Add the time of a block to a part of the loop."""
+        start = time.perf_counter()
+        yield
+        self._spent[part] = self._spent.get(part, 0.0) + time.perf_counter() - start
+
+    def updated(self, command: Command) -> None:
+        """Count an update of the controller."""
+        self._brakes += Status(command.diagnostics.status).brakes
+        self._smallest = min(self._smallest, command.diagnostics.smallest_distance)
+
+    def moved(self, contacts: int) -> None:
+        """Count a period of the robot."""
+        self.frames += 1
+        self._contacts.append(contacts)
+
+    def held(self) -> None:
+        """Count a period in which a paused robot stood still."""
+        self._held += 1
+
+    def pace(self) -> None:
+        """Wait for the end of the period, or note that it is over."""
+        ahead = (self.frames + self._held) * self._period - self.elapsed
+        if ahead > 0:
+            time.sleep(ahead)
+        else:
+            self._late += 1
+
+    def outcome(self, info: Mapping[str, Any], ended_by: EpisodeEvent | None) -> Outcome:
+        """Return how it went, as the task judges, or else as the operator says."""
+        success, reason = bool(info["is_success"]), str(info["failure_reason"])
+        if ended_by is not None:
+            success = ended_by is EpisodeEvent.SUCCESS
+            reason = "" if success else f"operator: {ended_by}"
+        return Outcome(
+            seed=self._seed,
+            success=success,
+            failure_reason=reason,
+            frames=self.frames,
+            seconds=self.frames * self._period,
+            wall_time=self.elapsed,
+            brakes=self._brakes,
+            late=self._late,
+            contacts=int(contacts_begun(self._contacts)),
+            contact_periods=int(np.count_nonzero(self._contacts)),
+            smallest_distance=float(self._smallest),
+            spent=dict(self._spent),
+            started=self._started,
+            ended_by=ended_by,
+            paused=self._held * self._period,
+        )
