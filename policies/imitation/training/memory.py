@@ -1,7 +1,7 @@
-"""A dataset in memory that LeRobot's training takes for one of its own, and the collating of its batches.
+"""A dataset in memory: a batch is one indexing operation on columns.
 
 LeRobot reads a sample at a time from Arrow tables, and an action chunk row by row: a few batches a second.
-Here a batch is one indexing operation on columns that lie in memory. The tensors are the same.
+The tensors are the same.
 """
 
 from collections.abc import Mapping, Sequence
@@ -11,23 +11,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import torch
-from torch.utils.data import Dataset
-from torch.utils.data._utils.collate import default_collate_fn_map
 
 if TYPE_CHECKING:
     from lerobot.datasets.lerobot_dataset import LeRobotDataset
 
 
-class Batch(dict[str, Any]):
-    """A whole batch; PyTorch's collating passes it on instead of stacking samples."""
-
-
-default_collate_fn_map[Batch] = lambda batches, **_: dict(batches[0])  # where PyTorch looks for new types
-
-
 @dataclass(frozen=True)
 class MemoryMeta:
-    """What LeRobot's training asks a dataset's metadata for.
+    """What LeRobot's policies ask a dataset's metadata for.
 
     Attributes:
         features: by key, each with `dtype`, `shape` and `names`.
@@ -59,14 +50,9 @@ class MemoryMeta:
         """Keys of pictures of distances: none."""
         return []
 
-    @property
-    def has_language_columns(self) -> bool:
-        """Whether there are columns of sentences: no."""
-        return False
-
 
 @dataclass(frozen=True)
-class MemoryDataset(Dataset):
+class MemoryDataset:
     """Samples of some episodes, with a window of frames where a policy asks for one.
 
     Attributes:
@@ -83,8 +69,6 @@ class MemoryDataset(Dataset):
     tasks: Sequence[str]
     windows: Mapping[str, Sequence[int]] = field(default_factory=dict)
     pictures: "LeRobotDataset | None" = None
-    episodes: None = None  # LeRobot's names for a part of a dataset: this one is whole
-    absolute_to_relative_idx: None = None
 
     @property
     def num_frames(self) -> int:
@@ -99,18 +83,10 @@ class MemoryDataset(Dataset):
     def __len__(self) -> int:
         return self.num_frames
 
-    def __getitem__(self, index: int) -> dict[str, Any]:
-        """Return one sample."""
-        return {key: values[0] for key, values in self.batch([index]).items()}
-
-    def __getitems__(self, indices: Sequence[int]) -> list[Batch]:
-        """Return a batch of samples, as PyTorch's loader asks for it."""
-        return [self.batch(indices)]
-
-    def batch(self, indices: Sequence[int]) -> Batch:
+    def batch(self, indices: Sequence[int]) -> dict[str, Any]:
         """Return samples (B,), each column stacked, (B, …) or (B, W, …)."""
         rows = torch.as_tensor(indices)
-        batch = Batch(self._pictures_of(indices) if self.pictures else {})
+        batch: dict[str, Any] = dict(self._pictures_of(indices)) if self.pictures else {}
         for key, values in self.columns.items():
             if key in self._offsets:
                 batch[key], batch[f"{key}_is_pad"] = self._window(values, rows, self._offsets[key])

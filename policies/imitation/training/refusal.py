@@ -28,7 +28,8 @@ def in_one_line(config: TrainConfig) -> Iterator[None]:
 
 
 def _of_lerobot(error: BaseException) -> bool:
-    """Return whether LeRobot, or what it called, raised it; not Handrail, or what that called."""
+    """Return whether LeRobot or accelerate, or what they called, raised it; not Handrail or the rest."""
     modules = [str(frame.f_globals.get("__name__")) for frame, _ in traceback.walk_tb(error.__traceback__)]
-    packages = [name.partition(".")[0] for name in modules if name.startswith(("handrail.", "lerobot."))]
-    return packages[-1:] == ["lerobot"]
+    packages = [name.partition(".")[0] for name in modules]
+    known = [name for name in packages if name in ("handrail", "lerobot", "accelerate")]
+    return known[-1:] not in ([], ["handrail"])

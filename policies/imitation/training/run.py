@@ -1,155 +1,123 @@
-"""LeRobot's training, run inside this process with our data, our checkpoints and without its pages of logs.
+"""The loop of a training: LeRobot's update, over our data in LeRobot's order, into our checkpoints."""
 
-Nothing of LeRobot is edited: while it trains, a few names that its script looks up lead here instead.
-"""
-
-import logging
 import shutil
-import sys
+import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
-from unittest.mock import patch
 
-import torch
-from lerobot.common import train_utils
+from accelerate import Accelerator
+from accelerate.data_loader import BatchSamplerShard
+from accelerate.utils import send_to_device
+from lerobot.common.train_utils import get_step_checkpoint_dir, should_save_checkpoint
 from lerobot.configs.train import TrainPipelineConfig
-from lerobot.optim.factory import make_optimizer_and_scheduler
-from lerobot.scripts import lerobot_train
-from lerobot.utils.logging_utils import MetricsTracker
+from lerobot.datasets.sampler import EpisodeAwareSampler, compute_sampler_state
+from lerobot.scripts.lerobot_train import update_policy
+from lerobot.utils.logging_utils import AverageMeter, MetricsTracker
+from lerobot.utils.random_utils import set_seed
+from torch.utils.data import BatchSampler
 
 from handrail.datasets.storage.atomic import publish_folder
 from handrail.policies.imitation.interface.checkpoint import MODEL, point_to
 from handrail.policies.imitation.training.curve import Bar, Curve, Watch
+from handrail.policies.imitation.training.learner import Learner, build_accelerator, build_learner
 from handrail.policies.imitation.training.memory import MemoryDataset
 
-
-@dataclass
-class Pipeline(TrainPipelineConfig):
-    """LeRobot's settings of a training, whose folder is ours to check and whose schedule may be given."""
-
-    def validate(self) -> None:
-        """Fill in what follows from the policy."""
-        folder, self.output_dir = self.output_dir, None
-        schedule = self.scheduler
-        super().validate()
-        self.output_dir = folder
-        assert self.policy is not None
-        self.optimizer = self.policy.get_optimizer_preset()
-        self.scheduler = schedule or self.policy.get_scheduler_preset()
+_OVER_PROCESSES = {
+    **{"loss": "mean", "grad_norm": "none", "lr": "none"},
+    **{"update_s": "max", "dataloading_s": "max", "gpu_mem_gb": "max"},
+}
 
 
 @dataclass(frozen=True)
 class Run:
-    """One call of LeRobot's training.
+    """One training, from its beginning or from a checkpoint.
 
     Attributes:
-        pipeline: its settings.
+        settings: LeRobot's.
         dataset: what it learns from.
         checkpoint: the checkpoint to go on from; None to begin.
         finish: called with the `pretrained_model` folder of every new checkpoint and its step.
         quiet: whether to show no progress.
     """
 
-    pipeline: Pipeline
+    settings: TrainPipelineConfig
     dataset: MemoryDataset
     checkpoint: Path | None
     finish: Callable[[Path, int], None]
     quiet: bool = False
 
     def train(self) -> Curve | None:
-        """Train to the end; return the curve of the loss in the process that writes it."""
-        watches: list[Watch] = []
+        """Train to the end; return the curve of the loss in the process that writes it.
+
+        Raises:
+            HandrailError: accelerate would split the model between processes.
+        """
+        settings, accelerator = self.settings, build_accelerator(self.settings.policy)
+        assert settings.output_dir is not None
+        set_seed(settings.seed, accelerator)  # pyright: ignore[reportArgumentType]
+        learner = build_learner(settings, self.dataset.meta, self.checkpoint, accelerator)
+        main = accelerator.is_main_process
+        curve = Curve(settings.output_dir, learner.step) if main else None
+        watch = Watch(curve, Bar(learner.step, settings.steps, shown=main and not self.quiet))
         try:
-            with self._substituted(watches):
-                lerobot_train.train.__wrapped__(self.pipeline)  # pyright: ignore[reportFunctionMemberAccess]
+            self._loop(learner, watch, accelerator)
         finally:
-            for watch in watches:
-                watch.bar.close()
-        return watches[0].curve
+            watch.bar.close()
+        accelerator.end_training()
+        return curve
 
-    @contextmanager
-    def _substituted(self, watches: list[Watch]) -> Iterator[None]:
-        arguments = [] if self.checkpoint is None else [f"--config_path={self.checkpoint / MODEL}"]
-        names: dict[str, Any] = {
-            "make_train_eval_datasets": lambda _: (self.dataset, None),
-            "make_optimizer_and_scheduler": _fused,
-            "save_checkpoint": self._save,
-            "update_last_checkpoint": point_to,
-            "MetricsTracker": self._tracker(watches),
-            "tqdm": lambda **_: _Silent(),
-            "cycle": _endless,
-            "init_logging": lambda **_: None,
-            "logging": logging.getLogger("lerobot.training"),
-        }
-        with patch.multiple(lerobot_train, **names), patch.object(sys, "argv", [sys.argv[0], *arguments]):
-            yield
+    def _loop(self, learner: Learner, watch: Watch, accelerator: Accelerator) -> None:
+        settings, means = self.settings, self._means(learner.step, accelerator)
+        assert settings.optimizer is not None
+        around = settings.optimizer.grad_clip_norm, accelerator, learner.schedule
+        batches = self._batches(learner.step, accelerator)
+        for step in range(learner.step + 1, settings.steps + 1):
+            began = time.perf_counter()
+            batch = learner.before(next(batches))
+            means.dataloading_s = time.perf_counter() - began
+            update_policy(means, learner.policy, batch, learner.optimizer, *around)
+            means.step()
+            watch.bar.advance()
+            if step % settings.log_freq == 0:
+                means.reduce_across_ranks()
+                watch.see(means.to_dict() | {"step": step})
+                means.reset_averages()
+            if should_save_checkpoint(step, settings.save_freq, settings.steps):
+                if accelerator.is_main_process:
+                    self._save(learner, step, accelerator)
+                accelerator.wait_for_everyone()
 
-    def _save(self, checkpoint_dir: Path, step: int, **rest: Any) -> None:
-        draft = checkpoint_dir.with_name(f".{checkpoint_dir.name}")
+    def _means(self, step: int, accelerator: Accelerator) -> MetricsTracker:
+        meters = {name: AverageMeter(name, reduction=how) for name, how in _OVER_PROCESSES.items()}
+        sizes = self.settings.batch_size, self.dataset.num_frames, self.dataset.num_episodes
+        return MetricsTracker(*sizes, meters, step, accelerator)  # pyright: ignore[reportArgumentType]
+
+    def _batches(self, step: int, accelerator: Accelerator) -> Iterator[Any]:
+        """Yield batches for ever, from where a training that was cut off would have gone on, to the bit."""
+        settings, processes = self.settings, accelerator.num_processes
+        sampler = EpisodeAwareSampler(
+            self.dataset.meta.episodes["dataset_from_index"],
+            self.dataset.meta.episodes["dataset_to_index"],
+            drop_n_last_frames=getattr(settings.policy, "drop_n_last_frames", 0),
+            shuffle=True,
+            seed=settings.seed or 0,
+        )
+        sampler.load_state_dict(compute_sampler_state(step, len(sampler), settings.batch_size, processes))
+        order: Any = BatchSampler(sampler, settings.batch_size, drop_last=False)
+        if processes > 1:
+            order = BatchSamplerShard(order, processes, accelerator.process_index)
+        while True:
+            for indices in order:
+                yield send_to_device(self.dataset.batch(indices), accelerator.device)
+
+    def _save(self, learner: Learner, step: int, accelerator: Accelerator) -> None:
+        assert self.settings.output_dir is not None
+        folder = get_step_checkpoint_dir(self.settings.output_dir, self.settings.steps, step)
+        draft = folder.with_name(f".{folder.name}")
         shutil.rmtree(draft, ignore_errors=True)
-        train_utils.save_checkpoint(checkpoint_dir=draft, step=step, **rest)
+        learner.save(draft, step, self.settings, accelerator)
         self.finish(draft / MODEL, step)
-        publish_folder(draft, checkpoint_dir)
-
-    def _tracker(self, watches: list[Watch]) -> type[MetricsTracker]:
-        folder, total, quiet = self.pipeline.output_dir, self.pipeline.steps, self.quiet
-        assert folder is not None
-
-        class Tracker(MetricsTracker):
-            """LeRobot's means, shown and written down whenever it would print them."""
-
-            def __init__(self, *arguments: Any, initial_step: int, accelerator: Any, **rest: Any) -> None:
-                super().__init__(*arguments, initial_step=initial_step, accelerator=accelerator, **rest)
-                main = accelerator.is_main_process
-                curve = Curve(folder, initial_step) if main else None
-                watches.append(Watch(curve, Bar(initial_step, total, shown=main and not quiet)))
-
-            def step(self) -> None:
-                super().step()
-                watches[0].bar.advance()
-
-            def reset_averages(self) -> None:
-                row = self.to_dict()
-                watches[0].see(row | {"step": row["steps"]})
-                super().reset_averages()
-
-        return Tracker
-
-
-class _Silent:
-    """In the place of LeRobot's progress bar."""
-
-    def update(self, steps: int) -> None:
-        """Count nothing."""
-
-    def close(self) -> None:
-        """Close nothing."""
-
-
-def _fused(pipeline: Pipeline, policy: Any) -> tuple[Any, Any]:
-    """Return LeRobot's optimizer and schedule; Adam updates all weights in one call."""
-    optimizer, scheduler = make_optimizer_and_scheduler(pipeline, policy)
-    if isinstance(optimizer, torch.optim.Adam):
-        for group in optimizer.param_groups:
-            group["fused"], group["foreach"] = True, False
-    return optimizer, scheduler
-
-
-def _endless(loader: Any) -> Iterator[Any]:
-    """Yield batches for ever, so that a training that was cut off goes on as if it had not been, to the bit.
-
-    Accelerate would set LeRobot's sampler back to the first epoch, and PyTorch draws a number when a loader
-    begins, which would change what is random in the policy.
-    """
-    batches = getattr(loader.batch_sampler, "batch_sampler", loader.batch_sampler)  # a share of it, or all
-    loader.iteration = batches.sampler.state_dict()["epoch"]
-    while True:
-        state = torch.get_rng_state()
-        batches = iter(loader)
-        batch = next(batches)
-        torch.set_rng_state(state)
-        yield batch
-        yield from batches
+        publish_folder(draft, folder)
+        point_to(folder)

@@ -1,4 +1,4 @@
-"""Training of an imitation policy: a part of a dataset, through an interface, with LeRobot's own training."""
+"""Training of an imitation policy: a part of a dataset, through an interface, with LeRobot's own parts."""
 
 import json
 import logging
@@ -30,7 +30,7 @@ from handrail.policies.imitation.training.resume import as_json, check_data, che
 from handrail.policies.imitation.training.source import Source, read_source
 
 if TYPE_CHECKING:
-    from handrail.policies.imitation.training.run import Pipeline
+    from lerobot.configs.train import TrainPipelineConfig
 
 RECORD = "training.json"
 _LOG_EVERY = 50  # updates
@@ -75,11 +75,11 @@ def _goes_on(config: TrainConfig, checkpoint: Path) -> PolicyMeta:
 def _run(config: TrainConfig, source: Source, steps: int, checkpoint: Path | None, quiet: bool) -> None:
     from handrail.policies.imitation.training.run import Run
 
-    pipeline = _pipeline(config, steps, checkpoint)
-    assert pipeline.policy is not None
-    dataset = source.dataset(pipeline.policy)
+    settings = _settings(config, steps)
+    assert settings.policy is not None
+    dataset = source.dataset(settings.policy)
     run = Run(
-        pipeline,
+        settings,
         dataset,
         checkpoint,
         lambda folder, step: write_meta(folder, source.interface, _meta(source, step)),
@@ -96,18 +96,18 @@ def _run(config: TrainConfig, source: Source, steps: int, checkpoint: Path | Non
         write_whole(config.folder / RECORD, (json.dumps(content, indent=1) + "\n").encode())
 
 
-def _pipeline(config: TrainConfig, steps: int, checkpoint: Path | None) -> "Pipeline":
+def _settings(config: TrainConfig, steps: int) -> "TrainPipelineConfig":
     from lerobot.configs.default import DatasetConfig
+    from lerobot.configs.train import TrainPipelineConfig
     from lerobot.optim.schedulers import CosineAnnealingWithWarmupSchedulerConfig as Cosine
 
-    from handrail.policies.imitation.training.run import Pipeline
-
-    sizes = resolved(config)
-    return Pipeline(
+    sizes, policy = resolved(config), policy_config(config)
+    schedule = Cosine(min(_WARMUP, steps // 10)) if sizes.cosine else policy.get_scheduler_preset()
+    return TrainPipelineConfig(
         dataset=DatasetConfig(config.dataset.name, root=str(config.dataset.folder), video_backend="pyav"),
-        policy=policy_config(config),
+        policy=policy,
         output_dir=config.folder,
-        resume=checkpoint is not None,
+        job_name=policy.type,
         seed=config.seed,
         num_workers=0,
         batch_size=sizes.batch_size,
@@ -115,7 +115,8 @@ def _pipeline(config: TrainConfig, steps: int, checkpoint: Path | None) -> "Pipe
         log_freq=_LOG_EVERY,
         save_freq=config.save_freq,
         env_eval_freq=0,
-        scheduler=Cosine(min(_WARMUP, steps // 10)) if sizes.cosine else None,
+        optimizer=policy.get_optimizer_preset(),
+        scheduler=schedule,
     )
 
 
