@@ -1,4 +1,4 @@
-"""The shell commands of README and the pages, in order, and what is made smaller so that a test can run them."""
+"""The shell commands of README and the pages, in order, and how a test makes them smaller."""
 
 import re
 import shlex
@@ -6,10 +6,7 @@ import shlex
 from places import ROOT
 
 MAIN = ("README.md", *(f"docs/{name}.md" for name in ("recording", "training", "evaluation", "comparison")))
-PAGES = (
-    *MAIN,
-    *(f"docs/{name}.md" for name in ("concepts", "study", "benchmark", "api")),
-)  # as they build on each other
+PAGES = (*MAIN, *(f"docs/{name}.md" for name in ("concepts", "study", "benchmark", "api")))
 LESS = {  # flag → the value that it gets where a page gives it
     "handrail-demo": {"--episodes": "1"},
     "handrail-record": {"--dataset.num_episodes": "2"},

@@ -1,4 +1,4 @@
-"""The commands of README and the pages can be pasted in order, into a fresh folder; with fewer episodes and steps."""
+"""The commands of README and the pages can be pasted in order into a fresh folder; here with less of all."""
 
 import re
 import subprocess
@@ -75,9 +75,8 @@ def test_every_page_with_commands_is_pasted():
 
 
 def test_the_readme_s_python_runs_and_the_base_makes_way(capsys):
-    (source,) = re.findall(
-        r"^```python\n(.*?)^```", (ROOT / "README.md").read_text(), re.DOTALL | re.MULTILINE
-    )
+    readme = (ROOT / "README.md").read_text()
+    (source,) = re.findall(r"^```python\n(.*?)^```", readme, re.DOTALL | re.MULTILINE)
     exec(compile(source, "README.md", "exec"), {})
     shown = re.fullmatch(r"base \[\S+ +(\S+)\], hand .*, ok\n", capsys.readouterr().out)
     assert shown is not None
