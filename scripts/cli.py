@@ -12,11 +12,13 @@ from typing import NoReturn
 import tyro
 
 from handrail.controllers.errors import HandrailError
+from handrail.controllers.numerics.first_use import tell_when_compiling
 
 BAD_INPUT = 2
 FAILED = 1
 INTERRUPTED = 130
 VERSION = "--version"
+COMPILING = "Compiling the controller for this machine, once; this can take a minute …"
 
 
 def parse[Config](config: Callable[..., Config], prog: str, arguments: Sequence[str] | None = None) -> Config:
@@ -47,6 +49,7 @@ def parse[Config](config: Callable[..., Config], prog: str, arguments: Sequence[
 
 def run(main: Callable[[], int | None]) -> NoReturn:
     """Run a command's body; an expected error becomes one line and exit code 2."""
+    tell_when_compiling(lambda: print(COMPILING, file=sys.stderr, flush=True))
     try:
         sys.exit(main())
     except HandrailError as error:

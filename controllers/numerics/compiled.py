@@ -14,6 +14,8 @@ from pathlib import Path
 
 import casadi as ca
 
+from handrail.controllers.numerics.first_use import compiling
+
 _FLAGS = ("-O2", "-fPIC", "-shared", "-ffp-contract=off")
 _TIMEOUT = 120.0  # [s]
 
@@ -38,6 +40,7 @@ def compiled(function: ca.Function) -> ca.Function:
 
 def _build(source: str, library: Path, compiler: str) -> None:
     """Compile to a temporary name beside the library, then rename: other processes see all or nothing."""
+    compiling()
     library.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=library.parent) as folder:
         code, built = Path(folder) / "function.c", Path(folder) / "function.so"

@@ -4,6 +4,9 @@ from collections.abc import Callable
 from typing import Any
 
 import numba
+from numba.core import event
+
+from handrail.controllers.numerics.first_use import compiling
 
 _SUMS = {"reassoc", "contract", "nsz"}  # sums may be reordered, so that they run on vectors; NaN stays NaN
 
@@ -24,6 +27,19 @@ def _compiled(function: Callable[..., Any], **options: Any) -> Callable[..., Any
         return numba.njit(cache=True, **options)(function)
     except RuntimeError:  # no folder to keep it in: compiled anew in every process
         return numba.njit(**options)(function)
+
+
+class _FirstUse(event.Listener):
+    """Hears numba compile what is not in its cache."""
+
+    def on_start(self, event: event.Event) -> None:
+        compiling()
+
+    def on_end(self, event: event.Event) -> None:
+        pass
+
+
+event.register("numba:compile", _FirstUse())
 
 
 @jit

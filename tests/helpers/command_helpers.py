@@ -10,6 +10,8 @@ from unittest import mock
 
 import pytest
 
+from handrail.scripts import cli
+
 
 @dataclass(frozen=True)
 class Done:
@@ -21,12 +23,13 @@ class Done:
 
 
 def command(*arguments: Any, name: str = "record") -> Done:
-    """Run `handrail-<name>` with its command line, in this process."""
+    """Run `handrail-<name>` with its command line, in this process; of cold caches it says no word."""
     main = importlib.import_module(f"handrail.scripts.{name}").main
     words = [f"handrail-{name}", *map(str, arguments)]
     out, error = io.StringIO(), io.StringIO()
     with (
         mock.patch.object(sys, "argv", words),
+        mock.patch.object(cli, "tell_when_compiling"),
         contextlib.redirect_stdout(out),
         contextlib.redirect_stderr(error),
         pytest.raises(SystemExit) as stop,

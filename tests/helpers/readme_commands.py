@@ -1,11 +1,13 @@
-"""README's shell commands, in order, and what is made smaller so that a test can run them."""
+"""The shell commands of README and the pages, in order, and how a test makes them smaller."""
 
 import re
 import shlex
 
 from places import ROOT
 
-LESS = {  # flag → the value that it gets where the README gives it
+MAIN = ("README.md", *(f"docs/{name}.md" for name in ("recording", "training", "evaluation", "comparison")))
+PAGES = (*MAIN, *(f"docs/{name}.md" for name in ("concepts", "study", "benchmark", "api")))
+LESS = {  # flag → the value that it gets where a page gives it
     "handrail-demo": {"--episodes": "1"},
     "handrail-record": {"--dataset.num_episodes": "2"},
     "handrail-train": {"--episodes": "1", "--minutes": "0.1"},
@@ -15,7 +17,7 @@ LESS = {  # flag → the value that it gets where the README gives it
     "handrail-benchmark": {"--goals": "2", "--workers": "1"},
     "lerobot-train": {"--steps": "4", "--batch_size": "4", "--num_workers": "0"},
 }
-MORE = {  # what is added where the README leaves it out
+MORE = {  # what is added where a page leaves it out
     "handrail-record": {"--dataset.num_episodes": "2"},
     "handrail-train": {"--steps": "4", "--batch_size": "4", "--device": "cpu"},
     "handrail-evaluate": {"--time_limit": "1"},
@@ -30,10 +32,12 @@ MORE = {  # what is added where the README leaves it out
         "--layers": "8",
     },
 }
-INSTEAD = {"quick": "policies/study/presets/quick.toml"}  # where the test has put a smaller design:
+INSTEAD = {"quick": "policies/study/design/presets/quick.toml"}  # where the test has put a smaller design:
 LESS_STUDY = {"rollouts": "2", "persons": "1", "episodes": "2", "minutes": "0.3", "steps": "4"}
 NOT_RUN = {
     "make": "sets up and tests this very clone",
+    ".": "makes the environment that the test runs in the shell's own",
+    "python": "runs the examples, which have a test of their own",
     "pip": "needs the network",
     "apt-get": "needs the network and the administrator",
     "tensorboard": "runs until Ctrl-C",
@@ -47,15 +51,17 @@ MINUTES_TOO = (
     "lerobot_act",
     "diffusion",
     "moving",
+    "watched",
+    "film",
     "trials",
     "showcase",
     "demo",
 )
 
 
-def readme_commands() -> list[list[str]]:
-    """Return the words of every command, in order."""
-    text = (ROOT / "README.md").read_text()
+def page_commands(page: str) -> list[list[str]]:
+    """Return the words of every command of a page, in order."""
+    text = (ROOT / page).read_text()
     blocks = re.findall(r"^```sh\n(.*?)^```", text, flags=re.DOTALL | re.MULTILINE)
     lines = "\n".join(blocks).replace("\\\n", " ").splitlines()
     return [words for line in lines if (words := shlex.split(line, comments=True))]

@@ -1,5 +1,6 @@
 """What the documents say is true: commands parse, links lead somewhere, tables are complete."""
 
+import importlib
 import json
 import re
 import shlex
@@ -8,6 +9,7 @@ import sys
 import tomllib
 from collections.abc import Sequence
 from dataclasses import fields, is_dataclass
+from pathlib import Path
 
 import pytest
 from configs import CONFIGS
@@ -28,7 +30,10 @@ from handrail.policies.imitation.evaluation.config import PROTECTIONS
 from handrail.policies.rl.baseline import RL_BASELINES
 from handrail.scripts import cli
 
-DOCUMENTS = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "SECURITY.md")
+PAGES = ("README.md", *sorted(str(path.relative_to(ROOT)) for path in (ROOT / "docs").glob("*.md")))
+RESULTS = sorted(str(path.relative_to(ROOT)) for path in (ROOT / "docs" / "results").glob("*.md"))
+DOCUMENTS = (*PAGES, "CONTRIBUTING.md", "CHANGELOG.md", "SECURITY.md", *RESULTS)
+LONGEST_README = 150  # lines
 ROOMS = "controllers|datasets|collect|policies|scripts|tests|docs"
 _LEROBOT = """
 import json, sys
@@ -53,17 +58,20 @@ def command_lines(document: str) -> Sequence[str]:
     return "\n".join(blocks).replace("\\\n", " ").splitlines()
 
 
-def commands(prefix: str) -> list[list[str]]:
-    lines = [shlex.split(line, comments=True) for document in DOCUMENTS for line in command_lines(document)]
+def commands(prefix: str, documents: Sequence[str] = DOCUMENTS) -> list[list[str]]:
+    lines = [shlex.split(line, comments=True) for document in documents for line in command_lines(document)]
     return [words for words in lines if words and words[0].startswith(prefix)]
 
 
-def table(heading: str) -> set[str]:
-    """Return the code words of the first column of the README's table under a heading."""
-    section = text("README.md").split(f"\n## {heading}\n")[1].split("\n## ")[0]
+def section(page: str, heading: str) -> str:
+    return text(f"docs/{page}.md").split(f"\n## {heading}\n")[1].split("\n## ")[0]
+
+
+def table(page: str, heading: str) -> set[str]:
+    """Return the code words of the first column of a page's tables under a heading."""
     return {
         name
-        for row in re.findall(r"^\| (`.*?) \|", section, re.MULTILINE)
+        for row in re.findall(r"^\| (`.*?) \|", section(page, heading), re.MULTILINE)
         for name in re.findall("`(.*?)`", row)
     }
 
@@ -71,7 +79,7 @@ def table(heading: str) -> set[str]:
 def test_every_command_is_known_and_shown():
     scripts = tomllib.loads(text("pyproject.toml"))["project"]["scripts"]
     assert set(CONFIGS) == set(scripts)
-    assert {words[0] for words in commands("handrail-")} == set(scripts)
+    assert {words[0] for words in commands("handrail-", PAGES)} == set(scripts)
 
 
 @pytest.mark.parametrize("words", commands("handrail-"), ids=" ".join)
@@ -97,11 +105,46 @@ def test_make_targets_exist():
     assert {"demo", "test"} <= named <= targets
 
 
+def anchors(document: Path) -> set[str]:
+    """Return what a link can lead to in a document: its headings, as GitHub calls them."""
+    headings = re.findall(r"^#+ (.*)$", document.read_text(), re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
 @pytest.mark.parametrize("document", DOCUMENTS)
 def test_links_lead_somewhere(document):
-    links = re.findall(r"\]\(([^)#]+)\)|src=\"([^\"]+)\"", text(document))
+    here = ROOT / document
+    links = re.findall(r"\]\(([^)\s]+)\)|src=\"([^\"]+)\"", text(document))
     for link in ("".join(pair) for pair in links):
-        assert link.startswith(("http", "mailto")) or (ROOT / link).exists(), link
+        if not link.startswith(("http", "mailto")):
+            file, _, anchor = link.partition("#")
+            target = here.parent / file if file else here
+            assert target.exists(), link
+            assert not anchor or anchor in anchors(target), link
+
+
+def test_every_page_is_reached_from_the_readme():
+    for page in PAGES[1:]:
+        assert f"({page})" in text("README.md"), page
+    for page in RESULTS:
+        assert f"(results/{Path(page).name})" in text("docs/results.md"), page
+
+
+def test_the_readme_is_short():
+    assert len(text("README.md").splitlines()) <= LONGEST_README
+
+
+@pytest.mark.parametrize("document", [*PAGES, "CONTRIBUTING.md", "SECURITY.md"])
+def test_operators_are_they(document):
+    assert not re.search(r"\b(he|him|his|himself)\b", text(document), re.IGNORECASE)
+
+
+def test_names_of_the_api_page_can_be_imported():
+    rows = re.findall(r"^\| (`\w+`(?:, `\w+`)*) \| `(handrail[\w.]+)` \|", text("docs/api.md"), re.MULTILINE)
+    assert len(rows) >= 8
+    for names, module in rows:
+        for name in re.findall(r"\w+", names):
+            assert hasattr(importlib.import_module(module), name), f"{module}.{name}"
 
 
 @pytest.mark.parametrize("document", DOCUMENTS)
@@ -110,17 +153,17 @@ def test_files_that_are_named_are_there(document):
     assert [path for path in named if not (ROOT / path).exists()] == []
 
 
-def test_modes_and_tasks_are_all_there():
-    assert table("Teleop modes") == set(MODES)
+def test_modes_tasks_and_cameras_are_all_there():
+    assert table("concepts", "Teleop modes") == set(MODES)
     from handrail.collect.config import CAMERAS, MODE_NAMES, TASKS
 
     assert set(MODE_NAMES) == set(MODES)
-    assert table("Tasks") == set(TASKS)
-    assert all(f"`{camera}`" in text("README.md") for camera in CAMERAS)
+    assert table("concepts", "Tasks") == set(TASKS)
+    assert all(f"`{camera}`" in text("docs/recording.md") for camera in CAMERAS)
 
 
 def test_controllers_and_profiles_of_the_benchmark_are_all_there():
-    assert table("Goal reaching against rivals") == set(CONTROLLERS) | set(PROFILES)
+    assert table("benchmark", "Goal reaching") == set(CONTROLLERS) | set(PROFILES)
     assert set(CONTROLLERS) == {*BASELINES, *RL_BASELINES}
     source = (ROOT / "collect" / "experiments" / "benchmark" / "config.py").read_text()
     helped = re.findall(r'^    """(.*?)"""', source, re.MULTILINE | re.DOTALL)
@@ -128,11 +171,11 @@ def test_controllers_and_profiles_of_the_benchmark_are_all_there():
 
 
 def test_protections_and_perturbations_are_all_there():
-    assert table("Evaluate") == {*PROTECTIONS, *DEFAULTS, "none"}
+    assert table("evaluation", "Protect and disturb") == {*PROTECTIONS, *DEFAULTS, "none"}
 
 
 def test_metrics_are_all_there():
-    assert table("Quality metrics") == {metric.name for metric in METRICS}
+    assert table("comparison", "Quality metrics") == {metric.name for metric in METRICS}
 
 
 def flags(config: type, prefix: str = "") -> set[str]:
@@ -145,7 +188,7 @@ def flags(config: type, prefix: str = "") -> set[str]:
 
 
 def test_flags_are_all_there():
-    shown = {name.split(" ")[0] for name in table("Flags of `handrail-record`")}
+    shown = {name.split(" ")[0] for name in table("recording", "Flags of `handrail-record`")}
     human = {name for name in flags(RecordConfig) if name.startswith("--human.")}
     assert shown == flags(RecordConfig) - human | {"--human.*"}
 
@@ -154,13 +197,13 @@ def test_columns_are_all_there():
     env = build_env(SessionConfig(task="reach"), 20)
     columns = {*session_features(env), "observation.images.*"}
     env.close()
-    assert table("What is recorded") == columns
+    assert table("recording", "What is recorded") == columns
 
 
 def test_exit_codes_and_statuses_are_all_there():
     codes = {"0", str(cli.FAILED), str(cli.BAD_INPUT), str(cli.INTERRUPTED)}
-    assert table("Exit codes") == codes
-    assert all(f"`{status.value}`" in text("README.md") for status in Status)
+    assert table("recording", "Exit codes") == codes
+    assert table("safety", "When the robot brakes") == {status.value for status in Status}
 
 
 def test_the_version_is_in_the_changelog():

@@ -1,9 +1,10 @@
-"""A message never names a flag that does not exist: every `--flag` in the source is one of a command."""
+"""Neither a message nor a page names a flag that does not exist: every `--flag` is one of a command."""
 
 import ast
 import re
 import tomllib
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 from command_helpers import command
@@ -16,7 +17,9 @@ OTHERS = {  # flags of other programs, by the word that the same text must say
     "lerobot-dataset-viz": {"--repo-id", "--root", "--episode-index", "--save", "--output-dir"},
     "`--flag`": {"--flag"},
     "--config_path=": {"--config_path"},  # what LeRobot's training is given
+    "accelerate launch": {"--multi_gpu"},
 }
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 type Function = ast.FunctionDef | ast.AsyncFunctionDef | ast.Module
 
 
@@ -124,6 +127,18 @@ def test_every_flag_that_a_text_names_exists(known):
             wrong += [f"{place}: {flag}" for flag in sorted(found - known - foreign(text))]
     assert named > 100
     assert not wrong, "\n".join(wrong)
+
+
+def spans(page: Path) -> list[str]:
+    """Return what a page shows as code in its sentences; commands in blocks are parsed by another test."""
+    prose = re.sub(r"^```.*?^```", "", page.read_text(), flags=re.DOTALL | re.MULTILINE)
+    return re.findall(r"`([^`\n]+)`", prose)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_every_flag_that_a_page_names_exists(page, known):
+    wrong = {flag for span in spans(page) for flag in flags_in(span) - known - foreign(span)}
+    assert wrong == set()
 
 
 def test_the_law_sees_a_flag_that_is_made_up_in_a_loop():

@@ -1,5 +1,6 @@
-"""README's commands can be pasted in order, into a fresh folder; with fewer episodes and steps."""
+"""The commands of README and the pages can be pasted in order into a fresh folder; here with less of all."""
 
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -7,7 +8,8 @@ from pathlib import Path
 import pytest
 from command_helpers import command
 from graphics import graphics_trouble
-from readme_commands import NOT_RUN, made_small, readme_commands, small_study, takes_minutes
+from places import ROOT
+from readme_commands import MAIN, NOT_RUN, PAGES, made_small, page_commands, small_study, takes_minutes
 
 _DRAW = ("--cameras", "--video")
 
@@ -35,13 +37,21 @@ def can_run(words: list[str]) -> bool:
     return words[0] not in NOT_RUN and not (set(_DRAW) & set(words) and graphics_trouble())
 
 
+def commands_of(pages):
+    """Return the commands of some pages that can be run here, each once: a page may repeat another's."""
+    found = []
+    for words in (words for page in pages for words in page_commands(page)):
+        if can_run(words) and words not in found:
+            found.append(words)
+    return found
+
+
 def test_the_main_path_can_be_pasted_in_order(tmp_path, monkeypatch):
     """Record, look, train, evaluate, compare: what no command before it made is not there."""
     fresh(tmp_path, monkeypatch)
-    chosen = [words for words in readme_commands() if can_run(words) and not takes_minutes(words)]
-    names = {words[0] for words in chosen}
+    chosen = [words for words in commands_of(MAIN) if not takes_minutes(words)]
     needed = {f"handrail-{name}" for name in ("record", "inspect", "replay", "train", "evaluate", "compare")}
-    assert needed <= names
+    assert needed <= {words[0] for words in chosen}
     for words in chosen:
         run(made_small(words))
     assert Path("outputs/compare/report.html").is_file()
@@ -50,11 +60,24 @@ def test_the_main_path_can_be_pasted_in_order(tmp_path, monkeypatch):
 @pytest.mark.slow
 def test_every_command_can_be_pasted_in_order(tmp_path, monkeypatch):
     fresh(tmp_path, monkeypatch)
-    for words in readme_commands():
-        if can_run(words):
-            run(made_small(words))
+    for words in commands_of(PAGES):
+        run(made_small(words))
 
 
 def test_what_is_not_run_is_no_command_of_ours():
     assert not [name for name in NOT_RUN if name.startswith(("handrail-", "lerobot-"))]
-    assert set(NOT_RUN) <= {words[0] for words in readme_commands()}
+    assert set(NOT_RUN) <= {words[0] for page in PAGES for words in page_commands(page)}
+
+
+def test_every_page_with_commands_is_pasted():
+    pages = {str(path.relative_to(ROOT)) for path in (ROOT / "docs").glob("*.md")} | {"README.md"}
+    assert {page for page in pages if page_commands(page)} == set(PAGES)
+
+
+def test_the_readme_s_python_runs_and_the_base_makes_way(capsys):
+    readme = (ROOT / "README.md").read_text()
+    (source,) = re.findall(r"^```python\n(.*?)^```", readme, re.DOTALL | re.MULTILINE)
+    exec(compile(source, "README.md", "exec"), {})
+    shown = re.fullmatch(r"base \[\S+ +(\S+)\], hand .*, ok\n", capsys.readouterr().out)
+    assert shown is not None
+    assert float(shown[1]) < -0.2  # it went round the pillar

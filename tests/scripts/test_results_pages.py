@@ -39,14 +39,32 @@ def nominal(seed, name, metric, digits):
 
 def test_limits_of_the_study_come_before_its_figures():
     page = words((RESULTS / "teleop_modes.md").read_text())
-    readme = words((ROOT / "README.md").read_text())
-    before = (
-        page.split("## What came out")[0],
-        readme.split("## A whole study")[1].split("[what came out]")[0],
-    )
+    study = words((ROOT / "docs" / "study.md").read_text())
+    before = (page.split("## What came out")[0], study.split("[what came out]")[0])
     for text in before:
         assert [limit for limit in LIMITS if limit not in text.lower()] == []
-    assert "97 %" not in before[0]  # what `ee` has
+        assert "97 %" not in text  # what `ee` has
+    readme = words((ROOT / "README.md").read_text())
+    assert "not tell input and controller apart" in readme.split("97")[0]
+
+
+def test_the_readme_s_results_are_those_of_the_pages():
+    readme = words((ROOT / "README.md").read_text())
+    page = (RESULTS / "teleop_modes.md").read_text()
+    for mode in ("ee", "direct"):
+        row = re.search(rf"^\| `{mode}` \|.*unprotected \|(.*)$", page, re.MULTILINE)[1]
+        reach, tray, pick_place = re.findall(r"(\d+) % \(", row)
+        assert f"{reach}, {tray} and {pick_place} %" in readme
+    reached = {
+        name: sum(
+            round(run["success"]["mean"] * run["episodes"])
+            for run in (runs()[f"nominal_seed_{seed}"]["controllers"][name] for seed in (1, 2, 3))
+        )
+        for name in ("mpc", "mink")
+    }
+    assert f"reached {reached['mpc']} of 300 goals without contact; `mink` {reached['mink']}" in readme
+    clutter = runs()["nominal_clutter_seed_1"]["controllers"]["mpc"]
+    assert f"touched nothing, and reached {100 * clutter['success']['mean']:.0f} of 100" in readme
 
 
 def test_the_families_of_p_values_follow_from_the_study_s_json():
@@ -112,7 +130,8 @@ def test_time_is_told_by_the_update_and_its_rate():
     rates = [nominal(1, name, "updates_per_s", 0) for name in ("mpc", "rl")]
     assert f"{took[0]} against {took[1]} ms" in TEXT
     assert f"{rates[0]} against {rates[1]} a second" in TEXT
-    for document in (*RESULTS.glob("*.md"), ROOT / "README.md", ROOT / "CHANGELOG.md"):
+    pages = (*RESULTS.glob("*.md"), *(ROOT / "docs").glob("*.md"), ROOT / "README.md", ROOT / "CHANGELOG.md")
+    for document in pages:
         assert not re.search(r"% of the actor's (wall )?time", words(document.read_text()))
 
 

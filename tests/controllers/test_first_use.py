@@ -1,0 +1,65 @@
+"""Who asked is told, once, that something is being compiled; what is in the cache is not compiled."""
+
+import runpy
+import subprocess
+import sys
+
+import casadi as ca
+import pytest
+
+from handrail.controllers.numerics import first_use
+from handrail.controllers.numerics.compiled import compiled
+
+SOURCE = """
+from handrail.controllers.numerics.jit import jit
+
+@jit
+def doubled(number):
+    return 2 * number
+"""
+
+
+@pytest.fixture
+def told():
+    """Return a list that grows whenever it is said that something is being compiled."""
+    said: list[str] = []
+    first_use.tell_when_compiling(lambda: said.append("compiling"))
+    yield said
+    first_use.tell_when_compiling(lambda: None)
+
+
+def test_numba_s_first_call_is_told_and_what_is_in_the_cache_is_not(told, tmp_path):
+    file = tmp_path / "doubling.py"
+    file.write_text(SOURCE)
+    doubled = runpy.run_path(str(file))["doubled"]
+    assert told == []
+    assert doubled(3) == 6
+    assert doubled(3.0) == 6.0  # another type is compiled too, but it has been said
+    assert told == ["compiling"]
+    first_use.tell_when_compiling(lambda: told.append("again"))
+    assert runpy.run_path(str(file))["doubled"](4) == 8
+    assert told == ["compiling"]
+
+
+def test_a_library_of_casadi_is_told_and_one_in_the_cache_is_not(told, tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    monkeypatch.delenv("HANDRAIL_COMPILE", raising=False)
+    x = ca.SX.sym("x")
+    function = ca.Function("squared", [x], [x * x])
+    if compiled(function) is function:
+        pytest.skip("no C compiler here")
+    assert told == ["compiling"]
+    first_use.tell_when_compiling(lambda: told.append("again"))
+    assert float(compiled(function)(3.0)) == 9.0
+    assert told == ["compiling"]
+
+
+def test_a_command_says_it_on_standard_error_in_one_line():
+    code = (
+        "from handrail.scripts import cli;"
+        "from handrail.controllers.numerics.first_use import compiling;"
+        "cli.run(lambda: compiling() or compiling() or 0)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert (done.returncode, done.stdout) == (0, "")
+    assert done.stderr == "Compiling the controller for this machine, once; this can take a minute …\n"
