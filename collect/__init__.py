@@ -6,14 +6,11 @@ made.
 
 import gymnasium
 
-TASKS = {
-    "Drawer": "handrail.collect.tasks.drawer:Drawer",
-    "Reach": "handrail.collect.tasks.reach:Reach",
-    "PickPlace": "handrail.collect.tasks.pick_place:PickPlace",
-    "Tray": "handrail.collect.tasks.tray:Tray",
-}
+from handrail.collect.tasks.catalogue import TASKS
 
-for _name, _entry in TASKS.items():
+for _spec in TASKS.built_in:
     gymnasium.register(
-        f"handrail/{_name}-v0", entry_point="handrail.collect.envs.env:HandrailEnv", kwargs={"task": _entry}
+        f"handrail/{str(_spec.task).rpartition(':')[2]}-v0",
+        entry_point="handrail.collect.envs.env:HandrailEnv",
+        kwargs={"task": _spec.task},
     )

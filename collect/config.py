@@ -7,26 +7,15 @@ from typing import Annotated
 
 import tyro
 
-from handrail.collect.flags import only_one
+from handrail.collect.flags import one_of, only_one
+from handrail.collect.operators.catalogue import OPERATORS
 from handrail.collect.operators.human.human import HumanSettings
+from handrail.collect.operators.modes import MODES
+from handrail.collect.tasks.catalogue import TASKS
 from handrail.controllers.errors import HandrailError, unknown_name
+from handrail.controllers.robot.catalogue import ROBOTS
 from handrail.datasets.lists import Names
 
-TASKS = ("drawer", "pick_place", "reach", "tray")
-MODE_NAMES = (
-    "base",
-    "base+ee",
-    "decoupled",
-    "direct",
-    "direct_cbf",
-    "direct_filtered",
-    "direct_single",
-    "ee",
-    "joints",
-    "leader",
-    "switching",
-)
-OPERATORS = ("scripted",)
 REPO_ID = "handrail/demo"  # of a dataset whose name nobody says
 CAMERAS = ("wrist", "scene")
 FPS_RANGE = (10, 100)
@@ -38,15 +27,14 @@ MOST_TIME = 3600.0  # [s]
 class SessionConfig:
     """Who steers what, how, and what is watched."""
 
-    task: str = "pick_place"
-    """What to do: drawer, pick_place, reach or tray."""
-    mode: str = "ee"
-    """Teleop mode; through the MPC: ee, base, base+ee, joints, switching; safety filters: direct_filtered,
-    direct_cbf; neither: direct, direct_single, leader, decoupled."""
+    task: Annotated[str, one_of(TASKS)] = "pick_place"
+    """What to do."""
+    mode: Annotated[str, one_of(MODES)] = "ee"
+    """Teleop mode: what the operator steers, and what becomes of it."""
     mask: str = ""
     """A mask of your own instead of the mode's: 0 or 1 for each channel (base twist, tool twist, joints)."""
-    operator: str = "scripted"
-    """Who steers: scripted."""
+    operator: Annotated[str, one_of(OPERATORS)] = "scripted"
+    """Who steers."""
     noise: float = 1.0
     """How human the scripted hand is: 0 perfect, 1 as measured in people."""
     human: HumanSettings = field(default_factory=HumanSettings)
@@ -56,8 +44,8 @@ class SessionConfig:
     """Time after which an episode is given up [s]; the task's own when 0."""
     moving_obstacles: int = 0
     """Obstacles that cross the robot's way at up to 0.5 m/s, 0 to 4; task reach only."""
-    robot: str = "ridgeback_ur10"
-    """A robot that comes with Handrail, or a description file (.toml)."""
+    robot: Annotated[str, one_of(ROBOTS)] = "ridgeback_ur10"
+    """A robot, or a description file (.toml)."""
     seed: int = 0
     """Of scenes and operator: the same seed and versions give the same data."""
     cameras: Names = ""
@@ -83,11 +71,12 @@ class SessionConfig:
         Raises:
             HandrailError: one setting is wrong; the message says what may be chosen.
         """
-        _choice("task", self.task, TASKS)
-        _choice("mode", self.mode, MODE_NAMES)
-        _choice("operator", self.operator, OPERATORS)
+        TASKS.check(self.task)
+        MODES.check(self.mode)
+        OPERATORS.check(self.operator)
         for camera in self.camera_names:
-            _choice("camera", camera, CAMERAS)
+            if camera not in CAMERAS:
+                raise unknown_name("camera", camera, CAMERAS)
         if len(set(self.camera_names)) != len(self.camera_names):
             raise HandrailError(f"--cameras {self.cameras}: expected each camera once")
         if not 0.0 <= self.noise <= 5.0:
@@ -96,8 +85,9 @@ class SessionConfig:
             raise HandrailError(
                 f"--moving_obstacles {self.moving_obstacles}: expected a whole number from 0 to {MOST_MOVING}"
             )
-        if self.moving_obstacles and self.task != "reach":
-            raise HandrailError(f"--moving_obstacles: expected --task reach, got --task {self.task}")
+        if self.moving_obstacles and not TASKS.find(self.task).movers:
+            fit = " or ".join(spec.name for spec in TASKS.built_in if spec.movers)
+            raise HandrailError(f"--moving_obstacles: expected --task {fit}, got --task {self.task}")
         if not 0.0 <= self.time_limit <= MOST_TIME:
             raise HandrailError(
                 f"--time_limit {self.time_limit}: expected 0 (the task's own) to {MOST_TIME} s"
@@ -212,6 +202,19 @@ class ReplayConfig:
     """Also write a contact sheet of the episode to this .png file (needs OpenGL)."""
     video: str = ""
     """Also film the episode to this .mp4 file (needs OpenGL)."""
+    task: str = ""
+    """The recorded task where it is a module:name: a dataset alone does not make Handrail import it."""
+    mode: str = ""
+    """The same of the teleop mode."""
+    operator: str = ""
+    """The same of the operator."""
+    robot: str = ""
+    """The same of the robot."""
+
+    @property
+    def said(self) -> tuple[str, ...]:
+        """What the dataset may name because the command line does."""
+        return (self.task, self.mode, self.operator, self.robot)
 
     def check(self) -> None:
         """Check the settings.
@@ -283,8 +286,3 @@ def check_fps(fps: int) -> None:
     low, high = FPS_RANGE
     if not low <= fps <= high:
         raise HandrailError(f"--dataset.fps {fps}: expected {low} to {high}")
-
-
-def _choice(thing: str, name: str, choices: tuple[str, ...]) -> None:
-    if name not in choices:
-        raise unknown_name(thing, name, choices)

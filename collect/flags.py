@@ -1,8 +1,13 @@
 """What settings of several commands have in common: two ways to say one thing, names from a list, a page."""
 
+from collections.abc import Collection
 from pathlib import Path
+from typing import Any
+
+import tyro
 
 from handrail.controllers.errors import HandrailError, unknown_name
+from handrail.controllers.registry import Registry
 
 
 def only_one[Given](place: Given, flagged: Given, flag: str) -> Given:
@@ -20,14 +25,23 @@ def _shown(given: object) -> str:
     return " ".join(map(str, given)) if isinstance(given, tuple) else str(given)
 
 
-def names(given: str, everything: tuple[str, ...]) -> tuple[str, ...]:
+def one_of(registry: Registry[Any]) -> object:
+    """Return what lists a registry's names in the help of a flag, those of installed packages too."""
+    return tyro.conf.arg(
+        help_behavior_hint=lambda default: (
+            f"(default: {default}. {registry.help}; or module:name of another package)"
+        )
+    )
+
+
+def names(given: str, everything: Collection[str]) -> tuple[str, ...]:
     """Return the names in a comma-separated list, or everything where it says `all`."""
     if given.strip() == "all":
-        return everything
+        return tuple(everything)
     return tuple(name.strip() for name in given.split(",") if name.strip())
 
 
-def check_names(thing: str, flag: str, chosen: tuple[str, ...], choices: tuple[str, ...]) -> None:
+def check_names(thing: str, flag: str, chosen: tuple[str, ...], choices: Collection[str]) -> None:
     """Check that names were chosen, that each may be, and each is there once.
 
     Raises:
@@ -36,7 +50,9 @@ def check_names(thing: str, flag: str, chosen: tuple[str, ...], choices: tuple[s
     if not chosen:
         raise HandrailError(f"{flag}: expected all, or some of {', '.join(choices)}; got none")
     for name in chosen:
-        if name not in choices:
+        if isinstance(choices, Registry):
+            choices.check(name)
+        elif name not in choices:
             raise unknown_name(thing, name, ("all", *choices))
     if len(set(chosen)) != len(chosen):
         raise HandrailError(f"{flag} {','.join(chosen)}: expected each {thing} once")

@@ -32,7 +32,7 @@ def _replay(config: ReplayConfig) -> int:
     rows = []
     for episode in episodes:
         video = Path(config.video).expanduser() if config.video else None
-        replay, pictures = replay_episode(root, episode, _PICTURES if config.sheet else 0, video)
+        replay, pictures = replay_episode(root, episode, _PICTURES if config.sheet else 0, video, config.said)
         rows.append(_row(replay))
         if pictures:
             save_sheet(pictures, Path(config.sheet).expanduser())

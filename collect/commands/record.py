@@ -23,10 +23,10 @@ from handrail.collect.config import RecordConfig
 from handrail.collect.envs.env import HandrailEnv
 from handrail.collect.session.build import build_env, build_session, session_features, software_versions
 from handrail.collect.session.display import Display
+from handrail.collect.session.outcome import Outcome
 from handrail.collect.session.recorded_settings import COLUMN as SETTINGS
 from handrail.collect.session.recorded_settings import settings_json
 from handrail.collect.session.recorder import Recorder
-from handrail.collect.session.outcome import Outcome
 from handrail.collect.session.session import Session
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.recording.writer import EpisodeWriter

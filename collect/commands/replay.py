@@ -1,6 +1,7 @@
 """Replays a recorded episode's commands and reports how far the motion deviates."""
 
 import contextlib
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -54,7 +55,7 @@ class Replay:
 
 
 def replay_episode(
-    root: Path, episode: int, pictures: int = 0, video: Path | None = None
+    root: Path, episode: int, pictures: int = 0, video: Path | None = None, said: Collection[str] = ()
 ) -> tuple[Replay, list[NDArray[np.uint8]]]:
     """Run the recorded commands of an episode in its environment, from the same seed.
 
@@ -63,6 +64,7 @@ def replay_episode(
         episode: its number.
         pictures: how many pictures to take, evenly over the episode.
         video: also film the whole episode to this .mp4 file.
+        said: names of the command line, which the dataset may name as `module:name`.
 
     Returns:
         What came out, and the pictures, (height, width, 3) each.
@@ -72,7 +74,7 @@ def replay_episode(
     """
     info = read_info(root)
     row = _row(root, episode)
-    config = replace(recorded_settings(row), cameras="")
+    config = replace(recorded_settings(row, said), cameras="")
     frames = read_frames(root, episode, ["action", "observation.state"])
     env = build_env(config, info.fps, render=bool(pictures or video))
     with contextlib.ExitStack() as stack:

@@ -1,67 +1,31 @@
 """From settings to a session: the robot, the environment, the operator and the controller."""
 
 import importlib.metadata
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 
-import gymnasium
 import numpy as np
 
 from handrail.collect.config import SessionConfig, check_fps
 from handrail.collect.envs.env import RENDER_SIZE, HandrailEnv
-from handrail.collect.operators.modes import Completion, TeleopMode, find_mode, minding, without
-from handrail.collect.operators.scripts.drawer import DrawerScript
-from handrail.collect.operators.scripts.pick_place import PickPlaceScript
-from handrail.collect.operators.scripts.reach import ReachScript
-from handrail.collect.operators.scripts.scripted import ScriptedOperator
-from handrail.collect.operators.scripts.tray import TrayScript
+from handrail.collect.operators.catalogue import OPERATORS
+from handrail.collect.operators.leaving import leaving
+from handrail.collect.operators.modes import MODES, TeleopMode, always
+from handrail.collect.operators.operator import Operator
 from handrail.collect.session.session import Observer, Session
-from handrail.collect.tasks.drawer import Drawer
-from handrail.collect.tasks.pick_place import PickPlace
-from handrail.collect.tasks.reach import Reach
+from handrail.collect.tasks.catalogue import TASKS
 from handrail.collect.tasks.task import Task
-from handrail.collect.tasks.tray import Tray
-from handrail.controllers.baselines.cbf_filter import CbfFilter
-from handrail.controllers.baselines.direct import DirectController
-from handrail.controllers.baselines.split_controller import split_controller
+from handrail.controllers.catalogue import CONTROLLERS
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import Controller
-from handrail.controllers.mpc.masked_mpc import MaskedMpc
-from handrail.controllers.mpc.safety_filter import safety_filter
 from handrail.controllers.objectives.narrow_joints import narrow_joint_centring
 from handrail.controllers.objectives.objective import Objective
-from handrail.controllers.objectives.tray import tray_levelling
+from handrail.controllers.registry import resolved
 from handrail.controllers.robot.model import RobotModel
 from handrail.datasets.format.schema import Feature
 from handrail.datasets.recording.frames import frame_features
 
-ENVIRONMENTS = {
-    "drawer": "handrail/Drawer-v0",
-    "pick_place": "handrail/PickPlace-v0",
-    "reach": "handrail/Reach-v0",
-    "tray": "handrail/Tray-v0",
-}
-TASK_CLASSES: Mapping[str, Callable[..., Task]] = {
-    "drawer": Drawer,
-    "pick_place": PickPlace,
-    "reach": Reach,
-    "tray": Tray,
-}
-SCRIPTS = {"drawer": DrawerScript, "pick_place": PickPlaceScript, "reach": ReachScript, "tray": TrayScript}
-CONTROLLERS: Mapping[Completion, Callable[[RobotModel, float], Controller]] = {
-    "mpc": lambda model, period: MaskedMpc(model),
-    "direct": DirectController,
-    "filter": safety_filter,
-    "cbf": CbfFilter,
-    "split": split_controller,
-}
-OBJECTIVES: Mapping[str, Callable[[Channels], tuple[Objective, ...]]] = {
-    "tray": lambda channels: (tray_levelling(channels, up=np.array([0.0, 0.0, -1.0]), level=LEVEL),)
-}
-LEFT = {"tray": ("ee.wx", "ee.wy")}  # a tray's tilt is the MPC's, not the operator's
-MINDED = {"tray": ("ee.vz",)}  # who drives with a tray in hand minds how high it is
-LEVEL = 20.0  # weight of a tray's tilt
-CENTRED = 10.0  # weight of the middle of joints that cannot turn half around
+_CENTRED = 10.0  # weight of the middle of joints that cannot turn half around
 _VERSIONED = ("handrail", "lerobot", "mujoco", "pin", "coal", "casadi", "daqp", "numpy", "gymnasium")
 
 
@@ -81,88 +45,77 @@ def build_env(
     """
     config.check()
     check_fps(fps)
-    env = gymnasium.make(
-        ENVIRONMENTS[config.task],
-        task=task or build_task(config),
-        robot=config.robot,
+    return HandrailEnv(
+        task or build_task(config),
+        config.robot,
         fps=fps,
         cameras=config.camera_names,
         image_size=(config.image_size, config.image_size),
         render_mode="rgb_array" if render else None,
         render_size=render if isinstance(render, tuple) else RENDER_SIZE,
-        disable_env_checker=True,
     )
-    unwrapped = env.unwrapped
-    if not isinstance(unwrapped, HandrailEnv):
-        raise HandrailError(f"environment of task {config.task}: expected a HandrailEnv, got {unwrapped}")
-    return unwrapped
 
 
 def build_task(config: SessionConfig) -> Task:
     """Return the task, with the time limit and the moving obstacles of the settings."""
     limit = {"horizon": config.time_limit} if config.time_limit else {}
     moving = {"moving_obstacles": config.moving_obstacles} if config.moving_obstacles else {}
-    return TASK_CLASSES[config.task](**limit, **moving)
+    return resolved(TASKS.find(config.task).task)(**limit, **moving)
 
 
 def build_session(config: SessionConfig, env: HandrailEnv, observers: Sequence[Observer] = ()) -> Session:
     """Return the session of an environment."""
     mode = build_mode(config, env.model)
-    mode = leave_to_objectives(mode, config.task)
     operator = build_operator(config, mode, env.model)
     controller = build_controller(mode, env.model, env.fps, config.task)
     return Session(env, controller, operator, observers, config.realtime)
 
 
-def build_operator(config: SessionConfig, mode: TeleopMode, model: RobotModel) -> ScriptedOperator:
-    """Return the scripted operator of a task in a mode: the person that the settings name."""
-    script = SCRIPTS[config.task](model, mode.gains, drives=mode.drives)
+def build_operator(config: SessionConfig, mode: TeleopMode, model: RobotModel) -> Operator:
+    """Return the operator of a task in a mode; a scripted one is the person that the settings name."""
     human = config.human.scaled(config.noise).person(np.random.default_rng(config.person))
-    return ScriptedOperator(model, script, mode, human)
+    build = resolved(OPERATORS.find(config.operator).build)
+    return build(model, mode, TASKS.find(config.task), human)
 
 
 def build_controller(mode: TeleopMode, model: RobotModel, fps: int, task: str = "") -> Controller:
     """Return the controller of a mode; the masked MPC's knows the objectives that robot and task bring."""
-    if mode.controller == "mpc":
-        return MaskedMpc(model, objectives=_objectives(model, task))
-    return CONTROLLERS[mode.controller](model, 1.0 / fps)
+    spec = CONTROLLERS.find(mode.controller)
+    objectives = (_objectives(model, task),) if spec.objectives else ()
+    return resolved(spec.build)(model, 1.0 / fps, *objectives)
 
 
 def _objectives(model: RobotModel, task: str) -> tuple[Objective, ...]:
     channels = Channels.of(model.description)
-    of_task = OBJECTIVES[task](channels) if task in OBJECTIVES else ()
-    return (*of_task, *narrow_joint_centring(channels, model.description.limits, CENTRED))
-
-
-def leave_to_objectives(mode: TeleopMode, task: str) -> TeleopMode:
-    """Return the mode without the channels that a task's objectives look after under the masked MPC.
-
-    And with those that are not to be left to it while only the base is steered.
-    """
-    if mode.controller != "mpc":
-        return mode
-    return minding(without(mode, LEFT.get(task, ())), MINDED.get(task, ()))
+    make = TASKS.find(task).objectives if task else None
+    of_task = resolved(make)(channels) if make else ()
+    return (*of_task, *narrow_joint_centring(channels, model.description.limits, _CENTRED))
 
 
 def build_mode(config: SessionConfig, model: RobotModel) -> TeleopMode:
-    """Return the teleop mode, with the mask of the command line if there is one.
+    """Return the teleop mode, without what the task's objectives look after under the masked MPC.
+
+    With the mask of the command line if there is one, on velocity sticks.
 
     Raises:
         HandrailError: the mask has the wrong size or other characters than 0 and 1.
     """
-    mode = find_mode(config.mode)
-    if not config.mask:
+    mode, task = MODES.find(config.mode), TASKS.find(config.task)
+    if config.mask:
+        names = _masked(config.mask, Channels.of(model.description))
+        mode = TeleopMode(config.mode_name, always(*names), mode.controller, "a mask of one's own")
+    if not CONTROLLERS.find(mode.controller).objectives:
         return mode
-    channels = Channels.of(model.description)
-    if set(config.mask) - {"0", "1"} or len(config.mask) != channels.size:
+    return leaving(mode, task.left, task.minded)
+
+
+def _masked(mask: str, channels: Channels) -> tuple[str, ...]:
+    if set(mask) - {"0", "1"} or len(mask) != channels.size:
         raise HandrailError(
-            f"--mask {config.mask}: expected {channels.size} characters 0 or 1, "
-            f"one each for {', '.join(channels.names)}; got {len(config.mask)}"
+            f"--mask {mask}: expected {channels.size} characters 0 or 1, "
+            f"one each for {', '.join(channels.names)}; got {len(mask)}"
         )
-    names = tuple(np.array(channels.names)[np.array(list(config.mask)) == "1"])
-    return TeleopMode(
-        config.mode_name, lambda focus: names, mode.controller, "a mask of one's own", gains=mode.gains
-    )
+    return tuple(name for name, bit in zip(channels.names, mask, strict=True) if bit == "1")
 
 
 def session_features(env: HandrailEnv) -> dict[str, Feature]:

@@ -1,14 +1,18 @@
 """The settings of a session, as every episode that came of it keeps them."""
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import asdict, fields
 from typing import Any
 
 from handrail.collect.config import SessionConfig
+from handrail.collect.operators.catalogue import OPERATORS
 from handrail.collect.operators.human.human import HumanSettings
+from handrail.collect.operators.modes import MODES
+from handrail.collect.tasks.catalogue import TASKS
 from handrail.controllers.entries import Entry, check_entries, is_number, is_table
 from handrail.controllers.errors import HandrailError, shown
+from handrail.controllers.robot.catalogue import ROBOTS
 
 COLUMN = "settings"
 _OLDER = {"environment": "task"} | {  # what an episode said before it kept every setting, and its name now
@@ -31,6 +35,7 @@ def _entries(settings: SessionConfig | HumanSettings, needed: tuple[str, ...] = 
 _WHERE = "settings of the episode"
 _ENTRIES = _entries(SessionConfig(), needed=("task", "robot"))
 _HUMAN = _entries(HumanSettings())
+_NAMES = {"task": TASKS, "mode": MODES, "operator": OPERATORS, "robot": ROBOTS}
 
 
 def settings_json(config: SessionConfig) -> str:
@@ -39,21 +44,24 @@ def settings_json(config: SessionConfig) -> str:
     return json.dumps({entry.name: everything[entry.name] for entry in fields(SessionConfig)})
 
 
-def recorded_settings(row: Mapping[str, Any]) -> SessionConfig:
+def recorded_settings(row: Mapping[str, Any], said: Collection[str] = ()) -> SessionConfig:
     """Return the settings with which an episode was recorded.
 
     Args:
         row: the episode's line of metadata. An older one says only its task, its robot and a few more: the
             rest is as by default.
+        said: the names of the command line; others that are `module:name` are refused.
 
     Raises:
-        HandrailError: it says no settings of a session, or wrong ones.
+        HandrailError: it says no settings of a session, wrong ones, or what is to be imported.
     """
     settings = _parsed(row[COLUMN]) if row.get(COLUMN) else _older(row)
     check_entries(settings, _ENTRIES, _WHERE)
     human = settings.pop("human", {})
     check_entries(human, _HUMAN, f"{_WHERE}: human")
     config = SessionConfig(**settings, human=HumanSettings(**human))
+    for name, registry in _NAMES.items():
+        registry.admit(getattr(config, name), said)
     config.check()
     return config
 

@@ -11,7 +11,10 @@ from handrail.collect.tasks.furniture import TRAY_BAR, can, table, tray
 from handrail.collect.tasks.task import Episode, Outcome, TaskState
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import HandrailError
+from handrail.controllers.interface.channels import Channels
 from handrail.controllers.numerics.rotation import quaternion_from_matrix
+from handrail.controllers.objectives.objective import Objective
+from handrail.controllers.objectives.tray import tray_levelling
 from handrail.controllers.robot.inverse_kinematics import arm_configuration
 from handrail.controllers.robot.model import Pose, RobotModel
 
@@ -21,6 +24,7 @@ _RADIUS, _HEIGHT = 0.033, 0.10  # of the can [m]
 _POSE = ("x", "y", "z", "qw", "qx", "qy", "qz")
 _MOST_TRIES = 20  # starts drawn, until the arm can hold the tray there
 _VIEW = View(position=(2.2, 0.0, 2.9), target=(-0.2, 0.0, 0.3), fovy=62.0)
+_LEVEL = 20.0  # weight of its tilt
 HANDLE = np.array([0.0, 0.0, _SIZE[2]])  # centre of the handle's bar in the tray's frame [m]
 
 
@@ -134,3 +138,8 @@ def _level(tool: FloatArray) -> FloatArray:
 def _sample_can(on: SceneObject, rng: np.random.Generator) -> SceneObject:
     offset = np.array([*rng.uniform([-0.05, -0.07], [0.05, 0.07]), _HEIGHT / 2])
     return can("can", on.position + on.rotation @ offset, _RADIUS, _HEIGHT, _CAN_MASS)
+
+
+def level_tray(channels: Channels) -> tuple[Objective, ...]:
+    """Return what the masked MPC minds while the operator carries the tray: that it is level."""
+    return (tray_levelling(channels, up=np.array([0.0, 0.0, -1.0]), level=_LEVEL),)

@@ -10,11 +10,11 @@ import numpy as np
 from handrail.controllers.arrays import FloatArray, frozen
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.numerics.rotation import matrix_from_rpy, matrix_to_axis
+from handrail.controllers.robot.catalogue import ROBOTS
 from handrail.controllers.robot.description_check import check_description
 from handrail.controllers.robot.shape import Shape, ShapeKind
 from handrail.controllers.strict_toml import read_toml
 
-_FOLDER = Path(__file__).parent / "robots"
 _PLANAR = ("x", "y", "theta")
 _SIMPLE: tuple[ShapeKind, ...] = ("box", "sphere", "cylinder")
 
@@ -108,17 +108,17 @@ class RobotDescription:
 
 
 def robot_names() -> list[str]:
-    """Return the robots that come with Handrail."""
-    return sorted(path.stem for path in _FOLDER.glob("*.toml"))
+    """Return the robots that come with Handrail, and those of installed packages."""
+    return sorted(ROBOTS)
 
 
 def load_description(robot: str | Path) -> RobotDescription:
-    """Read a robot by name, or from a description file.
+    """Read a robot by name, by `module:name`, or from a description file.
 
     Raises:
         HandrailError: no such robot, or the file cannot be one's.
     """
-    path = Path(robot) if str(robot).endswith(".toml") else _FOLDER / f"{robot}.toml"
+    path = Path(robot) if str(robot).endswith(".toml") else ROBOTS.find(str(robot)).file
     if not path.is_file():
         raise HandrailError(
             f"unknown robot {str(robot)!r}: expected a .toml file or one of {', '.join(robot_names())}"

@@ -107,9 +107,9 @@ def test_home_puts_the_tool_where_the_robot_has_it():
     ],
 )
 def test_a_wrong_description_says_what_is_wrong(tmp_path, change, words):
-    from handrail.controllers.robot import description
+    from handrail.controllers.robot.catalogue import ROBOTS
 
-    text = (description._FOLDER / "ridgeback_ur10.toml").read_text()
+    text = ROBOTS["ridgeback_ur10"].file.read_text()
     assert change[0] in text
     path = tmp_path / "robot.toml"
     path.write_text(text.replace(change[0], change[1], 1))

@@ -6,7 +6,7 @@ import numpy as np
 
 from handrail.collect.commands.record import episode_seed
 from handrail.collect.config import SessionConfig
-from handrail.collect.operators.modes import find_mode
+from handrail.collect.operators.modes import MODES
 from handrail.collect.session.build import build_controller, build_env, build_session
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.mpc.masked_mpc import MaskedMpc
@@ -35,7 +35,7 @@ def test_an_arm_whose_joints_turn_around_is_left_alone():
     model = load_model()
     channels = Channels.of(model.description)
     assert narrow_joint_centring(channels, model.description.limits, 10.0) == ()
-    entries = build_controller(find_mode("ee"), model, 20).residuals.objectives  # pyright: ignore
+    entries = build_controller(MODES["ee"], model, 20).residuals.objectives  # pyright: ignore
     assert [entry.name for entry in entries] == [
         entry.name for entry in MaskedMpc(model).residuals.objectives
     ]

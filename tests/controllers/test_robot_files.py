@@ -11,11 +11,11 @@ from toml_helpers import mutated
 
 from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.errors import HandrailError
-from handrail.controllers.robot import description as description_module
+from handrail.controllers.robot.catalogue import ROBOTS
 from handrail.controllers.robot.description import load_description, robot_names
 from handrail.controllers.robot.model import RobotModel
 
-TEXTS = {name: (description_module._FOLDER / f"{name}.toml").read_text() for name in robot_names()}
+TEXTS = {name: spec.file.read_text() for name, spec in ROBOTS.items()}
 QUICK = settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
 
 

@@ -4,7 +4,7 @@ import numpy as np
 from collect_helpers import environment
 
 from handrail.collect.operators.human.motion_goal import MotionGoal, Target
-from handrail.collect.operators.modes import find_mode
+from handrail.collect.operators.modes import MODES
 from handrail.collect.operators.operator import View
 from handrail.collect.operators.scripts.scripted import ScriptedOperator
 from handrail.collect.tasks.task import TaskState
@@ -44,7 +44,7 @@ def first_view() -> View:
 
 def drive(view, mode, human, seconds=12.0, script=None, start=HOME):
     """Integrate what the operator asks for, without physics; return intents and configurations."""
-    mode = find_mode(mode)
+    mode = MODES[mode]
     operator = ScriptedOperator(MODEL, script or Wisher(), mode, human)
     controller = split_controller(MODEL) if mode.controller == "split" else DirectController(MODEL)
     q, v, intents, path = start.copy(), np.zeros(MODEL.size), [], [start.copy()]

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from handrail.collect.config import SessionConfig
-from handrail.collect.operators.modes import find_mode
+from handrail.collect.operators.modes import MODES
 from handrail.collect.session.build import build_env
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.channels import Channels
@@ -86,7 +86,7 @@ def checkpoint(
     env = build_env(SessionConfig(task=task), 20)
     channels = Channels.of(env.model.description)
     focuses = ("base", "hand")
-    groups = [find_mode(mode).groups(focus) for focus in focuses]
+    groups = [MODES[mode].groups(focus) for focus in focuses]
     if mode == "direct_single":  # one axis at a time
         groups = [(name,) for name in (*channels.base, *channels.joints[3:])]
     masks = {tuple(channels.mask(*names).tolist()) for names in groups}

@@ -2,8 +2,9 @@
 
 from dataclasses import dataclass
 
-from handrail.collect.config import MODE_NAMES, TASKS
 from handrail.collect.flags import check_names, check_page, names
+from handrail.collect.operators.modes import MODES
+from handrail.collect.tasks.catalogue import TASKS
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.lists import Names
 
@@ -42,7 +43,7 @@ class TrialsConfig:
     @property
     def mode_names(self) -> tuple[str, ...]:
         """The modes asked for."""
-        return names(self.modes, MODE_NAMES)
+        return names(self.modes, MODES)
 
     def check(self) -> None:
         """Check what can be checked without loading anything heavy.
@@ -51,7 +52,7 @@ class TrialsConfig:
             HandrailError: one setting is wrong; the message says what may be chosen.
         """
         check_names("task", "--tasks", self.task_names, TASKS)
-        check_names("mode", "--modes", self.mode_names, MODE_NAMES)
+        check_names("mode", "--modes", self.mode_names, MODES)
         for name, least in (("episodes", 1), ("persons", 1), ("seed", 0)):
             value = getattr(self, name)
             if value < least:

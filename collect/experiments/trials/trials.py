@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
+from typing import cast
 
 from handrail.collect.commands.record import episode_seed
 from handrail.collect.config import SessionConfig
@@ -9,13 +10,7 @@ from handrail.collect.envs.env import HandrailEnv
 from handrail.collect.experiments.trials.config import SLOW_LIMITS, SLOW_MODE, TrialsConfig
 from handrail.collect.experiments.trials.file import Trial, TrialsFile
 from handrail.collect.operators.scripts.scripted import ScriptedOperator
-from handrail.collect.session.build import (
-    build_controller,
-    build_env,
-    build_mode,
-    build_operator,
-    leave_to_objectives,
-)
+from handrail.collect.session.build import build_controller, build_env, build_mode, build_operator
 from handrail.collect.session.session import Session
 from handrail.datasets.recording.frames import Frame
 
@@ -47,7 +42,7 @@ def _run(config: TrialsConfig, task: str, mode: str, episodes: Sequence[int]) ->
     """Yield how the episodes of a task in a mode went; person `i mod persons` does episode i."""
     if not episodes:
         return
-    limit = SLOW_LIMITS[task] if mode == SLOW_MODE else 0.0
+    limit = SLOW_LIMITS.get(task, 0.0) if mode == SLOW_MODE else 0.0
     settings = [
         SessionConfig(
             task=task, mode=mode, robot=config.robot, noise=config.noise, person=person, time_limit=limit
@@ -80,8 +75,8 @@ def _run(config: TrialsConfig, task: str, mode: str, episodes: Sequence[int]) ->
 
 
 def _watched(config: SessionConfig, env: HandrailEnv) -> "tuple[Session, _Hands]":
-    mode = leave_to_objectives(build_mode(config, env.model), config.task)
-    operator = build_operator(config, mode, env.model)
+    mode = build_mode(config, env.model)
+    operator = cast(ScriptedOperator, build_operator(config, mode, env.model))
     hands = _Hands(operator)
     return Session(env, build_controller(mode, env.model, env.fps, config.task), operator, [hands]), hands
 

@@ -6,9 +6,9 @@ import numpy as np
 
 from handrail.collect.operators.devices.large_turn import LargeTurn
 from handrail.collect.operators.human.human import HumanSettings
-from handrail.collect.operators.human.motion_goal import Focus, MotionGoal
+from handrail.collect.operators.human.motion_goal import MotionGoal
 from handrail.collect.operators.human.steering import Gains
-from handrail.collect.operators.modes import TeleopMode
+from handrail.collect.operators.modes import Focus, TeleopMode
 from handrail.collect.operators.operator import View
 from handrail.controllers.arrays import BoolArray, FloatArray
 from handrail.controllers.interface.channels import Channels
@@ -41,7 +41,7 @@ class InputMap(Protocol):
         ...
 
     def wanted(self, goal: MotionGoal, state: State) -> tuple[BoolArray, FloatArray]:
-        """Return the channels that the operator owns now, (m,), and how far he wants each input, (m,)."""
+        """Return the channels that the operator owns now, (m,), and how far they want each input, (m,)."""
         ...
 
     def sent(self, moved: FloatArray, state: State) -> FloatArray:
@@ -56,11 +56,11 @@ class InputMap(Protocol):
 class StickMap:
     """Velocity sticks on all channels of a mode at once.
 
-    Where the mode has joint channels, the operator solves for them himself, as an expert would, with the
-    arm's angles as he imagines them, q + δ:
+    Where the mode has joint channels, the operator solves for them, as an expert would, with the arm's angles
+    as they imagine them, q + δ:
     `min ‖J(q + δ) v - hand‖² + w_b ‖v_base - base‖² + w_p ‖v_arm - k (q_home - q)‖² + λ ‖v / v_max‖²`.
-    A large turn would fold the arm into itself that way; there he brings the arm's joints straight to where
-    they belong (`LargeTurn`), while the base drives.
+    A large turn would fold the arm into itself that way; there they bring the arm's joints straight to where
+    these belong (`LargeTurn`), while the base drives.
 
     Args:
         model: of the robot.

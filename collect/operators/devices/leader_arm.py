@@ -25,9 +25,9 @@ class LeaderArmMap:
     """Absolute joint targets from one hand, a stick for the base in the other; nothing to switch.
 
     The hand takes the leader along, whose joints q_L follow by its mechanics: `q̇_L = J⁺ hand`. A large turn
-    would fold the arm on the way; there the operator brings all joints at once to where he thinks they
-    belong (`LargeTurn`). The robot is sent `q̇ = q̇_L + k (q_L + tremor − q)`. The leader starts where the arm
-    is, so that nothing jumps.
+    would fold the arm on the way; there the operator brings all joints at once to where these seem to belong
+    (`LargeTurn`). The robot is sent `q̇ = q̇_L + k (q_L + tremor − q)`. The leader starts where the arm is, so
+    that nothing jumps.
 
     Args:
         model: of the robot.

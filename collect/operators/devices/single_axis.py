@@ -1,4 +1,4 @@
-"""One axis at a time: the operator picks a joint, drives it where he thinks it belongs, picks the next."""
+"""One axis at a time: the operator picks a joint, drives it where it seems to belong, picks the next."""
 
 import numpy as np
 
@@ -26,7 +26,7 @@ class SingleAxisMap:
     """A single stick on the base's axes and the arm's joints, one at a time; changing is a mode switch.
 
     The operator knows which joints would put the hand there, but not exactly: `q* = q + (q_ik − q)(1 + σ z)`.
-    He moves one joint after the other, in an order in which nothing is hit, and thinks anew when all are near
+    They move one joint after the other, in an order in which nothing is hit, and think anew when all are near
     q*. The base likewise, axis by axis.
 
     Args:

@@ -1,14 +1,12 @@
 """What an operator wants, whatever the teleop mode."""
 
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
+from handrail.collect.operators.modes import Focus
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.robot.model import Pose
-
-Focus = Literal["hand", "base"]
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,7 @@ class Gains:
         base_speed: full stick of the base's translation [m/s].
         base_rate: full stick of the base's rotation [rad/s].
         joint_rate: full stick of one joint [rad/s].
-        patience: how much longer than with a stick for the hand he tries before he goes on.
+        patience: how much longer than with a stick for the hand they try before they go on.
     """
 
     gain: float = 1.2

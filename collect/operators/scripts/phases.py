@@ -5,8 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from handrail.collect.operators.human.motion_goal import Focus, MotionGoal, Target
+from handrail.collect.operators.human.motion_goal import MotionGoal, Target
 from handrail.collect.operators.human.steering import Gains, base_twist, hand_twist, pose_errors
+from handrail.collect.operators.modes import Focus
 from handrail.collect.operators.operator import View
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.robot.model import Pose

@@ -5,15 +5,17 @@ from typing import Protocol
 
 import numpy as np
 
-from handrail.collect.operators.devices.devices import input_map
+from handrail.collect.operators.devices.devices import device_of, input_map
 from handrail.collect.operators.human.hand import HumanHand
 from handrail.collect.operators.human.human import HumanSettings
 from handrail.collect.operators.human.motion_goal import MotionGoal
 from handrail.collect.operators.human.perception import Perception
 from handrail.collect.operators.modes import TeleopMode
 from handrail.collect.operators.operator import View
+from handrail.collect.tasks.catalogue import TaskSpec
 from handrail.controllers.arrays import BoolArray
 from handrail.controllers.interface.intent import Intent, RawInput
+from handrail.controllers.registry import resolved
 from handrail.controllers.robot.model import RobotModel
 
 
@@ -49,7 +51,7 @@ class ScriptedOperator:
         self._script = script
         self._mode = mode
         self._map = input_map(model, mode)
-        self._human = replace(human, refractory=human.refractory * mode.refractory)
+        self._human = replace(human, refractory=human.refractory * device_of(mode).refractory)
 
     @property
     def name(self) -> str:
@@ -90,3 +92,12 @@ class ScriptedOperator:
             self._switches += 1
             self._free_at = time + self._settings.switch_time
         self._mask = mask
+
+
+def scripted_operator(
+    model: RobotModel, mode: TeleopMode, task: TaskSpec, human: HumanSettings
+) -> ScriptedOperator:
+    """Return who does a task's script in a mode, as brisk as people are with its device."""
+    device = device_of(mode)
+    script = resolved(task.script)(model, device.gains, drives=device.drives or mode.by_focus)
+    return ScriptedOperator(model, script, mode, human)

@@ -16,7 +16,7 @@ _OVER = 0.10  # the tray above the table while it comes near [m]
 _ABOVE = 0.012  # the tray above the table when it is let go [m]
 _INSIDE = 0.22  # the tray's middle behind the table's edge [m]
 _DOWN = np.diag([1.0, -1.0, -1.0])  # of the tool: pointing down, its x ahead
-_TILT = 0.06  # that a person who minds the can allows himself on the way [rad]
+_TILT = 0.06  # that a person who minds the can allows on the way [rad]
 _AHEAD = 1.0  # hand before the base's centre while carrying, with an arm that reaches as far as usual [m]
 
 

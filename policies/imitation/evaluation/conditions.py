@@ -9,12 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from handrail.collect.config import TASKS
-from handrail.collect.operators.modes import find_mode
+from handrail.collect.operators.modes import MODES
 from handrail.collect.perturbations.perturbations import Perturbation
+from handrail.collect.tasks.catalogue import TASKS
+from handrail.controllers.catalogue import CONTROLLERS, ControllerSpec
 from handrail.controllers.entries import is_count
 from handrail.controllers.errors import HandrailError
-from handrail.controllers.robot.description import robot_names
+from handrail.controllers.robot.catalogue import ROBOTS
 from handrail.datasets.storage.strict_json import load_json
 from handrail.policies.imitation.evaluation.config import EvaluateConfig
 from handrail.policies.imitation.evaluation.features import pictures, place_of
@@ -22,7 +23,6 @@ from handrail.policies.imitation.interface.checkpoint import NAME, PolicyMeta, m
 from handrail.policies.imitation.interface.interface import PolicyInterface
 from handrail.policies.imitation.interface.trust import check_policy_folder
 
-UNPROTECTED = ("direct", "split")  # completions of modes that keep nothing but the joints' limits
 _PART = 2**20  # bytes
 
 
@@ -105,11 +105,12 @@ def read_checkpoint(folder: Path, config: EvaluateConfig) -> Checkpoint:
     )
     if config.task and meta.environment in TASKS and meta.environment != config.task:
         raise HandrailError(f"{where}: expected one trained for {config.task}, got {meta.environment!r}")
+    _admit(meta, config)
     if interface is not None:
-        _check_task(meta.environment, where)
+        TASKS.check(meta.environment)
         movers = len({n.split(".")[0] for n in interface.environment_names if n.startswith("mover_")})
     else:
-        robot = meta.robot if meta.robot in robot_names() else ""
+        robot = meta.robot if meta.robot in ROBOTS else config.robot
         known = place_of(
             settings, where, robot, meta.environment if meta.environment in TASKS else config.task
         )
@@ -117,9 +118,11 @@ def read_checkpoint(folder: Path, config: EvaluateConfig) -> Checkpoint:
     return Checkpoint(place, meta, interface, pictures(settings, where), movers, _digest(place))
 
 
-def _check_task(task: str, where: str) -> None:
-    if task not in TASKS:
-        raise HandrailError(f"{where}: expected one trained for one of {', '.join(TASKS)}, got {task!r}")
+def _admit(meta: PolicyMeta, config: EvaluateConfig) -> None:
+    """Check what a policy names before anything of it is imported."""
+    TASKS.admit(meta.environment, (config.task,))
+    MODES.admit(meta.mode, (config.mode,))
+    ROBOTS.admit(meta.robot, (config.robot,))
 
 
 def _plain(place: Path, settings: Mapping[str, Any], config: EvaluateConfig) -> PolicyMeta:
@@ -191,7 +194,7 @@ def _tried[Value](refused: list[str], make: Callable[[], Value]) -> Value | None
 
 
 def _arm(checkpoint: Checkpoint, protection: str, perturbation: Perturbation, config: EvaluateConfig) -> Arm:
-    own = _own(checkpoint)
+    own = own_protection(checkpoint.intent_mode)
     chosen = own if protection == "own" else protection
     if chosen in ("mpc", "filter") and chosen != own and not _fits(checkpoint, chosen):
         raise HandrailError(
@@ -202,12 +205,16 @@ def _arm(checkpoint: Checkpoint, protection: str, perturbation: Perturbation, co
     return Arm(checkpoint, chosen, perturbation, config.time_limit, " ".join(filter(None, words)))
 
 
-def _own(checkpoint: Checkpoint) -> str:
-    """Return the protection that a policy's actions have by themselves."""
-    if not checkpoint.intent_mode:
+def own_protection(mode: str) -> str:
+    """Return the protection that a policy's actions have by themselves: intents of a mode, or none of any."""
+    if not mode:
         return "none"
-    completion = find_mode(checkpoint.intent_mode).controller
-    return "none" if completion in UNPROTECTED else completion
+    spec = _controller(mode)
+    return spec.name if spec.protects else "none"
+
+
+def _controller(mode: str) -> ControllerSpec:
+    return CONTROLLERS.find(MODES.find(mode).controller)
 
 
 def _fits(checkpoint: Checkpoint, protection: str) -> bool:
@@ -218,7 +225,7 @@ def _fits(checkpoint: Checkpoint, protection: str) -> bool:
     """
     if not checkpoint.intent_mode:
         return True
-    completes = find_mode(checkpoint.intent_mode).controller != "direct"
+    completes = _controller(checkpoint.intent_mode).completes
     return (protection == "mpc" and completes) or _commands_joints(checkpoint.interface)
 
 

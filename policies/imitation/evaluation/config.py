@@ -6,9 +6,10 @@ from typing import Annotated
 
 import tyro
 
-from handrail.collect.config import FPS_RANGE, MOST_TIME, TASKS
-from handrail.collect.flags import only_one
+from handrail.collect.config import FPS_RANGE, MOST_TIME
+from handrail.collect.flags import one_of, only_one
 from handrail.collect.perturbations.perturbations import Perturbation
+from handrail.collect.tasks.catalogue import TASKS
 from handrail.controllers.errors import HandrailError, unknown_name
 from handrail.datasets.lists import Names, Words
 
@@ -38,8 +39,12 @@ class EvaluateConfig:
     by + to have several at once."""
     label: str = ""
     """Name of the arm; the teleop mode, and what is special about it, when empty."""
-    task: str = ""
-    """Of policies that do not say it, such as lerobot-train's: drawer, pick_place, reach or tray."""
+    task: Annotated[str, one_of(TASKS)] = ""
+    """Of policies that do not say it, such as lerobot-train's, or that say a module:name."""
+    mode: str = ""
+    """The teleop mode of policies that say a module:name: it is imported only if you say it too."""
+    robot: str = ""
+    """The same of the robot."""
     fps: int = 20
     """Decisions a second of such policies: the rate of their dataset [Hz]."""
     time_limit: float = 0.0
@@ -102,8 +107,8 @@ class EvaluateConfig:
                 raise HandrailError(
                     f"--{name} {getattr(self, name)}: expected a whole number from {least} to {most}"
                 )
-        if self.task and self.task not in TASKS:
-            raise unknown_name("task", self.task, TASKS)
+        if self.task:
+            TASKS.check(self.task)
         for name in self.protections:
             if name not in PROTECTIONS:
                 raise unknown_name("protection", name, PROTECTIONS)

@@ -4,19 +4,19 @@ So does any policy of plain `lerobot-train`: the sizes of `observation.state`, `
 and `action` are those of one robot and one task, or of none.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from handrail.collect.config import CAMERAS, MOST_MOVING, TASKS, SessionConfig
+from handrail.collect.config import CAMERAS, MOST_MOVING, SessionConfig
 from handrail.collect.session.build import build_task
+from handrail.collect.tasks.catalogue import TASKS
 from handrail.controllers.entries import is_count
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.robot.description import load_description, robot_names
 
 IMAGES = "observation.images."
 STATE, ENVIRONMENT, ACTION = "observation.state", "observation.environment_state", "action"
-_MOVED = "reach"  # the task with moving obstacles
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ def place_of(settings: Mapping[str, Any], where: str, robot: str = "", task: str
         HandrailError: Handrail has none such, or several.
     """
     given = _sizes(settings, where)
-    known = [place for place in _places() if robot in ("", place.robot) and task in ("", place.task)]
+    known = list(_places((robot,) if robot else robot_names(), (task,) if task else TASKS))
     found = [place for place in known if all(place.sizes[name] == size for name, size in given.items())]
     if ENVIRONMENT not in given:
         found = [place for place in found if not place.movers]
@@ -114,11 +114,11 @@ def _shapes(settings: Mapping[str, Any], which: str, where: str) -> dict[str, tu
     return shapes
 
 
-def _places() -> Iterator[Place]:
-    for robot in robot_names():
+def _places(robots: Iterable[str], tasks: Iterable[str]) -> Iterator[Place]:
+    for robot in robots:
         joints = len(load_description(robot).joints)
-        for task in TASKS:
-            for movers in range(MOST_MOVING + 1 if task == _MOVED else 1):
+        for task in tasks:
+            for movers in range(MOST_MOVING + 1 if TASKS.find(task).movers else 1):
                 names = build_task(SessionConfig(task=task, moving_obstacles=movers)).state_names
                 sizes = {STATE: 2 * joints + 8, ENVIRONMENT: len(names), ACTION: joints + 1}
                 yield Place(robot, task, movers, sizes)

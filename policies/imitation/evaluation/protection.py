@@ -2,13 +2,13 @@
 
 from collections.abc import Mapping
 
-from handrail.collect.operators.modes import find_mode
+from handrail.collect.operators.modes import MODES
 from handrail.collect.session.build import build_controller
 from handrail.controllers.baselines.direct import DirectController
 from handrail.controllers.baselines.unprotected import unprotected_controller
 from handrail.controllers.interface.controller import Controller
 from handrail.controllers.robot.model import RobotModel
-from handrail.policies.imitation.evaluation.conditions import UNPROTECTED
+from handrail.policies.imitation.evaluation.conditions import own_protection
 
 _STAND_IN: Mapping[str, str] = {
     "mpc": "joints",
@@ -31,10 +31,9 @@ def build_protection(protection: str, mode: str, task: str, model: RobotModel, f
         model: of the robot.
         fps: control rate [Hz].
     """
-    own = find_mode(mode) if mode else None
-    if own is not None and protection == ("none" if own.controller in UNPROTECTED else own.controller):
-        return build_controller(own, model, fps, task)
+    if mode and protection == own_protection(mode):
+        return build_controller(MODES.find(mode), model, fps, task)
     if protection == "none":
-        complete = unprotected_controller if own else DirectController
+        complete = unprotected_controller if mode else DirectController
         return complete(model, 1.0 / fps)
-    return build_controller(find_mode(_STAND_IN[protection]), model, fps, task)
+    return build_controller(MODES[_STAND_IN[protection]], model, fps, task)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import torch
 
-from handrail.collect.config import MODE_NAMES
+from handrail.collect.operators.modes import MODES
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.format.schema import Feature
 from handrail.datasets.format.stats import column_stats
@@ -140,7 +140,7 @@ def read_source(config: TrainConfig, began: PolicyMeta | None = None) -> Source:
     else:
         selection = select(rows, info.fps, config)
     if config.actions == "intent":
-        _check_one_mode(selection)
+        _check_one_mode(selection, config.mode)
     if config.actions == "recorded":
         interface, features, columns = None, *_recorded(info, selection, config)
         _check_inputs(config, info, features)
@@ -151,13 +151,13 @@ def read_source(config: TrainConfig, began: PolicyMeta | None = None) -> Source:
     return Source(config, info, selection, interface, features, columns | _counters(selection, info.fps))
 
 
-def _check_one_mode(selection: Selection) -> None:
+def _check_one_mode(selection: Selection, said: str) -> None:
     """Check that an intent can be completed when the policy drives: as in its mode, and there is but one."""
     modes = Counter(str(row.get("mode") or "") for row in selection.rows)
-    if len(modes) == 1 and modes.keys() <= set(MODE_NAMES):
+    if len(modes) == 1 and modes.keys() <= {*MODES, said}:
         return
     found = ", ".join(f"{mode or 'no mode'} ({count})" for mode, count in modes.most_common())
-    known = next((mode for mode, _ in modes.most_common() if mode in MODE_NAMES), None)
+    known = next((mode for mode, _ in modes.most_common() if mode in MODES), None)
     flag = f"--mode {known}" if known else "--actions realised"
     raise HandrailError(
         f"--actions intent: expected episodes of one teleop mode, whose controller completes the intent when"

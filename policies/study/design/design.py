@@ -35,7 +35,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from handrail.collect.config import MODE_NAMES, TASKS
+from handrail.collect.operators.modes import MODES
+from handrail.collect.tasks.catalogue import TASKS
 from handrail.controllers.errors import HandrailError, unknown_name
 
 BUDGETS = ("time", "number")
@@ -139,7 +140,7 @@ class StudyDesign:
                 f"study {self.name}: expected two modes or more and a task, "
                 f"got {', '.join(self.modes) or 'no mode'}; {', '.join(self.tasks) or 'no task'}"
             )
-        _known("mode", self.modes, MODE_NAMES)
+        _known("mode", self.modes, MODES)
         _known("task", self.tasks, TASKS)
         _known("baseline", (self.baseline,), self.modes)
         _known("budget", self.budgets, BUDGETS)

@@ -6,7 +6,7 @@ from itertools import product
 from pathlib import Path
 from typing import Literal
 
-from handrail.collect.operators.modes import find_mode
+from handrail.collect.operators.modes import MODES
 from handrail.policies.study.design.design import StudyDesign
 
 Kind = Literal["collect", "policy", "compare"]
@@ -107,7 +107,7 @@ def _sweep(design: StudyDesign) -> Iterator[Job]:
 
 
 def _arms(cell: Cell, budget: str, seed: int) -> list[PolicyArm]:
-    completed = find_mode(cell.mode).controller == "mpc"  # the others leave nothing for an intent to complete
+    completed = MODES[cell.mode].controller == "mpc"  # the others leave nothing for an intent to complete
     spaces: tuple[Actions, ...] = ("realised", "intent") if completed else ("realised",)
     return [PolicyArm(cell, actions, budget, seed) for actions in spaces]
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 
-from handrail.collect.operators.modes import find_mode
+from handrail.collect.operators.modes import MODES
 from handrail.datasets.comparison.outcomes import OutcomeDifference, Outcomes
 from handrail.datasets.presentation.wording import families
 from handrail.policies.study.design.design import StudyDesign
@@ -48,7 +48,7 @@ def _policies(design: StudyDesign, results: Sequence[TaskResults]) -> Iterator[s
 
 def _differs_twice(mode: str, baseline: str) -> bool:
     """Return whether both the operator's input and the controller are others than in the baseline mode."""
-    one, other = find_mode(mode), find_mode(baseline)
+    one, other = MODES[mode], MODES[baseline]
     inputs = [(each.device, each.groups("base"), each.groups("hand")) for each in (one, other)]
     return inputs[0] != inputs[1] and one.controller != other.controller
 

@@ -12,7 +12,7 @@ from handrail.collect.operators.human.human import HumanSettings
 from handrail.collect.operators.human.motion_goal import MotionGoal
 from handrail.collect.operators.human.perception import Perception
 from handrail.collect.operators.human.steering import Gains, base_twist, hand_twist
-from handrail.collect.operators.modes import MODES, find_mode
+from handrail.collect.operators.modes import MODES
 from handrail.collect.operators.scripts.base_placement import (
     standing_point,
     standing_pose,
@@ -169,7 +169,7 @@ def motion_goal(focus="hand"):
 @pytest.mark.parametrize("name", STICKS)
 @pytest.mark.parametrize("focus", ["hand", "base"])
 def test_a_mode_speaks_only_on_its_channels(name, focus):
-    inputs = StickMap(MODEL, find_mode(name), Gains())
+    inputs = StickMap(MODEL, MODES[name], Gains())
     mask, values = inputs.wanted(motion_goal(focus), state())
     np.testing.assert_array_equal(mask, inputs.mask(focus))
     assert np.any(values[mask])
@@ -178,13 +178,13 @@ def test_a_mode_speaks_only_on_its_channels(name, focus):
 
 
 def test_switching_follows_the_focus():
-    inputs = StickMap(MODEL, find_mode("switching"), Gains())
+    inputs = StickMap(MODEL, MODES["switching"], Gains())
     np.testing.assert_array_equal(inputs.mask("hand"), inputs.channels.mask("ee"))
     np.testing.assert_array_equal(inputs.mask("base"), inputs.channels.mask("base"))
 
 
 def test_joint_inputs_move_the_hand_as_wished():
-    inputs = StickMap(MODEL, find_mode("direct"), Gains())
+    inputs = StickMap(MODEL, MODES["direct"], Gains())
     velocities = inputs.wanted(motion_goal(), state())[1][inputs.channels.joint_slice]
     twist = MODEL.jacobian(HOME) @ velocities
     np.testing.assert_allclose(twist, motion_goal().hand, atol=0.02)

@@ -4,14 +4,17 @@ import numpy as np
 import pytest
 from collect_helpers import action, environment
 
+from handrail.collect.config import SessionConfig
 from handrail.collect.operators.operator import View
 from handrail.collect.perturbations.delayed import DelayedOperator
 from handrail.collect.perturbations.perturbations import DEFAULTS, Perturbation
 from handrail.collect.perturbations.push import Pusher, sample_pushes
 from handrail.collect.perturbations.shift import ShiftedTask
-from handrail.collect.session.build import TASK_CLASSES
+from handrail.collect.session.build import build_task
 from handrail.collect.session.session import Session
+from handrail.collect.tasks.catalogue import TASKS
 from handrail.collect.tasks.reach import Reach
+from handrail.collect.tasks.tray import Tray
 from handrail.controllers.baselines.direct import DirectController
 from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.interface.channels import Channels
@@ -127,9 +130,9 @@ def test_a_session_without_disturbance_is_what_it_was():
     assert np.abs(again - calm).max() < np.abs(pushed - calm).max()
 
 
-@pytest.mark.parametrize("task", sorted(TASK_CLASSES))
+@pytest.mark.parametrize("task", sorted(TASKS))
 def test_a_shifted_start_is_elsewhere_and_free(task):
-    usual = TASK_CLASSES[task]()
+    usual = build_task(SessionConfig(task=task))
     shifted = ShiftedTask(usual, 0.3)
     assert (shifted.name, shifted.horizon, shifted.state_names) == (
         usual.name,
@@ -152,7 +155,7 @@ def test_a_shifted_start_is_elsewhere_and_free(task):
 
 
 def test_what_is_held_keeps_its_place_in_the_hand():
-    usual, shifted = TASK_CLASSES["tray"](), ShiftedTask(TASK_CLASSES["tray"](), 0.5)
+    usual, shifted = Tray(), ShiftedTask(Tray(), 0.5)
     before, after = (one.sample(MODEL, np.random.default_rng(1)) for one in (usual, shifted))
     for name in ("tray", "can"):
         places = []

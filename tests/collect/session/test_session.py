@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from handrail.collect.config import SessionConfig
-from handrail.collect.operators.modes import MODES, find_mode
+from handrail.collect.operators.modes import MODES
 from handrail.collect.session.build import (
     build_controller,
     build_env,
@@ -154,10 +154,10 @@ def test_a_mask_of_ones_own():
 
 def test_controllers_follow_the_mode():
     env = build_env(SessionConfig(task="reach"), 20)
-    assert isinstance(build_controller(find_mode("direct"), env.model, 20), DirectController)
-    assert isinstance(build_controller(find_mode("ee"), env.model, 20), MaskedMpc)
-    assert isinstance(build_controller(find_mode("direct_cbf"), env.model, 20), CbfFilter)
-    filtered = build_controller(find_mode("direct_filtered"), env.model, 25)
+    assert isinstance(build_controller(MODES["direct"], env.model, 20), DirectController)
+    assert isinstance(build_controller(MODES["ee"], env.model, 20), MaskedMpc)
+    assert isinstance(build_controller(MODES["direct_cbf"], env.model, 20), CbfFilter)
+    filtered = build_controller(MODES["direct_filtered"], env.model, 25)
     assert isinstance(filtered, MaskedMpc)
     assert filtered.settings == filter_settings(0.04)
 

@@ -13,7 +13,7 @@ from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.controller import State
 from handrail.controllers.interface.intent import Intent
 from handrail.controllers.mpc.masked_mpc import MaskedMpc
-from handrail.controllers.robot import description
+from handrail.controllers.robot.catalogue import ROBOTS
 from handrail.controllers.robot.description import load_description, robot_names
 from handrail.controllers.robot.model import RobotModel, load_model
 from handrail.controllers.robot.scene_shapes import floor_shapes, lowest_height, scene_shapes
@@ -150,7 +150,7 @@ def mesh_distance(model: RobotModel, pair: tuple[str, str], q: np.ndarray) -> fl
 
 @pytest.mark.parametrize("entry", ["scene", "floor"])
 def test_a_file_with_a_list_of_its_own_is_refused(tmp_path, entry):
-    text = (description._FOLDER / "ridgeback_ur10.toml").read_text()
+    text = ROBOTS["ridgeback_ur10"].file.read_text()
     path = tmp_path / "robot.toml"
     path.write_text(text.replace("[self_collision]", f'[self_collision]\n{entry} = ["chassis"]', 1))
     with pytest.raises(HandrailError, match=rf"robot.toml: entry {entry} of .*: remove it"):

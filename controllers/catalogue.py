@@ -1,0 +1,57 @@
+"""The controllers that a teleop mode can choose from; light to import."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from handrail.controllers.registry import Registry
+
+
+@dataclass(frozen=True)
+class ControllerSpec:
+    """A controller: one entry makes it.
+
+    Attributes:
+        name: that a teleop mode says.
+        build: `(model, period [s]) -> Controller`, or where that is, `module:name`.
+        help: what becomes of the command, in one line.
+        completes: whether it moves channels that nobody commands.
+        protects: whether it keeps more than the joints' limits.
+        objectives: whether `build` also takes what robot and task bring, `(model, period, objectives)`.
+    """
+
+    name: str
+    build: Callable[..., Any] | str
+    help: str
+    completes: bool = False
+    protects: bool = False
+    objectives: bool = False
+
+
+def _masked_mpc(model: Any, period: float, objectives: tuple[Any, ...]) -> Any:
+    from handrail.controllers.mpc.masked_mpc import MaskedMpc
+
+    return MaskedMpc(model, objectives=objectives)
+
+
+_HERE = "handrail.controllers"
+CONTROLLERS = Registry(
+    "controller",
+    ControllerSpec,
+    (
+        ControllerSpec("mpc", _masked_mpc, "the masked MPC", completes=True, protects=True, objectives=True),
+        ControllerSpec("direct", f"{_HERE}.baselines.direct:DirectController", "clipped to joint limits"),
+        ControllerSpec(
+            "filter", f"{_HERE}.mpc.safety_filter:safety_filter", "multi-step safety filter", protects=True
+        ),
+        ControllerSpec(
+            "cbf", f"{_HERE}.baselines.cbf_filter:CbfFilter", "one-step safety filter", protects=True
+        ),
+        ControllerSpec(
+            "split",
+            f"{_HERE}.baselines.split_controller:split_controller",
+            "inverse kinematics of the arm alone",
+            completes=True,
+        ),
+    ),
+)

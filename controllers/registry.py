@@ -1,0 +1,139 @@
+"""Things of one kind by name: built in, of an installed package, or `module:name` of the command line."""
+
+import importlib
+import re
+import sys
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from dataclasses import replace
+from functools import cache
+from importlib import metadata
+from typing import Any, Protocol
+
+from handrail.controllers.errors import HandrailError, message_of, unknown_name
+
+_REFERENCE = re.compile(r"[\w.]+:\w+")
+
+
+class Named(Protocol):
+    """What a registry holds: a frozen dataclass with a name and a line of help."""
+
+    @property
+    def name(self) -> str:
+        """What the command line and the data call it."""
+        ...
+
+    @property
+    def help(self) -> str:
+        """One line."""
+        ...
+
+
+class Registry[Spec: Named](Mapping[str, Spec]):
+    """Specs by name: what comes with Handrail, then what installed packages add by entry points.
+
+    Their group is `handrail.<thing>s`; they are imported when they are asked for. The names in this mapping
+    are safe, whoever says them. `find` also imports `module:name`: ask it for names that the command line or
+    a program says, and for those of a file once `admit` let them pass.
+
+    Args:
+        thing: in one word: for messages, the flag and the entry points.
+        kind: of the specs.
+        built_in: what comes with Handrail.
+    """
+
+    def __init__(self, thing: str, kind: type[Spec], built_in: Iterable[Spec]) -> None:
+        self._thing, self._kind = thing, kind
+        self._built_in = {spec.name: spec for spec in built_in}
+
+    @property
+    def built_in(self) -> tuple[Spec, ...]:
+        """What comes with Handrail."""
+        return tuple(self._built_in.values())
+
+    def __iter__(self) -> Iterator[str]:
+        return iter({**self._built_in, **self._installed()})
+
+    def __len__(self) -> int:
+        return len(list(iter(self)))
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._built_in or name in self._installed()
+
+    def __getitem__(self, name: str) -> Spec:
+        return self._built_in[name] if name in self._built_in else self._spec(name, self._installed()[name])
+
+    @property
+    def help(self) -> str:
+        """All names in one line; of what comes with Handrail, what it is."""
+        own = [f"{spec.name}: {spec.help}" for spec in self.built_in]
+        return "; ".join([*own, *(name for name in self if name not in self._built_in)])
+
+    def check(self, name: str) -> None:
+        """Check a name of the command line, without importing anything.
+
+        Raises:
+            HandrailError: there is none of that name, and it is no `module:name`.
+        """
+        if name not in self and not _REFERENCE.fullmatch(name):
+            raise unknown_name(self._thing, name, self)
+
+    def admit(self, name: str, said: Collection[str] = ()) -> None:
+        """Check a name that a file says: a stranger's file must not choose what is imported.
+
+        Args:
+            name: in the file.
+            said: the names on the command line, which may be imported.
+
+        Raises:
+            HandrailError: it is a `module:name` that the command line does not say too.
+        """
+        if _REFERENCE.fullmatch(name) and name not in self and name not in said:
+            raise HandrailError(
+                f"{self._thing} {name}: a file may not choose what is imported; "
+                f"expected an installed {self._thing}, or --{self._thing} {name} if you trust that module"
+            )
+
+    def find(self, name: str) -> Spec:
+        """Return a spec by its name, or by `module:name`, which is imported and becomes its name.
+
+        Raises:
+            HandrailError: there is none, it cannot be imported, or it is of another kind.
+        """
+        self.check(name)
+        return self[name] if name in self else self._spec(name, name)
+
+    def _installed(self) -> dict[str, str]:
+        return {entry.name: entry.value for entry in _entry_points(tuple(sys.path)).select(group=self._group)}
+
+    @property
+    def _group(self) -> str:
+        return f"handrail.{self._thing}s"
+
+    def _spec(self, name: str, reference: str) -> Spec:
+        spec = resolved(reference, f"--{self._thing} {name}")
+        if not isinstance(spec, self._kind):
+            raise HandrailError(
+                f"--{self._thing} {name}: expected a {self._kind.__name__}, got a {type(spec).__name__}"
+            )
+        return replace(spec, name=name)  # pyright: ignore[reportArgumentType]  (a dataclass)
+
+
+def resolved(value: Callable[..., Any] | str, where: str = "") -> Any:
+    """Return what is meant: `module:name` is imported now, anything else is itself.
+
+    Raises:
+        HandrailError: it cannot be imported.
+    """
+    if not isinstance(value, str):
+        return value
+    module, _, name = value.partition(":")
+    try:
+        return getattr(importlib.import_module(module), name)
+    except Exception as error:  # whatever another package's code raises
+        raise HandrailError(f"{where or value}: cannot import it: {message_of(error)}") from error
+
+
+@cache
+def _entry_points(path: tuple[str, ...]) -> metadata.EntryPoints:
+    """Return the entry points of all packages on the path; reading them takes a tenth of a second."""
+    return metadata.entry_points()

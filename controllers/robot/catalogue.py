@@ -1,0 +1,26 @@
+"""The robots by name; light to import."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from handrail.controllers.registry import Registry
+
+_FOLDER = Path(__file__).parent / "robots"
+
+
+@dataclass(frozen=True)
+class RobotSpec:
+    """A robot: one description file makes it.
+
+    Attributes:
+        name: as on the command line.
+        file: its description; `robots/ridgeback_ur10.toml` explains the format.
+        help: one line.
+    """
+
+    name: str
+    file: Path
+    help: str = "comes with Handrail"
+
+
+ROBOTS = Registry("robot", RobotSpec, (RobotSpec(path.stem, path) for path in sorted(_FOLDER.glob("*.toml"))))
