@@ -15,6 +15,8 @@ from handrail.collect.operators.scripts.reach import ReachScript
 from handrail.collect.operators.scripts.scripted import ScriptedOperator
 from handrail.collect.operators.scripts.tray import TrayScript
 from handrail.collect.session.session import Observer, Session
+from handrail.collect.simulation.ideal_robot import IdealRobot
+from handrail.collect.simulation.simulation import Simulation
 from handrail.collect.tasks.drawer import Drawer
 from handrail.collect.tasks.pick_place import PickPlace
 from handrail.collect.tasks.reach import Reach
@@ -72,7 +74,7 @@ def build_env(
 
     Args:
         config: of the session.
-        fps: control and recording rate [Hz].
+        fps: recording rate [Hz], and the robot's where the settings do not say another.
         render: whether `env.render()` shall give good-looking pictures; or their height and width [px].
         task: instead of the one that the settings name.
 
@@ -85,7 +87,8 @@ def build_env(
         ENVIRONMENTS[config.task],
         task=task or build_task(config),
         robot=config.robot,
-        fps=fps,
+        fps=config.robot_fps or fps,
+        plant=Simulation if config.physics else IdealRobot,
         cameras=config.camera_names,
         image_size=(config.image_size, config.image_size),
         render_mode="rgb_array" if render else None,
@@ -105,13 +108,25 @@ def build_task(config: SessionConfig) -> Task:
     return TASK_CLASSES[config.task](**limit, **moving)
 
 
-def build_session(config: SessionConfig, env: HandrailEnv, observers: Sequence[Observer] = ()) -> Session:
-    """Return the session of an environment."""
+def build_session(
+    config: SessionConfig, env: HandrailEnv, observers: Sequence[Observer] = (), fps: float | None = None
+) -> Session:
+    """Return the session of an environment, recorded at a rate [Hz]; at the robot's by default."""
+    fps = fps or env.fps
+    control_fps = config.control_fps or fps
     mode = build_mode(config, env.model)
     mode = leave_to_objectives(mode, config.task)
     operator = build_operator(config, mode, env.model)
-    controller = build_controller(mode, env.model, env.fps, config.task)
-    return Session(env, controller, operator, observers, config.realtime)
+    controller = build_controller(mode, env.model, control_fps, config.task)
+    return Session(
+        env,
+        controller,
+        operator,
+        observers,
+        config.realtime,
+        control_period=1.0 / control_fps,
+        record_period=1.0 / fps,
+    )
 
 
 def build_operator(config: SessionConfig, mode: TeleopMode, model: RobotModel) -> ScriptedOperator:
@@ -121,7 +136,7 @@ def build_operator(config: SessionConfig, mode: TeleopMode, model: RobotModel) -
     return ScriptedOperator(model, script, mode, human)
 
 
-def build_controller(mode: TeleopMode, model: RobotModel, fps: int, task: str = "") -> Controller:
+def build_controller(mode: TeleopMode, model: RobotModel, fps: float, task: str = "") -> Controller:
     """Return the controller of a mode; the masked MPC's knows the objectives that robot and task bring."""
     if mode.controller == "mpc":
         return MaskedMpc(model, objectives=_objectives(model, task))
