@@ -54,6 +54,12 @@ class SessionConfig:
     """Height and width of the pictures [pixels]."""
     realtime: bool = False
     """Pace the loop by the wall clock."""
+    physics: bool = True
+    """MuJoCo; without, an ideal robot does exactly as it is told (task reach, no cameras)."""
+    robot_fps: int = 0
+    """How often the robot is sent a command [Hz], a multiple of the recording rate; that rate when 0."""
+    control_fps: int = 0
+    """How often the controller is asked [Hz], at most as often as the robot; the recording rate when 0."""
 
     @property
     def camera_names(self) -> tuple[str, ...]:
@@ -91,6 +97,10 @@ class SessionConfig:
         if not 0.0 <= self.time_limit <= MOST_TIME:
             raise HandrailError(
                 f"--time_limit {self.time_limit}: expected 0 (the task's own) to {MOST_TIME} s"
+            )
+        if not self.physics and (self.task != "reach" or self.camera_names):
+            raise HandrailError(
+                "--no_physics: expected --task reach without cameras: nothing can be moved or seen"
             )
         if self.person < 0:
             raise HandrailError(f"--person {self.person}: expected a whole number >= 0")
@@ -183,12 +193,23 @@ class RecordConfig(SessionConfig):
         """
         super().check()
         self.dataset.check()
+        self._check_rates()
         if self.resume and self.overwrite:
             raise HandrailError("--resume and --overwrite: expected one of them, got both")
         if self.display_data and self.display_web:
             raise HandrailError("--display_data and --display_web: expected one of them, got both")
         if self.display_save and not self.display_save.endswith(".rrd"):
             raise HandrailError(f"--display_save {self.display_save}: expected a file that ends in .rrd")
+
+    def _check_rates(self) -> None:
+        fps = self.dataset.fps
+        robot = self.robot_fps or fps
+        if robot % fps or robot > FPS_RANGE[1]:
+            raise HandrailError(
+                f"--robot_fps {robot}: expected a multiple of --dataset.fps {fps}, at most {FPS_RANGE[1]}"
+            )
+        if self.control_fps and not 1 <= self.control_fps <= robot:
+            raise HandrailError(f"--control_fps {self.control_fps}: expected 1 to {robot}, the robot's rate")
 
 
 @dataclass(frozen=True)

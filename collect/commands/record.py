@@ -2,6 +2,7 @@
 
 import contextlib
 import signal
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from types import FrameType
@@ -21,6 +22,7 @@ from rich.table import Table
 
 from handrail.collect.config import RecordConfig
 from handrail.collect.envs.env import HandrailEnv
+from handrail.collect.operators.operator import EpisodeEvent
 from handrail.collect.session.build import build_env, build_session, session_features, software_versions
 from handrail.collect.session.display import Display
 from handrail.collect.session.outcome import Outcome
@@ -33,20 +35,35 @@ from handrail.datasets.recording.writer import EpisodeWriter
 
 INTERRUPTED = 130
 FAILED = 1
+_DROPPED: dict[EpisodeEvent | None, str] = {
+    EpisodeEvent.DISCARD: "thrown away",
+    EpisodeEvent.RESTART: "begun again",
+}
 PLAIN: dict[str, Any] = {"highlight": False, "markup": False, "soft_wrap": True}
 
 
 @dataclass
 class _Log:
-    """What has been recorded in this run."""
+    """What has been recorded in this run, and what the operator did not want to keep."""
 
     outcomes: list[Outcome] = field(default_factory=list)
+    dropped: list[Outcome] = field(default_factory=list)
+    attempt: int = 0
     trouble: str = ""
     exit_code: int = 0
 
+    def add(self, outcome: Outcome) -> None:
+        """Count an episode; one thrown away is tried again elsewhere, one begun again is not."""
+        (self.outcomes if outcome.kept else self.dropped).append(outcome)
+        self.attempt = 0 if outcome.kept else self.attempt + (outcome.ended_by is EpisodeEvent.DISCARD)
+
     @property
-    def successes(self) -> int:
-        return sum(outcome.success for outcome in self.outcomes)
+    def words(self) -> str:
+        """How it stands."""
+        successes = sum(outcome.success for outcome in self.outcomes)
+        counts = Counter(outcome.ended_by for outcome in self.dropped)
+        dropped = (f", {counts[event]} {word}" for event, word in _DROPPED.items() if counts[event])
+        return f"{successes}/{len(self.outcomes)} succeeded" + "".join(dropped)
 
 
 def record(config: RecordConfig) -> int:
@@ -70,7 +87,7 @@ def record(config: RecordConfig) -> int:
                 console.print(str(writer.repaired), **PLAIN)
             task = config.dataset.single_task or env.task_description
             recorder = Recorder(writer, task, _session_columns(config))
-            session = build_session(config, env, [*displays, recorder])
+            session = build_session(config, env, [*displays, recorder], config.dataset.fps)
             log = _Log()
             _record_all(config, session, recorder, writer, log, console)
             _report(config, writer, log, console)
@@ -81,9 +98,15 @@ def record(config: RecordConfig) -> int:
     return log.exit_code
 
 
-def episode_seed(seed: int, episode: int) -> int:
-    """Return the seed of an episode: far apart for every seed and number."""
-    return int(np.random.SeedSequence([seed, episode]).generate_state(1)[0])
+def episode_seed(seed: int, episode: int, attempt: int = 0) -> int:
+    """Return the seed of an episode: far apart for every seed and number.
+
+    Args:
+        seed: of the recording.
+        episode: its number.
+        attempt: how many with this number the operator has thrown away.
+    """
+    return int(np.random.SeedSequence([seed, episode, attempt]).generate_state(1)[0])
 
 
 def _session_columns(config: RecordConfig) -> dict[str, str | float]:
@@ -124,14 +147,18 @@ def _record_all(
     """Record until the number is reached, the operator interrupts, or the disk or an encoder fails."""
     with _progress(console) as progress, _Interrupts() as interrupts:
         bar = progress.add_task("recording", total=config.dataset.num_episodes, success="–")
+
+        def tell_paused(paused: bool) -> None:
+            progress.update(bar, description="paused" if paused else "recording")
+
         try:
             while len(log.outcomes) < config.dataset.num_episodes:
-                outcome = session.run(episode_seed(config.seed, writer.num_episodes))
+                seed = episode_seed(config.seed, writer.num_episodes, log.attempt)
+                outcome = session.run(seed, tell_paused)
                 with interrupts.deferred():
                     recorder.save(outcome)
-                    log.outcomes.append(outcome)
-                rate = f"{log.successes}/{len(log.outcomes)} succeeded"
-                progress.update(bar, advance=1, success=rate)
+                    log.add(outcome)
+                progress.update(bar, completed=len(log.outcomes), description="recording", success=log.words)
         except KeyboardInterrupt:
             log.trouble, log.exit_code = (
                 "interrupted; the open episode is dropped, the saved ones are whole",
@@ -145,7 +172,9 @@ def _report(config: RecordConfig, writer: EpisodeWriter, log: _Log, console: Con
     if log.trouble:
         console.print(f"error: {log.trouble}", style="bold red", **PLAIN)
     if log.outcomes:
-        console.print(_summary(config, log.outcomes))
+        console.print(_summary(config, log))
+    for outcome in log.dropped:
+        console.print(f"not saved: {_DROPPED[outcome.ended_by]}, seed {outcome.seed}", **PLAIN)
     console.print(
         f"{writer.num_episodes} episodes, {writer.num_frames} frames in {writer.root}",
         highlight=False,
@@ -153,7 +182,8 @@ def _report(config: RecordConfig, writer: EpisodeWriter, log: _Log, console: Con
     )
 
 
-def _summary(config: RecordConfig, outcomes: list[Outcome]) -> Table:
+def _summary(config: RecordConfig, log: _Log) -> Table:
+    outcomes = log.outcomes
     simulated = sum(outcome.seconds for outcome in outcomes)
     wall = sum(outcome.wall_time for outcome in outcomes)
     distance = min(outcome.smallest_distance for outcome in outcomes)
@@ -161,7 +191,7 @@ def _summary(config: RecordConfig, outcomes: list[Outcome]) -> Table:
     periods = sum(outcome.contact_periods for outcome in outcomes)
     rows = {
         "task, mode": f"{config.task}, {config.mode_name}",
-        "success": f"{sum(outcome.success for outcome in outcomes)} of {len(outcomes)}",
+        "success": log.words,
         "recorded": f"{simulated:.1f} s in {wall:.1f} s: {simulated / wall:.1f} × real time",
         "smallest distance": f"{distance:.3f} m",
         "contacts begun": f"{contacts}, {periods} periods in contact",

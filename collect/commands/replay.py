@@ -10,14 +10,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from handrail.collect.envs.env import HandrailEnv
+from handrail.collect.operators.operator import View
 from handrail.collect.session.build import build_env
 from handrail.collect.session.recorded_settings import recorded_settings
+from handrail.collect.session.session import Session
 from handrail.collect.session.video_file import VideoFile
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.entries import is_count
 from handrail.controllers.errors import HandrailError
-from handrail.datasets.quality.safety import contacts_begun
+from handrail.controllers.interface.command import Command
+from handrail.controllers.interface.controller import State
+from handrail.controllers.interface.intent import Intent
+from handrail.controllers.robot.shape import Obstacle
 from handrail.datasets.reading.reader import read_episodes, read_frames, read_info
+from handrail.datasets.recording.frames import Frame
 
 
 @dataclass(frozen=True)
@@ -74,24 +80,27 @@ def replay_episode(
     """
     info = read_info(root)
     row = _row(root, episode)
-    config = replace(recorded_settings(row, said), cameras="")
     frames = read_frames(root, episode, ["action", "observation.state"])
+    length = len(frames["action"])
+    config = replace(recorded_settings(row, said), cameras="", time_limit=(length - 0.5) / info.fps)
     env = build_env(config, info.fps, render=bool(pictures or video))
     with contextlib.ExitStack() as stack:
         stack.callback(env.close)
         _check_state(frames["observation.state"], env, f"episode {episode} of {root}")
-        film = stack.enter_context(VideoFile(video, env.render_size, env.fps)) if video else None
-        camera = _Camera(env, _moments(len(frames["action"]), pictures), film)
-        states, last = _run(env, row["seed"], frames["action"], camera)
-    difference = np.abs(states - frames["observation.state"])
+        film = stack.enter_context(VideoFile(video, env.render_size, info.fps)) if video else None
+        camera, period = _Camera(_moments(length, pictures), film), 1.0 / info.fps
+        recorded = _Recorded(frames["action"], period)
+        rates = {"control_period": period, "record_period": period}
+        outcome = Session(env, recorded, _Nobody(), [camera], **rates).run(row["seed"])
+    difference = np.abs(camera.states - frames["observation.state"][: len(camera.states)])
     replay = Replay(
         episode=episode,
         names=env.agent_names,
         deviations=difference.max(axis=0),
         final=difference[-1],
         recorded_success=bool(row.get("success")),
-        success=bool(last["is_success"]),
-        contacts=last["contacts_begun"],
+        success=outcome.success,
+        contacts=outcome.contacts,
     )
     return replay, camera.taken
 
@@ -116,18 +125,42 @@ def _check_state(states: np.ndarray, env: HandrailEnv, where: str) -> None:
         )
 
 
-def _run(
-    env: HandrailEnv, seed: int, actions: np.ndarray, camera: "_Camera"
-) -> tuple[np.ndarray, dict[str, Any]]:
-    """Return the observed states before each action, (T, s), and the last info."""
-    observation, info = env.reset(seed=seed)
-    states, contacts = [], []
-    for index, action in enumerate(actions):
-        states.append(observation["agent_pos"])
-        observation, _, _, _, info = env.step(action)
-        contacts.append(info["contacts"])
-        camera.look(index)
-    return np.array(states), info | {"contacts_begun": int(contacts_begun(contacts))}
+class _Recorded:
+    """Says what was said in an episode, frame by frame, whatever is asked; a controller.
+
+    Args:
+        actions: velocities at the ends of the periods, and gripper, (T, n + 1).
+        period: of a frame [s].
+    """
+
+    def __init__(self, actions: np.ndarray, period: float) -> None:
+        self._actions, self._period = actions, period
+
+    def reset(self, obstacles: tuple[Obstacle, ...] = ()) -> None:
+        """Begin with the first frame."""
+        self._left = iter(self._actions.astype(np.float64))
+
+    def update_scene(self, obstacles: tuple[Obstacle, ...]) -> None:
+        """Take no note of the scene."""
+
+    def update(self, state: State, intent: Intent) -> Command:
+        """Return the way to the next frame's velocities."""
+        *velocity, gripper = next(self._left)
+        before = np.array(state.commanded)
+        return Command(np.stack([before, velocity, np.zeros(len(before))]), self._period, gripper)
+
+
+class _Nobody:
+    """Asks for nothing; an operator."""
+
+    name = "nobody"
+
+    def reset(self, view: View, rng: np.random.Generator) -> None:
+        """Begin an episode."""
+
+    def act(self, view: View) -> Intent:
+        """Return the intent of who touches nothing."""
+        return Intent(np.zeros(0), np.zeros(0, dtype=bool))
 
 
 def _moments(frames: int, pictures: int) -> set[int]:
@@ -136,15 +169,21 @@ def _moments(frames: int, pictures: int) -> set[int]:
 
 
 class _Camera:
-    """Takes pictures at some moments, and films all of them if there is a file for it."""
+    """Keeps the states, takes pictures at some moments, and films if there is a file; an observer."""
 
-    def __init__(self, env: HandrailEnv, moments: set[int], film: VideoFile | None) -> None:
-        self._env, self._moments, self._film = env, moments, film
+    def __init__(self, moments: set[int], film: VideoFile | None) -> None:
+        self._moments, self._film = moments, film
         self.taken: list[NDArray[np.uint8]] = []
+        self.states: list[FloatArray] = []
 
-    def look(self, index: int) -> None:
-        """Take the picture of this moment, if somebody wants it."""
-        wanted = index in self._moments
+    def begin(self, env: HandrailEnv, seed: int) -> None:
+        """Take note of the environment."""
+        self._env = env
+
+    def see(self, frame: Frame) -> None:
+        """Keep the state, and take the picture of this moment, if somebody wants it."""
+        wanted = len(self.states) in self._moments
+        self.states.append(frame.state)
         picture = self._env.render() if wanted or self._film else None
         if picture is None:
             return

@@ -236,9 +236,7 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             observation["pixels"] = {camera: self._paint("pixels", camera) for camera in self.cameras}
         return observation
 
-    def _info(
-        self, state: TaskState, outcome: Outcome, sent: NDArray[np.floating[Any]]
-    ) -> dict[str, Any]:
+    def _info(self, state: TaskState, outcome: Outcome, sent: NDArray[np.floating[Any]]) -> dict[str, Any]:
         contacts = self.world.contacts
         return {
             "is_success": outcome.success,

@@ -12,6 +12,8 @@ from handrail.collect.operators.leaving import leaving
 from handrail.collect.operators.modes import MODES, TeleopMode, always
 from handrail.collect.operators.operator import Operator
 from handrail.collect.session.session import Observer, Session
+from handrail.collect.simulation.ideal_robot import IdealRobot
+from handrail.collect.simulation.simulation import Simulation
 from handrail.collect.tasks.catalogue import TASKS
 from handrail.collect.tasks.task import Task
 from handrail.controllers.catalogue import CONTROLLERS
@@ -36,7 +38,7 @@ def build_env(
 
     Args:
         config: of the session.
-        fps: control and recording rate [Hz].
+        fps: recording rate [Hz], and the robot's where the settings do not say another.
         render: whether `env.render()` shall give good-looking pictures; or their height and width [px].
         task: instead of the one that the settings name.
 
@@ -48,7 +50,8 @@ def build_env(
     return HandrailEnv(
         task or build_task(config),
         config.robot,
-        fps=fps,
+        fps=config.robot_fps or fps,
+        plant=Simulation if config.physics else IdealRobot,
         cameras=config.camera_names,
         image_size=(config.image_size, config.image_size),
         render_mode="rgb_array" if render else None,
@@ -63,12 +66,24 @@ def build_task(config: SessionConfig) -> Task:
     return resolved(TASKS.find(config.task).task)(**limit, **moving)
 
 
-def build_session(config: SessionConfig, env: HandrailEnv, observers: Sequence[Observer] = ()) -> Session:
-    """Return the session of an environment."""
+def build_session(
+    config: SessionConfig, env: HandrailEnv, observers: Sequence[Observer] = (), fps: float | None = None
+) -> Session:
+    """Return the session of an environment, recorded at a rate [Hz]; at the robot's by default."""
+    fps = fps or env.fps
+    control_fps = config.control_fps or fps
     mode = build_mode(config, env.model)
     operator = build_operator(config, mode, env.model)
-    controller = build_controller(mode, env.model, env.fps, config.task)
-    return Session(env, controller, operator, observers, config.realtime)
+    controller = build_controller(mode, env.model, control_fps, config.task)
+    return Session(
+        env,
+        controller,
+        operator,
+        observers,
+        config.realtime,
+        control_period=1.0 / control_fps,
+        record_period=1.0 / fps,
+    )
 
 
 def build_operator(config: SessionConfig, mode: TeleopMode, model: RobotModel) -> Operator:
@@ -78,7 +93,7 @@ def build_operator(config: SessionConfig, mode: TeleopMode, model: RobotModel) -
     return build(model, mode, TASKS.find(config.task), human)
 
 
-def build_controller(mode: TeleopMode, model: RobotModel, fps: int, task: str = "") -> Controller:
+def build_controller(mode: TeleopMode, model: RobotModel, fps: float, task: str = "") -> Controller:
     """Return the controller of a mode; the masked MPC's knows the objectives that robot and task bring."""
     spec = CONTROLLERS.find(mode.controller)
     objectives = (_objectives(model, task),) if spec.objectives else ()

@@ -11,7 +11,7 @@ from handrail.controllers.interface.intent import Intent
 
 
 class Driver:
-    """Drives the robot of one episode: a command's trajectory is followed until the controller is asked again.
+    """Drives the robot of one episode: a command is followed until the controller is asked again.
 
     It tells the controller what there is to avoid: at the beginning, and while it moves or is held.
 

@@ -31,13 +31,16 @@ class Recorder:
         """Add a frame."""
         self._writer.add_frame(frame_row(frame), self._task)
 
-    def save(self, outcome: Outcome) -> int:
-        """Save the episode with how it went; return its number.
+    def save(self, outcome: Outcome) -> None:
+        """Save the episode with how it went; or forget it, if the operator threw it away or begins it again.
 
         Raises:
             HandrailError: the disk or an encoder failed; the saved episodes are whole.
         """
-        return self._writer.save_episode(
+        if not outcome.kept:
+            self._writer.discard_episode()
+            return
+        self._writer.save_episode(
             self._columns
             | {
                 "success": outcome.success,

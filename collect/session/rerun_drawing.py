@@ -22,15 +22,14 @@ class Drawing:
 
     def __init__(self, rr: Any) -> None:
         self._rr = rr
-        self._episode, self._frame = -1, 0
+        self._episode = -1
 
     def begin(self, env: HandrailEnv) -> None:
         """Draw the scene of a new episode."""
         self._model = env.model
         self._channels = Channels.of(env.model.description)
-        self._period = 1.0 / env.fps
+        self._world, self._time = env.world, 0.0
         self._episode += 1
-        self._frame = 0
         rr = self._rr
         rr.set_time("episode", sequence=self._episode)
         rr.set_time("time", duration=0.0)
@@ -43,9 +42,8 @@ class Drawing:
     def see(self, frame: Frame) -> None:
         """Log one moment."""
         rr = self._rr
-        time = self._frame * self._period
+        time, self._time = self._time, self._world.time
         rr.set_time("time", duration=time)
-        self._frame += 1
         for mover in self._movers:
             self._log_shape(f"world/scene/{mover.name}", mover.obstacle(time))
         q = frame.state[: self._model.size].astype(float)

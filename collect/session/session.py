@@ -25,6 +25,7 @@ from handrail.controllers.numerics.threads import single_threaded
 from handrail.controllers.robot.model import RobotModel
 from handrail.datasets.recording.frames import Frame
 
+_CREEP = 1e-3  # slower, a paused robot is sent rest [m/s, rad/s]
 _LONG_AGO = -1e6  # when nobody who steers has asked last [s]
 
 
@@ -157,6 +158,8 @@ class Session:
             if self._driver.drive(tally.frames, self._state, self._intent):
                 tally.updated(self._driver.command)
             action = self._driver.action(tally.frames)
+            if self._event is EpisodeEvent.PAUSE and np.abs(action[:-1]).max() < _CREEP:
+                action[:-1] = 0.0  # a controller may come ever nearer to rest
         with tally.timed("environment"):
             for disturbance in self._disturbances:
                 disturbance.act()
@@ -191,7 +194,8 @@ class Session:
 
     @property
     def _rests(self) -> bool:
-        return not np.any(self._state.commanded)
+        commanded = self._state.commanded
+        return commanded is not None and not commanded.any()
 
     def _view(self) -> View:
         task = self.env.task_state()

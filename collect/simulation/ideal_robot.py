@@ -46,7 +46,7 @@ class IdealRobot:
     ) -> None:
         if scene.movables or grip is not None:
             things = ", ".join(item.name for item in scene.movables)
-            raise HandrailError(f"ideal robot: expected a scene without things that can be moved, got {things}")
+            raise HandrailError(f"ideal robot: expected a scene where nothing can be moved, got {things}")
         self._model, self._scene, self._step = model, scene, step
         self._gate = Gate(model, step, precision=precision)
         self._collision = CollisionModel(model, scene.obstacles())

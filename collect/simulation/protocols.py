@@ -20,7 +20,7 @@ class Robot(Protocol):
         ...
 
     def send(self, command: ArrayLike) -> NDArray[np.floating[Any]]:
-        """Reach velocities linearly over one period, inside the robot's limits; return what was sent, (n + 1,).
+        """Reach velocities linearly over one period, inside the limits; return what was sent, (n + 1,).
 
         Args:
             command: velocities at the end of the period [m/s, rad/s] and gripper (1 closed), (n + 1,); one

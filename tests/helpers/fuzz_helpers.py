@@ -1,6 +1,7 @@
 """Random clutter, movers, and random, rude intents, for the safety fuzz.
 
-The robot is MuJoCo's, driven without the environment's limiter; contacts and distances are MuJoCo's too.
+The robot is MuJoCo's; excesses are those of what the controller says, before the robot's own limits.
+Contacts and distances are MuJoCo's too.
 """
 
 import itertools
@@ -200,7 +201,8 @@ def run(model: RobotModel, controller, seed: int, seconds: float, movers: int = 
         excess = np.abs(velocity - previous) / (limits.acceleration * PERIOD) - 1.0
         result.acceleration_excess = max(result.acceleration_excess, float(np.max(excess)))
         previous = velocity
-        for pair in simulation.advance(velocity, 0.0):
+        simulation.send(np.append(velocity, 0.0))
+        for pair in simulation.contacts:
             met = set(pair.split(" – "))
             kind = result.moving if met & moving else result.standing if met & standing else result.own
             kind.append(f"{pair} at {state.time:.2f} s: {around.told(state)}, {command.diagnostics.status}")

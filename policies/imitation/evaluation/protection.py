@@ -16,7 +16,7 @@ _STAND_IN: Mapping[str, str] = {
 }  # the mode whose controller it is
 
 
-def build_protection(protection: str, mode: str, task: str, model: RobotModel, fps: int) -> Controller:
+def build_protection(protection: str, mode: str, task: str, model: RobotModel, fps: float) -> Controller:
     """Return the controller of an arm.
 
     An intent under its mode's own protection gets that mode's very controller. Otherwise `mpc` is the masked

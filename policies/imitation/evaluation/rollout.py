@@ -19,8 +19,6 @@ from handrail.collect.session.session import Observer, Session
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import Controller
-from handrail.datasets.quality.safety import contacts_begun
-from handrail.datasets.recording.frames import Frame
 from handrail.policies.imitation.evaluation.conditions import Arm
 from handrail.policies.imitation.evaluation.operator import Policy, PolicyOperator
 from handrail.policies.imitation.evaluation.protection import build_protection
@@ -63,12 +61,12 @@ def run_rollout(
     policy = _policy(arm.checkpoint.folder, arm.checkpoint.digest, load)
     with one_thread(), repeatable(rollout.seed):
         operator = PolicyOperator(policy, Channels.of(env.model.description), arm.checkpoint.meta.mode)
-        perturbation, watch = arm.perturbation, _Watch()
+        perturbation = arm.perturbation
         late = DelayedOperator(operator, perturbation.delay)
         pushers = (Pusher(perturbation.push),) if perturbation.push else ()
-        session = Session(env, controller, late, (watch, *observers), disturbances=pushers)
+        session = Session(env, controller, late, observers, disturbances=pushers)
         outcome = session.run(rollout.seed)
-    return _row(outcome, watch, operator.malformed)
+    return _row(outcome, operator.malformed)
 
 
 def _session_config(arm: Arm) -> SessionConfig:
@@ -105,26 +103,13 @@ def _policy(folder: Path, digest: str, load: Load) -> Policy:
     return load(folder)
 
 
-class _Watch:
-    """Counts contacts along a rollout; an observer."""
-
-    def begin(self, env: HandrailEnv, seed: int) -> None:
-        """Begin."""
-        self.contacts: list[int] = []
-
-    def see(self, frame: Frame) -> None:
-        """Note how many there were in the period."""
-        self.contacts.append(frame.contacts)
-
-
-def _row(outcome: Outcome, watch: _Watch, malformed: int) -> Row:
-    contacts = np.array(watch.contacts, float)
+def _row(outcome: Outcome, malformed: int) -> Row:
     period = outcome.seconds / outcome.frames
     row: Row = {
         "seed": outcome.seed,
         "success": outcome.success,
-        "contacts": int(contacts_begun(contacts)),
-        "contact_time": round(period * int(np.count_nonzero(contacts)), 6),
+        "contacts": outcome.contacts,
+        "contact_time": round(period * outcome.contact_periods, 6),
         "length": round(outcome.seconds, 6),
         "brakes": outcome.brakes,
         "malformed": malformed,

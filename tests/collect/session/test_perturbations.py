@@ -178,6 +178,7 @@ def test_delayed_is_what_was_seen_k_periods_ago(periods):
             if len(views) == 1:
                 operator.reset(views[0], np.random.default_rng(0))
             intent = operator.act(views[-1])
+            assert isinstance(intent, Intent)
             assert intent.time == views[-1].state.time
             env.step(action(env, 0.1))
     assert inner.seen == [views[max(0, step - periods)] for step in range(10)]

@@ -82,7 +82,8 @@ def test_home_puts_the_tool_where_the_real_robot_has_it():
 
 def test_home_touches_nothing(model):
     simulation = Simulation(model, Scene(), np.array(model.description.home), 0.05)
-    assert simulation.advance(np.zeros(model.size), 0.0) == ()
+    simulation.send(np.zeros(model.size + 1))
+    assert simulation.contacts == ()
 
 
 def signed_distance(shape: Shape, points: np.ndarray) -> np.ndarray:
@@ -137,7 +138,7 @@ def test_fingers_stay_in_the_box_that_the_controller_avoids(shipped):
     for q_finger in (0.0, 1.0):
         simulation = Simulation(shipped, Scene(), np.array(shipped.description.home), 0.05)
         for _ in range(40):
-            simulation.advance(np.zeros(shipped.size), q_finger)
+            simulation.send(np.append(np.zeros(shipped.size), q_finger))
         frame = shipped.pose(simulation.state().q, placed.frame)
         for name in FINGERS:
             geom = simulation.mujoco_model.geom(name)
@@ -157,7 +158,7 @@ def test_a_gripper_that_does_not_grip_is_the_open_one(shipped):
         simulation = Simulation(model, Scene(), home, 0.03, **options)
         fingers = [simulation.data.geom(name).xpos.copy() for name in FINGERS]
         for k in range(60):
-            simulation.advance(speed * min(k, 20, 59 - k) / 20, 1.0 if "grips" in options else 0.0)
+            simulation.send(np.append(speed * min(k, 20, 59 - k) / 20, 1.0 if "grips" in options else 0.0))
         fingers += [simulation.data.geom(name).xpos.copy() for name in FINGERS]
         ends.append(np.array([*fingers, simulation.tool.position]))
     assert len(simulation.data.qpos) == model.size
@@ -225,7 +226,7 @@ def test_the_hand_opens_as_far_and_presses_as_hard_as_it_says(shipped):
     bar = SceneObject("bar", box([0.03, 0.03, 0.03]), tool.position, tool.rotation)
     simulation = Simulation(shipped, Scene((bar,)), q, 0.05)
     for _ in range(60):
-        simulation.advance(np.zeros(shipped.size), 1.0)
+        simulation.send(np.append(np.zeros(shipped.size), 1.0))
     assert simulation.opening * gripper.stroke == pytest.approx(0.03, abs=0.002)
     force = simulation.data.actuator("gripper").force[0]
     assert abs(force) == pytest.approx(gripper.force, rel=0.02)

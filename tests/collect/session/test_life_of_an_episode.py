@@ -1,0 +1,197 @@
+"""What a person may say of an episode: done, gone wrong, throw away, begin again, wait. And being late."""
+
+import time
+
+import numpy as np
+import pytest
+
+from handrail.collect.commands.record import episode_seed, record
+from handrail.collect.config import DatasetConfig, RecordConfig, SessionConfig
+from handrail.collect.operators.operator import EpisodeEvent
+from handrail.collect.session import build
+from handrail.collect.session.build import build_env, session_features
+from handrail.collect.session.recorder import Recorder
+from handrail.collect.session.session import Session
+from handrail.controllers.baselines.direct import DirectController
+from handrail.controllers.interface.channels import Channels
+from handrail.controllers.interface.command import Status
+from handrail.controllers.interface.intent import Intent
+from handrail.controllers.mpc.masked_mpc import MaskedMpc
+from handrail.datasets.reading.reader import read_episodes, read_frames
+from handrail.datasets.recording.writer import EpisodeWriter
+
+SUCCESS, FAILURE, DISCARD, RESTART, PAUSE = EpisodeEvent
+CONTROLLERS = [lambda model: DirectController(model, 0.05), MaskedMpc]
+
+
+class Person:
+    """Drives the base, and says what is in `says` at these calls of an episode, episode by episode."""
+
+    name = "person"
+
+    def __init__(self, model, *says):
+        self._channels, self._says = Channels.of(model.description), iter(says)
+
+    def reset(self, view, rng):
+        self.asked, self.now = 0, next(self._says)
+
+    def act(self, view):
+        self.asked += 1
+        if self.asked in self.now:
+            return self.now[self.asked]
+        values = np.zeros(self._channels.size)
+        values[0] = 0.2
+        return Intent(values, self._channels.mask("base"), time=view.state.time)
+
+
+class Watcher:
+    def begin(self, env, seed):
+        self.frames = []
+
+    def see(self, frame):
+        self.frames.append(frame)
+
+
+@pytest.fixture
+def env():
+    env = build_env(SessionConfig(task="reach", physics=False), 20)
+    yield env
+    env.close()
+
+
+def run(env, says, controller=None, **options):
+    person, watcher = Person(env.model, says), Watcher()
+    controller = controller or DirectController(env.model, env.period)
+    return Session(env, controller, person, [watcher], **options).run(3), watcher.frames, person
+
+
+@pytest.mark.parametrize(
+    ("event", "success", "reason"), [(SUCCESS, True, ""), (FAILURE, False, "operator: failure")]
+)
+def test_the_operator_ends_an_episode(env, event, success, reason):
+    """The frame in which they say so is the last one; the robot brakes in it, and rests in the end."""
+    outcome, frames, _ = run(env, {15: event})
+    assert (outcome.success, outcome.failure_reason, outcome.ended_by) == (success, reason, event)
+    assert outcome.kept
+    assert [frame.done for frame in frames] == 14 * [False] + [True]
+    assert [frame.success for frame in frames] == 14 * [False] + [success]
+    assert not frames[-1].intent.mask.any()
+    assert 0.0 < frames[-1].action[0] < frames[-2].action[0]
+    assert not env.state().commanded.any()
+
+
+@pytest.mark.parametrize("controller", CONTROLLERS)
+def test_a_pause_brakes_holds_and_goes_on(env, controller):
+    """While the robot stands still nothing is recorded and no time passes; nothing jumps."""
+    told, saying = [], dict.fromkeys(range(20, 120), PAUSE) | {140: SUCCESS}
+    person, watcher = Person(env.model, saying), Watcher()
+    outcome = Session(env, controller(env.model), person, [watcher]).run(3, told.append)
+    frames, sent = watcher.frames, np.array([frame.action[:-1] for frame in watcher.frames])
+    braking = [frame for frame in frames[:-1] if frame.diagnostics.status is Status.STALE_INTENT]
+    assert told == [True, False]
+    assert 1 <= len(braking) < 40
+    assert outcome.paused == pytest.approx((100 - len(braking)) * env.period)
+    assert len(frames) == person.asked - (100 - len(braking)) == outcome.frames
+    assert not sent[18 + len(braking)].any()
+    assert sent[-2].any()
+    steps = np.abs(np.diff(sent, axis=0, prepend=np.zeros((1, sent.shape[1]))))
+    assert np.all(steps <= env.model.description.limits.acceleration * env.period * (1.0 + 1e-5))
+    q = np.array([frame.state[: env.model.size] for frame in frames])
+    assert np.abs(np.diff(q, axis=0)).max() < 0.02
+
+
+def test_a_late_operator_is_braked(env):
+    """Who asks for the same thing with the same stamp again and again is not there any more."""
+    person = Person(env.model, {})
+    steer = person.act
+
+    def act(view):
+        if person.asked == 10:
+            person.last = steer(view)
+        return steer(view) if person.asked < 10 else person.last
+
+    person.act, watcher = act, Watcher()
+    outcome = Session(env, DirectController(env.model, env.period), person, [watcher]).run(3)
+    assert outcome.failure_reason == "timeout"
+    assert watcher.frames[-1].diagnostics.status is Status.STALE_INTENT
+    assert not watcher.frames[60].action[:-1].any()
+
+
+@pytest.mark.parametrize("event", [DISCARD, RESTART])
+def test_what_is_not_kept_is_over_at_once(env, event, tmp_path):
+    with EpisodeWriter.create(tmp_path / "d", "x/d", 20, session_features(env), "robot") as writer:
+        recorder, person = Recorder(writer, "reach", {}), Person(env.model, {9: event}, {5: SUCCESS})
+        session = Session(env, DirectController(env.model, env.period), person, [recorder])
+        outcome = session.run(3)
+        assert (outcome.kept, outcome.ended_by, outcome.frames) == (False, event, 8)
+        assert not env.state().commanded.any()
+        recorder.save(outcome)
+        assert (writer.num_episodes, writer.open_frames) == (0, 0)
+        recorder.save(session.run(3))
+    assert [row["length"] for row in read_episodes(tmp_path / "d")] == [5]
+
+
+def test_a_recording_counts_and_names_what_it_does_not_keep(tmp_path, monkeypatch, capsys):
+    """After one thrown away comes another scene, after one begun again the same; both are said."""
+    says = {6: DISCARD}, {7: RESTART}, {8: FAILURE}, {9: SUCCESS}
+    monkeypatch.setattr(build, "build_operator", lambda config, mode, model: Person(model, *says))
+    root = tmp_path / "d"
+    config = RecordConfig(
+        task="reach", mode="base", physics=False, dataset=DatasetConfig(root=str(root), num_episodes=2)
+    )
+    assert record(config) == 0
+    rows = read_episodes(root)
+    assert [row["length"] for row in rows] == [8, 9]
+    assert [row["success"] for row in rows] == [False, True]
+    assert [row["failure_reason"] for row in rows] == ["operator: failure", ""]
+    first, other = (episode_seed(0, 0, attempt) for attempt in (0, 1))
+    assert [row["seed"] for row in rows] == [other, episode_seed(0, 1)]
+    said = capsys.readouterr().err
+    assert f"not saved: thrown away, seed {first}\nnot saved: begun again, seed {other}\n" in said
+    assert "1/2 succeeded, 1 thrown away, 1 begun again" in said
+    done = read_frames(root, 0, ["next.done", "next.success"])
+    assert done["next.done"].tolist() == 7 * [False] + [True]
+
+
+def test_a_first_attempt_has_the_seed_that_it_always_had():
+    for seed, episode in ((0, 0), (7, 3), (900, 2)):
+        assert episode_seed(seed, episode) == int(
+            np.random.SeedSequence([seed, episode]).generate_state(1)[0]
+        )
+        assert len({episode_seed(seed, episode, attempt) for attempt in range(50)}) == 50
+
+
+def test_a_pause_does_not_make_the_loop_late(env, monkeypatch):
+    """The clock of the pace stands for all periods, held ones too."""
+    now = [0.0]
+    monkeypatch.setattr(time, "perf_counter", lambda: now[0])
+    monkeypatch.setattr(time, "sleep", lambda seconds: now.__setitem__(0, now[0] + seconds))
+    outcome, _, person = run(env, dict.fromkeys(range(5, 60), PAUSE) | {70: SUCCESS}, realtime=True)
+    assert outcome.late == 0
+    assert outcome.wall_time == pytest.approx(person.asked * env.period)
+    assert outcome.paused > 1.0
+
+
+def test_three_rates(env):
+    """The robot is sent a command a step, also between two updates; frames are rarer still."""
+    updates, inner = [], MaskedMpc(env.model)
+    honest = inner.update
+
+    def update(state, intent):
+        updates.append(state.time)
+        return honest(state, intent)
+
+    inner.update = update
+    sent, step = [], env.step
+
+    def stepped(action):
+        result = step(action)
+        sent.append(result[-1]["sent"])
+        return result
+
+    env.step = stepped
+    outcome, frames, _ = run(env, {48: SUCCESS}, inner, control_period=0.1, record_period=0.2)
+    assert (outcome.frames, len(updates), len(frames)) == (48, 24, 12)
+    np.testing.assert_allclose(updates, 0.1 * np.arange(24), atol=1e-9)
+    np.testing.assert_array_equal([frame.action for frame in frames], sent[3::4])
+    assert np.all(np.diff([v[0] for v in sent[:8]]) > 0.0)  # also between two updates
