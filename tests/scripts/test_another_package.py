@@ -93,12 +93,13 @@ def test_a_policy_alone_imports_nothing(missing, trained, unseen):
     assert unseen()
 
 
-def test_what_was_trained_on_it_is_evaluated(trained):
-    flags = said("--task", "--mode", "--robot")
-    done = command(trained, *flags, "--episodes", 1, "--time_limit", 0.5, name="evaluate")
+def test_what_was_trained_on_it_is_evaluated(trained, tmp_path):
+    flags = [*said("--task", "--mode", "--robot"), "--episodes", 1, "--time_limit", 0.5]
+    done = command(trained, *flags, "--json", tmp_path / "e.json", name="evaluate")
     assert done.returncode == 0, done.stderr
-    assert "press_kit:PRESS" in done.stdout
-    assert " 0 of 1 " in done.stdout.replace("│", " ")
+    content = json.loads((tmp_path / "e.json").read_text())
+    assert content["task"] == "press_kit:PRESS"
+    assert list(content["arms"]) == ["press_kit:HAND intent"]
 
 
 def test_an_installed_entry_is_listed_recorded_and_found_again(installed, tmp_path, unseen):
@@ -116,10 +117,10 @@ def test_an_installed_entry_is_listed_recorded_and_found_again(installed, tmp_pa
     ("flags", "words"),
     [
         (["--task", "press"], "unknown task 'press': expected one of drawer, pick_place, reach, tray"),
-        (["--task", "nowhere.press:PRESS"], "--task nowhere.press:PRESS: cannot import it: No module named"),
-        (["--task", "press_kit:PULL"], "--task press_kit:PULL: cannot import it: module 'press_kit' has no"),
-        (["--task", "press_kit:HAND"], "--task press_kit:HAND: expected a TaskSpec, got a TeleopMode"),
-        (["--robot", "press_kit:PRESS"], "--robot press_kit:PRESS: expected a RobotSpec, got a TaskSpec"),
+        (["--task", "nowhere.press:PRESS"], "task nowhere.press:PRESS: cannot import it: No module named"),
+        (["--task", "press_kit:PULL"], "task press_kit:PULL: cannot import it: module 'press_kit' has no"),
+        (["--task", "press_kit:HAND"], "task press_kit:HAND: expected a TaskSpec, got a TeleopMode"),
+        (["--robot", "press_kit:PRESS"], "robot press_kit:PRESS: expected a RobotSpec, got a TaskSpec"),
     ],
 )
 def test_what_is_not_there_is_one_line(flags, words, tmp_path):

@@ -1,11 +1,12 @@
 """One episode of the benchmark: planner, command profile, controller, robot."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from time import perf_counter, process_time
 
 import numpy as np
 
-from handrail.collect.experiments.benchmark.baselines import Baseline, IntentMap
+from handrail.collect.experiments.benchmark.catalogue import Baseline
 from handrail.collect.experiments.benchmark.metrics import Trace
 from handrail.collect.experiments.benchmark.plants import Plant, build_plant
 from handrail.collect.experiments.benchmark.profiles import NOTHING_YET, SPEEDS, Commands, profile_commands
@@ -16,6 +17,7 @@ from handrail.controllers.interface.command import Command
 from handrail.controllers.interface.controller import Controller, State
 from handrail.controllers.interface.intent import Intent
 from handrail.controllers.numerics.rotation import rotation_vector
+from handrail.controllers.registry import resolved
 from handrail.controllers.robot.model import Pose, RobotModel
 
 _GAIN = 1.0  # of a planner that sees the hand [1/s]
@@ -59,11 +61,12 @@ def run_episode(
     start = perf_counter(), process_time()
     plant = build_plant(model, conditions.scene, conditions.physics)
     controller.reset(conditions.scene.obstacles())
-    baseline.aim(controller, conditions.goal)
-    operator = _Operator(conditions, plant.tool, baseline.operator(model))
+    if baseline.aim:
+        resolved(baseline.aim)(controller, conditions.goal)
+    operator = _Operator(conditions, plant.tool, resolved(baseline.operator)(model))
     tally = _Tally(plant, conditions.goal)
     last = T_MAX if conditions.early_stop else min(T_MAX, operator.end + _SETTLING)
-    drive = _Drive(controller, baseline.period)
+    drive = _Drive(controller, baseline.period or STEP)
     for step in range(last):
         operator.send(step, tally.state, tally.tool)
         velocity = drive.velocity(step, tally.state, operator)
@@ -77,7 +80,9 @@ def run_episode(
 class _Operator:
     """The planner behind a command profile: sends a message a step, of which the profile delivers some."""
 
-    def __init__(self, conditions: Conditions, tool: Pose, intents: IntentMap) -> None:
+    def __init__(
+        self, conditions: Conditions, tool: Pose, intents: Callable[[FloatArray, State, float], Intent]
+    ) -> None:
         speed = SPEEDS.get(conditions.profile, 1.0)
         self._planner = StraightPlanner.plan(tool.position, tool.rotation, conditions.goal, speed=speed)
         rng = np.random.default_rng(conditions.seed)
