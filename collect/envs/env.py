@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from handrail.collect.envs.observation import AgentObservation, bounded, box_space, image_space
 from handrail.collect.simulation.rendering import CAMERAS, FAST, PRETTY, Painter
 from handrail.collect.simulation.simulation import Simulation
-from handrail.collect.tasks.task import Episode, Outcome, Task, TaskState
+from handrail.collect.tasks.task import Episode, Task, TaskState, Verdict
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import HandrailError, unknown_name
 from handrail.controllers.interface.controller import State
@@ -179,7 +179,7 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self._gripper = float(episode.grip is not None)
         state = self.task_state()
         rest = np.append(np.zeros(self.model.size), self._gripper).astype(np.float32)
-        return self._observe(state), self._info(state, Outcome(), rest, contacts=())
+        return self._observe(state), self._info(state, Verdict(), rest, contacts=())
 
     def step(self, action: ArrayLike) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Move for 1/fps seconds; the reward is 1 at success. `info["sent"]` is the action that was sent."""
@@ -187,10 +187,10 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         contacts = self.simulation.advance(sent[:-1].astype(np.float64), float(sent[-1]))
         self._steps += 1
         state = self.task_state()
-        outcome = self.task.outcome(state) if state.stable else Outcome(failure="unstable")
+        outcome = self.task.outcome(state) if state.stable else Verdict(failure="unstable")
         truncated = not outcome.over and self._steps >= self._max_episode_steps
         if truncated:
-            outcome = Outcome(failure="timeout")
+            outcome = Verdict(failure="timeout")
         info = self._info(state, outcome, sent, contacts)
         return self._observe(state), float(outcome.success), outcome.over and not truncated, truncated, info
 
@@ -214,7 +214,7 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         return observation
 
     def _info(
-        self, state: TaskState, outcome: Outcome, sent: NDArray[np.float32], contacts: tuple[str, ...]
+        self, state: TaskState, outcome: Verdict, sent: NDArray[np.float32], contacts: tuple[str, ...]
     ) -> dict[str, Any]:
         return {
             "is_success": outcome.success,

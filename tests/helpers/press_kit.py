@@ -12,7 +12,7 @@ from handrail.collect.operators.modes import TeleopMode, always
 from handrail.collect.operators.scripts.scripted import scripted_operator
 from handrail.collect.simulation.scene import Scene
 from handrail.collect.tasks.catalogue import TaskSpec
-from handrail.collect.tasks.task import Episode, Outcome
+from handrail.collect.tasks.task import Episode, Verdict
 from handrail.controllers.baselines.twist_completion import twist_controller
 from handrail.controllers.baselines.whole_body_completion import WholeBodyCompletion
 from handrail.controllers.catalogue import ControllerSpec
@@ -38,7 +38,7 @@ class Press:
         return state.goal.position
 
     def outcome(self, state):
-        return Outcome(bool(np.linalg.norm(state.tool.position - state.goal.position) < 0.04))
+        return Verdict(bool(np.linalg.norm(state.tool.position - state.goal.position) < 0.04))
 
 
 class PressScript:
