@@ -50,9 +50,8 @@ def check_names(thing: str, flag: str, chosen: tuple[str, ...], choices: Collect
     if not chosen:
         raise HandrailError(f"{flag}: expected all, or some of {', '.join(choices)}; got none")
     for name in chosen:
-        if isinstance(choices, Registry):
-            choices.check(name)
-        elif name not in choices:
+        fits = choices.accepts if isinstance(choices, Registry) else choices.__contains__
+        if not fits(name):
             raise unknown_name(thing, name, ("all", *choices))
     if len(set(chosen)) != len(chosen):
         raise HandrailError(f"{flag} {','.join(chosen)}: expected each {thing} once")

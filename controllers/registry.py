@@ -68,13 +68,17 @@ class Registry[Spec: Named](Mapping[str, Spec]):
         own = [f"{spec.name}: {spec.help}" for spec in self.built_in]
         return "; ".join([*own, *(name for name in self if name not in self._built_in)])
 
+    def accepts(self, name: str) -> bool:
+        """Return whether the command line may say a name: there is one, or it is a `module:name`."""
+        return name in self or _REFERENCE.fullmatch(name) is not None
+
     def check(self, name: str) -> None:
         """Check a name of the command line, without importing anything.
 
         Raises:
             HandrailError: there is none of that name, and it is no `module:name`.
         """
-        if name not in self and not _REFERENCE.fullmatch(name):
+        if not self.accepts(name):
             raise unknown_name(self._thing, name, self)
 
     def admit(self, name: str, said: Collection[str] = ()) -> None:
@@ -110,10 +114,10 @@ class Registry[Spec: Named](Mapping[str, Spec]):
         return f"handrail.{self._thing}s"
 
     def _spec(self, name: str, reference: str) -> Spec:
-        spec = resolved(reference, f"--{self._thing} {name}")
+        spec = resolved(reference, f"{self._thing} {name}")
         if not isinstance(spec, self._kind):
             raise HandrailError(
-                f"--{self._thing} {name}: expected a {self._kind.__name__}, got a {type(spec).__name__}"
+                f"{self._thing} {name}: expected a {self._kind.__name__}, got a {type(spec).__name__}"
             )
         return replace(spec, name=name)  # pyright: ignore[reportArgumentType]  (a dataclass)
 

@@ -13,13 +13,13 @@ def _benchmark(config: BenchmarkConfig) -> int:
     config.check()
     from rich.console import Console
 
-    from handrail.collect.experiments.benchmark.baselines import BASELINES
     from handrail.collect.experiments.benchmark.benchmark import benchmark
+    from handrail.collect.experiments.benchmark.catalogue import BASELINES
     from handrail.collect.experiments.benchmark.tables import benchmark_tables
-    from handrail.policies.rl.baseline import RL_BASELINES
 
     console = Console()
-    results = benchmark(config, {**BASELINES, **RL_BASELINES}, console)
+    baselines = {name: BASELINES.find(name) for name in config.controller_names}
+    results = benchmark(config, baselines, console)
     console.print(benchmark_tables(results))
     for written in (config.json, config.report and f"{config.report}/benchmark.html", config.page):
         if written:

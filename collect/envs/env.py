@@ -15,7 +15,7 @@ from handrail.collect.envs.observation import AgentObservation, bounded, box_spa
 from handrail.collect.simulation.protocols import Plant, Robot, World
 from handrail.collect.simulation.rendering import CAMERAS, FAST, PRETTY, Painter
 from handrail.collect.simulation.simulation import Simulation
-from handrail.collect.tasks.task import Episode, Outcome, Task, TaskState
+from handrail.collect.tasks.task import Episode, Task, TaskState, Verdict
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import HandrailError, unknown_name
 from handrail.controllers.interface.controller import State
@@ -211,17 +211,17 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self._steps = 0
         state = self.task_state()
         rest = np.append(np.zeros(self.model.size), float(episode.grip is not None)).astype(np.float32)
-        return self._observe(state), self._info(state, Outcome(), rest)
+        return self._observe(state), self._info(state, Verdict(), rest)
 
     def step(self, action: ArrayLike) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Move for 1/fps seconds; the reward is 1 at success. `info["sent"]` is the action that was sent."""
         sent = self.robot.send(action)
         self._steps += 1
         state = self.task_state()
-        outcome = self.task.outcome(state) if state.stable else Outcome(failure="unstable")
+        outcome = self.task.outcome(state) if state.stable else Verdict(failure="unstable")
         truncated = not outcome.over and self._steps >= self._max_episode_steps
         if truncated:
-            outcome = Outcome(failure="timeout")
+            outcome = Verdict(failure="timeout")
         info = self._info(state, outcome, sent)
         return self._observe(state), float(outcome.success), outcome.over and not truncated, truncated, info
 
@@ -236,7 +236,7 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             observation["pixels"] = {camera: self._paint("pixels", camera) for camera in self.cameras}
         return observation
 
-    def _info(self, state: TaskState, outcome: Outcome, sent: NDArray[np.floating[Any]]) -> dict[str, Any]:
+    def _info(self, state: TaskState, outcome: Verdict, sent: NDArray[np.floating[Any]]) -> dict[str, Any]:
         contacts = self.world.contacts
         return {
             "is_success": outcome.success,

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from handrail.collect.simulation.scene import Scene, SceneObject
-from handrail.collect.tasks.task import Episode, Outcome, Task, TaskState
+from handrail.collect.tasks.task import Episode, Task, TaskState, Verdict
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.robot.model import RobotModel
@@ -65,7 +65,7 @@ class ShiftedTask:
         """Return the task's state."""
         return self.task.features(state)
 
-    def outcome(self, state: TaskState) -> Outcome:
+    def outcome(self, state: TaskState) -> Verdict:
         """Judge as the task does."""
         return self.task.outcome(state)
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from handrail.collect.simulation.scene import Scene, View
 from handrail.collect.tasks.cabinet import HANDLE, cabinet, drawer, inward
-from handrail.collect.tasks.task import Episode, Outcome, TaskState
+from handrail.collect.tasks.task import Episode, TaskState, Verdict
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.robot.model import RobotModel
 
@@ -55,10 +55,10 @@ class Drawer:
         direction = inward(body.rotation)[:2]
         return np.array([*handle(state), *direction, opened(state), *body.position[:2], body.top])
 
-    def outcome(self, state: TaskState) -> Outcome:
+    def outcome(self, state: TaskState) -> Verdict:
         """Judge how far the drawer is open, and whether the hand has let go."""
         away = float(np.linalg.norm(state.tool.position - handle(state))) >= self.retreat
-        return Outcome(success=opened(state) >= self.opening and away and state.opening > 0.8)
+        return Verdict(success=opened(state) >= self.opening and away and state.opening > 0.8)
 
 
 def handle(state: TaskState) -> FloatArray:

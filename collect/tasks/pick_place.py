@@ -7,7 +7,7 @@ import numpy as np
 from handrail.collect.simulation.scene import Scene, SceneObject, View
 from handrail.collect.tasks.clutter import obstacle_features, obstacle_names, sample_obstacles
 from handrail.collect.tasks.furniture import cube, open_bin, table
-from handrail.collect.tasks.task import Episode, Outcome, TaskState
+from handrail.collect.tasks.task import Episode, TaskState, Verdict
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.numerics.rotation import quaternion_from_matrix
 from handrail.controllers.robot.model import RobotModel
@@ -70,14 +70,14 @@ class PickPlace:
             numbers += [item.position[0], item.position[1], item.top]
         return np.concatenate([numbers, obstacle_features(state.episode.scene)])
 
-    def outcome(self, state: TaskState) -> Outcome:
+    def outcome(self, state: TaskState) -> Verdict:
         """Judge where the cube is, whether it rests, and where the gripper is."""
         position = state.pose("cube").position
         if position[2] < 2 * _EDGE:
-            return Outcome(failure="dropped")
+            return Verdict(failure="dropped")
         away = float(np.linalg.norm(state.tool.position - position)) >= self.retreat
         rests = _inside_bin(state, position) and state.twists["cube"].is_still
-        return Outcome(success=rests and away and state.opening > 0.8)
+        return Verdict(success=rests and away and state.opening > 0.8)
 
 
 def _sample_table(name: str, side: float, rng: np.random.Generator) -> SceneObject:

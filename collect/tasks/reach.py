@@ -7,7 +7,7 @@ import numpy as np
 from handrail.collect.simulation.scene import Part, Scene, SceneObject, View
 from handrail.collect.tasks.goal_reaching import ORIENTATION_TOLERANCE, POSITION_TOLERANCE, sample_goal
 from handrail.collect.tasks.moving import mover_features, mover_names, sample_movers
-from handrail.collect.tasks.task import Episode, Outcome, TaskState
+from handrail.collect.tasks.task import Episode, TaskState, Verdict
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.numerics.rotation import matrix_to_axis, orientation_error, quaternion_from_matrix
 from handrail.controllers.robot.model import Pose, RobotModel
@@ -58,14 +58,14 @@ class Reach:
         movers = mover_features(state.episode.scene, state.time, self.moving_obstacles)
         return np.concatenate([goal.position, quaternion_from_matrix(goal.rotation), movers])
 
-    def outcome(self, state: TaskState) -> Outcome:
+    def outcome(self, state: TaskState) -> Verdict:
         """Judge by the distance and the orientation error."""
         goal = _goal(state)
         distance = float(np.linalg.norm(state.tool.position - goal.position))
         turn = orientation_error(
             quaternion_from_matrix(state.tool.rotation), quaternion_from_matrix(goal.rotation)
         )
-        return Outcome(distance <= self.position_tolerance and turn <= self.orientation_tolerance)
+        return Verdict(distance <= self.position_tolerance and turn <= self.orientation_tolerance)
 
 
 _VIEW = View(position=(-2.6, -3.0, 2.2), target=(-0.35, 0.0, 0.65))

@@ -87,8 +87,8 @@ class TaskState:
 
 
 @dataclass(frozen=True)
-class Outcome:
-    """How it stands: success, a failure with its reason, or neither yet."""
+class Verdict:
+    """How a task stands: success, a failure with its reason, or neither yet."""
 
     success: bool = False
     failure: str = ""
@@ -100,7 +100,7 @@ class Outcome:
 
 
 class Task(Protocol):
-    """A task; a frozen dataclass in its own file, with one line in `handrail.collect.TASKS`."""
+    """A task; a frozen dataclass in its own file, with one entry in `handrail.collect.tasks.catalogue`."""
 
     @property
     def name(self) -> str:
@@ -130,6 +130,6 @@ class Task(Protocol):
         """Return the `environment_state`, (k,), in [m], wxyz quaternions."""
         ...
 
-    def outcome(self, state: TaskState) -> Outcome:
+    def outcome(self, state: TaskState) -> Verdict:
         """Judge a moment."""
         ...

@@ -8,7 +8,7 @@ from handrail.collect.simulation.scene import Scene, SceneObject, View
 from handrail.collect.tasks.arm_reach import reach_share
 from handrail.collect.tasks.clutter import obstacle_features, obstacle_names, sample_obstacles
 from handrail.collect.tasks.furniture import TRAY_BAR, can, table, tray
-from handrail.collect.tasks.task import Episode, Outcome, TaskState
+from handrail.collect.tasks.task import Episode, TaskState, Verdict
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.channels import Channels
@@ -76,18 +76,18 @@ class Tray:
         numbers += [*goal.position[:2], goal.top]
         return np.concatenate([numbers, obstacle_features(state.episode.scene)])
 
-    def outcome(self, state: TaskState) -> Outcome:
+    def outcome(self, state: TaskState) -> Verdict:
         """Judge the tray, then the can on it, then whether the tray was left on the table."""
         held, goal = state.pose("tray"), state.object("table")
         if held.position[2] < goal.top - 0.05 or held.rotation[2, 2] < np.cos(0.8):
-            return Outcome(failure="tray_dropped")
+            return Verdict(failure="tray_dropped")
         if not _stands_on(held, state.pose("can")):
-            return Outcome(failure="can_fell")
+            return Verdict(failure="can_fell")
         inside = np.abs(held.position[:2] - goal.position[:2]) < goal.shape.size[:2] / 2
         down = held.position[2] < goal.top + 0.02 and state.twists["tray"].is_still and inside.all()
         handle = held.position + held.rotation @ HANDLE
         away = float(np.linalg.norm(state.tool.position - handle)) >= self.retreat
-        return Outcome(success=bool(down) and away and state.opening > 0.8)
+        return Verdict(success=bool(down) and away and state.opening > 0.8)
 
 
 def _stands_on(held: Pose, thing: Pose) -> bool:

@@ -13,7 +13,7 @@ from handrail.collect.operators.modes import find_mode
 from handrail.collect.session.build import build_controller, build_operator
 from handrail.collect.session.session import Session
 from handrail.collect.simulation.scene import Scene, SceneObject
-from handrail.collect.tasks.task import Episode, Outcome, TaskState
+from handrail.collect.tasks.task import Episode, TaskState, Verdict
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.robot.model import Pose, RobotModel
 from handrail.controllers.robot.shape import Shape
@@ -39,9 +39,9 @@ class TouchBall:
         """Return what is recorded as `observation.environment_state`: where the ball is, (3,) [m]."""
         return state.pose("ball").position
 
-    def outcome(self, state: TaskState) -> Outcome:
+    def outcome(self, state: TaskState) -> Verdict:
         """Say whether it is done."""
-        return Outcome(bool(np.linalg.norm(state.tool.position - state.pose("ball").position) < 0.03))
+        return Verdict(bool(np.linalg.norm(state.tool.position - state.pose("ball").position) < 0.03))
 
 
 def main() -> None:

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from handrail.collect.experiments.benchmark.baselines import BASELINES
+from handrail.collect.experiments.benchmark.catalogue import BASELINES
 from handrail.collect.tasks.goal_reaching import STEP
 from handrail.controllers.baselines.arm_completion import WeldedBaseCompletion
 from handrail.controllers.baselines.blended_completion import BlendedCompletion
@@ -24,6 +24,7 @@ from handrail.controllers.interface.frames import Frames
 from handrail.controllers.interface.intent import Intent
 from handrail.controllers.objectives.objective import Stage
 from handrail.controllers.objectives.tracking import channel_velocities
+from handrail.controllers.registry import resolved
 from handrail.controllers.robot.model import RobotModel, load_model
 
 MODEL = load_model()
@@ -40,7 +41,7 @@ RIVALS = [name for name in BASELINES if name not in ("mpc", "safety_filter")]
 def controller(name):
     if name == "mink":
         pytest.importorskip("mink")
-    return BASELINES[name].build(MODEL)
+    return resolved(BASELINES[name].build)(MODEL)
 
 
 def hand_intent(twist, time=0.0, frames=None):
@@ -154,7 +155,7 @@ def test_a_rival_follows_the_hand(name):
 def test_a_rival_stays_inside_the_limits(name, twists):
     """Whatever is asked, velocity and acceleration stay inside, and a garbled message brakes."""
     rival, v, q = controller(name), REST, HOME.copy()
-    operator = BASELINES[name].operator(MODEL)
+    operator = resolved(BASELINES[name].operator)(MODEL)
     for step, twist in enumerate(twists):
         state = State(q, v, step * STEP)
         after = rival.update(state, operator(twist, state, state.time)).velocity(STEP)
@@ -172,7 +173,7 @@ def test_a_rival_stays_inside_the_limits(name, twists):
 def test_a_rival_says_how_it_fares(name):
     rival = controller(name)
     state = State(HOME, REST, 1.0)
-    stale = BASELINES[name].operator(MODEL)(np.full(6, 0.1), state, 0.5)
+    stale = resolved(BASELINES[name].operator)(MODEL)(np.full(6, 0.1), state, 0.5)
     command = rival.update(state, stale)
     assert command.diagnostics.status is Status.STALE_INTENT
     assert command.diagnostics.solve_time > 0

@@ -1,12 +1,12 @@
 """Who takes part in the benchmark: each controller, what its operator sends, and how often it is asked."""
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
+from handrail.collect.experiments.benchmark.catalogue import FILTER_PERIOD
 from handrail.collect.experiments.mink.controller import MinkController
-from handrail.collect.tasks.goal_reaching import STEP, Goal
+from handrail.collect.tasks.goal_reaching import STEP
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.baselines.arm_completion import WeldedBaseCompletion
 from handrail.controllers.baselines.blended_completion import BlendedCompletion
@@ -24,8 +24,6 @@ from handrail.controllers.mpc.safety_filter import safety_filter
 from handrail.controllers.ocp.settings import MpcSettings
 from handrail.controllers.robot.model import RobotModel
 
-MPC_PERIOD = 0.1  # of the protocol [s]
-_FILTER_PERIOD = 0.06  # [s]
 TAKE_UP, TAKE_UP_TURN = 1.0, 0.65  # time constants of the masked MPC's hand [s]
 _NOW = np.zeros(1)  # no time ahead [s]
 
@@ -124,10 +122,10 @@ class SmoothedHandIntent:
 
 
 class JointIntent:
-    """The operator steers every joint, and works out how by himself: plain damped least squares.
+    """The operator steers every joint, and works out how alone: plain damped least squares.
 
     What reaches the controller is a complete command, as direct control and safety filters expect it; nobody
-    could do that with his hands so well.
+    could do that by hand so well.
 
     Args:
         model: of the robot.
@@ -145,96 +143,53 @@ class JointIntent:
         return Intent(values, self._mask, mode="joints", time=time)
 
 
-IntentMap = Callable[[FloatArray, State, float], Intent]
-
-
-def _no_aim(controller: Controller, goal: Goal) -> None:
-    """Tell a controller nothing of the goal: it sees the operator's commands only."""
-
-
-@dataclass(frozen=True)
-class Baseline:
-    """One entry of the benchmark; its functions are a module's own, so that worker processes find them.
-
-    Attributes:
-        name: as on the command line.
-        title: one line.
-        build: the controller for a robot.
-        operator: what the planner's twist becomes; made anew for every episode.
-        period: between two updates [s].
-        aim: tells the controller the goal, if it needs to know it.
-    """
-
-    name: str
-    title: str
-    build: Callable[[RobotModel], Controller]
-    operator: Callable[[RobotModel], IntentMap] = HandIntent
-    period: float = STEP
-    aim: Callable[[Controller, Goal], None] = _no_aim
-
-
-def _mpc(model: RobotModel) -> Controller:
+def mpc(model: RobotModel) -> Controller:
+    """Return the masked MPC of the benchmark."""
     predict = goal_reaching_prediction(Channels.of(model.description))
     return MaskedMpc(model, goal_reaching_settings(), predict=predict)
 
 
-def _mpc_paper(model: RobotModel) -> Controller:
+def mpc_paper(model: RobotModel) -> Controller:
+    """Return the masked MPC with the paper's horizon."""
     return MaskedMpc(model, paper_settings())
 
 
-def _mink(model: RobotModel) -> Controller:
+def mink(model: RobotModel) -> Controller:
+    """Return differential inverse kinematics with collision avoidance."""
     return MinkController(model, STEP)
 
 
-def _whole_body(model: RobotModel) -> Controller:
+def whole_body(model: RobotModel) -> Controller:
+    """Return damped least squares on all joints."""
     return twist_controller(model, WholeBodyCompletion(model), STEP)
 
 
-def _nominal_base(model: RobotModel) -> Controller:
+def nominal_base(model: RobotModel) -> Controller:
+    """Return damped least squares on the arm, and a nominal base."""
     return twist_controller(model, WeldedBaseCompletion(model), STEP)
 
 
-def _decoupled(model: RobotModel) -> Controller:
+def decoupled(model: RobotModel) -> Controller:
+    """Return base and arm that share nothing but the robot."""
     return twist_controller(model, DecoupledCompletion(model), STEP)
 
 
-def _blended(model: RobotModel) -> Controller:
+def blended(model: RobotModel) -> Controller:
+    """Return the average of two completions."""
     blend = BlendedCompletion(WholeBodyCompletion(model), WeldedBaseCompletion(model))
     return twist_controller(model, blend, STEP)
 
 
-def _direct(model: RobotModel) -> Controller:
+def direct(model: RobotModel) -> Controller:
+    """Return direct joint control."""
     return DirectController(model, STEP)
 
 
-def _cbf(model: RobotModel) -> Controller:
+def cbf(model: RobotModel) -> Controller:
+    """Return the CBF safety filter."""
     return CbfFilter(model, STEP)
 
 
-def _filter(model: RobotModel) -> Controller:
-    return safety_filter(model, _FILTER_PERIOD)
-
-
-BASELINES: Mapping[str, Baseline] = {
-    baseline.name: baseline
-    for baseline in (
-        Baseline("mpc", "masked MPC", _mpc, period=MPC_PERIOD),
-        Baseline("mpc_paper", "masked MPC, the paper's horizon", _mpc_paper, period=MPC_PERIOD),
-        Baseline("mink", "differential IK with collision avoidance (mink)", _mink),
-        Baseline("mink_low_pass", "mink behind the MPC's low-pass", _mink, SmoothedHandIntent),
-        Baseline("dls", "damped least squares, whole body", _whole_body),
-        Baseline("dls_arm", "damped least squares on the arm, nominal base", _nominal_base),
-        Baseline("decoupled", "decoupled base and arm", _decoupled),
-        Baseline("blended", "blended control, α = 0.5", _blended),
-        Baseline("direct", "direct joint control", _direct, JointIntent),
-        Baseline("cbf_filter", "CBF safety filter on joint commands", _cbf, JointIntent),
-        Baseline(
-            "safety_filter",
-            "multi-step safety filter on joint commands",
-            _filter,
-            JointIntent,
-            _FILTER_PERIOD,
-        ),
-    )
-}
-"""All that this floor can build; the RL baseline comes from the floor above."""
+def multi_step(model: RobotModel) -> Controller:
+    """Return the multi-step safety filter."""
+    return safety_filter(model, FILTER_PERIOD)

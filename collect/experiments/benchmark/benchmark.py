@@ -7,7 +7,7 @@ from typing import Any
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from handrail.collect.experiments.benchmark.baselines import Baseline
+from handrail.collect.experiments.benchmark.catalogue import Baseline
 from handrail.collect.experiments.benchmark.config import BenchmarkConfig
 from handrail.collect.experiments.benchmark.episode import Conditions
 from handrail.collect.experiments.benchmark.figures import figures

@@ -2,15 +2,13 @@
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
-from handrail.collect.flags import check_names, check_page, names
+from handrail.collect.experiments.benchmark.catalogue import BASELINES
+from handrail.collect.flags import check_names, check_page, names, one_of
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.lists import Names
 
-CONTROLLERS = (
-    *("mpc", "rl", "mink", "mpc_paper", "rl_low_pass", "mink_low_pass"),
-    *("dls", "dls_arm", "decoupled", "blended", "direct", "cbf_filter", "safety_filter"),
-)
 PROFILES = ("nominal", "fast15", "fast2", "fast3", "steps", "noise", "delay", "dropouts", "quantised")
 MOST_WORKERS = 64
 
@@ -19,9 +17,8 @@ MOST_WORKERS = 64
 class BenchmarkConfig:
     """Run the paper's goal-reaching benchmark: every controller on the same goals, with the same planner."""
 
-    controllers: Names = "all"
-    """Which controllers, or all: mpc, rl, mink, mpc_paper, rl_low_pass, mink_low_pass, dls,
-    dls_arm, decoupled, blended, direct, cbf_filter, safety_filter."""
+    controllers: Annotated[Names, one_of(BASELINES)] = "all"
+    """Which controllers, or all."""
     goals: int = 100
     """Goals, the same for every controller."""
     seed: int = 1
@@ -51,7 +48,7 @@ class BenchmarkConfig:
     @property
     def controller_names(self) -> tuple[str, ...]:
         """The controllers asked for."""
-        return names(self.controllers, CONTROLLERS)
+        return names(self.controllers, BASELINES)
 
     @property
     def profile_names(self) -> tuple[str, ...]:
@@ -73,7 +70,7 @@ class BenchmarkConfig:
         Raises:
             HandrailError: one setting is wrong; the message says what may be chosen.
         """
-        check_names("controller", "--controllers", self.controller_names, CONTROLLERS)
+        check_names("controller", "--controllers", self.controller_names, BASELINES)
         check_names("profile", "--profile", self.profile_names, PROFILES)
         for name, least, most in (("goals", 1, 100_000), ("seed", 0, None), ("workers", 1, MOST_WORKERS)):
             value = getattr(self, name)

@@ -7,7 +7,7 @@ from time import process_time
 import numpy as np
 
 from handrail.collect.envs.env import HandrailEnv
-from handrail.collect.experiments.benchmark.baselines import Baseline, IntentMap
+from handrail.collect.experiments.benchmark.catalogue import Baseline
 from handrail.collect.experiments.benchmark.metrics import Trace
 from handrail.collect.experiments.benchmark.plants import plant
 from handrail.collect.experiments.benchmark.profiles import NOTHING_YET, SPEEDS, Commands, profile_commands
@@ -16,13 +16,13 @@ from handrail.collect.session.outcome import Outcome
 from handrail.collect.session.session import Session
 from handrail.collect.simulation.scene import Scene
 from handrail.collect.tasks.goal_reaching import STEP, T_MAX, Goal, StraightPlanner, pose_error, reached
-from handrail.collect.tasks.task import Episode, TaskState
-from handrail.collect.tasks.task import Outcome as Verdict
+from handrail.collect.tasks.task import Episode, TaskState, Verdict
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.interface.command import Diagnostics
 from handrail.controllers.interface.controller import Controller, State
 from handrail.controllers.interface.intent import Intent
 from handrail.controllers.numerics.rotation import rotation_vector
+from handrail.controllers.registry import resolved
 from handrail.controllers.robot.model import Pose, RobotModel
 from handrail.datasets.recording.frames import Frame
 
@@ -66,7 +66,7 @@ def run_episode(
     """
     start = process_time()
     operator = _Planner(
-        conditions, baseline.operator(model), lambda: baseline.aim(controller, conditions.goal)
+        conditions, resolved(baseline.operator)(model), lambda: _aim(baseline, controller, conditions.goal)
     )
     task, build = _Task(conditions, operator), plant(conditions.physics)
     env = HandrailEnv(task, model, fps=1.0 / STEP, plant=build, observes=False)
@@ -75,12 +75,22 @@ def run_episode(
     return tracer.trace(operator.end, outcome, process_time() - start)
 
 
+def _aim(baseline: Baseline, controller: Controller, goal: Goal) -> None:
+    if baseline.aim:
+        resolved(baseline.aim)(controller, goal)
+
+
 class _Planner:
     """The planner behind a command profile: sends a message a step, of which the profile delivers some."""
 
     name = "planner"
 
-    def __init__(self, conditions: Conditions, intents: IntentMap, aim: Callable[[], None]) -> None:
+    def __init__(
+        self,
+        conditions: Conditions,
+        intents: Callable[[FloatArray, State, float], Intent],
+        aim: Callable[[], None],
+    ) -> None:
         self._conditions, self._intents, self._aim = conditions, intents, aim
 
     def reset(self, view: View, rng: np.random.Generator) -> None:

@@ -13,10 +13,10 @@ import numpy as np
 from handrail.collect.experiments.benchmark.baselines import (
     TAKE_UP,
     TAKE_UP_TURN,
-    Baseline,
     goal_reaching_settings,
     paper_settings,
 )
+from handrail.collect.experiments.benchmark.catalogue import Baseline
 from handrail.collect.experiments.benchmark.config import BenchmarkConfig
 from handrail.collect.experiments.benchmark.metrics import (
     AIM,
@@ -57,7 +57,7 @@ def summarise(
         "controllers": by_profile[profiles[0]],
         "profiles": by_profile,
         "paired": {profile: _paired(rows, profile, names, config.seed) for profile in profiles},
-        "titles": {baseline.name: baseline.title for baseline in baselines},
+        "titles": {baseline.name: baseline.help for baseline in baselines},
         "skipped": dict(skipped),
         "config": {name: value for name, value in asdict(config).items() if name not in _PLACES},
         "mpc_settings": asdict(goal_reaching_settings()) | {"take_up": TAKE_UP, "take_up_turn": TAKE_UP_TURN},

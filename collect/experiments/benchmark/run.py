@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from handrail.collect.experiments.benchmark.baselines import Baseline
+from handrail.collect.experiments.benchmark.catalogue import Baseline
 from handrail.collect.experiments.benchmark.config import BenchmarkConfig
 from handrail.collect.experiments.benchmark.episode import Conditions, run_episode
 from handrail.collect.experiments.benchmark.metrics import Trace, measure
@@ -21,6 +21,7 @@ from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.controller import Controller
 from handrail.controllers.numerics.threads import single_threaded
+from handrail.controllers.registry import resolved
 from handrail.controllers.robot.model import load_model
 
 _PATHS = 12  # goals whose paths are kept, for drawing
@@ -146,7 +147,7 @@ def trace_of(config: BenchmarkConfig, baseline: Baseline, index: int) -> tuple[C
 @lru_cache(maxsize=32)
 def _controller(baseline: Baseline) -> Controller:
     """Return a baseline's controller, built once a process."""
-    return baseline.build(load_model())
+    return resolved(baseline.build)(load_model())
 
 
 @lru_cache(maxsize=32)

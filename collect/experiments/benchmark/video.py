@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
-from handrail.collect.experiments.benchmark.baselines import Baseline
+from handrail.collect.experiments.benchmark.catalogue import Baseline
 from handrail.collect.experiments.benchmark.episode import Conditions
 from handrail.collect.experiments.benchmark.metrics import Trace
 from handrail.collect.session.contact_sheet import contact_sheet
@@ -104,7 +104,7 @@ def _panel(
     image = Image.new("RGB", (width, height + _BAR), (24, 26, 30))
     image.paste(Image.fromarray(picture))
     draw = ImageDraw.Draw(image)
-    draw.text((10, height + 5), who.title, font=ImageFont.load_default(14), fill=(245, 245, 245))
+    draw.text((10, height + 5), who.help, font=ImageFont.load_default(14), fill=(245, 245, 245))
     words = f"{index * STEP:4.1f} s   {d_p:.2f} m   d_r {d_r:.3f}"
     touched = sum(map(bool, trace.contacts[:index]))
     words += f"   in contact {touched * STEP:.1f} s" if touched else ""

@@ -10,8 +10,7 @@ from handrail.collect.experiments.showcase.cases import Case
 from handrail.collect.operators.operator import View
 from handrail.collect.session.outcome import Outcome
 from handrail.collect.session.session import Observer, Session
-from handrail.collect.tasks.task import Episode, TaskState
-from handrail.collect.tasks.task import Outcome as Verdict
+from handrail.collect.tasks.task import Episode, TaskState, Verdict
 from handrail.controllers.arrays import BoolArray, FloatArray
 from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.interface.channels import Channels

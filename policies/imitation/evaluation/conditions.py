@@ -107,7 +107,10 @@ def read_checkpoint(folder: Path, config: EvaluateConfig) -> Checkpoint:
         raise HandrailError(f"{where}: expected one trained for {config.task}, got {meta.environment!r}")
     _admit(meta, config)
     if interface is not None:
-        TASKS.check(meta.environment)
+        if not TASKS.accepts(meta.environment):
+            raise HandrailError(
+                f"{where}: expected one trained for one of {', '.join(TASKS)}, got {meta.environment!r}"
+            )
         movers = len({n.split(".")[0] for n in interface.environment_names if n.startswith("mover_")})
     else:
         robot = meta.robot if meta.robot in ROBOTS else config.robot

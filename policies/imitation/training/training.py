@@ -11,6 +11,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from handrail.controllers.entries import is_name
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.storage.atomic import write_whole
 from handrail.policies.imitation.config import TrainConfig
@@ -158,7 +159,7 @@ def _meta(source: Source, steps: int) -> PolicyMeta:
     return PolicyMeta(
         environment=_common([str(row.get("environment") or "") for row in rows]),
         mode=_common([str(row.get("mode") or "") for row in rows]),
-        robot=source.info.robot_type,
+        robot=_robot(source),
         fps=source.info.fps,
         actions=config.actions,
         training_seed=config.seed,
@@ -172,6 +173,12 @@ def _meta(source: Source, steps: int) -> PolicyMeta:
         episodes=[int(row["episode_index"]) for row in rows],
         data=source.digest,
     )
+
+
+def _robot(source: Source) -> str:
+    """Return the name that finds the robot again, not the path of a file; else what the dataset calls it."""
+    said = _common([str(row.get("robot") or "") for row in source.selection.rows])
+    return said if said and is_name(said) else source.info.robot_type
 
 
 def _common(values: list[str]) -> str:

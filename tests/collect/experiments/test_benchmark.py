@@ -11,9 +11,9 @@ import pytest
 from command_helpers import command
 from rich.console import Console
 
-from handrail.collect.experiments.benchmark.baselines import BASELINES
 from handrail.collect.experiments.benchmark.benchmark import benchmark
-from handrail.collect.experiments.benchmark.config import CONTROLLERS, BenchmarkConfig
+from handrail.collect.experiments.benchmark.catalogue import BASELINES
+from handrail.collect.experiments.benchmark.config import BenchmarkConfig
 from handrail.collect.experiments.benchmark.metrics import METRICS
 from handrail.collect.experiments.benchmark.page import write_page
 from handrail.collect.experiments.benchmark.run import available, conditions, goals, run, trace_of
@@ -192,9 +192,9 @@ def _fails(model):
 
 def test_with_all_what_is_missing_is_left_out_and_said():
     broken = replace(BASELINES["mink"], build=_fails)
-    baselines = dict.fromkeys(CONTROLLERS, BASELINES["dls"]) | {"mink": broken}
+    baselines = dict.fromkeys(BASELINES, BASELINES["dls"]) | {"mink": broken}
     present, skipped = available(baselines, BenchmarkConfig(controllers="all"))
-    assert len(present) == len(CONTROLLERS) - 1
+    assert len(present) == len(BASELINES) - 1
     assert skipped == {"mink": "robot missing"}
     with pytest.raises(HandrailError, match="robot missing"):
         available(baselines, BenchmarkConfig(controllers="dls,mink"))

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from handrail.collect.experiments.benchmark.baselines import BASELINES
+from handrail.collect.experiments.benchmark.catalogue import BASELINES
 from handrail.collect.experiments.benchmark.config import BenchmarkConfig
 from handrail.collect.experiments.benchmark.format import paired_table, settles, settling_table
 from handrail.collect.experiments.benchmark.metrics import METRICS, Trace, arm_effort, jerkiness, measure

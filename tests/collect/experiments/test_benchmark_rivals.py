@@ -6,21 +6,21 @@ import numpy as np
 import pytest
 
 from handrail.collect.experiments.benchmark.baselines import (
-    BASELINES,
     TAKE_UP,
     TAKE_UP_TURN,
     HandIntent,
     SmoothedHandIntent,
     goal_reaching_prediction,
 )
+from handrail.collect.experiments.benchmark.catalogue import BASELINES
 from handrail.collect.experiments.benchmark.config import BenchmarkConfig
 from handrail.collect.experiments.benchmark.run import trace_of
 from handrail.collect.tasks.goal_reaching import STEP
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import State
 from handrail.controllers.mpc.masked_mpc import MaskedMpc
+from handrail.controllers.registry import resolved
 from handrail.controllers.robot.model import load_model
-from handrail.policies.rl.baseline import RL_BASELINES
 
 MODEL = load_model()
 CHANNELS = Channels.of(MODEL.description)
@@ -54,11 +54,11 @@ def test_the_low_pass_takes_a_step_up_in_its_time_and_keeps_the_way():
 
 
 def test_who_has_the_low_pass_differs_from_their_twin_in_nothing_else():
-    everyone = {**BASELINES, **RL_BASELINES}
     for name in ("mink", "rl"):
-        bare, smooth = everyone[name], everyone[f"{name}_low_pass"]
-        assert smooth.operator is SmoothedHandIntent
-        assert replace(smooth, name=bare.name, title=bare.title, operator=HandIntent) == bare
+        bare, smooth = BASELINES[name], BASELINES[f"{name}_low_pass"]
+        assert resolved(smooth.operator) is SmoothedHandIntent
+        assert resolved(bare.operator) is HandIntent
+        assert replace(smooth, name=bare.name, help=bare.help, operator=bare.operator) == bare
 
 
 def test_behind_the_low_pass_keys_jerk_less():
@@ -78,7 +78,7 @@ def test_the_low_pass_begins_at_rest_in_every_episode():
 def test_the_paper_s_horizon_is_the_paper_s():
     """N = 10, dt = 0.1 s, γ = 1, the command held constant, no posture and no terminal cost."""
     baseline = BASELINES["mpc_paper"]
-    mpc = baseline.build(MODEL)
+    mpc = resolved(baseline.build)(MODEL)
     assert isinstance(mpc, MaskedMpc)
     assert (mpc.settings.horizon, mpc.settings.dt, baseline.period) == (10, 0.1, 0.1)
     intent = HandIntent(MODEL)(np.full(6, 0.1), STATE, 0.0)
