@@ -153,6 +153,14 @@ def test_files_that_are_named_are_there(document):
     assert [path for path in named if not (ROOT / path).exists()] == []
 
 
+def test_rooms_are_all_there():
+    floors = ("controllers", "datasets", "collect", "policies")
+    for floor in floors:
+        (row,) = re.findall(rf"^\| `{floor}/` \| (`.*) \|$", section("architecture", "Rooms"), re.MULTILINE)
+        rooms = {path.name for path in (ROOT / floor).iterdir() if any(path.rglob("*.py"))}
+        assert set(re.findall("`(.*?)`", row)) == rooms
+
+
 def test_modes_tasks_and_cameras_are_all_there():
     assert table("concepts", "Teleop modes") == set(MODES)
     from handrail.collect.config import CAMERAS, MODE_NAMES, TASKS
