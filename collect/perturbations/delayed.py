@@ -12,8 +12,8 @@ from handrail.controllers.interface.intent import Intent
 class DelayedOperator:
     """Shows another operator each moment k control periods late; an operator.
 
-    What he asks for arrives at once: the intent carries the time at which it was asked. Before the k-th
-    period he sees the beginning.
+    What they ask for arrives at once: the intent carries the time at which it was asked. Before the k-th
+    period they see the beginning.
 
     Args:
         operator: whoever steers.

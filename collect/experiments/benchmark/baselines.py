@@ -124,10 +124,10 @@ class SmoothedHandIntent:
 
 
 class JointIntent:
-    """The operator steers every joint, and works out how by himself: plain damped least squares.
+    """The operator steers every joint, and works out how by themselves: plain damped least squares.
 
     What reaches the controller is a complete command, as direct control and safety filters expect it; nobody
-    could do that with his hands so well.
+    could do that with their hands so well.
 
     Args:
         model: of the robot.
