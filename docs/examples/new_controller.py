@@ -9,7 +9,7 @@ import gymnasium
 
 import handrail.collect  # noqa: F401  (registers the environments)
 from handrail.collect.config import SessionConfig
-from handrail.collect.operators.modes import find_mode
+from handrail.collect.operators.modes import MODES
 from handrail.collect.session.build import build_operator
 from handrail.collect.session.session import Session
 from handrail.controllers.arrays import FloatArray
@@ -39,7 +39,7 @@ def main() -> None:
     """Let the scripted operator steer through it; input checks, limits and brakes come with the shell."""
     env = gymnasium.make("handrail/Reach-v0").unwrapped
     controller = twist_controller(env.model, TransposedJacobian(env.model), period=1.0 / env.fps)
-    operator = build_operator(SessionConfig(task="reach"), find_mode("ee"), env.model)
+    operator = build_operator(SessionConfig(task="reach"), MODES["ee"], env.model)
     session = Session(env, controller, operator)
     for seed in range(3):
         outcome = session.run(seed)

@@ -9,7 +9,7 @@ import numpy as np
 
 from handrail.collect.config import SessionConfig
 from handrail.collect.envs.env import HandrailEnv
-from handrail.collect.operators.modes import find_mode
+from handrail.collect.operators.modes import MODES
 from handrail.collect.session.build import build_controller, build_operator
 from handrail.collect.session.session import Session
 from handrail.collect.simulation.scene import Scene, SceneObject
@@ -46,7 +46,7 @@ class TouchBall:
 
 def main() -> None:
     """Let the scripted operator of `reach` do it: it goes to any goal that an episode names."""
-    env, mode = HandrailEnv(TouchBall()), find_mode("ee")
+    env, mode = HandrailEnv(TouchBall()), MODES["ee"]
     operator = build_operator(SessionConfig(task="reach"), mode, env.model)
     session = Session(env, build_controller(mode, env.model, env.fps), operator)
     for seed in range(3):

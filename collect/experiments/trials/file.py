@@ -34,7 +34,7 @@ class Trial:
         smallest_distance: signed, tool against work surfaces left out [m].
         brakes: updates in which the controller braked the robot.
         switches: how often the operator changed to other channels.
-        switching: time for which his hands were away from the input meanwhile [s].
+        switching: time for which their hands were away from the input meanwhile [s].
     """
 
     task: str

@@ -82,7 +82,7 @@ def _watched(config: SessionConfig, env: HandrailEnv) -> "tuple[Session, _Hands]
 
 
 class _Hands:
-    """Counts how often an operator changes to other channels, and for how many frames his hands are away."""
+    """Counts how often an operator changes to other channels, and the frames their hands are away for it."""
 
     def __init__(self, operator: ScriptedOperator) -> None:
         self._operator = operator
