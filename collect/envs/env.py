@@ -130,13 +130,8 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             raise HandrailError(f"environment {self.task.name}: call reset() before anything else")
         return self._episode
 
-    @property
-    def commanded_velocity(self) -> FloatArray:
-        """The velocity commanded at the end of the last step, (n,) [m/s, rad/s]."""
-        return self.simulation.commanded.copy()
-
     def state(self) -> State:
-        """Return the measured positions, velocities and time."""
+        """Return the measured positions, velocities and time, and the velocity sent last."""
         return self.simulation.state()
 
     def obstacles(self) -> tuple[Obstacle, ...]:
@@ -196,12 +191,12 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
 
     def _limit(self, action: FloatArray) -> NDArray[np.float32]:
         """Return what is sent instead of an action, (n + 1,): within the limits, as it can be recorded."""
-        size, now = self.model.size, self.simulation
+        size, now = self.model.size, self.state()
         gripper = float(action[size]) if action.size == size + 1 else math.nan
         usable = math.isfinite(gripper)
         self._gripper = min(max(gripper, 0.0), 1.0) if usable else self._gripper
         target = action[:size] if usable else np.full(size, np.nan)
-        velocity, _ = self._limiter.limit(now.commanded, target, 1.0 / self.fps, now.state().q)
+        velocity, _ = self._limiter.limit(now.commanded, target, 1.0 / self.fps, now.q)
         return np.append(velocity, self._gripper).astype(np.float32)
 
     def _observe(self, state: TaskState) -> Observation:

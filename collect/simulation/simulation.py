@@ -56,7 +56,6 @@ class Simulation:
         mujoco_model: the compiled model.
         data: its state.
         substeps: integration steps in one control step.
-        commanded: velocity commanded last, (n,) [m/s, rad/s].
     """
 
     def __init__(
@@ -91,7 +90,6 @@ class Simulation:
         portable = [item.name for item in scene.movables if item.portable]
         self._grasp = GraspMonitor(self.mujoco_model, fingers, portable)
         self._index()
-        self.commanded = np.zeros(model.size)
         self._place(q, grip)
 
     def _index(self) -> None:
@@ -136,8 +134,7 @@ class Simulation:
         contacts, patrols = self._contacts, self._patrols
         contacts.clear()
         model, data, control = self.mujoco_model, self.data, self.data.ctrl
-        self.commanded, before = np.array(velocity, dtype=np.float64), self.commanded
-        for control[:] in self._ramp(before, gripper):
+        for control[:] in self._ramp(velocity, gripper):
             if patrols:
                 self._move_obstacles()
             mujoco.mj_step(model, data)
@@ -162,10 +159,10 @@ class Simulation:
         data.xfrc_applied[self.mujoco_model.body(BASE_BODY).id, :3] = base
         data.xfrc_applied[carrier] += np.concatenate([hand, np.cross(lever, hand)])
 
-    def _ramp(self, before: FloatArray, gripper: float) -> FloatArray:
+    def _ramp(self, velocity: FloatArray, gripper: float) -> FloatArray:
         """Return what the servos are sent at every substep: linear to the command, (substeps, servos)."""
         fingers = self._gripper_servo, self._gripper_target(gripper), self._speed * self._step
-        return _ramp(self.data.ctrl, before, self.commanded, self._shares, self._servo_index, fingers)
+        return _ramp(self.data.ctrl, velocity, self._shares, self._servo_index, fingers)
 
     def _gripper_target(self, gripper: float) -> float:
         """Return the opening that the gripper's servo is sent to [m]; closed is a little beyond touching."""
@@ -177,9 +174,10 @@ class Simulation:
             self.data.mocap_pos[body] = patrol.position(self.data.time)
 
     def state(self) -> State:
-        """Return the measured positions and velocities, and what was commanded last."""
+        """Return the measured positions and velocities, and what the servos were sent last."""
         data = self.data
-        return State(data.qpos[self._q_index], data.qvel[self._v_index], data.time, self.commanded)
+        commanded = data.ctrl[self._servo_index]
+        return State(data.qpos[self._q_index], data.qvel[self._v_index], data.time, commanded)
 
     @property
     def tool(self) -> Pose:
@@ -232,13 +230,14 @@ class Simulation:
 
 
 @exact_jit
-def _ramp(control, before, after, shares, servos, fingers):
-    """Return controls on the way from one velocity to another, and the fingers' towards their opening."""
+def _ramp(control, velocity, shares, servos, fingers):
+    """Return controls on the way from those now to a velocity, and the fingers' towards their opening."""
     ramp = np.empty((len(shares), len(control)))
     finger, opening, reach = fingers
     for k in range(len(shares)):
         for joint in range(len(servos)):
-            ramp[k, servos[joint]] = (1.0 - shares[k]) * before[joint] + shares[k] * after[joint]
+            before = control[servos[joint]]
+            ramp[k, servos[joint]] = (1.0 - shares[k]) * before + shares[k] * velocity[joint]
         if finger >= 0:
             way = opening - control[finger]
             ramp[k, finger] = control[finger] + min(max(way, -(reach * shares[k])), reach * shares[k])
