@@ -173,7 +173,7 @@ class RealTimeSolver:
 
 
 class _Answer(NamedTuple):
-    """Of the QP: whether solved, slacks, change of cost, changes of rows, active rows, distances among them."""
+    """Of the QP: whether solved, slacks, change of cost, changes of rows, active rows, distances of them."""
 
     solved: bool
     slack: FloatArray
