@@ -1,12 +1,42 @@
 """Scenes, tasks, the Gymnasium environments, operators and the session loop.
 
-Importing it registers one environment a task, `handrail/<name>-v0`; nothing heavy is imported until one is
-made.
+Importing it registers one environment a task, `handrail/<name>-v0`. The names of `__all__` are imported
+from here: `from handrail.collect import SessionConfig, build_env, build_session`. Nothing heavy is loaded
+until one of them is used or an environment is made.
 """
+
+from typing import TYPE_CHECKING
 
 import gymnasium
 
 from handrail.collect.tasks.catalogue import TASKS
+from handrail.controllers.lazy import lazily
+
+if TYPE_CHECKING:
+    from handrail.collect.commands.record import record as record
+    from handrail.collect.commands.replay import replay_episode as replay_episode
+    from handrail.collect.config import RecordConfig as RecordConfig
+    from handrail.collect.config import SessionConfig as SessionConfig
+    from handrail.collect.envs.env import HandrailEnv as HandrailEnv
+    from handrail.collect.operators.modes import MODES as MODES
+    from handrail.collect.session.build import build_env as build_env
+    from handrail.collect.session.build import build_session as build_session
+    from handrail.collect.session.session import Session as Session
+
+_MODULES = {
+    "HandrailEnv": "envs.env",
+    "MODES": "operators.modes",
+    "RecordConfig": "config",
+    "Session": "session.session",
+    "SessionConfig": "config",
+    "build_env": "session.build",
+    "build_session": "session.build",
+    "record": "commands.record",
+    "replay_episode": "commands.replay",
+}
+
+__all__ = sorted(_MODULES)  # pyright: ignore[reportUnsupportedDunderAll]
+__getattr__ = lazily(__name__, _MODULES)
 
 for _spec in TASKS.built_in:
     gymnasium.register(

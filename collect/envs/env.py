@@ -16,7 +16,6 @@ from handrail.collect.simulation.protocols import Plant, Robot, World
 from handrail.collect.simulation.rendering import CAMERAS, FAST, PRETTY, Painter
 from handrail.collect.simulation.simulation import Simulation
 from handrail.collect.tasks.task import Episode, Task, TaskState, Verdict
-from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import HandrailError, unknown_name
 from handrail.controllers.interface.controller import State
 from handrail.controllers.robot.model import RobotModel, load_model
@@ -163,13 +162,8 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             raise HandrailError(f"environment {self.task.name}: call reset() before anything else")
         return self._episode
 
-    @property
-    def commanded_velocity(self) -> FloatArray:
-        """The velocity commanded at the end of the last step, (n,) [m/s, rad/s]."""
-        return np.array(self.state().commanded)
-
     def state(self) -> State:
-        """Return the measured positions, velocities and time."""
+        """Return the measured positions, velocities and time, and the velocity sent last."""
         return self.robot.state()
 
     def obstacles(self) -> tuple[Obstacle, ...]:

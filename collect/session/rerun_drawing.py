@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 
 from handrail.collect.envs.env import HandrailEnv
+from handrail.controllers.interface.channel_matrix import channel_matrix
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.robot.shape import Obstacle
 from handrail.datasets.recording.frames import Frame
@@ -71,19 +72,13 @@ class Drawing:
     def _log_tracking(self, frame: Frame, q: np.ndarray, v: np.ndarray) -> None:
         """Plot what is asked on each owned channel against what happens."""
         rr, channels = self._rr, self._channels
-        realised = np.concatenate([self._base_twist(q, v), self._model.jacobian(q) @ v, v])
+        realised = channel_matrix(self._model, channels, q) @ v
         for name, asked, owned, real in zip(
             channels.names, frame.intent.values, frame.intent.mask, realised, strict=True
         ):
             rr.log(f"motion/{name}/realised", rr.Scalars(real))
             if owned and np.isfinite(asked):
                 rr.log(f"motion/{name}/asked", rr.Scalars(asked))
-
-    def _base_twist(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        if not self._channels.base:
-            return np.zeros(0)
-        c, s = np.cos(q[2]), np.sin(q[2])
-        return np.array([c * v[0] + s * v[1], -s * v[0] + c * v[1], v[2]])
 
     def _log_shape(self, path: str, thing: Obstacle, colour: tuple[int, int, int] = _SCENE) -> None:
         rr, size = self._rr, thing.shape.size

@@ -8,14 +8,14 @@ import numpy as np
 
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.collision.margins import Margins
+from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.collision.surroundings import Surroundings
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.command import Command, Diagnostics, Status
 from handrail.controllers.interface.controller import State
 from handrail.controllers.interface.intent import Intent
-from handrail.controllers.interface.validation import InputValidator
-from handrail.controllers.mpc.last_command import Followed, following, sent_velocity
+from handrail.controllers.interface.validation import InputHistory, InputValidator
 from handrail.controllers.robot.model import RobotModel
 from handrail.controllers.robot.shape import Obstacle
 from handrail.controllers.safety.limiter import Limiter
@@ -93,28 +93,29 @@ class CbfFilter:
         self.reset()
 
     def reset(self, obstacles: tuple[Obstacle, ...] = ()) -> None:
-        """Forget the last command; take the obstacles of a new episode."""
-        self._surroundings = Surroundings(self._model, obstacles)
+        """Forget the past; take the obstacles of a new episode."""
+        self._surroundings = Surroundings(CollisionModel(self._model, obstacles))
         self._margins = self._wanted_margins()
-        self._validator.reset()
-        self._followed: Followed | None = None
+        self._inputs = InputHistory()
         self._gripper = 0.0
 
     def update_scene(self, obstacles: tuple[Obstacle, ...]) -> None:
         """Take where the obstacles are now, how fast they move, and what the hand holds."""
-        if self._surroundings.update_scene(obstacles):
+        before, self._surroundings = self._surroundings, self._surroundings.among(obstacles)
+        if self._surroundings.collision is not before.collision:
             self._margins = self._wanted_margins(self._margins)
 
     def _wanted_margins(self, before: Margins | None = None) -> Margins:
         """Return the margins of the pairs that there are now."""
         settings = self._settings
-        return Margins(self._surroundings.collision, settings.margin, settings.work_margin, before)
+        return Margins.of(self._surroundings.collision, settings.margin, settings.work_margin, before)
 
     def update(self, state: State, intent: Intent) -> Command:
         """Return the command from now on; brakes on a bad input or a failed solve."""
         start = perf_counter()
-        status = self._validator.check(state, intent, self._surroundings)
-        previous = sent_velocity(state, self._followed, self._model.description.limits)
+        makes_sense = self._surroundings.make_sense
+        status, self._inputs = self._validator.check(state, intent, makes_sense, self._inputs)
+        previous = state.sent(self._model.description.limits)
         if state.is_of(self._model.size):
             velocity, diagnostics = self._filtered(state.q, previous, intent, status)
         else:
@@ -122,9 +123,7 @@ class CbfFilter:
             diagnostics = Diagnostics(status)
         velocities = self._limiter.to_rest(np.stack([previous, velocity]), self._period)
         diagnostics = replace(diagnostics, solve_time=perf_counter() - start)
-        command = Command(velocities, self._period, self._gripper, diagnostics)
-        self._followed = following(self._followed, command, state.time, self._period)
-        return command
+        return Command(velocities, self._period, self._gripper, diagnostics)
 
     def _filtered(
         self, q: FloatArray, previous: FloatArray, intent: Intent, status: Status
@@ -153,15 +152,16 @@ class CbfFilter:
         """Return the barrier rows at q; how the obstacles' own motion changes d is seen over a period."""
         collision = self._surroundings.collision
         if self._margins.unknown:
-            self._margins.see(collision.values(q[None, :])[0])
-        times, margins = np.array([0.0, self._period]), self._margins.values
-        distances = collision.distances(np.stack([q, q]), margins + self._settings.reach, times)
-        self._margins.see(distances.values[0])
+            self._margins = self._margins.seen(collision.values(q[None, :])[0])
+        times = np.array([0.0, self._period])
+        reach = self._margins.values + self._settings.reach
+        distances = collision.distances(np.stack([q, q]), reach, times)
+        self._margins = self._margins.seen(distances.values[0])
         keep = distances.near[:, 0] == 1
         pair = distances.near[keep, 1]
         now, then = distances.values[:, pair]
         drift = (then - now) / self._period
-        lower = -self._settings.alpha * (now - margins[pair]) - drift
+        lower = -self._settings.alpha * (now - self._margins.values[pair]) - drift
         return _Barriers(distances.gradients[keep], lower, distances.values[0])
 
     def _bounds(self, previous: FloatArray, q: FloatArray) -> tuple[FloatArray, FloatArray]:

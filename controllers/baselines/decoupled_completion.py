@@ -6,6 +6,7 @@ import numpy as np
 
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.baselines.arm_completion import ArmCompletion
+from handrail.controllers.numerics.rotation import turned
 from handrail.controllers.robot.model import RobotModel
 
 
@@ -64,14 +65,9 @@ class DecoupledCompletion:
         drive = error * (speed / max(distance, 1e-9))
         bearing = np.arctan2(hand[1], hand[0]) - np.arctan2(self._home[1], self._home[0])
         rate = settings.turning * np.arctan2(np.sin(bearing), np.cos(bearing))
-        c, s = np.cos(q[2]), np.sin(q[2])
-        return np.array([c * drive[0] - s * drive[1], s * drive[0] + c * drive[1], rate])
+        return turned([*drive, rate], q[2])
 
     def _seen_from_base(self, q: FloatArray) -> FloatArray:
         """Return where the hand is in the base frame, in the plane, (2,) [m]."""
         hand = self._model.pose(q).position[:2]
-        if not self._base:
-            return hand
-        c, s = np.cos(q[2]), np.sin(q[2])
-        away = hand - q[:2]
-        return np.array([c * away[0] + s * away[1], -s * away[0] + c * away[1]])
+        return turned(hand - q[:2], -q[2]) if self._base else hand

@@ -6,13 +6,13 @@ from time import perf_counter
 import numpy as np
 
 from handrail.controllers.arrays import BoolArray, FloatArray
+from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.collision.surroundings import Surroundings
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.command import Command, Diagnostics, Status
 from handrail.controllers.interface.controller import State
 from handrail.controllers.interface.intent import Intent
-from handrail.controllers.interface.validation import InputValidator
-from handrail.controllers.mpc.last_command import Followed, following, sent_velocity
+from handrail.controllers.interface.validation import InputHistory, InputValidator
 from handrail.controllers.robot.model import RobotModel
 from handrail.controllers.robot.shape import Obstacle
 from handrail.controllers.safety.limiter import Limiter
@@ -53,23 +53,23 @@ class ReactiveController:
         self.reset()
 
     def reset(self, obstacles: tuple[Obstacle, ...] = ()) -> None:
-        """Forget the last command; take the obstacles whose distance is reported."""
-        self._surroundings = Surroundings(self._model, obstacles)
-        self._validator.reset()
-        self._followed: Followed | None = None
+        """Forget when inputs came, and the gripper; take the obstacles whose distance is reported."""
+        self._surroundings = Surroundings(CollisionModel(self._model, obstacles))
+        self._inputs = InputHistory()
         self._gripper = 0.0
 
     def update_scene(self, obstacles: tuple[Obstacle, ...]) -> None:
         """Take where the obstacles are now, and what the hand holds."""
-        self._surroundings.update_scene(obstacles)
+        self._surroundings = self._surroundings.among(obstacles)
 
     def update(self, state: State, intent: Intent) -> Command:
         """Return the command from now on."""
         start = perf_counter()
-        status = self._validator.check(state, intent, self._surroundings)
+        makes_sense = self._surroundings.make_sense
+        status, self._inputs = self._validator.check(state, intent, makes_sense, self._inputs)
         if status is Status.OK and np.any(intent.mask & self._foreign):
             status = Status.INVALID_INTENT
-        previous = sent_velocity(state, self._followed, self._model.description.limits)
+        previous = state.sent(self._model.description.limits)
         target = np.zeros(self._model.size)
         if status is Status.OK:
             target = self._ask(state, intent, previous)
@@ -80,9 +80,7 @@ class ReactiveController:
             status = Status.CLIPPED
         velocities = self._limiter.to_rest(np.stack([previous, velocity]), self._period)
         diagnostics = self._diagnostics(state, status, start)
-        command = Command(velocities, self._period, self._gripper, diagnostics)
-        self._followed = following(self._followed, command, state.time, self._period)
-        return command
+        return Command(velocities, self._period, self._gripper, diagnostics)
 
     def _diagnostics(self, state: State, status: Status, start: float) -> Diagnostics:
         solve_time = perf_counter() - start

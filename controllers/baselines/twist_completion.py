@@ -9,6 +9,7 @@ from handrail.controllers.baselines.reactive import ReactiveController
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import State
 from handrail.controllers.interface.intent import Intent
+from handrail.controllers.numerics.rotation import turned
 from handrail.controllers.robot.model import Pose, RobotModel
 
 Completion = Callable[[FloatArray, FloatArray, FloatArray, float], FloatArray]
@@ -46,9 +47,8 @@ def base_velocity(intent: Intent, channels: Channels, q: FloatArray) -> FloatArr
     """Return the commanded base twist as the base's joint velocities in the world, (3,), or (0,)."""
     if not channels.base:
         return np.zeros(0)
-    vx, vy, wz = np.where(intent.mask, intent.values, 0.0)[channels.base_slice]
-    c, s = (1.0, 0.0) if intent.frames.base == "world" else (np.cos(q[2]), np.sin(q[2]))
-    return np.array([c * vx - s * vy, s * vx + c * vy, wz])
+    twist = np.where(intent.mask, intent.values, 0.0)[channels.base_slice]
+    return twist if intent.frames.base == "world" else turned(twist, q[2])
 
 
 def tool_twist(intent: Intent, channels: Channels, tool: Pose) -> FloatArray:

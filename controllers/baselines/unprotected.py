@@ -5,10 +5,11 @@ import numpy as np
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.baselines.reactive import ReactiveController
 from handrail.controllers.baselines.twist_completion import base_velocity, tool_twist
+from handrail.controllers.interface.channel_matrix import channel_matrix
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import State
 from handrail.controllers.interface.intent import Intent
-from handrail.controllers.mpc.masked_mpc import channel_matrix
+from handrail.controllers.numerics.rotation import turned
 from handrail.controllers.robot.model import RobotModel
 
 _DAMPING = 0.01  # λ, as in WholeBodyCompletion
@@ -44,7 +45,5 @@ def _world_values(model: RobotModel, channels: Channels, state: State, intent: I
     values = intent.values.copy()
     values[channels.tool_slice] = tool_twist(intent, channels, model.pose(state.q))
     if channels.base and intent.frames.base == "world":
-        vx, vy, wz = base_velocity(intent, channels, state.q)
-        c, s = np.cos(state.q[2]), np.sin(state.q[2])
-        values[channels.base_slice] = (c * vx + s * vy, c * vy - s * vx, wz)
+        values[channels.base_slice] = turned(base_velocity(intent, channels, state.q), -state.q[2])
     return values

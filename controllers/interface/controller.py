@@ -9,6 +9,7 @@ from handrail.controllers.arrays import FloatArray, frozen, real
 from handrail.controllers.interface.command import Command
 from handrail.controllers.interface.intent import Intent
 from handrail.controllers.numerics.jit import exact_jit
+from handrail.controllers.robot.description import Limits
 from handrail.controllers.robot.shape import Obstacle
 
 
@@ -21,13 +22,14 @@ class State:
         v: measured velocities, dq/dt, (n,) [m/s, rad/s].
         time: on the robot's clock [s]; later at every update.
         commanded: the velocity that the robot was sent last, (n,). It alone knows, for what is asked may be
-            limited on the way. None where it does not say; then it was sent what was asked.
+            limited on the way: controllers do not remember it. Left out of a robot that moves as it is told,
+            which is `v`.
     """
 
     q: FloatArray
     v: FloatArray
     time: float = 0.0
-    commanded: FloatArray | None = None
+    commanded: FloatArray = None  # type: ignore[assignment]
 
     def __post_init__(self) -> None:
         """Copy the arrays and make them read-only.
@@ -35,15 +37,31 @@ class State:
         Raises:
             HandrailError: one of them is not made of real numbers.
         """
+        if self.commanded is None:
+            object.__setattr__(self, "commanded", self.v)
         for name in ("q", "v", "commanded"):
-            if getattr(self, name) is not None:
-                object.__setattr__(self, name, frozen(getattr(self, name), what=f"{name} of a state"))
+            object.__setattr__(self, name, frozen(getattr(self, name), what=f"{name} of a state"))
         object.__setattr__(self, "time", real(self.time, "time of a state"))
 
     def is_of(self, size: int) -> bool:
         """Whether all of it but the time are finite numbers for a robot with `size` coordinates."""
-        known = self.commanded is None or (self.commanded.shape == (size,) and _finite(self.commanded))
-        return known and self.q.shape == self.v.shape == (size,) and _finite(self.q) and _finite(self.v)
+        return all(_known(values, size) for values in (self.q, self.v, self.commanded))
+
+    def sent(self, limits: Limits) -> FloatArray:
+        """Return the velocity with which every command begins, (n,): the one sent last, within the limits.
+
+        A command between two such velocities keeps the limit of acceleration whatever the robot does. Where
+        the robot does not say what it was sent, it is how it moves; where it does not say that, rest.
+        """
+        size = len(limits.velocity)
+        said = (values for values in (self.commanded, self.v) if _known(values, size))
+        velocity = next(said, np.zeros(size))
+        return np.minimum(np.maximum(velocity, -limits.velocity), limits.velocity)
+
+
+def _known(values: FloatArray, size: int) -> bool:
+    """Whether values are as many finite numbers."""
+    return values.shape == (size,) and bool(_finite(values))
 
 
 @exact_jit

@@ -1,7 +1,7 @@
 """Intent prediction Ψ: what the operator will ask for over the horizon (the paper's equation 4)."""
 
-from collections import deque
 from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,8 +13,15 @@ from handrail.controllers.numerics.jit import copy, exact_jit, jit
 Prediction = Callable[[Intent, FloatArray], FloatArray]
 """The intent now and times ahead, (N,) [s] → predicted values on every channel, (N, m).
 
-Any callable will do; one that remembers has a `reset()`, called when an episode begins.
+Any callable will do. One that remembers is a value with a method `after(intent)`, which returns the
+prediction that has heard an intent too; it is asked at every update, before the prediction is made.
 """
+
+
+def after(predict: Prediction, intent: Intent) -> Prediction:
+    """Return the prediction that has heard an intent; itself if it remembers nothing."""
+    remember = getattr(predict, "after", None)
+    return predict if remember is None else remember(intent)
 
 
 def constant(intent: Intent, times: FloatArray) -> FloatArray:
@@ -22,42 +29,40 @@ def constant(intent: Intent, times: FloatArray) -> FloatArray:
     return np.broadcast_to(intent.values, (len(times), len(intent.values)))
 
 
+@dataclass(frozen=True)
 class Extrapolated:
     """Go on with the recent trend, `û(t) = u + s τ (1 - exp(-t / τ))`.
 
     s is the least-squares slope over the window; it fades with τ, so that the prediction levels off. The
     history begins anew when the mask changes.
 
-    Args:
+    Attributes:
         window: how far back the trend is taken from [s].
         fade: τ [s].
+        history: intents of the window.
     """
 
-    def __init__(self, window: float = 0.3, fade: float = 0.2) -> None:
-        self._window = window
-        self._fade = fade
-        self.reset()
+    window: float = 0.3
+    fade: float = 0.2
+    history: tuple[Intent, ...] = ()
 
-    def reset(self) -> None:
-        """Forget the history."""
-        self._history: deque[Intent] = deque()
+    def after(self, intent: Intent) -> "Extrapolated":
+        """Return the prediction that has heard an intent."""
+        same = self.history and np.array_equal(self.history[-1].mask, intent.mask)
+        before = self.history if same else ()
+        recent = (each for each in before if each.time >= intent.time - self.window)
+        return replace(self, history=(*recent, intent))
 
     def __call__(self, intent: Intent, times: FloatArray) -> FloatArray:
         """Return the predicted values, (N, m)."""
-        self._remember(intent)
-        gain = self._fade * (1.0 - np.exp(-times / self._fade))
+        if not self.history:
+            return constant(intent, times)
+        gain = self.fade * (1.0 - np.exp(-times / self.fade))
         return intent.values + gain[:, None] * self._slope()
 
-    def _remember(self, intent: Intent) -> None:
-        if self._history and not np.array_equal(self._history[-1].mask, intent.mask):
-            self._history.clear()
-        self._history.append(intent)
-        while self._history[0].time < intent.time - self._window:
-            self._history.popleft()
-
     def _slope(self) -> FloatArray:
-        times = np.array([intent.time for intent in self._history])
-        values = np.array([np.where(intent.mask, intent.values, 0.0) for intent in self._history])
+        times = np.array([intent.time for intent in self.history])
+        values = np.array([np.where(intent.mask, intent.values, 0.0) for intent in self.history])
         centred = times - times.mean()
         spread = float(centred @ centred)
         return centred @ values / spread if spread > 0 else np.zeros(values.shape[1])
@@ -103,6 +108,16 @@ def _bounded(values, mask, times, tool, distance, angle):
     return predicted
 
 
+@dataclass(frozen=True)
+class Level:
+    """What a low-pass remembers: when an intent came last [s], its command and the level then, (m,)."""
+
+    time: float
+    command: FloatArray
+    level: FloatArray
+
+
+@dataclass(frozen=True)
 class Smoothed:
     """Let the hand take up a command gradually: a low-pass that is known ahead.
 
@@ -110,40 +125,30 @@ class Smoothed:
     is f itself as long as the command holds. The gain at rest is 1: a hand that follows arrives where the
     command leads, τ later. Steps and tremor become what a heavy arm can follow without effort.
 
-    Args:
+    Attributes:
         predict: Ψ.
         time_constant: τ, one or one a channel [s].
+        last: command and level now; None at rest, before the first intent.
     """
 
-    def __init__(self, predict: Prediction, time_constant: float | FloatArray) -> None:
-        self._predict = predict
-        self._time_constant = np.asarray(time_constant, dtype=float)
-        self.reset()
+    predict: Prediction
+    time_constant: float | FloatArray
+    last: Level | None = None
 
-    def reset(self) -> None:
-        """Begin at rest."""
-        self._last: tuple[float, FloatArray, FloatArray] | None = None  # time, command and level
-        self._faded = b"", np.zeros(0)
-        getattr(self._predict, "reset", lambda: None)()
+    def after(self, intent: Intent) -> "Smoothed":
+        """Return the prediction that has heard an intent."""
+        rest = np.zeros(len(intent.values))
+        last = self.last or Level(intent.time, rest, rest)
+        left = np.exp(-max(intent.time - last.time, 0.0) / (self.time_constant + rest))
+        command, level = _taken_up(intent.values, intent.mask, last.command, last.level, left)
+        return replace(self, predict=after(self.predict, intent), last=Level(intent.time, command, level))
 
     def __call__(self, intent: Intent, times: FloatArray) -> FloatArray:
         """Return the predicted values, (N, m)."""
-        if self._last is None:
-            rest = np.zeros(len(intent.values))
-            self._time_constant = self._time_constant + rest
-            self._last = intent.time, rest, rest
-        time, before, level = self._last
-        left = np.exp(-max(intent.time - time, 0.0) / self._time_constant)
-        command, level = _taken_up(intent.values, intent.mask, before, level, left)
-        self._last = intent.time, command, level
-        return self._predict(intent, times) + self._fade(times) * (level - command)
-
-    def _fade(self, times: FloatArray) -> FloatArray:
-        """Return `exp(-t / τ)`, remembered for the last times asked for, (N, m)."""
-        key = times.tobytes()
-        if key != self._faded[0]:
-            self._faded = key, np.exp(-times[:, None] / self._time_constant)
-        return self._faded[1]
+        if self.last is None:
+            return self.after(intent)(intent, times)
+        faded = np.exp(-times[:, None] / (self.time_constant + np.zeros(len(intent.values))))
+        return self.predict(intent, times) + faded * (self.last.level - self.last.command)
 
 
 @exact_jit

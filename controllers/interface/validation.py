@@ -1,8 +1,8 @@
 """The checks that every controller makes before it listens to an intent."""
 
 import math
+from dataclasses import dataclass, replace
 
-from handrail.controllers.collision.surroundings import Surroundings
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.command import Status
 from handrail.controllers.interface.controller import State
@@ -12,8 +12,39 @@ _LEAD = 0.05  # by which an intent's stamp may be ahead of the state's clock: on
 _TICK = 1e-4  # by which the state's clock advances from update to update at least [s]
 
 
+@dataclass(frozen=True)
+class InputHistory:
+    """When the inputs of the updates so far came.
+
+    Attributes:
+        time: of the last state [s].
+        stamp: of the newest intent [s].
+        age: time since that came first [s].
+        jumped: whether the clock jumped back since.
+    """
+
+    time: float = -math.inf
+    stamp: float = -math.inf
+    age: float = 0.0
+    jumped: bool = False
+
+    def at(self, time: float) -> "InputHistory":
+        """Return the history at a state's time [s], which may be no number."""
+        if not math.isfinite(time):
+            return self
+        passed = time - self.time
+        return replace(self, time=time, age=self.age + max(passed, 0.0), jumped=self.jumped or passed < 0.0)
+
+    def with_stamp(self, stamp: float) -> "InputHistory":
+        """Return the history with an intent's stamp [s], if that is a new one."""
+        if stamp > self.stamp or (self.jumped and stamp < self.stamp):
+            return replace(self, stamp=stamp, age=0.0, jumped=False)
+        return self
+
+
+@dataclass(frozen=True)
 class InputValidator:
-    """Says whether an update's inputs may move the robot; remembers when they came.
+    """Says whether an update's inputs may move the robot.
 
     An intent is new if its stamp is later than all before. With t the state's time, t_s the stamp and t_a the
     time at which it came first, its age is `max(t - t_s, t - t_a)`: an operator whose clock is ahead grows
@@ -21,44 +52,32 @@ class InputValidator:
     then nobody knows how old anything is. After it jumped back a stamp that differs from the last one is new
     too: those of before may lie ahead now; what was there before the jump grows older all the same.
 
-    Args:
+    Attributes:
         channels: of the robot.
         timeout: age from which an intent is stale [s].
     """
 
-    def __init__(self, channels: Channels, timeout: float) -> None:
-        self._channels = channels
-        self._timeout = timeout
-        self.reset()
+    channels: Channels
+    timeout: float
 
-    def reset(self) -> None:
-        """Forget what came."""
-        self._time = self._stamp = -math.inf
-        self._age, self._jumped = 0.0, False
+    def check(
+        self, state: State, intent: Intent, scene_makes_sense: bool, before: InputHistory
+    ) -> tuple[Status, InputHistory]:
+        """Return `ok`, or why the robot must brake; and the history with this update's inputs."""
+        now = before.at(state.time)
+        advances = math.isfinite(state.time) and state.time - before.time > _TICK
+        if not (advances and state.is_of(len(self.channels.joints))):
+            return Status.INVALID_STATE, now
+        if not scene_makes_sense:
+            return Status.INVALID_SCENE, now
+        if not self._is_intent(state, intent):
+            return Status.INVALID_INTENT, now
+        now = now.with_stamp(intent.time)
+        stale = max(state.time - intent.time, now.age) > self.timeout
+        return Status.STALE_INTENT if stale else Status.OK, now
 
-    def check(self, state: State, intent: Intent, surroundings: Surroundings) -> Status:
-        """Return `ok`, or why the robot must brake."""
-        if not (self._advances(state.time) and state.is_of(len(self._channels.joints))):
-            return Status.INVALID_STATE
-        if not surroundings.make_sense:
-            return Status.INVALID_SCENE
-        return self._check_intent(state, intent)
-
-    def _check_intent(self, state: State, intent: Intent) -> Status:
-        size = self._channels.size
+    def _is_intent(self, state: State, intent: Intent) -> bool:
+        size = self.channels.size
         if intent.values.shape != (size,) or intent.mask.shape != (size,):
-            return Status.INVALID_INTENT
-        if not (intent.is_finite and intent.frames.are_known) or intent.time > state.time + _LEAD:
-            return Status.INVALID_INTENT
-        if intent.time > self._stamp or (self._jumped and intent.time < self._stamp):
-            self._stamp, self._age, self._jumped = intent.time, 0.0, False
-        return Status.STALE_INTENT if max(state.time - intent.time, self._age) > self._timeout else Status.OK
-
-    def _advances(self, time: float) -> bool:
-        """Take the state's time [s]; return whether it is later than the one before."""
-        if not math.isfinite(time):
             return False
-        passed, self._time = time - self._time, time
-        self._jumped |= passed < 0.0
-        self._age += max(passed, 0.0)
-        return passed > _TICK
+        return intent.is_finite and intent.frames.are_known and intent.time <= state.time + _LEAD

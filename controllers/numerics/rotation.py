@@ -13,6 +13,20 @@ def skew(vector: ArrayLike) -> FloatArray:
     return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
 
+def turned(planar: ArrayLike, angle: ArrayLike) -> FloatArray:
+    """Return planar vectors or twists turned about z: `(c x − s y, s x + c y)`; what comes after x, y stays.
+
+    By the base's yaw it takes them from the base frame to the world, by minus that back.
+
+    Args:
+        planar: (2, …) or, as (vx, vy, ωz) or a matrix of such columns, (3, …).
+        angle: [rad], one, or one a column.
+    """
+    x, y, *rest = np.asarray(planar)
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([c * x - s * y, s * x + c * y, *rest])
+
+
 def matrix_from_rpy(rpy: ArrayLike) -> FloatArray:
     """Return `Rz(yaw) Ry(pitch) Rx(roll)` as URDF defines it; angles [rad]."""
     return Rotation.from_euler("xyz", np.asarray(rpy, dtype=float)).as_matrix()

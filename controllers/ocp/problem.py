@@ -1,10 +1,10 @@
 """The masked optimal control problem of one update (the paper's equation 6), as a value."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from handrail.controllers.arrays import FloatArray, frozen
+from handrail.controllers.arrays import FloatArray, IntArray, frozen
 from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.ocp.motion import approach, cumulated, is_motion, largest_share, rollout
 from handrail.controllers.robot.description import Limits
@@ -78,6 +78,7 @@ class Plan:
         iterations: of the solver.
         tracking_error: norm of the commanded channels' error at the last tracked stage.
         rows: inequality rows of the last QP, bounds left out.
+        active: names of those that hold with equality, for the next problem among the same pairs.
         phases: where the time went: `residuals`, `distances`, `solve` [s].
     """
 
@@ -91,6 +92,7 @@ class Plan:
     iterations: int
     tracking_error: float = 0.0
     rows: int = 0
+    active: IntArray = field(default_factory=lambda: np.empty(0, dtype=int))
     phases: tuple[tuple[str, float], ...] = ()
 
     def __post_init__(self) -> None:

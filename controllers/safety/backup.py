@@ -17,18 +17,20 @@ _SAME = 1e-6  # difference of velocities that is rounding [m/s, rad/s]
 
 @dataclass(frozen=True)
 class Situation:
-    """Where the robot is, and how the motion that was stored has gone on.
+    """Where the robot is, and what was stored.
 
     Attributes:
         q: measured position, (n,).
-        v: velocity that a command begins with: the commanded one, if the robot keeps up, (n,).
+        v: velocity that a command begins with, (n,).
         distances: signed distances of all pairs, (P,) [m].
-        elapsed: time since the last update [s].
+        stored: the motion of the candidate taken last, from when that was on; None before the first.
+        elapsed: time since then [s].
     """
 
     q: FloatArray
     v: FloatArray
     distances: FloatArray
+    stored: Trajectory | None
     elapsed: float
 
 
@@ -47,6 +49,7 @@ class Candidate:
     planned: bool = False
 
 
+@dataclass(frozen=True)
 class Backup:
     """A ladder of ways, of which the robot takes the first that is safe.
 
@@ -61,24 +64,18 @@ class Backup:
     because an obstacle or the robot was moved by somebody else, it is the one that falls least short: first
     of keeping from itself and from what stands still, then of keeping from everything.
 
-    Args:
+    Attributes:
         certificate: measures the ways.
         limiter: knows the full stop.
         dt: time between knots [s].
     """
 
-    def __init__(self, certificate: StopCertificate, limiter: Limiter, dt: float) -> None:
-        self._certificate = certificate
-        self._limiter = limiter
-        self._dt = dt
-        self._stored: Trajectory | None = None
-
-    def measure_by(self, certificate: StopCertificate) -> None:
-        """Measure by other pairs from now on: something was grasped or let go."""
-        self._certificate = certificate
+    certificate: StopCertificate
+    limiter: Limiter
+    dt: float
 
     def choose(self, situation: Situation, plan: Plan | None, halt: bool = False) -> Candidate:
-        """Return the way to take, and store it.
+        """Return the way to take, whose motion is to be stored.
 
         Args:
             situation: of the robot.
@@ -88,53 +85,46 @@ class Backup:
         refused: list[Candidate] = []
         for way in self._ways(situation, plan, halt):
             if way.violation.all <= 0.0:
-                break
+                return way
             refused.insert(0, way)
-        else:
-            way = min(refused, key=lambda refused: refused.violation)  # of equals the one farther down
-        self._stored = way.motion
-        return way
-
-    def brake(self, velocity: FloatArray) -> Trajectory:
-        """Return a full stop from a velocity, (n,), which is stored unmeasured: nobody knows where we are."""
-        self._stored = self._braking(velocity)
-        return self._stored
+        return min(refused, key=lambda refused: refused.violation)  # of equals the one farther down
 
     def _ways(self, situation: Situation, plan: Plan | None, halt: bool) -> Iterator[Candidate]:
         now = situation.q, situation.distances
         if plan is not None:
-            violation = self._certificate.violation(plan.q[1], plan.v[1], now, self._dt)
-            yield Candidate(Trajectory(plan.v[:2], self._dt), violation, planned=True)
+            violation = self.certificate.violation(plan.q[1], plan.v[1], now, self.dt)
+            yield Candidate(Trajectory(plan.v[:2], self.dt), violation, planned=True)
             yield from self._farther(plan, now)
         if halt:
             yield self._stop(situation)
-        if self._stored is not None:
-            rest = self._stopping(self._stored).after(situation.elapsed)
+        if situation.stored is not None:
+            rest = self._stopping(situation.stored).after(situation.elapsed)
             if np.allclose(situation.v, rest.velocity(0.0), rtol=0.0, atol=_SAME):
-                yield Candidate(rest, self._certificate.until_rest(*rest.path(situation.q), now))
+                yield Candidate(rest, self.certificate.until_rest(*rest.path(situation.q), now))
         if not halt:
             yield self._stop(situation)
 
     def _farther(self, plan: Plan, now: tuple[FloatArray, FloatArray]) -> Iterator[Candidate]:
         """Yield the plan as far as its own path is safe, then a full stop; half as far; and so on."""
-        path = Trajectory(plan.v, self._dt).path(plan.q[0], _SAMPLES)
-        violations = self._certificate.along(*path, now)[:, 1]
+        path = Trajectory(plan.v, self.dt).path(plan.q[0], _SAMPLES)
+        violations = self.certificate.along(*path, now)[:, 1]
         unsafe = np.flatnonzero(violations > 0.0)
         stages = len(plan.u) if not len(unsafe) else (int(unsafe[0]) - 1) // _SAMPLES
         while stages > 1:
-            violation = self._certificate.violation(plan.q[stages], plan.v[stages], now, self._dt * stages)
-            yield Candidate(Trajectory(plan.v[: stages + 1], self._dt), violation, planned=True)
+            violation = self.certificate.violation(plan.q[stages], plan.v[stages], now, self.dt * stages)
+            yield Candidate(Trajectory(plan.v[: stages + 1], self.dt), violation, planned=True)
             stages //= 2
 
     def _stop(self, situation: Situation) -> Candidate:
         now = situation.q, situation.distances
-        violation = self._certificate.violation(situation.q, situation.v, now)
-        return Candidate(self._braking(situation.v), violation)
-
-    def _braking(self, velocity: FloatArray) -> Trajectory:
-        """Return a full stop from a velocity, (n,)."""
-        return Trajectory(self._limiter.to_rest(velocity[None], self._dt), self._dt)
+        violation = self.certificate.violation(situation.q, situation.v, now)
+        return Candidate(full_stop(self.limiter, situation.v, self.dt), violation)
 
     def _stopping(self, motion: Trajectory) -> Trajectory:
         """Return a motion and a full stop from its end."""
-        return replace(motion, velocities=self._limiter.to_rest(motion.velocities, self._dt))
+        return replace(motion, velocities=self.limiter.to_rest(motion.velocities, self.dt))
+
+
+def full_stop(limiter: Limiter, velocity: FloatArray, dt: float) -> Trajectory:
+    """Return the fastest stop from a velocity, (n,), with knots every dt [s]."""
+    return Trajectory(limiter.to_rest(velocity[None], dt), dt)

@@ -1,11 +1,11 @@
-"""The certificate that a motion is safe: no pair comes below its floor, no joint beyond its range."""
+"""The certificate that a motion is safe: no pair comes too near, no joint beyond its range."""
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray
-from handrail.controllers.collision.margins import Margins
 from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.collision.slacks import MOVING
 from handrail.controllers.numerics.jit import jit
@@ -14,8 +14,8 @@ from handrail.controllers.safety.limiter import Limiter
 
 _SAMPLES = np.array([0.25, 0.5, 0.75, 1.0])  # of the time that a stop takes, or that the robot waits after it
 _ERROR = 1e-3  # of signed distances, that is no loss [m]
-_HARD_ERROR = 1e-4  # the same where a thing that stands still is nearer than its hard floor [m]
-_HARD = 0.5  # hard floor of the robot with itself and with what stands still, as a share of the floor
+_HARD_ERROR = 1e-4  # the same where a thing that stands still is nearer than its hard limit [m]
+_HARD = 0.5  # hard limit of the robot with itself and with what stands still, as a share of the least
 _BEYOND = 0.01  # of its range that a joint may come to rest [m, rad]
 
 
@@ -23,45 +23,35 @@ class Violation(NamedTuple):
     """How far a motion falls short of safety; of two the smaller is safer. 0 when it is safe [m, rad].
 
     Attributes:
-        hard: of the hard floors of the robot with itself and with what stands still, and of the joints'
+        hard: of the hard limits of the robot with itself and with what stands still, and of the joints'
             range. Nobody else moves these: what was safe once stays safe, and nothing is worth giving it up.
-        all: of all floors.
+        all: of all least distances.
     """
 
     hard: float
     all: float
 
 
+@dataclass(frozen=True)
 class StopCertificate:
     """Measures motions by exact distances; moving obstacles go on at constant velocity.
 
-    A motion is safe when no pair comes below its floor and no joint leaves its range, or, where one is
-    beyond already, no farther than now.
+    A motion is safe when no pair comes below its least distance and no joint leaves its range, or, where one
+    is beyond already, no farther than now.
 
-    Args:
+    Attributes:
         limiter: knows the full stop.
         collision: the pairs.
-        margins: of the pairs.
-        floor: of each pair, as a share of its margin.
+        least: distance of each pair that is kept, (P,) [m].
         limits: of the joints.
         span: time for which the robot has to be safe, where obstacles move [s].
     """
 
-    def __init__(
-        self,
-        limiter: Limiter,
-        collision: CollisionModel,
-        margins: Margins,
-        floor: float,
-        limits: Limits,
-        span: float,
-    ) -> None:
-        self._limiter = limiter
-        self._collision = collision
-        self._margins = margins
-        self._floor = floor
-        self._limits = limits
-        self._span = span
+    limiter: Limiter
+    collision: CollisionModel
+    least: FloatArray
+    limits: Limits
+    span: float
 
     def violation(
         self, q: FloatArray, v: FloatArray, now: tuple[FloatArray, FloatArray], delay: float = 0.0
@@ -76,7 +66,7 @@ class StopCertificate:
             now: the position now, (n,), and its distances, (P,).
             delay: time until it begins [s].
         """
-        path, times = self._limiter.stop(q, v, _SAMPLES)
+        path, times = self.limiter.stop(q, v, _SAMPLES)
         return self.until_rest(path, delay + times, now)
 
     def until_rest(
@@ -86,30 +76,28 @@ class StopCertificate:
 
         Where obstacles move, the robot has to be safe for some time, moving or waiting.
         """
-        left = self._span - times[-1]
-        if self._collision.moves and left > 0.0:
+        left = self.span - times[-1]
+        if self.collision.moves and left > 0.0:
             path = np.vstack([path, np.broadcast_to(path[-1], (len(_SAMPLES), path.shape[1]))])
             times = np.append(times, times[-1] + left * _SAMPLES)
-        hard, all_floors = self.along(path, times, now).max(axis=0).tolist()
-        return Violation(hard, all_floors)
+        return Violation(*self.along(path, times, now).max(axis=0).tolist())
 
     def along(self, path: FloatArray, times: FloatArray, now: tuple[FloatArray, FloatArray]) -> FloatArray:
-        """Return the same at every point of a motion, hard and of all floors, (K, 2)."""
-        floors = self._floor * self._margins.values
-        distances = self._collision.values(path, times, now, floors)
-        bounds = self._limits.position_lower, self._limits.position_upper
-        return _violations(path, distances, *now, floors, self._collision.kinds, *bounds)
+        """Return the same at every point of a motion, hard and of all, (K, 2)."""
+        distances = self.collision.values(path, times, now, self.least)
+        bounds = self.limits.position_lower, self.limits.position_upper
+        return _violations(path, distances, *now, self.least, self.collision.kinds, *bounds)
 
 
 @jit
-def _violations(path, distances, start, now, floors, kinds, lower, upper):
+def _violations(path, distances, start, now, least, kinds, lower, upper):
     short = np.zeros((len(path), 2))
     for k in range(len(path)):
-        for p in range(len(floors)):
+        for p in range(len(least)):
             distance = distances[k, p]
-            short[k, 1] = max(short[k, 1], min(floors[p], now[p] - _ERROR) - distance)
+            short[k, 1] = max(short[k, 1], min(least[p], now[p] - _ERROR) - distance)
             if kinds[p] != MOVING:
-                short[k, 0] = max(short[k, 0], min(_HARD * floors[p], now[p] - _HARD_ERROR) - distance)
+                short[k, 0] = max(short[k, 0], min(_HARD * least[p], now[p] - _HARD_ERROR) - distance)
         for j in range(len(start)):
             room = min(path[k, j] - lower[j], upper[j] - path[k, j]) + _BEYOND
             if room < 0.0:

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from handrail.controllers.arrays import FloatArray
+from handrail.controllers.arrays import FloatArray, IntArray
 from handrail.controllers.collision.distance_kernels import depth
 from handrail.controllers.collision.model import Distances
 from handrail.controllers.collision.slacks import LIMITS, SLACKS
@@ -26,7 +26,8 @@ _COARSE = 0.01  # share of the promised descent by which a linearised cost may b
 _SMALL = 0.1  # or of a descent that is this share of the cost
 _SMALLEST_SHARE = 1.0 / 16.0  # of a step that makes the cost rise
 _CHANGES = 10  # of the active rows, for each variable: an answer that takes more is none
-_NOTHING_ACTIVE = np.arange(SLACKS)  # but that no slack is negative
+NOTHING_ACTIVE = np.arange(SLACKS)
+"""Names of the active rows where only the slacks are at rest: none is negative."""
 
 
 class _Guess(NamedTuple):
@@ -51,21 +52,22 @@ class RealTimeSolver:
         self.cost = StageCost(residuals, horizon, size, dt)
         self._held = active_rows(horizon, size)
         self._motion = np.zeros((horizon, 3, size))
-        self.reset()
 
-    def reset(self) -> None:
-        """Forget which rows were active."""
-        self._active = _NOTHING_ACTIVE
-
-    def solve(self, problem: Problem, guess: FloatArray) -> Plan:
-        """Return the plan after one step from the accelerations `guess`, (N, n).
+    def solve(self, problem: Problem, guess: FloatArray, active: IntArray = NOTHING_ACTIVE) -> Plan:
+        """Return the plan after one step from a guess.
 
         Right after the intent or the scene has jumped, the guess is far off; a step that is still large, and
         did not lead where its linearisation said, is followed by another.
+
+        Args:
+            problem: of this update.
+            guess: accelerations, (N, n).
+            active: names of the rows that are expected to be active, as a plan among the same pairs has them.
         """
         spent = [0.0] * len(_PHASES)
         for _ in range(1 + _MORE_STEPS):
-            step = self._step(problem, guess, spent)
+            step = self._step(problem, guess, active, spent)
+            active = step.answer.active
             if not step.again:
                 break
             guess = step.moved.u
@@ -81,10 +83,11 @@ class RealTimeSolver:
             iterations=step.answer.changes,
             tracking_error=self.cost.tracking_error(problem),
             rows=step.rows,
+            active=active,
             phases=tuple(zip(_PHASES, spent, strict=True)),
         )
 
-    def _step(self, problem: Problem, guess: FloatArray, spent: list[float]) -> "_Step":
+    def _step(self, problem: Problem, guess: FloatArray, active: IntArray, spent: list[float]) -> "_Step":
         """Take one step; add the time that its phases take."""
         start = perf_counter()
         begin = self._linearisation(problem, guess)
@@ -92,7 +95,7 @@ class RealTimeSolver:
         measured = perf_counter()
         quadratic = self.cost.expand(problem, *begin[:3])
         built = perf_counter()
-        answer = self._solve(problem, quadratic, rows)
+        answer = self._solve(problem, quadratic, rows, active)
         moved = self._damped(problem, begin.u, quadratic.value, answer.slack, rows.needed)
         again = answer.solved and self._is_far(problem, quadratic.value, answer, moved)
         spent[0] += measured - start
@@ -121,13 +124,13 @@ class RealTimeSolver:
         stopped = _measured(problem, *_rolled_out(problem, stop, np.zeros_like(stop)))
         return stopped if stopped.depth <= begin.depth else begin
 
-    def _solve(self, problem: Problem, quadratic: Quadratic, rows: Rows) -> "_Answer":
+    def _solve(self, problem: Problem, quadratic: Quadratic, rows: Rows, active: IntArray) -> "_Answer":
         """Solve the QP; its step is left in `_motion`."""
         changes = 0
         if factor(quadratic.band):
             penalty = (problem.slack_linear, problem.slack_quadratic)
             limit = _CHANGES * len(quadratic.gradient)
-            for warm in (rows.keys(self._active), _NOTHING_ACTIVE):
+            for warm in (rows.keys(active), NOTHING_ACTIVE):
                 slack, descent, solved, changes, count = active_set.solve(
                     quadratic.band,
                     quadratic.gradient,
@@ -140,10 +143,8 @@ class RealTimeSolver:
                 )
                 if solved:
                     keys = self._held.keys[:count]
-                    self._active = rows.named(keys)
-                    return _Answer(True, slack, descent, changes, rows.any_distance(keys))
-        self.reset()
-        return _Answer(False, np.zeros(SLACKS), 0.0, changes, False)
+                    return _Answer(True, slack, descent, changes, rows.named(keys), rows.any_distance(keys))
+        return _Answer(False, np.zeros(SLACKS), 0.0, changes, NOTHING_ACTIVE, False)
 
     def _damped(
         self, problem: Problem, guess: FloatArray, allowed: float, slack: FloatArray, needed: FloatArray
@@ -172,12 +173,13 @@ class RealTimeSolver:
 
 
 class _Answer(NamedTuple):
-    """Of the QP: whether it was solved, slacks, change of the cost, changes of rows, distances active."""
+    """Of the QP: whether solved, slacks, change of cost, changes of rows, active rows, distances of them."""
 
     solved: bool
     slack: FloatArray
     descent: float
     changes: int
+    active: IntArray
     near: bool
 
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray
+from handrail.controllers.numerics.rotation import turned
 
 OBSERVATION_SIZE = 54
 ACTION_SIZE = 3
@@ -43,13 +44,13 @@ def observe(situation: Situation) -> FloatArray:
     first pose, so that an observation does not change when robot and goal are moved or turned together.
     """
     angle = situation.q[2]
-    to_base = planar_rotation(-angle)
+    to_base = turned(np.eye(3), -angle)
     origin = np.array([situation.q[0], situation.q[1], 0.0])
     twist = situation.twist.reshape(2, 3) @ to_base.T
     parts = [twist.ravel()]
     for position, rotation in (situation.current, situation.desired, situation.goal):
         parts += [to_base @ (position - origin), (to_base @ rotation).ravel()]
-    travelled = planar_rotation(-situation.start[2])[:2, :2] @ (situation.q[:2] - situation.start[:2])
+    travelled = turned(np.eye(2), -situation.start[2]) @ (situation.q[:2] - situation.start[:2])
     parts += [travelled, [angle - situation.start[2]], situation.q[3:], situation.previous]
     return np.concatenate(parts)
 
@@ -75,10 +76,4 @@ def base_velocity(action: FloatArray, angle: float) -> FloatArray:
         action: in [−1, 1], (3,), in the base frame.
         angle: of the base [rad].
     """
-    return planar_rotation(angle) @ (BASE_SPEED * np.clip(action, -1.0, 1.0))
-
-
-def planar_rotation(angle: float) -> FloatArray:
-    """Return the rotation about z by an angle [rad], (3, 3)."""
-    c, s = np.cos(angle), np.sin(angle)
-    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    return turned(np.eye(3), angle) @ (BASE_SPEED * np.clip(action, -1.0, 1.0))

@@ -34,7 +34,7 @@ AHEAD = asking(CHANNELS, np.eye(18)[0] * 0.6, "base")
 def reckless(joint):
     """Return a solver that speeds a joint up as fast as it can, whatever is in its way."""
 
-    def solve(problem, guess):
+    def solve(problem, guess, *active):
         u = np.tile(LIMITS.acceleration * (np.arange(9) == joint), (10, 1))
         q, v = problem.rollout(u)
         return replace(HONEST(problem, guess), q=q, v=v, u=u)
@@ -43,17 +43,17 @@ def reckless(joint):
 
 
 def raises(error):
-    def solve(problem, guess):
+    def solve(problem, guess, *active):
         raise error
 
     return solve
 
 
-def unsolved(problem, guess):
+def unsolved(problem, guess, *active):
     return replace(HONEST(problem, guess), solved=False)
 
 
-def not_a_number(problem, guess):
+def not_a_number(problem, guess, *active):
     plan = HONEST(problem, guess)
     return replace(plan, u=plan.u * np.nan, v=plan.v * np.nan, q=plan.q * np.nan)
 
@@ -63,7 +63,7 @@ FAILURES = [raises(HandrailError("no")), raises(RuntimeError("no")), unsolved, n
 
 def full_stop(robot):
     """Return the smallest distance to obstacles along the full stop from where the robot is now [m]."""
-    collision = robot.controller._collision
+    collision = robot.controller.loop.surroundings.collision
     path, _ = LIMITER.stop(robot.q, robot.v, np.linspace(0.0, 1.0, 21))
     scene = np.array([second == "table" for _, second in collision.pairs])
     return float(collision.values(path)[:, scene].min())
@@ -143,8 +143,8 @@ def test_no_change_of_mind_exceeds_a_limit(monkeypatch, period):
     """Plans, what is stored and stops follow each other at random, at periods that divide no stage."""
     rng = np.random.default_rng(int(1000 * period))
 
-    def moody(problem, guess):
-        return HONEST(problem, guess) if rng.random() < 0.7 else unsolved(problem, guess)
+    def moody(problem, guess, *active):
+        return HONEST(problem, guess, *active) if rng.random() < 0.7 else unsolved(problem, guess)
 
     monkeypatch.setattr(MPC.solver, "solve", moody)
     robot = Robot(MPC, clutter(rng), period)
@@ -185,9 +185,9 @@ def test_a_robot_that_cannot_follow_is_waited_for():
     place, sent = robot.q.copy(), [robot.v[0]]
     assert sent[0] > 0.2
     for _ in range(20):
-        held = State(place, np.zeros(9), robot.time, robot.v)
+        held = State(place, np.zeros(9), robot.time, robot.sent)
         robot.update(AHEAD(robot.time), held)
-        sent.append(robot.v[0])
+        sent.append(robot.sent[0])
     stage = LIMITS.acceleration[0] * MPC.settings.dt
     assert sent[-1] < 0.1 * LIMITS.velocity[0] + stage + 1e-3  # as far as is trusted, and one stage
     assert_within_limits(robot)
@@ -209,11 +209,11 @@ def test_a_robot_knows_better_what_it_was_sent():
 
 @pytest.mark.parametrize("late", [0.3, 1.05, 1.5, 3.0])
 def test_a_late_update_goes_on_from_what_is_commanded(late):
-    """A command brakes at its end; after that nothing is commanded, whatever the robot does."""
+    """A command brakes at its end; after that the robot is sent nothing, whatever it does."""
     MPC.reset()
     first = MPC.update(State(HOME, np.zeros(9), 0.0), AHEAD(0.0))
     moving = 0.4 * np.eye(9)[0]
-    command = MPC.update(State(HOME, moving, late), AHEAD(late))
+    command = MPC.update(State(HOME, moving, late, first.velocity(late)), AHEAD(late))
     np.testing.assert_allclose(command.velocity(0.0), first.velocity(late), atol=1e-12)
     assert late < 2.0 or not first.velocity(late).any()
 
@@ -236,7 +236,7 @@ def test_a_command_goes_on_between_rest_and_what_was_commanded():
 def test_a_plan_within_the_limits_is_still_a_plan(accelerations, velocity):
     """Cutting velocities keeps the dynamics and the accelerations' limits, and changes nothing inside."""
     MPC.reset()
-    problem = MPC.problem(State(HOME, velocity * LIMITS.velocity), Intent.idle(CHANNELS))
+    problem = MPC.build_problem(State(HOME, velocity * LIMITS.velocity), Intent.idle(CHANNELS))
     honest = HONEST(problem, np.zeros((10, 9)))
     u = accelerations * LIMITS.acceleration
     q, v = problem.rollout(u)
@@ -292,7 +292,8 @@ def test_where_obstacles_move_rest_is_not_safe_for_ever():
             "pillar", Shape("cylinder", [0.2, 0.25]), [x, 0.0, 0.125], velocity=[-0.5, 0.0, 0.0]
         )
         collision = CollisionModel(MODEL, (pillar,))
-        certificate = StopCertificate(LIMITER, collision, Margins(collision, 0.1, 0.1), 0.3, LIMITS, span=1.0)
+        least = 0.3 * Margins.of(collision, 0.1, 0.1).values
+        certificate = StopCertificate(LIMITER, collision, least, LIMITS, span=1.0)
         now = collision.values(HOME[None])[0]
         violation = certificate.violation(HOME, np.zeros(9), (HOME, now))
         assert violation.all == pytest.approx(0.0 if safe else 0.5 - away + 0.03, abs=1e-6)

@@ -62,7 +62,7 @@ def test_both_solvers_agree_where_the_real_time_one_rests():
     rng = np.random.default_rng(1)
     for _ in range(4):
         mpc.reset()
-        problem = mpc.problem(random_state(rng), random_intent(mpc, rng))
+        problem = mpc.build_problem(random_state(rng), random_intent(mpc, rng))
         u = fixed_point(mpc, problem)
         plan = converged.solve(problem, np.zeros_like(u))
         assert plan.is_solution(problem)
@@ -79,7 +79,7 @@ def test_both_solvers_agree_where_limits_bind():
     q[0] = LIMITS.position_upper[0] - 0.05  # too fast to stop in time: needs slack
     v = np.zeros(9)
     v[0] = 0.9
-    problem = mpc.problem(State(q, v), Intent.idle(mpc.channels))
+    problem = mpc.build_problem(State(q, v), Intent.idle(mpc.channels))
     guess = np.zeros((10, 9))
     converged = solver(mpc).solve(problem, guess)
     assert converged.limit_slack > 0.01
@@ -94,7 +94,7 @@ def test_what_is_asked_of_distances_is_what_the_real_time_solver_asks():
     post = Obstacle("post", Shape("cylinder", [0.2, 1.2]), [0.4, 0.5, 0.6])
     mpc = MaskedMpc(load_model())
     mpc.reset((post,))
-    problem = mpc.problem(State(DESCRIPTION.home, 0.2 * LIMITS.velocity), Intent.idle(mpc.channels))
+    problem = mpc.build_problem(State(DESCRIPTION.home, 0.2 * LIMITS.velocity), Intent.idle(mpc.channels))
     u = np.random.default_rng(2).uniform(-0.3, 0.3, (10, 9))
     q, v = problem.rollout(u)
     nodes = Nodes(problem, q, v)
@@ -124,7 +124,7 @@ def test_an_obstacle_is_kept_away_from():
     mask = mpc.channels.mask("ee.vx", "ee.vy", "ee.vz")
     values = np.zeros(18)
     values[3] = 0.5
-    problem = mpc.problem(State(DESCRIPTION.home, np.zeros(9)), Intent(values, mask))
+    problem = mpc.build_problem(State(DESCRIPTION.home, np.zeros(9)), Intent(values, mask))
     guess = np.zeros((10, 9))
     plan = solver(mpc).solve(problem, guess)
     assert plan.is_solution(problem)
@@ -136,7 +136,7 @@ def test_an_obstacle_is_kept_away_from():
 
 def test_it_prints_nothing(capfd):
     mpc = MaskedMpc(ALONE)
-    problem = mpc.problem(State(DESCRIPTION.home, np.zeros(9)), Intent.idle(mpc.channels))
+    problem = mpc.build_problem(State(DESCRIPTION.home, np.zeros(9)), Intent.idle(mpc.channels))
     solver(mpc).solve(problem, np.zeros((10, 9)))
     assert capfd.readouterr() == ("", "")
 
@@ -166,7 +166,7 @@ def closed_loops(count, updates, seed):
             if update == updates // 2:
                 intent, jump = random_intent(mpc, rng), update
             now = replace(intent, time=state.time)
-            problem = mpc.problem(state, now)
+            problem = mpc.build_problem(state, now)
             command = mpc.update(state, now)
             if update > 0:  # the first begins from nothing
                 best = converged.solve(problem, mpc.plan.u)

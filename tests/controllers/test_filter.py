@@ -83,7 +83,7 @@ def test_in_free_space_the_smallest_correction_is_the_clip(make):
 
 def test_the_cost_is_that_of_the_multi_step_filter():
     mpc = safety_filter(MODEL, PERIOD)
-    problem = mpc.problem(State(HOME, np.zeros(9)), asked(0.1 * LIMITS.velocity))
+    problem = mpc.build_problem(State(HOME, np.zeros(9)), asked(0.1 * LIMITS.velocity))
     tracked = problem.weights[:, JOINTS]
     shares = np.append(0.85 ** np.arange(5), np.zeros(problem.horizon - 5))
     np.testing.assert_allclose(tracked / tracked[0], np.tile(shares[:, None], 9))
@@ -102,7 +102,7 @@ def test_the_correction_is_the_smallest():
     mpc.reset((POST,))
     path, sent, _ = roll(mpc, [AHEAD] * 14)
     state, intent = State(path[-1], sent[-1], 14 * PERIOD), asked(AHEAD, 14 * PERIOD)
-    problem = mpc.problem(state, intent)
+    problem = mpc.build_problem(state, intent)
     velocity = mpc.update(state, intent).velocity(PERIOD)
     evaluate = Evaluator(mpc.residuals, problem.horizon)
     found = evaluate(problem, mpc.plan.u)

@@ -96,7 +96,7 @@ def test_a_clock_that_keeps_jumping_back_does_not_keep_an_intent_fresh(name):
     for k in range(24):
         command = robot.update(last, replace(robot.state, time=start + 0.1 * ((k % 3) - 1)))
     assert command.diagnostics.status.brakes
-    np.testing.assert_allclose(robot.v, 0.0, atol=1e-12)
+    np.testing.assert_allclose(robot.v, 0.0, atol=1e-4)
 
 
 @pytest.mark.parametrize("name", CONTROLLERS)

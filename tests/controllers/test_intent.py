@@ -14,6 +14,7 @@ from handrail.controllers.interface.prediction import (
     Bounded,
     Extrapolated,
     Smoothed,
+    after,
     constant,
 )
 from handrail.controllers.mpc.masked_mpc import MaskedMpc
@@ -74,7 +75,9 @@ def test_bounded_ends_with_the_first_of_way_and_turn():
 def test_extrapolated_follows_a_ramp_and_levels_off():
     predict = Extrapolated(window=0.3, fade=0.2)
     for time in np.arange(0.0, 0.5, 0.05):
-        predicted = predict(intent(np.full(18, 2.0 * time), "ee", time=time), TIMES)
+        asked = intent(np.full(18, 2.0 * time), "ee", time=time)
+        predict = after(predict, asked)
+        predicted = predict(asked, TIMES)
     slope = (predicted[:, 3] - 2.0 * 0.45) / TIMES
     assert slope[0] == pytest.approx(2.0, rel=0.25)
     assert predicted[-1, 3] - 0.9 == pytest.approx(2.0 * 0.2, rel=0.02)
@@ -84,9 +87,9 @@ def test_extrapolated_follows_a_ramp_and_levels_off():
 def test_extrapolated_forgets_at_a_mode_switch():
     predict = Extrapolated()
     for time in (0.0, 0.1, 0.2):
-        predict(intent(np.full(18, time), "ee", time=time), TIMES)
+        predict = after(predict, intent(np.full(18, time), "ee", time=time))
     asked = intent(np.full(18, 0.3), "base", time=0.3)
-    np.testing.assert_allclose(predict(asked, TIMES), constant(asked, TIMES))
+    np.testing.assert_allclose(after(predict, asked)(asked, TIMES), constant(asked, TIMES))
 
 
 def test_smoothed_is_what_a_low_pass_will_do():
@@ -97,6 +100,7 @@ def test_smoothed_is_what_a_low_pass_will_do():
     np.testing.assert_allclose(ahead[:, 3:9], (1.0 - np.exp(-TIMES[:, None] / 0.5)) * asked[3:9])
     np.testing.assert_array_equal(ahead[:, 9:], 0.0)
     for time in 2.0 + np.concatenate([[0.0], TIMES]):
+        often = after(often, intent(asked, "ee", time=time))
         level = often(intent(asked, "ee", time=time), np.zeros(1))[0]
     np.testing.assert_allclose(level, ahead[-1], atol=1e-12)
 
@@ -106,7 +110,11 @@ def test_smoothed_leads_where_the_command_does(time_constant):
     """Bursts of 0.2 s: the level's integral is the command's in the end, however slow the channel."""
     predict, step = Smoothed(constant, time_constant), 0.01
     asked = [np.full(18, 0.5 * (k // 20 % 2 == 0) * (k < 200)) for k in range(1600)]
-    levels = [predict(intent(values, "ee", time=k * step), np.zeros(1))[0] for k, values in enumerate(asked)]
+    levels = []
+    for k, values in enumerate(asked):
+        now = intent(values, "ee", time=k * step)
+        predict = after(predict, now)
+        levels.append(predict(now, np.zeros(1))[0])
     np.testing.assert_allclose(
         step * np.sum(levels, axis=0)[3:9], step * np.sum(asked, axis=0)[3:9], rtol=0.02
     )
@@ -114,15 +122,15 @@ def test_smoothed_leads_where_the_command_does(time_constant):
     assert np.all(steepest <= 0.5 * step / np.broadcast_to(time_constant, 18)[3:9] + 1e-9)
 
 
-def test_smoothed_begins_at_rest_after_a_reset_and_on_new_channels():
-    predict = Smoothed(constant, 0.5)
+def test_smoothed_begins_at_rest_and_again_on_new_channels():
+    predict = new = Smoothed(constant, 0.5)
     for time in (0.0, 1.0, 2.0):
-        predict(intent(np.ones(18), "ee", time=time), TIMES)
-    switched = predict(intent(np.ones(18), "base", time=2.1), np.zeros(1))[0]
+        predict = after(predict, intent(np.ones(18), "ee", time=time))
+    asked = intent(np.ones(18), "base", time=2.1)
+    switched = after(predict, asked)(asked, np.zeros(1))[0]
     assert 0.0 <= switched[:3].max() < 0.2
     np.testing.assert_array_equal(switched[3:9], 0.0)
-    predict.reset()
-    np.testing.assert_array_equal(predict(intent(np.ones(18), "ee", time=9.0), np.zeros(1)), 0.0)
+    np.testing.assert_array_equal(new(intent(np.ones(18), "ee", time=9.0), np.zeros(1)), 0.0)
 
 
 def test_turns_may_be_followed_less_closely_than_the_way():
@@ -157,7 +165,7 @@ def test_only_the_tracked_stages_are_tracked():
     settings = MpcSettings(tracked_stages=4, decay=0.5)
     np.testing.assert_allclose(settings.discounts, [1, 0.5, 0.25, 0.125, 0, 0, 0, 0, 0, 0])
     mpc = MaskedMpc(MODEL, settings)
-    problem = mpc.problem(State(HOME, np.zeros(9)), intent(np.full(18, 0.1), "ee"))
+    problem = mpc.build_problem(State(HOME, np.zeros(9)), intent(np.full(18, 0.1), "ee"))
     assert np.all(problem.weights[3, 3:9] > 0)
     assert np.all(problem.weights[4:, 3:9] == 0)
 
@@ -228,8 +236,8 @@ def test_the_certificate_measures_the_stop():
     for gap, safe in ((0.2, False), (0.5, True)):
         wall = Obstacle("wall", Shape("box", [0.2, 4.0, 0.2]), [HOME[0] + 0.48 + gap + 0.1, 0.0, 0.1])
         collision = CollisionModel(MODEL, (wall,))
-        margins = Margins(collision, 0.1, 0.1)
-        certificate = StopCertificate(limiter, collision, margins, 0.3, MODEL.description.limits, span=1.0)
+        least = 0.3 * Margins.of(collision, 0.1, 0.1).values
+        certificate = StopCertificate(limiter, collision, least, MODEL.description.limits, span=1.0)
         now = collision.values(HOME[None])[0]
         violation = certificate.violation(HOME, v, (HOME, now))
         assert (violation.all == 0.0) is safe
@@ -245,7 +253,7 @@ def test_an_unsafe_plan_is_replaced_by_a_full_stop(monkeypatch):
     mpc.reset((wall,))
     honest = mpc.solver.solve
 
-    def reckless(problem, guess):
+    def reckless(problem, guess, *active):
         from dataclasses import replace
 
         plan = honest(problem, guess)
@@ -262,7 +270,7 @@ def test_an_unsafe_plan_is_replaced_by_a_full_stop(monkeypatch):
         q, v = q + 0.05 * 0.5 * (v + after), after
         statuses.append(command.diagnostics.status)
     assert Status.BACKUP in statuses
-    assert mpc._collision.values(q[None])[0].min() > 0.02
+    assert mpc.loop.surroundings.collision.values(q[None])[0].min() > 0.02
 
 
 @pytest.mark.parametrize(

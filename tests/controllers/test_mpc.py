@@ -205,7 +205,7 @@ def test_the_quadratic_is_that_of_the_cost():
     mask = CHANNELS.mask("ee", "base")
     state = State(HOME + rng.uniform(-0.2, 0.2, 9), rng.uniform(-0.2, 0.2, 9))
     frames = Frames("world", "tool", [0.1, -0.2, 0.05])
-    problem = MPC.problem(state, Intent(rng.uniform(-0.3, 0.3, 18), mask, frames=frames))
+    problem = MPC.build_problem(state, Intent(rng.uniform(-0.3, 0.3, 18), mask, frames=frames))
     u = rng.uniform(-0.5, 0.5, (10, 9))
     residual = MPC.residuals.expression
 
@@ -241,7 +241,7 @@ def test_a_plan_knows_whether_it_is_a_solution():
     from dataclasses import replace
 
     MPC.reset()
-    problem = MPC.problem(still(), asking(np.full(18, 0.2), "ee")(0.0))
+    problem = MPC.build_problem(still(), asking(np.full(18, 0.2), "ee")(0.0))
     MPC.update(still(), asking(np.full(18, 0.2), "ee")(0.0))
     plan = MPC.plan
     assert plan.is_solution(problem)

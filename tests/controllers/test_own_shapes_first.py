@@ -7,7 +7,7 @@ from backup_helpers import HOME, LIMITS, MODEL, Robot, asking
 from handrail.controllers.interface.controller import State
 from handrail.controllers.mpc.masked_mpc import MaskedMpc
 from handrail.controllers.robot.shape import Obstacle, Shape
-from handrail.controllers.safety.backup import Backup, Situation
+from handrail.controllers.safety.backup import Backup, Situation, full_stop
 from handrail.controllers.safety.certificate import Violation
 from handrail.controllers.safety.limiter import Limiter
 
@@ -27,7 +27,7 @@ def test_what_comes_too_near_buys_no_slack_to_the_robot_itself(speed):
         "ball", Shape("sphere", [0.1]), [robot.q[0] - 0.53, 0.0, 0.14], velocity=[speed, 0.0, 0.0]
     )
     mpc.reset((ball,))
-    problem = mpc.problem(State(robot.q, np.zeros(MODEL.size), 0.0), ask(0.0))
+    problem = mpc.build_problem(State(robot.q, np.zeros(MODEL.size), 0.0), ask(0.0))
     plan = mpc.solver.solve(problem, np.zeros((mpc.settings.horizon, MODEL.size)))
     for _ in range(5):
         plan = mpc.solver.solve(problem, plan.u)
@@ -49,6 +49,6 @@ class Judge:
 @pytest.mark.parametrize("halt", [True, False])
 def test_of_two_ways_that_are_not_safe_the_one_is_taken_that_keeps_from_itself(halt):
     backup, moving = Backup(Judge(), Limiter(MODEL.description), 0.1), 0.3 * LIMITS.velocity  # pyright: ignore
-    backup.brake(moving)
-    way = backup.choose(Situation(HOME, moving, np.zeros(OWN), 0.0), None, halt)
+    stored = full_stop(backup.limiter, moving, backup.dt)
+    way = backup.choose(Situation(HOME, moving, np.zeros(OWN), stored, 0.0), None, halt)
     assert way.violation == (0.0, 0.05)

@@ -18,19 +18,23 @@ TRAIL = 5  # positions looked at in a period
 
 
 class Robot:
-    """Follows commands exactly; remembers commands and the smallest true distance to anything."""
+    """Follows commands exactly; remembers commands and the smallest true distance to anything.
+
+    It says what it was sent last, whatever a test makes of its velocity.
+    """
 
     def __init__(self, controller, obstacles=(), period=PERIOD, q=HOME):
         controller.reset(obstacles)
         self.controller, self.period = controller, period
         self.q, self.v, self.time = np.array(q), np.zeros(MODEL.size), 0.0
+        self.sent = self.v
         self.smallest, self.commands, self.steps = np.inf, [], []
         self._obstacles = obstacles
         self._truth = CollisionModel(MODEL, obstacles)
 
     @property
     def state(self):
-        return State(self.q, self.v, self.time)
+        return State(self.q, self.v, self.time, self.sent)
 
     def observe(self):
         self.controller.update_scene(self._seen(self.time))
@@ -39,14 +43,14 @@ class Robot:
         """Let the controller see a state, the true one if None; move for one period."""
         self.observe()
         command = self.controller.update(self.state if state is None else state, intent)
-        self.steps.append(command.velocity(0.0) - self.v)
+        self.steps.append(command.velocity(0.0) - self.sent)
         for k in range(TRAIL):
             before, after = (command.velocity(share * self.period / TRAIL) for share in (k, k + 1))
             self.q = self.q + 0.5 * self.period / TRAIL * (before + after)
             self.time += self.period / TRAIL
             self._look()
-        self.steps.append(after - self.v)
-        self.v = after
+        self.steps.append(after - self.sent)
+        self.v = self.sent = after
         self.commands.append(command)
         return command
 

@@ -17,6 +17,7 @@ from handrail.collect.simulation.robot import FINGERS
 from handrail.collect.simulation.scene import Scene, SceneObject, View
 from handrail.collect.simulation.simulation import Simulation
 from handrail.collect.tasks.moving import sample_movers
+from handrail.controllers.arrays import FloatArray, IntArray
 from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.collision.slacks import MOVING
 from handrail.controllers.errors import HandrailError
@@ -26,6 +27,7 @@ from handrail.controllers.mpc.masked_mpc import MaskedMpc
 from handrail.controllers.ocp.problem import Plan, Problem
 from handrail.controllers.robot.model import RobotModel
 from handrail.controllers.robot.shape import Shape
+from handrail.controllers.solvers.real_time import NOTHING_ACTIVE
 
 PERIOD = 0.05  # [s]
 CLEARANCE = 0.15  # of the robot at the start [m]
@@ -132,12 +134,12 @@ def failing(controller: MaskedMpc, seed: int, share: float) -> Iterator[None]:
     """Let the solver fail at random, now and then for a while."""
     rng, honest, until = np.random.default_rng([seed, 2]), controller.solver.solve, 0
 
-    def solve(problem: Problem, guess: np.ndarray) -> Plan:
+    def solve(problem: Problem, guess: FloatArray, active: IntArray = NOTHING_ACTIVE) -> Plan:
         nonlocal until
         if until > 0 or rng.random() < share:
             until = until - 1 if until else int(rng.integers(0, 20))
             raise HandrailError("the solver fails on purpose")
-        return honest(problem, guess)
+        return honest(problem, guess, active)
 
     controller.solver.solve = solve
     yield

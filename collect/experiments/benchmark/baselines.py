@@ -18,7 +18,7 @@ from handrail.controllers.baselines.whole_body_completion import WholeBodyComple
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import Controller, State
 from handrail.controllers.interface.intent import Intent
-from handrail.controllers.interface.prediction import Bounded, Prediction, Smoothed
+from handrail.controllers.interface.prediction import Bounded, Prediction, Smoothed, after
 from handrail.controllers.mpc.masked_mpc import MaskedMpc
 from handrail.controllers.mpc.safety_filter import safety_filter
 from handrail.controllers.ocp.settings import MpcSettings
@@ -118,6 +118,7 @@ class SmoothedHandIntent:
     def __call__(self, twist: FloatArray, state: State, time: float) -> Intent:
         """Return the smoothed intent of a twist, world-aligned at the tool, that was sent at a time [s]."""
         intent = self._hand(twist, state, time)
+        self._predict = after(self._predict, intent)
         return replace(intent, values=self._predict(intent, _NOW)[0])
 
 

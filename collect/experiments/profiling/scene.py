@@ -9,6 +9,7 @@ from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import State
 from handrail.controllers.interface.intent import Intent
+from handrail.controllers.numerics.rotation import turned
 from handrail.controllers.robot.description import load_description
 from handrail.controllers.robot.model import RobotModel
 from handrail.controllers.robot.shape import Obstacle, Shape
@@ -56,9 +57,7 @@ def _random_obstacle(name: str, home: FloatArray, rng: np.random.Generator) -> O
         Shape("sphere", rng.uniform(0.05, 0.2, 1)),
     )[rng.integers(4)]
     position = np.append(home[:2], 0.0) + rng.uniform([-1.2, -1.2, 0.1], [1.6, 1.2, 1.4])
-    angle = rng.uniform(-np.pi, np.pi)
-    c, s = np.cos(angle), np.sin(angle)
-    return Obstacle(name, shape, position, np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]))
+    return Obstacle(name, shape, position, turned(np.eye(3), rng.uniform(-np.pi, np.pi)))
 
 
 class Driver:
@@ -84,9 +83,7 @@ class Driver:
             tool = self._model.pose(state.q).position
             values[channels.tool_slice][:3] = _SPEED * _unit(target - tool)
             if channels.base:
-                c, s = np.cos(state.q[2]), np.sin(state.q[2])
-                ahead = _unit(target[:2] - state.q[:2])
-                values[:2] = _SPEED * np.array([c * ahead[0] + s * ahead[1], -s * ahead[0] + c * ahead[1]])
+                values[:2] = _SPEED * turned(_unit(target[:2] - state.q[:2]), -state.q[2])
         return Intent(np.where(mask, values, 0.0), mask)
 
 

@@ -6,7 +6,7 @@ from time import perf_counter
 import numpy as np
 
 from handrail.collect.experiments.profiling.scene import Driver, random_scene, robot_for
-from handrail.controllers.arrays import FloatArray
+from handrail.controllers.arrays import FloatArray, IntArray
 from handrail.controllers.interface.controller import State
 from handrail.controllers.interface.intent import Intent
 from handrail.controllers.mpc.masked_mpc import MaskedMpc
@@ -57,9 +57,9 @@ class _Watched:
     def __init__(self, solver: object) -> None:
         self._solver = solver
 
-    def solve(self, problem: Problem, guess: FloatArray) -> Plan:
+    def solve(self, problem: Problem, guess: FloatArray, active: IntArray) -> Plan:
         """Solve, and remember."""
-        plan = self._solver.solve(problem, guess)  # type: ignore[attr-defined]
+        plan = self._solver.solve(problem, guess, active)  # type: ignore[attr-defined]
         self.last = problem, guess, plan
         return plan
 

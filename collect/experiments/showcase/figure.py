@@ -10,6 +10,7 @@ from handrail.collect.experiments.showcase.metrics import held_error, tracking_e
 from handrail.collect.experiments.showcase.run import Trace
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import not_installed
+from handrail.controllers.numerics.rotation import turned
 from handrail.controllers.robot.model import RobotModel
 from handrail.datasets.storage.atomic import write_whole
 
@@ -90,8 +91,7 @@ def _robot(axes: Any, q: FloatArray, model: RobotModel, alpha: float) -> None:
     """Draw the chassis' outline and the arm at q."""
     length, width = model.description.base_size
     corners = 0.5 * np.array([[1, 1], [-1, 1], [-1, -1], [1, -1], [1, 1]]) * [length, width]
-    c, s = np.cos(q[2]), np.sin(q[2])
-    axes.plot(*(corners @ [[c, s], [-s, c]] + q[:2]).T, color=_BASE, lw=1.0, alpha=alpha, zorder=2)
+    axes.plot(*(turned(corners.T, q[2]).T + q[:2]).T, color=_BASE, lw=1.0, alpha=alpha, zorder=2)
     frames = [shape.frame for shape in model.description.collision if shape.frame != "planar_base"]
     points = [model.pose(q, frame).position[:2] for frame in (*dict.fromkeys(frames), "tool")]
     axes.plot(*np.array(points).T, color=_GREY, lw=2.2, alpha=alpha, zorder=3, solid_capstyle="round")

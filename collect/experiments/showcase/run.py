@@ -13,12 +13,13 @@ from handrail.collect.session.session import Observer, Session
 from handrail.collect.tasks.task import Episode, TaskState, Verdict
 from handrail.controllers.arrays import BoolArray, FloatArray
 from handrail.controllers.collision.model import CollisionModel
+from handrail.controllers.interface.channel_matrix import channel_matrix
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.command import Command
 from handrail.controllers.interface.controller import State
 from handrail.controllers.interface.intent import Intent
 from handrail.controllers.interface.prediction import Extrapolated
-from handrail.controllers.mpc.masked_mpc import MaskedMpc, channel_matrix
+from handrail.controllers.mpc.masked_mpc import MaskedMpc
 from handrail.controllers.objectives.hold import end_effector_hold, hold_parameters
 from handrail.controllers.objectives.switch import switchable, switched
 from handrail.controllers.ocp.settings import MpcSettings

@@ -13,6 +13,7 @@ from handrail.collect.operators.operator import View
 from handrail.controllers.arrays import BoolArray, FloatArray
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import State
+from handrail.controllers.numerics.rotation import turned
 from handrail.controllers.robot.model import RobotModel
 
 _DAMPING = 0.03
@@ -135,11 +136,7 @@ class StickMap:
         return solution / max(1.0, float(np.max(np.abs(solution) / self.full[self.channels.joint_slice])))
 
     def _base_world(self, goal: MotionGoal, q: FloatArray) -> FloatArray:
-        if not self.channels.base:
-            return np.zeros(0)
-        c, s = np.cos(q[2]), np.sin(q[2])
-        vx, vy, wz = goal.base
-        return np.array([c * vx - s * vy, s * vx + c * vy, wz])
+        return turned(goal.base, q[2]) if self.channels.base else np.zeros(0)
 
 
 def full_stick(model: RobotModel, gains: Gains) -> FloatArray:

@@ -12,6 +12,7 @@ from handrail.controllers.arrays import BoolArray, FloatArray
 from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import State
+from handrail.controllers.numerics.rotation import turned
 from handrail.controllers.robot.model import RobotModel
 
 _NEAR = 0.35  # share of the tolerance that one axis may use up
@@ -169,10 +170,8 @@ class SingleAxisMap:
         """Return how far each axis is from where it belongs, (m,), and how near is near enough, (m,)."""
         errors, tolerances = np.zeros(self.channels.size), np.ones(self.channels.size)
         if goal.focus == "base" and self._base:
-            c, s = np.cos(q[2]), np.sin(q[2])
-            x, y = target.base[:2] - q[:2]
             turn = np.arctan2(np.sin(target.base[2] - q[2]), np.cos(target.base[2] - q[2]))
-            errors[self.channels.base_slice] = [c * x + s * y, -s * x + c * y, turn]
+            errors[self.channels.base_slice] = turned([*(target.base[:2] - q[:2]), turn], -q[2])
             near = [target.distance, target.distance, target.angle]
             tolerances[self.channels.base_slice] = 0.5 * np.array(near)
         else:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray
-from handrail.controllers.numerics.rotation import rotation_vector
+from handrail.controllers.numerics.rotation import rotation_vector, turned
 from handrail.controllers.robot.model import Pose
 
 
@@ -60,11 +60,10 @@ def hand_twist(tool: Pose, goal: Pose, gains: Gains, pace: float = 1.0) -> Float
 
 def base_twist(q: FloatArray, goal: FloatArray, gains: Gains) -> FloatArray:
     """Return the twist that drives the base to (x, y, θ), in the base frame, (3,)."""
-    c, s = np.cos(q[2]), np.sin(q[2])
     world = saturated(gains.gain * (goal[:2] - q[:2]), gains.base_speed)
     turn = np.arctan2(np.sin(goal[2] - q[2]), np.cos(goal[2] - q[2]))
     rate = np.clip(gains.gain * turn, -gains.base_rate, gains.base_rate)
-    return np.array([c * world[0] + s * world[1], -s * world[0] + c * world[1], rate])
+    return turned([*world, rate], -q[2])
 
 
 def pose_errors(tool: Pose, goal: Pose) -> tuple[float, float]:

@@ -5,6 +5,7 @@ from numpy.typing import ArrayLike
 
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.collision.model import CollisionModel
+from handrail.controllers.numerics.rotation import turned
 from handrail.controllers.robot.inverse_kinematics import arm_configuration
 from handrail.controllers.robot.model import Pose, RobotModel
 
@@ -28,7 +29,7 @@ def standing_point(
         return np.zeros(3)
     x, y, theta = description.home[:3]
     tool = model.pose(description.home).position[:2] - [x, y]
-    offset = _rotation(yaw - theta) @ tool
+    offset = turned(np.eye(2), yaw - theta) @ tool
     spot = np.asarray(place, dtype=float)[:2] - comfort * offset
     lower, upper = description.limits.position_lower[:2], description.limits.position_upper[:2]
     return np.array([*np.clip(spot, lower, upper), yaw])
@@ -78,8 +79,3 @@ def standing_pose(model: RobotModel, q: FloatArray, goal: Pose) -> FloatArray:
         if not lack:
             break
     return best
-
-
-def _rotation(angle: float) -> FloatArray:
-    c, s = np.cos(angle), np.sin(angle)
-    return np.array([[c, -s], [s, c]])

@@ -24,6 +24,7 @@ from scipy.spatial.transform import Rotation
 
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import HandrailError
+from handrail.controllers.numerics.rotation import turned
 
 _POSITION = ("x", "y", "z")
 _QUATERNION = ("qw", "qx", "qy", "qz")
@@ -60,25 +61,23 @@ class RobotPose:
 
     Attributes:
         base: the base's x and y, (T, 2) [m].
-        heading: cosine and sine of the base's heading, (T, 2).
+        yaw: the base's heading, (T,) [rad].
         tool: the tool's position, (T, 3) [m].
         rotation: the tool's rotation, (T, 3, 3).
     """
 
     base: FloatArray
-    heading: FloatArray
+    yaw: FloatArray
     tool: FloatArray
     rotation: FloatArray
 
     def turned(self, vectors: FloatArray) -> FloatArray:
         """Return world vectors in the base's axes; z stays, (T, 2 or 3)."""
-        c, s = self.heading[:, 0], self.heading[:, 1]
-        x, y = vectors[:, 0], vectors[:, 1]
-        return np.column_stack([c * x + s * y, c * y - s * x, vectors[:, 2:]])
+        return turned(vectors.T, -self.yaw).T
 
     def turned_back(self, vectors: FloatArray) -> FloatArray:
         """Return vectors in the base's axes in the world's; z stays, (T, 2 or 3)."""
-        return RobotPose(self.base, self.heading * [1.0, -1.0], self.tool, self.rotation).turned(vectors)
+        return turned(vectors.T, self.yaw).T
 
     def conjugated(self, rotations: FloatArray) -> FloatArray:
         """Return `R_wbᵀ R R_wb`, (T, 9)."""
@@ -87,9 +86,8 @@ class RobotPose:
 
     def matrices(self) -> FloatArray:
         """Return `R_wb`, (T, 3, 3)."""
-        base = np.zeros((len(self.heading), 3, 3))
-        base[:, 0, 0] = base[:, 1, 1] = self.heading[:, 0]
-        base[:, 1, 0], base[:, 0, 1], base[:, 2, 2] = self.heading[:, 1], -self.heading[:, 1], 1.0
+        base = np.tile(np.eye(3), (len(self.yaw), 1, 1))
+        base[:, :2, :2] = turned(np.eye(2)[:, :, None], self.yaw).transpose(2, 0, 1)
         return base
 
 
@@ -159,8 +157,7 @@ class RelativeView:
             base = np.zeros((len(state), 3))
         tool = state[:, [self._at(name) for name in _TOOL]]
         rotation = Rotation.from_quat(tool[:, 3:], scalar_first=True).as_matrix()
-        heading = np.column_stack([np.cos(base[:, 2]), np.sin(base[:, 2])])
-        return RobotPose(base[:, :2], heading, tool[:, :3], rotation)
+        return RobotPose(base[:, :2], base[:, 2], tool[:, :3], rotation)
 
     def velocities(self, state: FloatArray) -> FloatArray:
         """Return the joint velocities in recorded states, (T, n)."""

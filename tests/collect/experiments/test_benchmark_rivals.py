@@ -82,7 +82,7 @@ def test_the_paper_s_horizon_is_the_paper_s():
     assert isinstance(mpc, MaskedMpc)
     assert (mpc.settings.horizon, mpc.settings.dt, baseline.period) == (10, 0.1, 0.1)
     intent = HandIntent(MODEL)(np.full(6, 0.1), STATE, 0.0)
-    problem = mpc.problem(STATE, intent)
+    problem = mpc.build_problem(STATE, intent)
     tool = CHANNELS.tool_slice
     np.testing.assert_allclose(problem.reference[:, tool], 0.1)
     assert np.ptp(problem.weights, axis=0).max() == 0.0  # every stage alike, the last one too

@@ -215,7 +215,7 @@ def test_what_is_recorded_is_what_was_sent(mode):
 
     def stepped(action):
         result = step(action)
-        sent.append(np.append(env.commanded_velocity, result[4]["sent"][-1]))
+        sent.append(np.append(env.state().commanded, result[4]["sent"][-1]))
         return result
 
     env.step = stepped

@@ -89,9 +89,9 @@ def test_limits_hold_for_any_action():
             drive = rng.normal(scale=5.0, size=env.model.size + 1)
             if index % 7 == 0:
                 drive[rng.integers(len(drive))] = [np.nan, np.inf, -np.inf][index % 3]
-            before = env.commanded_velocity
+            before = env.state().commanded
             *_, info = env.step(drive)
-            after = env.commanded_velocity
+            after = env.state().commanded
             np.testing.assert_array_equal(info["sent"][:-1], after)
             assert 0.0 <= info["sent"][-1] <= 1.0
             assert np.all(np.abs(after) <= limits.velocity * (1.0 + 1e-6))
@@ -107,7 +107,7 @@ def test_an_action_that_is_no_action_brakes():
             for _ in range(10):
                 *_, info = env.step(bad)
             np.testing.assert_array_equal(info["sent"], 0.0)
-            np.testing.assert_array_equal(env.commanded_velocity, 0.0)
+            np.testing.assert_array_equal(env.state().commanded, 0.0)
 
 
 def test_a_reachable_action_is_sent_as_it_is():

@@ -78,10 +78,8 @@ def test_what_is_held_does_not_come_nearer_because_other_things_come():
     """What it keeps once it keeps on; to what came while it was held, what there was then."""
     other = replace(POST, name="other")
     first, second = (CollisionModel(MODEL, things) for things in ((POST, BOX), (POST, other, BOX)))
-    before = Margins(first, 0.1, 0.008)
-    before.see(np.full(first.size, 1.0))
-    margins = Margins(second, 0.1, 0.008, before)
-    margins.see(np.full(second.size, 0.02))
+    before = Margins.of(first, 0.1, 0.008).seen(np.full(first.size, 1.0))
+    margins = Margins.of(second, 0.1, 0.008, before).seen(np.full(second.size, 0.02))
     for row in held_rows(second):
         assert margins.values[row] == (0.02 if "other" in second.pairs[row] else 0.1)
 

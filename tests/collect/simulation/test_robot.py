@@ -185,7 +185,7 @@ def test_velocity_commands_are_tracked(robot):
             before = 0.0
             for _ in range(16):
                 env.step(target)
-                commanded = env.commanded_velocity[joint]
+                commanded = env.state().commanded[joint]
                 lag = abs(env.state().v[joint] - commanded) / limits.acceleration[joint]
                 assert commanded == before or lag < 0.010, env.model.joints[joint]
                 before = commanded

@@ -15,9 +15,10 @@ import handrail.policies  # noqa: F401  (registers the environment)
 from handrail.collect.tasks.goal_reaching import STEP, T_MAX, Goal, pose_error, sample_goal
 from handrail.controllers.baselines.arm_completion import ArmCompletion
 from handrail.controllers.errors import HandrailError
+from handrail.controllers.numerics.rotation import turned
 from handrail.controllers.robot.model import load_model
 from handrail.policies.rl.env import GoalReachingEnv, Reward
-from handrail.policies.rl.observation import Situation, base_velocity, observe, planar_rotation
+from handrail.policies.rl.observation import Situation, base_velocity, observe
 
 SEEDS = st.integers(0, 2**32 - 1)
 NEAR = Goal(np.array([-0.6, 0.3, 0.9]), np.eye(3))
@@ -38,7 +39,7 @@ def situation(rng) -> Situation:
 
 def moved(before: Situation, shift, angle) -> Situation:
     """Return a situation with robot, twist and poses moved and turned on the floor together."""
-    turn = planar_rotation(angle)
+    turn = turned(np.eye(3), angle)
 
     def pose(place):
         return turn @ place[0] + [*shift, 0.0], turn @ place[1]

@@ -1,0 +1,18 @@
+"""The channels' velocities as a matrix times the robot's velocity."""
+
+import numpy as np
+
+from handrail.controllers.arrays import FloatArray
+from handrail.controllers.interface.channels import Channels
+from handrail.controllers.numerics.rotation import turned
+from handrail.controllers.robot.model import RobotModel
+
+
+def channel_matrix(model: RobotModel, channels: Channels, q: FloatArray) -> FloatArray:
+    """Return C with `c = C v`, every channel's velocity at q, (m, n)."""
+    rows = [model.jacobian(q), np.eye(model.size)]
+    if channels.base:
+        base = np.zeros((3, model.size))
+        base[:, :3] = turned(np.eye(3), -q[2])
+        rows.insert(0, base)
+    return np.vstack(rows)

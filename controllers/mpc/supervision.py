@@ -1,0 +1,123 @@
+"""Turns a plan into a command: the plan where it is safe, else what `Backup` has instead."""
+
+from dataclasses import dataclass, replace
+from time import perf_counter
+
+import numpy as np
+
+from handrail.controllers.arrays import FloatArray
+from handrail.controllers.collision.distance_kernels import smallest_distances
+from handrail.controllers.interface.command import Command, Diagnostics, Status
+from handrail.controllers.interface.controller import State
+from handrail.controllers.interface.intent import Intent
+from handrail.controllers.interface.trajectory import Trajectory
+from handrail.controllers.mpc.last_command import LastCommand
+from handrail.controllers.mpc.loop_state import LoopState
+from handrail.controllers.ocp.problem import Plan
+from handrail.controllers.ocp.settings import MpcSettings
+from handrail.controllers.robot.description import Limits
+from handrail.controllers.safety.backup import Backup, Situation, full_stop
+from handrail.controllers.safety.certificate import StopCertificate
+from handrail.controllers.safety.limiter import Limiter
+
+_UNHEARD = (Status.INVALID_STATE, Status.INVALID_SCENE, Status.INVALID_INTENT, Status.STALE_INTENT)
+
+
+@dataclass(frozen=True)
+class Attempt:
+    """What came of an update's problem: a plan or none, why, and when the update began [s]."""
+
+    plan: Plan | None
+    status: Status
+    start: float
+
+
+@dataclass(frozen=True)
+class Supervisor:
+    """Says what is sent.
+
+    Attributes:
+        limits: of the robot.
+        limiter: knows the full stop.
+        settings: margins, horizon.
+    """
+
+    limits: Limits
+    limiter: Limiter
+    settings: MpcSettings
+
+    def supervise(
+        self, loop: LoopState, state: State, intent: Intent, attempt: Attempt
+    ) -> tuple[Command, LoopState]:
+        """Return the command of an update, which ends at rest, and the loop's state after it."""
+        plan, status = attempt.plan, attempt.status
+        distances = self._distances(loop, state, plan)
+        if distances is not None:
+            loop = replace(loop, margins=loop.margins.seen(distances))
+        motion, stored, planned = self._motion(loop, state, attempt, distances)
+        if plan is not None and not planned:
+            status = Status.BACKUP
+        diagnostics = _diagnostics(replace(attempt, status=status), distances, loop)
+        gripper = _gripper(loop, intent, status)
+        command = Command(motion.velocities, motion.dt, gripper, diagnostics, motion.elapsed)
+        last = LastCommand.after(loop.last, command, state.time, self.settings.dt)
+        return command, replace(loop, last=last, plan=plan if planned else None, stored=stored)
+
+    def _motion(
+        self, loop: LoopState, state: State, attempt: Attempt, distances: FloatArray | None
+    ) -> tuple[Trajectory, Trajectory, bool]:
+        """Return how the robot moves, to rest at last; what is stored; whether it begins with the plan."""
+        dt, plan = self.settings.dt, attempt.plan
+        if distances is None:
+            stop = full_stop(self.limiter, self._sent_unseen(loop, state), dt)
+            return stop, stop, False
+        sent, elapsed = state.sent(self.limits), loop.elapsed(state.time)
+        situation = Situation(state.q, sent, distances, loop.stored, elapsed)
+        way = self._backup(loop).choose(situation, plan, halt=attempt.status in _UNHEARD)
+        if plan is not None and way.planned:
+            return Trajectory(self.limiter.to_rest(plan.v, dt), dt), way.motion, True
+        return way.motion, way.motion, False
+
+    def _sent_unseen(self, loop: LoopState, state: State) -> FloatArray:
+        """Return what a robot is being sent whose state is nonsense, (n,): what it follows, if anything."""
+        said = state.commanded
+        if loop.last is None or (said.shape == self.limits.velocity.shape and np.isfinite(said).all()):
+            return state.sent(self.limits)
+        return loop.last.command.velocity(loop.last.elapsed(state.time))
+
+    def _backup(self, loop: LoopState) -> Backup:
+        settings = self.settings
+        least, span = settings.floor * loop.margins.values, settings.horizon * settings.dt
+        collision = loop.surroundings.collision
+        certificate = StopCertificate(self.limiter, collision, least, self.limits, span)
+        return Backup(certificate, self.limiter, settings.dt)
+
+    def _distances(self, loop: LoopState, state: State, plan: Plan | None) -> FloatArray | None:
+        """Return the signed distances now, (P,); None where nobody knows where the robot is."""
+        if not state.is_of(len(self.limits.velocity)):
+            return None
+        return loop.surroundings.collision.values(state.q[None, :])[0] if plan is None else plan.distances
+
+
+def _gripper(loop: LoopState, intent: Intent, status: Status) -> float:
+    """Return how far the gripper is closed: as asked; as before where nobody is listened to."""
+    if status in _UNHEARD:
+        return 0.0 if loop.last is None else loop.last.command.gripper
+    return min(max(intent.gripper, 0.0), 1.0)
+
+
+def _diagnostics(attempt: Attempt, distances: FloatArray | None, loop: LoopState) -> Diagnostics:
+    if distances is None:
+        return Diagnostics(attempt.status, perf_counter() - attempt.start)
+    smallest, at_work = smallest_distances(distances, loop.surroundings.collision.work)
+    known = Diagnostics(
+        attempt.status,
+        solve_time=perf_counter() - attempt.start,
+        smallest_distance=smallest,
+        work_distance=at_work,
+    )
+    plan = attempt.plan
+    if plan is None:
+        return known
+    slack = max(plan.collision_slack, plan.limit_slack)
+    return replace(known, slack=slack, tracking_error=plan.tracking_error, phases=plan.phases)

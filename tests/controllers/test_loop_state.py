@@ -1,0 +1,85 @@
+"""What lasts from update to update: one value in the MPC, and nobody but the robot knows what it was sent."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from backup_helpers import HOME, LIMITS, MODEL, PERIOD, Robot, asking, clutter
+
+from handrail.controllers.baselines.cbf_filter import CbfFilter
+from handrail.controllers.baselines.direct import DirectController
+from handrail.controllers.interface.channels import Channels
+from handrail.controllers.interface.controller import State
+from handrail.controllers.interface.prediction import Extrapolated, Smoothed
+from handrail.controllers.mpc.masked_mpc import MaskedMpc
+from handrail.controllers.numerics.rotation import turned
+from handrail.controllers.robot.shape import Obstacle, Shape
+
+CHANNELS = Channels.of(MODEL.description)
+MPC = MaskedMpc(MODEL, predict=Smoothed(Extrapolated(), 0.3))
+HAND = asking(CHANNELS, np.full(18, 0.2), "ee")
+BASE = asking(CHANNELS, np.full(18, -0.4), "base")
+HELD = Obstacle("box", Shape("box", [0.06, 0.06, 0.06]), [0.0, 0.0, 0.06], frame="tool")
+
+
+def same(one, other):
+    """Whether two commands are the same, but for how long they took."""
+    timeless = [replace(c.diagnostics, solve_time=0.0, phases=()) for c in (one, other)]
+    return np.array_equal(one.velocities, other.velocities) and timeless[0] == timeless[1]
+
+
+def test_asking_for_a_problem_changes_nothing():
+    """Not the prediction's memory, nor parameters, nor the margins of what has just been grasped."""
+    scene, runs = (*clutter(np.random.default_rng(4)), HELD), []
+    for asks in (False, True):
+        robot, commands = Robot(MPC, scene), []
+        for _ in range(12):
+            if asks:
+                robot.observe()
+                loop = MPC.loop
+                for other in (BASE, HAND):
+                    MPC.build_problem(robot.state, other(robot.time + 0.01))
+                assert MPC.loop is loop
+            commands.append(robot.update(HAND(robot.time)))
+        runs.append(commands)
+    assert all(same(*commands) for commands in zip(*runs, strict=True))
+
+
+def test_an_update_depends_on_the_loop_state_alone():
+    """Put back after others have passed, the same state and intent get the same command, bit for bit."""
+    robot = Robot(MPC, (*clutter(np.random.default_rng(4)), HELD))
+    for _ in range(8):
+        robot.update(HAND(robot.time))
+    loop, state, time = MPC.loop, robot.state, robot.time
+    first = MPC.update(state, HAND(time))
+    for _ in range(8):
+        robot.time += PERIOD
+        robot.update(BASE(robot.time))
+    MPC.loop = loop
+    assert same(MPC.update(state, HAND(time)), first)
+
+
+@pytest.mark.parametrize("build", [DirectController, CbfFilter])
+def test_what_a_controller_asked_for_before_does_not_matter(build):
+    """It looks at one moment: an old one and a new one answer a state alike."""
+    ask = asking(CHANNELS, np.full(18, 0.3), "joint")
+    robot = Robot(build(MODEL))
+    for _ in range(8):
+        robot.update(ask(robot.time))
+    state = State(HOME, 0.1 * LIMITS.velocity, robot.time, 0.2 * LIMITS.velocity)
+    assert same(robot.controller.update(state, ask(robot.time)), build(MODEL).update(state, ask(robot.time)))
+
+
+def test_a_robot_that_says_nothing_moves_as_it_is_told():
+    np.testing.assert_array_equal(State(HOME, 0.1 * HOME).commanded, 0.1 * HOME)
+
+
+def test_planar_vectors_turn_into_the_base_and_back():
+    """A quarter turn; columns at once; a turn and its inverse."""
+    np.testing.assert_allclose(turned([1.0, 0.0, 0.7], np.pi / 2), [0.0, 1.0, 0.7], atol=1e-15)
+    rng = np.random.default_rng(0)
+    many, angles = rng.normal(size=(3, 5)), rng.uniform(-np.pi, np.pi, 5)
+    columns = [turned(column, angle) for column, angle in zip(many.T, angles, strict=True)]
+    np.testing.assert_array_equal(turned(many, angles).T, columns)
+    np.testing.assert_allclose(turned(turned(many, angles), -angles), many)
+    np.testing.assert_allclose(turned(np.eye(3), 0.3) @ many, turned(many, 0.3))
