@@ -7,9 +7,8 @@ import gymnasium
 import numpy as np
 
 import handrail.collect  # noqa: F401  (registers the environments)
+from handrail.controllers import Intent, MaskedMpc
 from handrail.controllers.arrays import FloatArray
-from handrail.controllers.interface.intent import Intent
-from handrail.controllers.mpc.masked_mpc import MaskedMpc
 from handrail.controllers.numerics.rotation import matrix_from_quaternion, rotation_vector
 
 

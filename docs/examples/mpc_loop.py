@@ -5,11 +5,7 @@ python docs/examples/mpc_loop.py
 
 import numpy as np
 
-from handrail.controllers.interface.controller import State
-from handrail.controllers.interface.intent import Intent
-from handrail.controllers.mpc.masked_mpc import MaskedMpc
-from handrail.controllers.robot.model import load_model
-from handrail.controllers.robot.shape import Obstacle, Shape
+from handrail.controllers import Intent, MaskedMpc, Obstacle, Shape, State, load_model
 
 PERIOD = 0.05  # between two updates [s]
 

@@ -8,13 +8,11 @@ python docs/examples/new_controller.py
 import gymnasium
 
 import handrail.collect  # noqa: F401  (registers the environments)
-from handrail.collect.config import SessionConfig
-from handrail.collect.operators.modes import MODES
+from handrail.collect import MODES, Session, SessionConfig
 from handrail.collect.session.build import build_operator
-from handrail.collect.session.session import Session
+from handrail.controllers import RobotModel
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.baselines.twist_completion import twist_controller
-from handrail.controllers.robot.model import RobotModel
 
 
 class TransposedJacobian:

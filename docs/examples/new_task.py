@@ -1,22 +1,19 @@
-"""A task of your own, from outside of Handrail: touch a ball with the hand's tip, and how to run it.
+"""A task of your own, from outside of Handrail: one class and one entry.
 
 python docs/examples/new_task.py
+PYTHONPATH=docs/examples handrail-record outputs/touch --task new_task:TOUCH_BALL
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from handrail.collect.config import SessionConfig
-from handrail.collect.envs.env import HandrailEnv
-from handrail.collect.operators.modes import MODES
-from handrail.collect.session.build import build_controller, build_operator
-from handrail.collect.session.session import Session
+from handrail.collect import SessionConfig, build_env, build_session
 from handrail.collect.simulation.scene import Scene, SceneObject
+from handrail.collect.tasks.catalogue import TaskSpec
 from handrail.collect.tasks.task import Episode, TaskState, Verdict
+from handrail.controllers import Pose, RobotModel, Shape
 from handrail.controllers.arrays import FloatArray
-from handrail.controllers.robot.model import Pose, RobotModel
-from handrail.controllers.robot.shape import Shape
 
 
 @dataclass(frozen=True)
@@ -44,11 +41,14 @@ class TouchBall:
         return Verdict(bool(np.linalg.norm(state.tool.position - state.pose("ball").position) < 0.03))
 
 
+SCRIPT = "handrail.collect.operators.scripts.reach:ReachScript"  # goes to the goal that an episode names
+TOUCH_BALL = TaskSpec("touch_ball", TouchBall, SCRIPT, "touch a ball with the hand's tip")
+
+
 def main() -> None:
-    """Let the scripted operator of `reach` do it: it goes to any goal that an episode names."""
-    env, mode = HandrailEnv(TouchBall()), MODES["ee"]
-    operator = build_operator(SessionConfig(task="reach"), mode, env.model)
-    session = Session(env, build_controller(mode, env.model, env.fps), operator)
+    """Let the scripted operator do it."""
+    config = SessionConfig(task="new_task:TOUCH_BALL")
+    session = build_session(config, build_env(config, fps=20))
     for seed in range(3):
         outcome = session.run(seed)
         print(f"seed {seed}: {'touched' if outcome.success else 'missed'} after {outcome.seconds:.1f} s")

@@ -45,6 +45,7 @@ def test_a_policy_reaches_its_goals_in_a_gymnasium_environment(capsys, monkeypat
 
 
 def test_a_task_from_outside_is_done(capsys, monkeypatch):
+    monkeypatch.syspath_prepend(EXAMPLES)
     assert shown("new_task", capsys, monkeypatch).count("touched after") == 3
 
 
