@@ -8,15 +8,13 @@ import numpy as np
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.collision.distance_kernels import depth
 from handrail.controllers.collision.model import Distances
-from handrail.controllers.collision.slacks import LIMITS, SLACKS
+from handrail.controllers.collision.slacks import LIMITS
 from handrail.controllers.ocp.motion import changed, largest_share
 from handrail.controllers.ocp.nodes import Nodes
 from handrail.controllers.ocp.problem import Plan, Problem
 from handrail.controllers.ocp.residuals import StageResiduals
-from handrail.controllers.solvers import active_set
-from handrail.controllers.solvers.active_rows import active_rows
-from handrail.controllers.solvers.banded import factor
-from handrail.controllers.solvers.rows import Rows, rows_around
+from handrail.controllers.solvers.active_set import ActiveSet, Answer, QuadraticProgram
+from handrail.controllers.solvers.constraints import Constraints, constraints_around
 from handrail.controllers.solvers.stage_cost import Quadratic, StageCost
 
 _PHASES = ("distances", "residuals", "solve")
@@ -25,8 +23,6 @@ _LARGE = 0.2  # change of an acceleration near obstacles that asks for another s
 _COARSE = 0.01  # share of the promised descent by which a linearised cost may be wrong,
 _SMALL = 0.1  # or of a descent that is this share of the cost
 _SMALLEST_SHARE = 1.0 / 16.0  # of a step that makes the cost rise
-_CHANGES = 10  # of the active rows, for each variable: an answer that takes more is none
-_NOTHING_ACTIVE = np.arange(SLACKS)  # but that no slack is negative
 
 
 class _Guess(NamedTuple):
@@ -44,18 +40,20 @@ class RealTimeSolver:
     """Gauss-Newton steps around a guess, usually one.
 
     The QP's variables have local support (basis.py), so that its Hessian is banded and the cost of an update
-    grows linearly with the horizon; see active_set.py for the method.
+    grows linearly with the horizon.
+
+    Attributes:
+        cost: of all stages.
+        qp: solves the QPs.
     """
 
     def __init__(self, residuals: StageResiduals, horizon: int, size: int, dt: float) -> None:
         self.cost = StageCost(residuals, horizon, size, dt)
-        self._held = active_rows(horizon, size)
-        self._motion = np.zeros((horizon, 3, size))
-        self.reset()
+        self.qp = ActiveSet(horizon, size)
 
     def reset(self) -> None:
         """Forget which rows were active."""
-        self._active = _NOTHING_ACTIVE
+        self.qp.reset()
 
     def solve(self, problem: Problem, guess: FloatArray) -> Plan:
         """Return the plan after one step from the accelerations `guess`, (N, n).
@@ -84,28 +82,39 @@ class RealTimeSolver:
             phases=tuple(zip(_PHASES, spent, strict=True)),
         )
 
+    def program(self, problem: Problem, guess: FloatArray) -> QuadraticProgram:
+        """Return the QP of the step from a guess, (N, n); H and g last until the next update."""
+        begin = self._linearisation(problem, guess)
+        return _program(problem, self.cost.expand(problem, *begin[:3]), self._constraints(problem, begin))
+
+    def _constraints(self, problem: Problem, begin: _Guess) -> Constraints:
+        return constraints_around(problem, begin[:3], begin.nodes, begin.distances, self.cost.matrix)
+
     def _step(self, problem: Problem, guess: FloatArray, spent: list[float]) -> "_Step":
         """Take one step; add the time that its phases take."""
         start = perf_counter()
         begin = self._linearisation(problem, guess)
-        rows = rows_around(problem, begin[:3], begin.nodes, begin.distances, self.cost.matrix)
+        constraints = self._constraints(problem, begin)
         measured = perf_counter()
         quadratic = self.cost.expand(problem, *begin[:3])
         built = perf_counter()
-        answer = self._solve(problem, quadratic, rows)
-        moved = self._damped(problem, begin.u, quadratic.value, answer.slack, rows.needed)
-        again = answer.solved and self._is_far(problem, quadratic.value, answer, moved)
+        answer = self.qp.solve(_program(problem, quadratic, constraints))
+        moved = self._damped(problem, begin.u, quadratic.value, answer.slack, constraints)
+        again = answer.solved and self._is_far(problem, constraints, quadratic.value, answer, moved)
         spent[0] += measured - start
         spent[1] += built - measured
         spent[2] += perf_counter() - built
-        return _Step(answer, moved, begin.distances.values[0], len(rows.names), again)
+        return _Step(answer, moved, begin.distances.values[0], len(constraints.distances.row), again)
 
-    def _is_far(self, problem: Problem, before: float, answer: "_Answer", moved: "_Moved") -> bool:
+    def _is_far(
+        self, problem: Problem, constraints: Constraints, before: float, answer: Answer, moved: "_Moved"
+    ) -> bool:
         """Whether a step's linearisation was too coarse: of the cost, or of distances after a large step."""
         wrong = abs(moved.cost - before - answer.descent)
         if wrong > _COARSE * max(abs(answer.descent), _SMALL * moved.cost):
             return True
-        return answer.near and largest_share(moved.change, problem.limits.acceleration) > _LARGE
+        large = largest_share(moved.change, problem.limits.acceleration) > _LARGE
+        return large and bool(np.any(answer.active >= constraints.distances.first))
 
     def _linearisation(self, problem: Problem, guess: FloatArray) -> _Guess:
         """Return what to linearise around: the guess, or a full stop where the guess runs into something.
@@ -121,32 +130,8 @@ class RealTimeSolver:
         stopped = _measured(problem, *_rolled_out(problem, stop, np.zeros_like(stop)))
         return stopped if stopped.depth <= begin.depth else begin
 
-    def _solve(self, problem: Problem, quadratic: Quadratic, rows: Rows) -> "_Answer":
-        """Solve the QP; its step is left in `_motion`."""
-        changes = 0
-        if factor(quadratic.band):
-            penalty = (problem.slack_linear, problem.slack_quadratic)
-            limit = _CHANGES * len(quadratic.gradient)
-            for warm in (rows.keys(self._active), _NOTHING_ACTIVE):
-                slack, descent, solved, changes, count = active_set.solve(
-                    quadratic.band,
-                    quadratic.gradient,
-                    penalty,
-                    rows.constraints,
-                    warm,
-                    limit,
-                    self._held,
-                    self._motion,
-                )
-                if solved:
-                    keys = self._held.keys[:count]
-                    self._active = rows.named(keys)
-                    return _Answer(True, slack, descent, changes, rows.any_distance(keys))
-        self.reset()
-        return _Answer(False, np.zeros(SLACKS), 0.0, changes, False)
-
     def _damped(
-        self, problem: Problem, guess: FloatArray, allowed: float, slack: FloatArray, needed: FloatArray
+        self, problem: Problem, guess: FloatArray, allowed: float, slack: FloatArray, constraints: Constraints
     ) -> "_Moved":
         """Take the step, halved until the cost itself falls: Gauss-Newton alone may go round in circles.
 
@@ -158,33 +143,23 @@ class RealTimeSolver:
             guess: accelerations, (N, n).
             allowed: cost of the guess.
             slack: of the QP's solution, (4,).
-            needed: by the guess, (4,).
+            constraints: around the guess.
         """
-        change, share = self._motion[:, 2].copy(), 1.0
+        change, share = self.qp.motion[:, 2].copy(), 1.0
         while True:
             q, v, u = _rolled_out(problem, guess, change)
             cost = self.cost.value(problem, q, v, u)
             lower = cost + _penalty(problem, share * slack) <= allowed
-            if lower or needed.any() or share <= _SMALLEST_SHARE:
+            if lower or share <= _SMALLEST_SHARE or constraints.broken:
                 return _Moved(q, v, u, change, cost)
             change *= 0.5
             share *= 0.5
 
 
-class _Answer(NamedTuple):
-    """Of the QP: whether it was solved, slacks, change of the cost, changes of rows, distances active."""
-
-    solved: bool
-    slack: FloatArray
-    descent: float
-    changes: int
-    near: bool
-
-
 class _Step(NamedTuple):
     """A step, the distances now, (P,), the number of distance rows, and whether to take another."""
 
-    answer: _Answer
+    answer: Answer
     moved: "_Moved"
     distances: FloatArray
     rows: int
@@ -199,6 +174,11 @@ class _Moved(NamedTuple):
     u: FloatArray
     change: FloatArray
     cost: float
+
+
+def _program(problem: Problem, quadratic: Quadratic, constraints: Constraints) -> QuadraticProgram:
+    penalty = (problem.slack_linear, problem.slack_quadratic)
+    return QuadraticProgram(quadratic.band, quadratic.gradient, penalty, constraints)
 
 
 def _rolled_out(problem: Problem, guess: FloatArray, change: FloatArray) -> tuple[FloatArray, ...]:
