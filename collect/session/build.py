@@ -16,7 +16,7 @@ from handrail.collect.simulation.ideal_robot import IdealRobot
 from handrail.collect.simulation.simulation import Simulation
 from handrail.collect.tasks.catalogue import TASKS
 from handrail.collect.tasks.task import Task
-from handrail.controllers.catalogue import CONTROLLERS
+from handrail.controllers.baselines.catalogue import CONTROLLERS
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import Controller

@@ -16,7 +16,7 @@ from handrail.controllers.mpc.last_command import LastCommand
 from handrail.controllers.ocp.problem import Plan
 from handrail.controllers.ocp.settings import MpcSettings
 from handrail.controllers.robot.shape import Obstacle
-from handrail.controllers.solvers.real_time import NOTHING_ACTIVE
+from handrail.controllers.solvers.active_set import NOTHING_ACTIVE
 
 
 @dataclass(frozen=True)

@@ -25,7 +25,8 @@ from handrail.controllers.ocp.settings import MpcSettings
 from handrail.controllers.robot.model import RobotModel
 from handrail.controllers.robot.shape import Obstacle
 from handrail.controllers.safety.limiter import Limiter
-from handrail.controllers.solvers.real_time import NOTHING_ACTIVE, RealTimeSolver
+from handrail.controllers.solvers.active_set import NOTHING_ACTIVE
+from handrail.controllers.solvers.real_time import RealTimeSolver
 
 _SOLVER_ERRORS = (HandrailError, ArithmeticError, RuntimeError, ValueError)  # of ours, numpy, CasADi, coal
 

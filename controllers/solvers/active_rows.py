@@ -21,14 +21,14 @@ class ActiveRows(NamedTuple):
         directions: Q, (A, N n + 4).
         triangle: T, (A, A).
         multipliers: λ, (A,).
-        keys: which rows they are, (A,).
+        rows: their numbers, (A,).
         upper: their right-hand sides as seen from the free minimum, (A,).
     """
 
     directions: FloatArray
     triangle: FloatArray
     multipliers: FloatArray
-    keys: IntArray
+    rows: IntArray
     upper: FloatArray
 
 
@@ -39,9 +39,18 @@ def active_rows(horizon: int, size: int) -> ActiveRows:
         directions=np.zeros((count, count)),
         triangle=np.zeros((count, count)),
         multipliers=np.zeros(count),
-        keys=np.zeros(count, dtype=np.int64),
+        rows=np.zeros(count, dtype=np.int64),
         upper=np.zeros(count),
     )
+
+
+@jit
+def contains(rows, row):
+    """Whether a row is among some."""
+    found = False
+    for index in range(len(rows)):
+        found |= rows[index] == row
+    return found
 
 
 @jit
@@ -76,14 +85,14 @@ def project(held, count, new, along, shares, normal):
 
 
 @jit
-def append(held, count, along, normal, square, key, upper, multiplier):
+def append(held, count, along, normal, square, row, upper, multiplier):
     """Make a row active that `project` has split; return how many are."""
     length = square**0.5
     for t in range(len(normal)):
         held.directions[count, t] = normal[t] / length
     copy(along, count, held.triangle[count])
     held.triangle[count, count] = length
-    held.keys[count] = key
+    held.rows[count] = row
     held.upper[count] = upper
     held.multipliers[count] = multiplier
     return count + 1
@@ -94,7 +103,7 @@ def drop(held, count, index):
     """Make a row inactive; return how many are left. Rotations make T triangular again."""
     T, Q = held.triangle, held.directions
     for i in range(index, count - 1):
-        held.keys[i] = held.keys[i + 1]
+        held.rows[i] = held.rows[i + 1]
         held.upper[i] = held.upper[i + 1]
         held.multipliers[i] = held.multipliers[i + 1]
         copy(T[i + 1], i + 2, T[i])
@@ -102,10 +111,10 @@ def drop(held, count, index):
         length = (T[i, i] ** 2 + T[i, i + 1] ** 2) ** 0.5
         c, s = T[i, i] / length, T[i, i + 1] / length
         T[i, i] = length
-        for row in range(i + 1, count - 1):
-            left, right = T[row, i], T[row, i + 1]
-            T[row, i] = c * left + s * right
-            T[row, i + 1] = c * right - s * left
+        for below in range(i + 1, count - 1):
+            left, right = T[below, i], T[below, i + 1]
+            T[below, i] = c * left + s * right
+            T[below, i + 1] = c * right - s * left
         for t in range(Q.shape[1]):
             first, second = Q[i, t], Q[i + 1, t]
             Q[i, t] = c * first + s * second

@@ -9,32 +9,89 @@ one, the most violated first, while all multipliers stay ≥ 0 (D. Goldfarb, A. 
 with the rows that were active in the last update, it needs few changes.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
+from handrail.controllers.arrays import FloatArray, IntArray
 from handrail.controllers.collision.slacks import SLACKS
 from handrail.controllers.numerics.jit import copy, jit
-from handrail.controllers.solvers.active_rows import append, drop, project, settle
-from handrail.controllers.solvers.banded import backward, forward
+from handrail.controllers.solvers.active_rows import active_rows, append, drop, project, settle
+from handrail.controllers.solvers.banded import backward, factor, forward
 from handrail.controllers.solvers.basis import to_motion
-from handrail.controllers.solvers.constraints import most_violated, write_row
+from handrail.controllers.solvers.constraints import Constraints, existing, most_violated, write_row
 
 _DEPENDENT = 1e-12  # squared sine to the active rows, below which a row is a combination of them
+_CHANGES = 10  # of the active rows, for each variable: an answer that takes more is none
+NOTHING_ACTIVE = np.arange(SLACKS)
+"""Numbers of the active rows where only the slacks are at rest: none is negative."""
+
+
+class QuadraticProgram(NamedTuple):
+    """The QP of one update.
+
+    Attributes:
+        band: H as a band, (N n, 3n); see banded.py. Solving overwrites it with its factor.
+        gradient: g, (N n,).
+        penalty: ρ₁ and ρ₂.
+        constraints: of the update.
+    """
+
+    band: FloatArray
+    gradient: FloatArray
+    penalty: tuple[float, float]
+    constraints: Constraints
+
+
+class Answer(NamedTuple):
+    """Whether the QP was solved, σ (4,), change of the cost, changes of rows, numbers of the active ones."""
+
+    solved: bool
+    slack: FloatArray
+    descent: float
+    changes: int
+    active: IntArray
+
+
+class ActiveSet:
+    """Solves the QPs of one update after another.
+
+    Args:
+        horizon: stages N.
+        size: coordinates n.
+
+    Attributes:
+        motion: changes of (q, v, u) after every stage of the last solution, (N, 3, n).
+    """
+
+    def __init__(self, horizon: int, size: int) -> None:
+        self.motion = np.zeros((horizon, 3, size))
+        self._held = active_rows(horizon, size)
+
+    def solve(self, program: QuadraticProgram, active: IntArray = NOTHING_ACTIVE) -> Answer:
+        """Solve a QP, begun with the rows that are expected to be active, as those of the last one were."""
+        changes = 0
+        if factor(program.band):
+            limit = _CHANGES * len(program.gradient)
+            for warm in (active, NOTHING_ACTIVE):
+                slack, descent, solved, changes, count = solve(program, warm, limit, self._held, self.motion)
+                if solved:
+                    return Answer(True, slack, descent, changes, self._held.rows[:count].copy())
+        return Answer(False, np.zeros(SLACKS), 0.0, changes, NOTHING_ACTIVE)
 
 
 @jit
-def solve(band, gradient, penalty, rows, warm, limit, held, motion):
+def solve(program, warm, limit, held, motion):
     """Solve the QP; return σ (4,), `gᵀ s + ½ sᵀ H s`, whether that is the solution, changes, active rows.
 
     Args:
-        band: L, (N n, 3n); see banded.py.
-        gradient: g, (N n,).
-        penalty: ρ₁ and ρ₂.
-        rows: the constraints.
-        warm: keys of rows to begin with, (k,).
+        program: with L in place of H.
+        warm: numbers of rows to begin with, those that do not exist left out, (k,).
         limit: of the number of changes.
-        held: room; the active rows' keys and multipliers are left in it.
+        held: room; the active rows' numbers and multipliers are left in it.
         motion: filled with the changes of (q, v, u) after every stage, (N, 3, n).
     """
+    band, gradient, penalty, constraints = program
     size = len(gradient)
     root = penalty[1] ** 0.5
     free = np.empty(size + SLACKS)
@@ -45,22 +102,23 @@ def solve(band, gradient, penalty, rows, warm, limit, held, motion):
     y, new, normal = np.empty_like(free), np.empty_like(free), np.empty_like(free)
     along, shares = np.empty_like(free), np.empty_like(free)
     s, slack = np.empty(size), np.empty(SLACKS)
-    count = _begin(band, root, rows, warm, free, held, y, new, along, shares, normal)
+    warm = existing(constraints, warm)
+    count = _begin(band, root, constraints, warm, free, held, y, new, along, shares, normal)
     changes, settled = 0, 0
     while True:
         copy(y, size, s)
         backward(band, s)
         for index in range(SLACKS):
             slack[index] = y[size + index] / root
-        to_motion(rows.matrix, s, motion)
-        key = most_violated(rows, s, motion, slack, held.keys[:count])
-        if key < 0:
+        to_motion(constraints.matrix, s, motion)
+        row = most_violated(constraints, s, motion, slack, held.rows[:count])
+        if row < 0:
             if settled == changes:
                 return slack, _descent(gradient, s, y), True, changes, count
             settled = changes  # without the rounding errors of the changes
             settle(held, count, free, shares, y)
             continue
-        upper = _transform(band, root, rows, key, new)
+        upper = _transform(band, root, constraints, row, new)
         multiplier = 0.0
         while True:
             changes += 1
@@ -76,17 +134,17 @@ def solve(band, gradient, penalty, rows, warm, limit, held, motion):
                     y[t] -= step * normal[t]
             if blocking < 0:
                 upper += np.dot(new, free)
-                count = append(held, count, along, normal, square, key, upper, multiplier)
+                count = append(held, count, along, normal, square, row, upper, multiplier)
                 break
             count = drop(held, count, blocking)
 
 
 @jit
-def _begin(band, root, rows, warm, free, held, y, new, along, shares, normal):
+def _begin(band, root, constraints, warm, free, held, y, new, along, shares, normal):
     """Make the warm rows active, less those with a negative multiplier; write y; return their number."""
     count = 0
     for index in range(len(warm)):
-        upper = _transform(band, root, rows, warm[index], new) + np.dot(new, free)
+        upper = _transform(band, root, constraints, warm[index], new) + np.dot(new, free)
         square = project(held, count, new, along, shares, normal)
         if square > _DEPENDENT * np.dot(new, new):
             count = append(held, count, along, normal, square, warm[index], upper, 0.0)
@@ -102,9 +160,9 @@ def _begin(band, root, rows, warm, free, held, y, new, along, shares, normal):
 
 
 @jit
-def _transform(band, root, rows, key, new):
+def _transform(band, root, constraints, row, new):
     """Write m_p of a row; return its right-hand side."""
-    upper, first = write_row(rows, key, new)
+    upper, first = write_row(constraints, row, new)
     forward(band, new, first)
     for index in range(len(band), len(new)):
         new[index] /= root

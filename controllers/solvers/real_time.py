@@ -8,15 +8,13 @@ import numpy as np
 from handrail.controllers.arrays import FloatArray, IntArray
 from handrail.controllers.collision.distance_kernels import depth
 from handrail.controllers.collision.model import Distances
-from handrail.controllers.collision.slacks import LIMITS, SLACKS
+from handrail.controllers.collision.slacks import LIMITS
 from handrail.controllers.ocp.motion import changed, largest_share
 from handrail.controllers.ocp.nodes import Nodes
 from handrail.controllers.ocp.problem import Plan, Problem
 from handrail.controllers.ocp.residuals import StageResiduals
-from handrail.controllers.solvers import active_set
-from handrail.controllers.solvers.active_rows import active_rows
-from handrail.controllers.solvers.banded import factor
-from handrail.controllers.solvers.rows import Rows, rows_around
+from handrail.controllers.solvers.active_set import NOTHING_ACTIVE, ActiveSet, Answer, QuadraticProgram
+from handrail.controllers.solvers.constraints import Constraints, constraints_around
 from handrail.controllers.solvers.stage_cost import Quadratic, StageCost
 
 _PHASES = ("distances", "residuals", "solve")
@@ -25,9 +23,6 @@ _LARGE = 0.2  # change of an acceleration near obstacles that asks for another s
 _COARSE = 0.01  # share of the promised descent by which a linearised cost may be wrong,
 _SMALL = 0.1  # or of a descent that is this share of the cost
 _SMALLEST_SHARE = 1.0 / 16.0  # of a step that makes the cost rise
-_CHANGES = 10  # of the active rows, for each variable: an answer that takes more is none
-NOTHING_ACTIVE = np.arange(SLACKS)
-"""Names of the active rows where only the slacks are at rest: none is negative."""
 
 
 class _Guess(NamedTuple):
@@ -45,13 +40,16 @@ class RealTimeSolver:
     """Gauss-Newton steps around a guess, usually one.
 
     The QP's variables have local support (basis.py), so that its Hessian is banded and the cost of an update
-    grows linearly with the horizon; see active_set.py for the method.
+    grows linearly with the horizon.
+
+    Attributes:
+        cost: of all stages.
+        qp: solves the QPs.
     """
 
     def __init__(self, residuals: StageResiduals, horizon: int, size: int, dt: float) -> None:
         self.cost = StageCost(residuals, horizon, size, dt)
-        self._held = active_rows(horizon, size)
-        self._motion = np.zeros((horizon, 3, size))
+        self.qp = ActiveSet(horizon, size)
 
     def solve(self, problem: Problem, guess: FloatArray, active: IntArray = NOTHING_ACTIVE) -> Plan:
         """Return the plan after one step from a guess.
@@ -62,7 +60,7 @@ class RealTimeSolver:
         Args:
             problem: of this update.
             guess: accelerations, (N, n).
-            active: names of the rows that are expected to be active, as a plan among the same pairs has them.
+            active: numbers of the rows that are expected to be active, as a plan among the same pairs has them.
         """
         spent = [0.0] * len(_PHASES)
         for _ in range(1 + _MORE_STEPS):
@@ -87,28 +85,39 @@ class RealTimeSolver:
             phases=tuple(zip(_PHASES, spent, strict=True)),
         )
 
+    def program(self, problem: Problem, guess: FloatArray) -> QuadraticProgram:
+        """Return the QP of the step from a guess, (N, n); H and g last until the next update."""
+        begin = self._linearisation(problem, guess)
+        return _program(problem, self.cost.expand(problem, *begin[:3]), self._constraints(problem, begin))
+
+    def _constraints(self, problem: Problem, begin: _Guess) -> Constraints:
+        return constraints_around(problem, begin[:3], begin.nodes, begin.distances, self.cost.matrix)
+
     def _step(self, problem: Problem, guess: FloatArray, active: IntArray, spent: list[float]) -> "_Step":
         """Take one step; add the time that its phases take."""
         start = perf_counter()
         begin = self._linearisation(problem, guess)
-        rows = rows_around(problem, begin[:3], begin.nodes, begin.distances, self.cost.matrix)
+        constraints = self._constraints(problem, begin)
         measured = perf_counter()
         quadratic = self.cost.expand(problem, *begin[:3])
         built = perf_counter()
-        answer = self._solve(problem, quadratic, rows, active)
-        moved = self._damped(problem, begin.u, quadratic.value, answer.slack, rows.needed)
-        again = answer.solved and self._is_far(problem, quadratic.value, answer, moved)
+        answer = self.qp.solve(_program(problem, quadratic, constraints), active)
+        moved = self._damped(problem, begin.u, quadratic.value, answer.slack, constraints)
+        again = answer.solved and self._is_far(problem, constraints, quadratic.value, answer, moved)
         spent[0] += measured - start
         spent[1] += built - measured
         spent[2] += perf_counter() - built
-        return _Step(answer, moved, begin.distances.values[0], len(rows.names), again)
+        return _Step(answer, moved, begin.distances.values[0], len(constraints.distances.row), again)
 
-    def _is_far(self, problem: Problem, before: float, answer: "_Answer", moved: "_Moved") -> bool:
+    def _is_far(
+        self, problem: Problem, constraints: Constraints, before: float, answer: Answer, moved: "_Moved"
+    ) -> bool:
         """Whether a step's linearisation was too coarse: of the cost, or of distances after a large step."""
         wrong = abs(moved.cost - before - answer.descent)
         if wrong > _COARSE * max(abs(answer.descent), _SMALL * moved.cost):
             return True
-        return answer.near and largest_share(moved.change, problem.limits.acceleration) > _LARGE
+        large = largest_share(moved.change, problem.limits.acceleration) > _LARGE
+        return large and bool(np.any(answer.active >= constraints.distances.first))
 
     def _linearisation(self, problem: Problem, guess: FloatArray) -> _Guess:
         """Return what to linearise around: the guess, or a full stop where the guess runs into something.
@@ -124,30 +133,8 @@ class RealTimeSolver:
         stopped = _measured(problem, *_rolled_out(problem, stop, np.zeros_like(stop)))
         return stopped if stopped.depth <= begin.depth else begin
 
-    def _solve(self, problem: Problem, quadratic: Quadratic, rows: Rows, active: IntArray) -> "_Answer":
-        """Solve the QP; its step is left in `_motion`."""
-        changes = 0
-        if factor(quadratic.band):
-            penalty = (problem.slack_linear, problem.slack_quadratic)
-            limit = _CHANGES * len(quadratic.gradient)
-            for warm in (rows.keys(active), NOTHING_ACTIVE):
-                slack, descent, solved, changes, count = active_set.solve(
-                    quadratic.band,
-                    quadratic.gradient,
-                    penalty,
-                    rows.constraints,
-                    warm,
-                    limit,
-                    self._held,
-                    self._motion,
-                )
-                if solved:
-                    keys = self._held.keys[:count]
-                    return _Answer(True, slack, descent, changes, rows.named(keys), rows.any_distance(keys))
-        return _Answer(False, np.zeros(SLACKS), 0.0, changes, NOTHING_ACTIVE, False)
-
     def _damped(
-        self, problem: Problem, guess: FloatArray, allowed: float, slack: FloatArray, needed: FloatArray
+        self, problem: Problem, guess: FloatArray, allowed: float, slack: FloatArray, constraints: Constraints
     ) -> "_Moved":
         """Take the step, halved until the cost itself falls: Gauss-Newton alone may go round in circles.
 
@@ -159,34 +146,23 @@ class RealTimeSolver:
             guess: accelerations, (N, n).
             allowed: cost of the guess.
             slack: of the QP's solution, (4,).
-            needed: by the guess, (4,).
+            constraints: around the guess.
         """
-        change, share = self._motion[:, 2].copy(), 1.0
+        change, share = self.qp.motion[:, 2].copy(), 1.0
         while True:
             q, v, u = _rolled_out(problem, guess, change)
             cost = self.cost.value(problem, q, v, u)
             lower = cost + _penalty(problem, share * slack) <= allowed
-            if lower or needed.any() or share <= _SMALLEST_SHARE:
+            if lower or share <= _SMALLEST_SHARE or constraints.broken:
                 return _Moved(q, v, u, change, cost)
             change *= 0.5
             share *= 0.5
 
 
-class _Answer(NamedTuple):
-    """Of the QP: whether solved, slacks, change of cost, changes of rows, active rows, distances of them."""
-
-    solved: bool
-    slack: FloatArray
-    descent: float
-    changes: int
-    active: IntArray
-    near: bool
-
-
 class _Step(NamedTuple):
     """A step, the distances now, (P,), the number of distance rows, and whether to take another."""
 
-    answer: _Answer
+    answer: Answer
     moved: "_Moved"
     distances: FloatArray
     rows: int
@@ -201,6 +177,11 @@ class _Moved(NamedTuple):
     u: FloatArray
     change: FloatArray
     cost: float
+
+
+def _program(problem: Problem, quadratic: Quadratic, constraints: Constraints) -> QuadraticProgram:
+    penalty = (problem.slack_linear, problem.slack_quadratic)
+    return QuadraticProgram(quadratic.band, quadratic.gradient, penalty, constraints)
 
 
 def _rolled_out(problem: Problem, guess: FloatArray, change: FloatArray) -> tuple[FloatArray, ...]:

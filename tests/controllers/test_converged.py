@@ -89,7 +89,7 @@ def test_both_solvers_agree_where_limits_bind():
 
 def test_what_is_asked_of_distances_is_what_the_real_time_solver_asks():
     from handrail.controllers.ocp.nodes import Nodes
-    from handrail.controllers.solvers.rows import rows_around
+    from handrail.controllers.solvers.constraints import constraints_around
 
     post = Obstacle("post", Shape("cylinder", [0.2, 1.2]), [0.4, 0.5, 0.6])
     mpc = MaskedMpc(load_model())
@@ -100,10 +100,10 @@ def test_what_is_asked_of_distances_is_what_the_real_time_solver_asks():
     nodes = Nodes(problem, q, v)
     found = problem.collision.distances(nodes.q, problem.margins + problem.reach, nodes.times)
     matrix = mpc.solver.cost.matrix
-    rows = rows_around(problem, (q, v, u), nodes, found, matrix).constraints
+    rows = constraints_around(problem, (q, v, u), nodes, found, matrix).distances
     node, pair = found.near[found.near[:, 0] > 0].T
     bounds = distance_bounds(problem, found.values[0], len(nodes.q))
-    np.testing.assert_allclose(rows.upper, found.values[node, pair] - bounds[node, pair], atol=1e-12)
+    np.testing.assert_allclose(rows.left, found.values[node, pair] - bounds[node, pair], atol=1e-12)
     s, motion = np.random.default_rng(3).uniform(-0.1, 0.1, 90), np.zeros((10, 3, 9))
     to_motion(matrix, s, motion)  # and so is how they change
     change = motion[:, 2]
@@ -111,7 +111,7 @@ def test_what_is_asked_of_distances_is_what_the_real_time_solver_asks():
     moved = [row @ padded[9 * k : 9 * k + 27] for row, k in zip(rows.coefficients, rows.stage, strict=True)]
     linear = linear_distances(problem, u)
     left = (linear.at(*problem.rollout(u + change)) - linear.lower)[linear.pairs >= 0]
-    expected = rows.upper - moved
+    expected = rows.left - moved
     np.testing.assert_allclose(np.sort(left), np.sort(expected), atol=1e-9)
 
 

@@ -16,6 +16,7 @@ from handrail.controllers.mpc.masked_mpc import MaskedMpc
 from handrail.controllers.ocp.settings import MpcSettings
 from handrail.controllers.robot.model import load_model
 from handrail.controllers.robot.shape import Obstacle, Shape
+from handrail.controllers.solvers.active_set import Answer
 from handrail.controllers.solvers.basis import to_motion
 
 MODEL = load_model()
@@ -120,16 +121,12 @@ def test_a_bad_state_brakes_from_the_last_command(state):
 
 
 def test_a_failed_solve_brakes(monkeypatch):
-    from handrail.controllers.solvers import active_set
-
     MPC.reset()
     asked = asking(np.full(18, 0.3), "ee")
     positions, velocities, _ = roll(MPC, [asked] * 10)
 
-    def infeasible(band, gradient, *rest):
-        return np.zeros(SLACKS), 0.0, False, 3, 0
-
-    monkeypatch.setattr(active_set, "solve", infeasible)
+    infeasible = Answer(False, np.zeros(SLACKS), 0.0, 3, np.arange(SLACKS))
+    monkeypatch.setattr(MPC.solver.qp, "solve", lambda program, active: infeasible)
     beyond = asking(np.full(18, -2.0), "ee")
     command = MPC.update(State(positions[-1], velocities[-1], 0.5), beyond(0.5))
     assert command.diagnostics.status is Status.SOLVER_FAILED

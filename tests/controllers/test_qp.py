@@ -5,23 +5,17 @@ import numpy as np
 import pytest
 
 from handrail.controllers.collision.slacks import LIMITS, SLACKS
-from handrail.controllers.solvers import active_set
 from handrail.controllers.solvers.active_rows import active_rows
+from handrail.controllers.solvers.active_set import ActiveSet, QuadraticProgram, solve
 from handrail.controllers.solvers.banded import backward, factor, forward
 from handrail.controllers.solvers.basis import REACH, stage_matrix, to_motion
-from handrail.controllers.solvers.constraints import Constraints, first_distance, write_row
+from handrail.controllers.solvers.constraints import Constraints
+from handrail.controllers.solvers.distance_limits import DistanceLimits
+from handrail.controllers.solvers.joint_limits import JointLimits
+from handrail.controllers.solvers.reference.dense import dense
 
 DT, N = 0.1, 3  # N coordinates
 NONE = np.arange(SLACKS)  # the rows that an update begins with
-
-
-def dense(band):
-    size, width = band.shape
-    matrix = np.zeros((size, size))
-    for j in range(size):
-        for t in range(min(width, size - j)):
-            matrix[j + t, j] = matrix[j, j + t] = band[j, t]
-    return matrix
 
 
 def random_band(rng, horizon):
@@ -46,50 +40,57 @@ def random_band(rng, horizon):
 def random_rows(rng, horizon, distances, tight):
     coefficients = 0.01 * rng.normal(size=(distances, REACH * N))
     coefficients[:, :N] = 0.0  # positions do not depend on the stage before the last
+    value = rng.uniform(-1, 1, (horizon, 3, N)) * np.array([[0.95], [0.95], [1.0]])
+    first = SLACKS + 2 * value.size
     return Constraints(
-        matrix=stage_matrix(DT),
-        guess=rng.uniform(-1, 1, (horizon, N)),
-        acceleration=rng.uniform(0.5, 2.0, N),
-        offsets=rng.uniform(-0.95, 0.95, (horizon, 2, N)),
-        scales=rng.uniform(0.5, 2.0, (2, N)),
-        stage=rng.integers(0, horizon, distances),
-        kind=rng.integers(0, LIMITS, distances),
-        coefficients=coefficients,
-        upper=rng.uniform(-tight, 0.1, distances),
+        stage_matrix(DT),
+        JointLimits(value, rng.uniform(0.5, 2.0, (3, N)), False),
+        DistanceLimits(
+            stage=rng.integers(0, horizon, distances),
+            kind=rng.integers(0, LIMITS, distances),
+            coefficients=coefficients,
+            left=rng.uniform(-tight, 0.1, distances),
+            row=first + 5 + rng.permutation(distances),
+            first=first,
+        ),
     )
 
 
-def reference(band, gradient, penalty, rows):
-    """The same QP, dense, by DAQP: (s, σ), all rows and right-hand sides."""
-    size = len(gradient)
-    count = first_distance(*rows.guess.shape) + len(rows.upper)
-    matrix, upper = np.zeros((count, size + SLACKS)), np.zeros(count)
-    for key in range(count):
-        upper[key], _ = write_row(rows, key, matrix[key])
-    hessian = np.diag(np.full(size + SLACKS, penalty[1]))
-    hessian[:size, :size] = dense(band)
-    linear = np.concatenate([gradient, np.full(SLACKS, penalty[0])])
-    sense = np.zeros(count, dtype=np.int32)
-    x, _, flag, _ = daqp.solve(hessian, linear, matrix, upper, np.full(count, -1e30), sense)
+def random_program(rng, horizon, distances, tight):
+    band, constraints = random_band(rng, horizon), random_rows(rng, horizon, distances, tight)
+    return QuadraticProgram(band, 30.0 * rng.normal(size=horizon * N), (1e5, 1e5), constraints)
+
+
+def reference(program):
+    """The same QP, dense, and its solution by DAQP: (s, σ)."""
+    same = dense(program)
+    least, sense = np.full(len(same.upper), -1e30), np.zeros(len(same.upper), dtype=np.int32)
+    x, _, flag, _ = daqp.solve(same.hessian, same.gradient, same.matrix, same.upper, least, sense)
     assert flag > 0
-    return x, hessian, linear, matrix, upper
+    return x, same
 
 
-def solve(band, gradient, penalty, rows, warm=NONE, limit=2000):
-    triangle = band.copy()
-    assert factor(triangle)
-    held, motion = active_rows(len(rows.guess), N), np.zeros((len(rows.guess), 3, N))
-    slack, descent, solved, changes, count = active_set.solve(
-        triangle, gradient, penalty, rows, warm, limit, held, motion
-    )
+def solved_by_ours(program, warm=NONE, limit=2000):
+    same, factored = dense(program), program._replace(band=program.band.copy())
+    assert factor(factored.band)
+    horizon = len(program.gradient) // N
+    held, motion = active_rows(horizon, N), np.zeros((horizon, 3, N))
+    slack, descent, solved, changes, count = solve(factored, warm, limit, held, motion)
+    s = variables(motion)
+    if solved:
+        hessian = same.hessian[: len(s), : len(s)]
+        np.testing.assert_allclose(
+            descent, program.gradient @ s + 0.5 * s @ hessian @ s, rtol=1e-6, atol=1e-6
+        )
+    return np.append(s, slack), solved, changes, held.rows[:count].copy(), held, motion
+
+
+def variables(motion):
     q = motion[:, 0] / (0.5 * DT**2)  # s_k + s_{k-1}
     s = np.empty_like(q)
     for k in range(len(q)):
         s[k] = q[k] - (s[k - 1] if k else 0.0)
-    s = s.ravel()
-    if solved:
-        np.testing.assert_allclose(descent, gradient @ s + 0.5 * s @ dense(band) @ s, rtol=1e-6, atol=1e-6)
-    return np.append(s, slack), solved, changes, held.keys[:count].copy(), held, motion
+    return s.ravel()
 
 
 def test_the_basis_obeys_the_dynamics():
@@ -104,13 +105,14 @@ def test_the_basis_obeys_the_dynamics():
 
 def test_the_factor_is_the_factor():
     rng = np.random.default_rng(1)
-    band = random_band(rng, 8)
-    matrix, triangle = dense(band), band.copy()
+    program = random_program(rng, 8, 0, 0.0)
+    band, matrix = program.band, dense(program).hessian[:-SLACKS, :-SLACKS]
+    triangle = band.copy()
     assert factor(triangle)
     right = rng.normal(size=len(band))
     x = right.copy()
     forward(triangle, x, 0)
-    np.testing.assert_allclose(np.linalg.cholesky(matrix) @ x, right, rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(np.linalg.cholesky(matrix) @ x, right, rtol=1e-9, atol=1e-8)
     backward(triangle, x)
     np.testing.assert_allclose(matrix @ x, right, rtol=1e-7, atol=1e-7)
     assert not factor(-band)
@@ -121,55 +123,69 @@ def test_the_factor_is_the_factor():
 @pytest.mark.parametrize("tight", [0.0, 0.05])  # the second needs slack
 def test_the_solution_is_that_of_a_dense_solver(horizon, tight):
     rng = np.random.default_rng(horizon)
-    penalty = (1e5, 1e5)
     slacks = 0
     for _ in range(10):
-        band, rows = random_band(rng, horizon), random_rows(rng, horizon, 40, tight)
-        gradient = 30.0 * rng.normal(size=horizon * N)
-        x, solved, changes, keys, held, motion = solve(band, gradient, penalty, rows)
-        expected, hessian, linear, matrix, upper = reference(band, gradient, penalty, rows)
+        program = random_program(rng, horizon, 40, tight)
+        x, solved, changes, rows, held, motion = solved_by_ours(program)
+        expected, same = reference(program)
         assert solved
         assert changes > 0
-        assert np.all(matrix @ x <= upper + 2e-5)
-        assert np.all(held.multipliers[: len(keys)] > -1e-6)
-        costs = [0.5 * z @ hessian @ z + linear @ z for z in (x, expected)]
-        np.testing.assert_allclose(*costs, rtol=1e-6)
+        assert same.violation(x) <= 2e-5
+        assert np.all(held.multipliers[: len(rows)] > -1e-6)
+        np.testing.assert_allclose(same.value(x), same.value(expected), rtol=1e-6)
         exact = np.zeros_like(motion)
-        to_motion(rows.matrix, x[:-SLACKS], exact)
+        to_motion(stage_matrix(DT), x[:-SLACKS], exact)
         np.testing.assert_allclose(motion, exact, atol=1e-9)
         slacks += np.any(x[-SLACKS:] > 1e-6)
-        again, solved, changes, *_ = solve(band, gradient, penalty, rows, warm=keys)
+        again, solved, changes, *_ = solved_by_ours(program, warm=rows)
         assert solved
         assert changes == 0  # begun with the right rows there is nothing to change
         np.testing.assert_allclose(again, x, atol=1e-7)
-        wrong = rng.integers(0, first_distance(horizon, N) + 40, 12)
-        again, solved, *_ = solve(band, gradient, penalty, rows, warm=wrong)  # with any rows
+        wrong = rng.integers(0, same.rows.max() + 5, 12)  # any rows, and such as do not exist
+        again, solved, *_ = solved_by_ours(program, warm=np.unique(wrong))
         assert solved
         np.testing.assert_allclose(again, x, atol=1e-6)
     assert (slacks > 0) == (tight > 0.0)
 
 
+def test_a_qp_begins_with_the_rows_that_were_active():
+    program = random_program(np.random.default_rng(7), 6, 40, 0.05)
+    qp = ActiveSet(6, N)
+    first = qp.solve(program._replace(band=program.band.copy()))
+    again = qp.solve(program._replace(band=program.band.copy()), first.active)
+    assert first.solved
+    assert first.changes > 0
+    assert again.solved
+    assert again.changes == 0
+    assert qp.solve(program._replace(band=program.band.copy())).changes == first.changes
+
+
+def test_a_hessian_that_is_not_positive_is_no_solution():
+    program = random_program(np.random.default_rng(8), 6, 10, 0.0)
+    assert not ActiveSet(6, N).solve(program._replace(band=-program.band)).solved
+
+
 def test_rows_that_are_the_same_twice_do_no_harm():
-    rng = np.random.default_rng(5)
-    band, rows = random_band(rng, 6), random_rows(rng, 6, 10, 0.05)
-    twice = rows._replace(
-        stage=np.tile(rows.stage, 3),
-        kind=np.tile(rows.kind, 3),
-        coefficients=np.tile(rows.coefficients, (3, 1)),
-        upper=np.tile(rows.upper, 3),
+    program = random_program(np.random.default_rng(5), 6, 10, 0.05)
+    near = program.constraints.distances
+    thrice = near._replace(
+        stage=np.tile(near.stage, 3),
+        kind=np.tile(near.kind, 3),
+        coefficients=np.tile(near.coefficients, (3, 1)),
+        left=np.tile(near.left, 3),
+        row=near.first + np.arange(3 * len(near.row)),
     )
-    gradient = 30.0 * rng.normal(size=18)
-    once, solved, *_ = solve(band, gradient, (1e5, 1e5), rows)
+    once, solved, *_ = solved_by_ours(program)
     assert solved
-    again, solved, *_ = solve(band, gradient, (1e5, 1e5), twice)
+    again, solved, *_ = solved_by_ours(
+        program._replace(constraints=program.constraints._replace(distances=thrice))
+    )
     assert solved
     np.testing.assert_allclose(again, once, atol=1e-6)
 
 
 def test_too_many_changes_are_no_solution():
-    rng = np.random.default_rng(6)
-    band, rows = random_band(rng, 6), random_rows(rng, 6, 40, 0.05)
-    gradient = 30.0 * rng.normal(size=18)
-    _, solved, changes, *_ = solve(band, gradient, (1e5, 1e5), rows)
+    program = random_program(np.random.default_rng(6), 6, 40, 0.05)
+    _, solved, changes, *_ = solved_by_ours(program)
     assert solved
-    assert not solve(band, gradient, (1e5, 1e5), rows, limit=changes // 2)[1]
+    assert not solved_by_ours(program, limit=changes // 2)[1]

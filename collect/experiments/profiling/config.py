@@ -8,7 +8,7 @@ from handrail.controllers.errors import HandrailError
 
 @dataclass(frozen=True)
 class ProfileConfig:
-    """Measure the controller's update against IPOPT and mink, all in one interleaved run."""
+    """Measure the controller's update against IPOPT and mink, and its QP solver against DAQP and PIQP."""
 
     updates: int = 400
     """Timed updates of every case."""
@@ -20,6 +20,8 @@ class ProfileConfig:
     """Also measure longer horizons, more pairs and another robot."""
     solves: int = 40
     """Converged solves of IPOPT a case."""
+    qps: int = 100
+    """QPs of every case that DAQP and PIQP solve too; 0 for none."""
     json: str = ""
     """Write everything measured to this file."""
 
@@ -29,7 +31,7 @@ class ProfileConfig:
         Raises:
             HandrailError: one is wrong.
         """
-        for name, least in (("updates", 10), ("solves", 1), ("seed", 0)):
+        for name, least in (("updates", 10), ("solves", 1), ("seed", 0), ("qps", 0)):
             value = getattr(self, name)
             if value < least:
                 raise HandrailError(f"--{name} {value}: expected a whole number >= {least}")

@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 
 from handrail.collect.experiments.profiling.config import ProfileConfig
+from handrail.collect.experiments.profiling.qp import compare_qp
 from handrail.collect.experiments.profiling.rivals import Converged, Mink
-from handrail.collect.experiments.profiling.timing_loop import Case, TimingLoop, Update
+from handrail.collect.experiments.profiling.timing_loop import Case, TimingLoop, Update, times
 from handrail.controllers.numerics.threads import single_threaded
 from handrail.controllers.ocp.settings import MpcSettings
 from handrail.datasets.storage.atomic import write_whole
@@ -59,7 +60,8 @@ class Profile:
             for block in range(blocks + 1):
                 for name, lane in self._lanes.items():
                     self._turn(name, lane, warm_up=block == 0)
-        return self._results(load)
+            qp = compare_qp(self._config.qps, self._config.seed) if self._config.qps else {}
+        return {**self._results(load), "qp": qp}
 
     def _add_rivals(self) -> None:
         settings = MpcSettings()
@@ -100,13 +102,6 @@ class Profile:
         }
 
 
-def _times(seconds: list[float]) -> dict[str, float]:
-    """Return median, p95, p99 and worst [ms]."""
-    milliseconds = 1e3 * np.array(seconds)
-    names = ("median_ms", "p95_ms", "p99_ms", "worst_ms")
-    return dict(zip(names, np.percentile(milliseconds, (50, 95, 99, 100)).tolist(), strict=True))
-
-
 def _case(case: Case, updates: list[Update]) -> dict[str, Any]:
     pairs = len(updates[0].plan.distances)
     names = [name for name, _ in updates[0].plan.phases]
@@ -118,7 +113,7 @@ def _case(case: Case, updates: list[Update]) -> dict[str, Any]:
     near = [int(np.sum(u.plan.distances < u.problem.margins + u.problem.reach)) for u in updates]
     statuses = [update.status for update in updates]
     return {
-        **_times([update.seconds for update in updates]),
+        **times([update.seconds for update in updates]),
         "pairs": pairs,
         "near_mean": float(np.mean(near)),
         "rows_mean": float(np.mean([update.plan.rows for update in updates])),
@@ -139,8 +134,10 @@ def _rival(rival: Converged | Mink) -> dict[str, Any]:
     if not rival.seconds:
         return {**counts, "ratio": None}
     ratio = float(np.median(rival.ours) / np.median(rival.seconds))
-    times = {**counts, **_times(rival.seconds), "ratio": ratio}
-    return {**times, "qp_solver": rival.solver, "pairs": rival.pairs} if isinstance(rival, Mink) else times
+    measured = {**counts, **times(rival.seconds), "ratio": ratio}
+    return (
+        {**measured, "qp_solver": rival.solver, "pairs": rival.pairs} if isinstance(rival, Mink) else measured
+    )
 
 
 def _ratios(rivals: dict[str, list[dict[str, Any]]]) -> dict[str, float | None]:

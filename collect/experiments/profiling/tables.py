@@ -17,7 +17,7 @@ _RATIOS = {
 
 def profile_tables(results: dict[str, Any]) -> Group:
     """Return everything measured, for printing."""
-    return Group(_cases(results), _phases(results), _rivals(results), _growth(results))
+    return Group(_cases(results), _phases(results), _rivals(results), _growth(results), _qp(results))
 
 
 def _all(results: dict[str, Any]) -> dict[str, Any]:
@@ -64,3 +64,16 @@ def _growth(results: dict[str, Any]) -> PlainTable:
     for name, exponent in results["growth_exponents"].items():
         rows.append((f"growth with {name}", f"size^{exponent:.2f}", ""))
     return PlainTable(("against", "ours / theirs", "times as fast"), rows, "Ratios and growth")
+
+
+def _qp(results: dict[str, Any]) -> PlainTable:
+    headings, rows = (
+        ("case", "pairs", "solver", "median", "p95", "p99", "own / it", "failed", "violation"),
+        [],
+    )
+    for name, case in results["qp"].items():
+        for solver, entry in case["solvers"].items():
+            figures = *(f"{entry[t]:.2f}" for t in _TIMES[:3]), f"{entry['ratio']:.3f}"
+            broken = "–" if entry["violation"] is None else f"{entry['violation']:.0e}"
+            rows.append((name, str(case["pairs"]), solver, *figures, str(entry["failed"]), broken))
+    return PlainTable(headings, rows, "The same QPs by other solvers, warm-started [ms]")

@@ -114,3 +114,10 @@ class TimingLoop:
         self._state = State(state.q + 0.5 * PERIOD * (state.v + after), after, state.time + PERIOD)
         self._count += 1
         return Update(seconds, state, intent, *self._watched.last, command.diagnostics.status.value)
+
+
+def times(seconds: list[float]) -> dict[str, float]:
+    """Return median, p95, p99 and worst [ms]."""
+    milliseconds = 1e3 * np.array(seconds)
+    names = ("median_ms", "p95_ms", "p99_ms", "worst_ms")
+    return dict(zip(names, np.percentile(milliseconds, (50, 95, 99, 100)).tolist(), strict=True))

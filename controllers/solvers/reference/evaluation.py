@@ -9,7 +9,7 @@ from handrail.controllers.collision.slacks import LIMITS, VELOCITY_SLACK
 from handrail.controllers.ocp.nodes import Nodes
 from handrail.controllers.ocp.problem import Problem
 from handrail.controllers.ocp.residuals import StageResiduals
-from handrail.controllers.solvers.rows import RECOVERY
+from handrail.controllers.solvers.distance_limits import RECOVERY
 
 
 @dataclass(frozen=True)

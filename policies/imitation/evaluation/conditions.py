@@ -12,7 +12,7 @@ import numpy as np
 from handrail.collect.operators.modes import MODES
 from handrail.collect.perturbations.perturbations import Perturbation
 from handrail.collect.tasks.catalogue import TASKS
-from handrail.controllers.catalogue import CONTROLLERS, ControllerSpec
+from handrail.controllers.baselines.catalogue import CONTROLLERS, ControllerSpec
 from handrail.controllers.entries import is_count
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.robot.catalogue import ROBOTS

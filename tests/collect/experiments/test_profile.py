@@ -6,6 +6,7 @@ import pytest
 
 from handrail.collect.experiments.profiling.config import ProfileConfig
 from handrail.collect.experiments.profiling.profiling import Profile, save
+from handrail.collect.experiments.profiling.qp import compare_qp
 from handrail.collect.experiments.profiling.tables import profile_tables
 from handrail.controllers.errors import HandrailError
 
@@ -22,23 +23,38 @@ def check(results):
 
 
 def test_a_tiny_run_writes_what_it_promises(tmp_path):
-    results = Profile(ProfileConfig(updates=10, rivals=False, growth=False)).run()
+    results = Profile(ProfileConfig(updates=10, rivals=False, growth=False, qps=0)).run()
     check(results)
     assert results["ratio_vs_ipopt"] is None
     save(results, str(tmp_path / "profile.json"))
     check(json.loads((tmp_path / "profile.json").read_text()))
-    assert len(profile_tables(results).renderables) == 4
+    assert len(profile_tables(results).renderables) == 5
 
 
 def test_rivals_solve_the_same_problems():
     pytest.importorskip("mink")
-    results = Profile(ProfileConfig(updates=10, solves=1, growth=False)).run()
+    results = Profile(ProfileConfig(updates=10, solves=1, growth=False, qps=0)).run()
     check(results)
     assert results["ratio_vs_ipopt"] > 0
     assert results["ratio_vs_mink"] > 0
     mink = next(rival for rival in results["rivals"]["pairs_30"] if rival["name"] == "mink")
     assert mink["pairs"] == results["pairs_30"]["pairs"]
     assert mink["failed"] == 0
+
+
+def test_every_qp_solver_solves_the_same_qps():
+    """All find the same minimum within the same rows; what is timed is theirs, so that the ratio is one."""
+    pytest.importorskip("piqp")
+    results = compare_qp(8, seed=1, horizons=(10,))
+    assert results["no_collision_horizon_10"]["pairs"] == 0
+    assert all(case["stages"] == 10 for case in results.values())
+    for case in results.values():
+        assert set(case["solvers"]) == {"own", "daqp", "piqp"}
+        for entry in case["solvers"].values():
+            assert entry["failed"] == 0
+            assert entry["violation"] < 2e-5
+            assert entry["objective_excess_worst"] < 1e-3
+            assert entry["ratio"] * entry["median_ms"] == pytest.approx(case["solvers"]["own"]["median_ms"])
 
 
 @pytest.mark.parametrize(
