@@ -1,6 +1,6 @@
 """`handrail-demo`: record a few real demonstrations and show what came out."""
 
-from handrail.collect.config import DemoConfig
+from handrail.collect.commands.config import DemoConfig
 from handrail.scripts import cli
 
 

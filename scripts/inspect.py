@@ -1,6 +1,6 @@
 """`handrail-inspect`: print a dataset's episodes as a table."""
 
-from handrail.collect.config import InspectConfig
+from handrail.collect.commands.config import InspectConfig
 from handrail.scripts import cli
 
 

@@ -1,6 +1,6 @@
 """`handrail-repair`: say what is wrong with a dataset, mend what can be mended, lose nothing."""
 
-from handrail.collect.config import RepairConfig
+from handrail.collect.commands.config import RepairConfig
 from handrail.scripts import cli
 
 

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from handrail.collect.config import ReplayConfig
+from handrail.collect.commands.config import ReplayConfig
 from handrail.scripts import cli
 
 if TYPE_CHECKING:

@@ -6,10 +6,11 @@ from pathlib import Path
 
 from rich.console import Console
 
+from handrail.collect.commands.config import DemoConfig
 from handrail.collect.commands.record import PLAIN, record
 from handrail.collect.commands.replay import replay_episode
 from handrail.collect.commands.tables import summary_table
-from handrail.collect.config import DatasetConfig, DemoConfig, RecordConfig
+from handrail.collect.config import DatasetConfig, RecordConfig
 from handrail.collect.session.contact_sheet import save_sheet
 from handrail.collect.simulation.gl import graphics_trouble
 from handrail.controllers.errors import HandrailError

@@ -60,7 +60,7 @@ class RealTimeSolver:
         Args:
             problem: of this update.
             guess: accelerations, (N, n).
-            active: numbers of the rows that are expected to be active, as a plan among the same pairs has them.
+            active: numbers of the rows expected to be active, as a plan among the same pairs has them.
         """
         spent = [0.0] * len(_PHASES)
         for _ in range(1 + _MORE_STEPS):

@@ -1,6 +1,7 @@
 """The configuration of every command."""
 
-from handrail.collect.config import DemoConfig, InspectConfig, RecordConfig, RepairConfig, ReplayConfig
+from handrail.collect.commands.config import DemoConfig, InspectConfig, RepairConfig, ReplayConfig
+from handrail.collect.config import RecordConfig
 from handrail.collect.experiments.benchmark.config import BenchmarkConfig
 from handrail.collect.experiments.profiling.config import ProfileConfig
 from handrail.collect.experiments.showcase.config import ShowcaseConfig

@@ -1,0 +1,97 @@
+"""What the commands that look at datasets ask for."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from handrail.collect.config import StoredConfig
+from handrail.collect.flags import only_one
+from handrail.controllers.errors import HandrailError
+
+
+@dataclass(frozen=True)
+class ReplayConfig:
+    """Run a recorded episode's commands in its environment and report the deviation."""
+
+    dataset: StoredConfig = field(default_factory=StoredConfig)
+    episode: int = -1
+    """Which episode; all of them when negative."""
+    sheet: str = ""
+    """Also write a contact sheet of the episode to this .png file (needs OpenGL)."""
+    video: str = ""
+    """Also film the episode to this .mp4 file (needs OpenGL)."""
+    task: str = ""
+    """The recorded task where it is a module:name: a dataset alone does not make Handrail import it."""
+    mode: str = ""
+    """The same of the teleop mode."""
+    operator: str = ""
+    """The same of the operator."""
+    robot: str = ""
+    """The same of the robot."""
+
+    @property
+    def said(self) -> tuple[str, ...]:
+        """What the dataset may name because the command line does."""
+        return (self.task, self.mode, self.operator, self.robot)
+
+    def check(self) -> None:
+        """Check the settings.
+
+        Raises:
+            HandrailError: one is wrong.
+        """
+        for flag, file, ending in (("--sheet", self.sheet, ".png"), ("--video", self.video, ".mp4")):
+            if file and not (file.endswith(ending) and Path(file).expanduser().absolute().parent.is_dir()):
+                raise HandrailError(f"{flag} {file}: expected a {ending} file in an existing folder")
+            if file and self.episode < 0:
+                raise HandrailError(f"{flag}: expected --episode with the number of one episode")
+
+
+@dataclass(frozen=True)
+class RepairConfig:
+    """Say what is wrong with a dataset, mend it, and put back what was set aside and is whole.
+
+    Exit code 0 only if everything that was saved is in the dataset and whole, else 1.
+    """
+
+    dataset: StoredConfig = field(default_factory=StoredConfig)
+    set_aside: bool = False
+    """Move episodes that cannot be mended to .damaged, and those after them up; without, they stay."""
+
+
+@dataclass(frozen=True)
+class InspectConfig:
+    """Print the episodes of a LeRobot dataset as a table."""
+
+    dataset: StoredConfig = field(default_factory=StoredConfig)
+    repair: bool = False
+    """Repair first what a crash left behind, as handrail-repair does."""
+    check: bool = False
+    """Read every byte and compare it with the checksums; exit code 1 if anything is not as it was saved."""
+    quality: bool = False
+    """Also print how smooth the motion was and how much the commands chattered."""
+
+
+@dataclass(frozen=True)
+class DemoConfig:
+    """Record a few real demonstrations and show what came out."""
+
+    root: str = ""
+    """The same as FOLDER."""
+    episodes: int = 5
+    """How many."""
+    overwrite: bool = False
+    """Remove an earlier demo's dataset."""
+    place: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="FOLDER")] = ""
+    """Folder for the dataset and the picture; outputs/demo when none is given."""
+
+    @property
+    def folder(self) -> Path:
+        """The folder of the demo.
+
+        Raises:
+            HandrailError: it is given twice.
+        """
+        return Path(only_one(self.place, self.root, "--root") or "outputs/demo").expanduser()
