@@ -88,8 +88,8 @@ def replay_episode(
         film = stack.enter_context(VideoFile(video, env.render_size, info.fps)) if video else None
         camera, period = _Camera(_moments(length, pictures), film), 1.0 / info.fps
         recorded = _Recorded(frames["action"], period)
-        rates = {"control_period": period, "record_period": period}
-        outcome = Session(env, recorded, _Nobody(), [camera], **rates).run(row["seed"])
+        session = Session(env, recorded, _Nobody(), [camera], control_period=period, record_period=period)
+        outcome = session.run(row["seed"])
     difference = np.abs(camera.states - frames["observation.state"][: len(camera.states)])
     replay = Replay(
         episode=episode,
@@ -143,9 +143,9 @@ class _Recorded:
 
     def update(self, state: State, intent: Intent) -> Command:
         """Return the way to the next frame's velocities."""
-        *velocity, gripper = next(self._left)
-        before = np.array(state.commanded)
-        return Command(np.stack([before, velocity, np.zeros(len(before))]), self._period, gripper)
+        action, before = next(self._left), np.array(state.commanded)
+        velocities = np.stack([before, action[:-1], np.zeros(len(before))])
+        return Command(velocities, self._period, float(action[-1]))
 
 
 class _Nobody:
