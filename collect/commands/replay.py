@@ -138,15 +138,17 @@ class _Recorded:
 
     def reset(self, obstacles: tuple[Obstacle, ...] = ()) -> None:
         """Begin with the first frame."""
-        self._left = iter(self._actions.astype(np.float64))
+        self._frame = 0
 
     def update_scene(self, obstacles: tuple[Obstacle, ...]) -> None:
         """Take no note of the scene."""
 
     def update(self, state: State, intent: Intent) -> Command:
         """Return the way to the next frame's velocities."""
-        frame, before = next(self._left), np.array(state.commanded)
-        return Command(np.stack([before, frame[:-1], np.zeros(len(before))]), self._period, float(frame[-1]))
+        action, before = self._actions[self._frame].astype(np.float64), np.array(state.commanded)
+        self._frame += 1
+        velocities = np.stack([before, action[:-1], np.zeros(len(before))])
+        return Command(velocities, self._period, float(action[-1]))
 
 
 class _Nobody:
