@@ -33,7 +33,7 @@ class CbfSettings:
             robot has.
         margin: signed distance kept between shapes [m].
         work_margin: the same between tool shapes and work surfaces [m].
-        reach: distance beyond the margin at which a pair gets a row [m].
+        activation_distance: distance beyond the margin at which a pair gets a row [m].
         slack_linear: linear penalty of the slack of the rows, per m/s.
         slack_quadratic: quadratic penalty of it.
         intent_timeout: age from which an intent is stale [s].
@@ -42,7 +42,7 @@ class CbfSettings:
     alpha: float = 1.0
     margin: float = 0.10
     work_margin: float = 0.008
-    reach: float = 2.0
+    activation_distance: float = 2.0
     slack_linear: float = 1e4
     slack_quadratic: float = 1e4
     intent_timeout: float = 0.25
@@ -154,8 +154,8 @@ class CbfFilter:
         if self._margins.unknown:
             self._margins = self._margins.seen(collision.values(q[None, :])[0])
         times = np.array([0.0, self._period])
-        reach = self._margins.values + self._settings.reach
-        distances = collision.distances(np.stack([q, q]), reach, times)
+        within = self._margins.values + self._settings.activation_distance
+        distances = collision.distances(np.stack([q, q]), within, times)
         self._margins = self._margins.seen(distances.values[0])
         keep = distances.near[:, 0] == 1
         pair = distances.near[keep, 1]

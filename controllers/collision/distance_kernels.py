@@ -18,8 +18,8 @@ def signed(witness):
 
 
 @jit
-def lower_bounds(now, start, path, times, levers, speeds, reach):
-    """Return how near each pair can be along a path, (K, P) [m], and whether it can come below its reach.
+def lower_bounds(now, start, path, times, motion_bounds, speeds, within):
+    """Return how near each pair can be along a path, (K, P) [m], and whether it can come below its limit.
 
     `d_p(q_k) ≥ d_p(q) - Σ_j L_jp |q_k - q|_j - |v_p| t_k`.
 
@@ -28,9 +28,9 @@ def lower_bounds(now, start, path, times, levers, speeds, reach):
         start: q, (n,).
         path: configurations, (K, n).
         times: of them [s], (K,).
-        levers: L, (n, P).
+        motion_bounds: L, (n, P).
         speeds: of moving obstacles, (P,) [m/s].
-        reach: (P,) [m].
+        within: that limit, (P,) [m].
     """
     pairs = len(now)
     bounds = np.empty((len(path), pairs))
@@ -42,15 +42,15 @@ def lower_bounds(now, start, path, times, levers, speeds, reach):
             moved = abs(path[k, j] - start[j])
             if moved > 0.0:
                 for p in range(pairs):
-                    bounds[k, p] -= levers[j, p] * moved
+                    bounds[k, p] -= motion_bounds[j, p] * moved
         for p in range(pairs):
-            if bounds[k, p] < reach[p]:
+            if bounds[k, p] < within[p]:
                 close[p] = True
     return bounds, close
 
 
 @jit
-def raise_bounds(bounds, path, known, there, levers, reach):
+def raise_bounds(bounds, path, known, there, motion_bounds, within):
     """Raise lower bounds by those of another path among the same obstacles; return which are close.
 
     `d_p(q_k) ≥ d_p(q'_k) - Σ_j L_jp |q_k - q'_k|_j`.
@@ -60,8 +60,8 @@ def raise_bounds(bounds, path, known, there, levers, reach):
         path: configurations q, (K, n).
         known: distances along another path, or lower bounds of them, (K, P) [m].
         there: its configurations q', (K, n).
-        levers: L, (n, P).
-        reach: below which a pair is close, (P,) [m].
+        motion_bounds: L, (n, P).
+        within: below which a pair is close, (P,) [m].
     """
     pairs = bounds.shape[1]
     close, other = np.zeros(pairs, dtype=np.bool_), np.empty(pairs)
@@ -70,10 +70,10 @@ def raise_bounds(bounds, path, known, there, levers, reach):
         for j in range(path.shape[1]):
             moved = abs(path[k, j] - there[k, j])
             for p in range(pairs):
-                other[p] -= levers[j, p] * moved
+                other[p] -= motion_bounds[j, p] * moved
         for p in range(pairs):
             bounds[k, p] = max(bounds[k, p], other[p])
-            if bounds[k, p] < reach[p]:
+            if bounds[k, p] < within[p]:
                 close[p] = True
     return close
 
@@ -87,8 +87,8 @@ def measured(witnesses, pairs, values):
 
 
 @jit
-def gradients(witnesses, jacobians, moves, values, reach):
-    """Return the entries (node, pair) below their reach, (R, 2), and their gradients, (R, n).
+def gradients(witnesses, jacobians, moves, values, within):
+    """Return the entries (node, pair) below their limit, (R, 2), and their gradients, (R, n).
 
     `∂d/∂q = n·(J(p₂) - J(p₁))` with `J(p) = J_v + J_ω × p` of the joints that move the shape.
 
@@ -97,18 +97,18 @@ def gradients(witnesses, jacobians, moves, values, reach):
         jacobians: spatial, in the world, (K, 6, n).
         moves: which joints move the two shapes of a pair: 1 or 0, (P, 2, n).
         values: distances, (K, P) [m].
-        reach: (P,) [m].
+        within: that limit, (P,) [m].
     """
     count = 0
     for k in range(values.shape[0]):
         for p in range(values.shape[1]):
-            count += values[k, p] < reach[p]
+            count += values[k, p] < within[p]
     near = np.empty((count, 2), dtype=np.int64)
     rows = np.zeros((count, moves.shape[2]))
     row = 0
     for k in range(values.shape[0]):
         for p in range(values.shape[1]):
-            if values[k, p] < reach[p]:
+            if values[k, p] < within[p]:
                 near[row, 0], near[row, 1] = k, p
                 _add_gradient(witnesses[k, p], 3, jacobians[k], moves[p, 0], -1.0, rows[row])
                 _add_gradient(witnesses[k, p], 6, jacobians[k], moves[p, 1], 1.0, rows[row])

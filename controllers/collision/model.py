@@ -36,7 +36,7 @@ class Distances:
 class CollisionModel:
     """Measures the pairs that must keep apart.
 
-    See shape_pairs.py for which these are, and witnesses.py for the distance of a pair and its gradient.
+    See shape_pairs.py for which these are, and distance_kernels.py for distances and their gradients.
 
     Attributes:
         pairs: names of the two shapes of each pair, (P,) of (str, str).
@@ -58,7 +58,7 @@ class CollisionModel:
         self.largest_margin = self._shapes.largest_margin
         self.held = self._shapes.held
         self._moves = self._shapes.moves  # (P, 2, n)
-        self._levers = self._shapes.levers  # (n, P), which `observe` brings up to date
+        self._motion_bounds = self._shapes.motion_bounds  # (n, P), which `update_scene` brings up to date
         self._data = self._model.createData()
         self._every = np.arange(len(self.pairs))
         self._far = np.full(len(self.pairs), _FAR)
@@ -74,28 +74,28 @@ class CollisionModel:
         return len(self.pairs)
 
     @property
-    def moves(self) -> bool:
+    def any_moving(self) -> bool:
         """Whether any obstacle moves."""
         return bool(self._moving)
 
     def distances(
-        self, q: FloatArray, reach: FloatArray | float = np.inf, times: FloatArray | None = None
+        self, q: FloatArray, within: FloatArray | float = np.inf, times: FloatArray | None = None
     ) -> Distances:
-        """Return the signed distances along a trajectory, and gradients of those below `reach`.
+        """Return the signed distances along a trajectory, and gradients of those below `within`.
 
-        On every stretch of the way a pair that cannot come below its reach is measured at the beginning only;
+        On every stretch of the way a pair that cannot come below its limit is measured at the beginning only;
         after that its value is a lower bound: `d(q_k) ≥ d(q_0) - Σ_j L_j |q_k - q_0|_j - |v_obstacle| t_k`,
         or what the last trajectory's distances leave of it: the next one is seldom far from it.
 
         Args:
             q: configurations, (K, n).
-            reach: the largest distance whose gradient is wanted, for all pairs or each, (P,) [m].
+            within: the largest distance whose gradient is wanted, for all pairs or each, (P,) [m].
             times: of the configurations from now on, (K,) [s]; moving obstacles are where they will be then.
         """
         if not self.size:
             return _nothing(len(q), self._model.nv)
         times = np.zeros(len(q)) if times is None else times
-        reaches = reach if isinstance(reach, np.ndarray) else np.full(self.size, float(reach))
+        limits = within if isinstance(within, np.ndarray) else np.full(self.size, float(within))
         witnesses = np.empty((len(q), self.size, 9))
         jacobians = np.empty((len(q), 6, self._model.nv))
         values = np.empty((len(q), self.size))
@@ -106,11 +106,11 @@ class CollisionModel:
             measured(witnesses[first], self._every, values[first])
             ahead = times[stretch] - times[begin]
             bounds, close = lower_bounds(
-                values[begin], q[begin], q[stretch], ahead, self._levers, self._speeds, reaches
+                values[begin], q[begin], q[stretch], ahead, self._motion_bounds, self._speeds, limits
             )
             if self._last is not None and self._last[0].shape == q.shape:
                 there, known = self._last[0][stretch], self._last[1][stretch]
-                close = raise_bounds(bounds, q[stretch], known, there, self._levers, reaches)
+                close = raise_bounds(bounds, q[stretch], known, there, self._motion_bounds, limits)
             chosen = self._along.select(close)
             if len(chosen):
                 after = slice(begin + 1, begin + len(bounds))
@@ -118,7 +118,7 @@ class CollisionModel:
             measured(witnesses[stretch], chosen, bounds)
             values[stretch] = bounds
         self._last = None if self._moving else (q.copy(), values)
-        near, rows = gradients(witnesses, jacobians, self._moves, values, reaches)
+        near, rows = gradients(witnesses, jacobians, self._moves, values, limits)
         return Distances(values, near, rows)
 
     def values(
@@ -126,7 +126,7 @@ class CollisionModel:
         q: FloatArray,
         times: FloatArray | None = None,
         now: tuple[FloatArray, FloatArray] | None = None,
-        reach: FloatArray | None = None,
+        within: FloatArray | None = None,
     ) -> FloatArray:
         """Return the signed distances at configurations (K, n) and times (K,), (K, P) [m].
 
@@ -134,8 +134,8 @@ class CollisionModel:
             q: configurations.
             times: from now on [s].
             now: a configuration, (n,), and its distances, (P,), if they are known: pairs that cannot come
-                below their reach then get a lower bound instead, infinitely cheaper.
-            reach: distance below which a pair's own value is wanted, (P,) [m]; 0.15 m when None.
+                below their limit then get a lower bound instead, infinitely cheaper.
+            within: distance below which a pair's own value is wanted, (P,) [m]; 0.15 m when None.
         """
         if not self.size:
             return np.empty((len(q), 0))
@@ -144,8 +144,8 @@ class CollisionModel:
             data, chosen, values = self._all, self._every, np.empty((len(q), self.size))
         else:
             data, (start, there) = self._after, now
-            reach = self._far if reach is None else reach
-            values, close = lower_bounds(there, start, q, times, self._levers, self._speeds, reach)
+            within = self._far if within is None else within
+            values, close = lower_bounds(there, start, q, times, self._motion_bounds, self._speeds, within)
             if not close.any():
                 return values
             chosen = data.select(close)

@@ -7,7 +7,7 @@ import numpy as np
 import pinocchio as pin
 
 from handrail.controllers.arrays import BoolArray, FloatArray, frozen
-from handrail.controllers.collision.motion_bounds import all_lever_arms, lever_arms
+from handrail.controllers.collision.motion_bounds import all_motion_bounds, motion_bounds
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.robot.description import PlacedShape, Placement
 from handrail.controllers.robot.model import RobotModel
@@ -35,7 +35,7 @@ class ShapePairs:
         largest_margin: the largest margin that a pair can keep [m], (P,).
         held: rows of the pairs with something that is held, (H,).
         moves: which coordinates move the two shapes of a pair: 1 or 0, (P, 2, n).
-        levers: how far a unit of each coordinate can bring a pair together at most, (n, P) [m].
+        motion_bounds: how far a unit of each coordinate can bring a pair together at most, (n, P) [m].
 
     Raises:
         HandrailError: two things share a name, or one is held by a frame that the robot lacks.
@@ -58,12 +58,12 @@ class ShapePairs:
         margins = [description.self_margins, np.full(len(others), np.inf)]
         self.largest_margin: FloatArray = frozen(np.concatenate(margins))
         self.moves = self._pair_moves()
-        self.levers = np.zeros((model.size, len(self.names)))
-        self._arms = dict(all_lever_arms(model))
+        self.motion_bounds = np.zeros((model.size, len(self.names)))
+        self._shape_bounds = dict(all_motion_bounds(model))
         held = [obstacle.name for obstacle in obstacles if obstacle.held]
         self._rows = {name: [row for row, pair in enumerate(self.names) if name in pair] for name in held}
         self.held = np.array([row for rows in self._rows.values() for row in rows], dtype=int)
-        self._measure_levers(range(len(self.names)))
+        self._bound_motions(range(len(self.names)))
         self.update_scene(obstacles)
 
     def update_scene(self, obstacles: tuple[Obstacle, ...]) -> None:
@@ -71,8 +71,8 @@ class ShapePairs:
         for obstacle in obstacles:
             self.place(obstacle)
             if obstacle.held:
-                self._arms[obstacle.name] = lever_arms(self._model, _placed(obstacle))
-                self._measure_levers(self._rows[obstacle.name])
+                self._shape_bounds[obstacle.name] = motion_bounds(self._model, _placed(obstacle))
+                self._bound_motions(self._rows[obstacle.name])
 
     def place(self, obstacle: Obstacle, time: float = 0.0) -> None:
         """Put an obstacle where it is after a time [s]."""
@@ -121,16 +121,18 @@ class ShapePairs:
         pairs = [(joints[pair.first], joints[pair.second]) for pair in self.geometry.collisionPairs]
         return moved[np.array(pairs, dtype=int).reshape(-1, 2)]
 
-    def _measure_levers(self, rows: Iterable[int]) -> None:
-        """Write the levers of some pairs.
+    def _bound_motions(self, rows: Iterable[int]) -> None:
+        """Write the motion bounds of some pairs.
 
         A coordinate that moves both shapes alike does not bring them together; of one that moves a single
-        shape it is the shape's lever arm.
+        shape it is the shape's motion bound.
         """
         none = np.zeros(self._model.size)
         for row in rows:
-            first, second = (self._arms.get(name, none) for name in self.names[row])
-            self.levers[:, row] = (self.moves[row, 0] != self.moves[row, 1]) * np.maximum(first, second)
+            first, second = (self._shape_bounds.get(name, none) for name in self.names[row])
+            self.motion_bounds[:, row] = (self.moves[row, 0] != self.moves[row, 1]) * np.maximum(
+                first, second
+            )
 
 
 def _check_names(names: list[str]) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 from handrail.controllers.arrays import FloatArray, frozen
 from handrail.controllers.errors import HandrailError, unknown_name
 
-_REACH = 5.0  # farthest tool point from the tool frame [m]
+_FARTHEST = 5.0  # farthest tool point from the tool frame [m]
 
 
 @dataclass(frozen=True)
@@ -39,9 +39,9 @@ class Frames:
             raise unknown_name("frame of the base twist", self.base, ("base", "world"))
         if self.tool not in ("world", "tool"):
             raise unknown_name("frame of the end-effector twist", self.tool, ("world", "tool"))
-        if self.point.shape != (3,) or not np.all(np.abs(self.point) <= _REACH):
+        if self.point.shape != (3,) or not np.all(np.abs(self.point) <= _FARTHEST):
             raise HandrailError(
-                f"tool point: expected 3 numbers within {_REACH} m, got {self.point.tolist()}"
+                f"tool point: expected 3 numbers within {_FARTHEST} m, got {self.point.tolist()}"
             )
 
     @cached_property

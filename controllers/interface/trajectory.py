@@ -67,7 +67,7 @@ class Trajectory:
         step = self.dt / samples
         ahead = step * np.arange(samples * (len(self.velocities) - 1) + 1) - self.elapsed
         times = np.append(0.0, ahead[ahead > 0.0])
-        velocities = self._held(times)
+        velocities = self._interpolated(times)
         moves = 0.5 * np.diff(times)[:, None] * (velocities[:-1] + velocities[1:])
         return np.vstack([q, q + np.cumsum(moves, axis=0)]), times
 
@@ -77,13 +77,13 @@ class Trajectory:
         whole = min(int(passed / self.dt), len(self.velocities) - 2)
         return whole, passed - whole * self.dt
 
-    def _held(self, times: FloatArray) -> FloatArray:
+    def _interpolated(self, times: FloatArray) -> FloatArray:
         """Return the velocities at times from now, (K,), the last one held after the end, (K, n)."""
-        return _held(self.velocities, (times + self.elapsed) / self.dt)
+        return _interpolated(self.velocities, (times + self.elapsed) / self.dt)
 
 
 @jit
-def _held(velocities, knots):
+def _interpolated(velocities, knots):
     last, n = len(velocities) - 1, velocities.shape[1]
     result = np.empty((len(knots), n))
     for k in range(len(knots)):
@@ -100,9 +100,9 @@ def _accelerations(velocities, dt, elapsed, count):
     knots = np.empty(count + 1)
     for k in range(count + 1):
         knots[k] = (dt * k + elapsed) / dt
-    held = _held(velocities, knots)
+    found = _interpolated(velocities, knots)
     result = np.empty((count, velocities.shape[1]))
     for k in range(count):
         for j in range(velocities.shape[1]):
-            result[k, j] = (held[k + 1, j] - held[k, j]) / dt
+            result[k, j] = (found[k + 1, j] - found[k, j]) / dt
     return result

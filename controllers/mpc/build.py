@@ -56,7 +56,7 @@ class ProblemBuilder:
             limits=self._limits,
             collision=loop.surroundings.collision,
             margins=loop.margins.values,
-            reach=settings.reach,
+            activation_distance=settings.activation_distance,
             slack_linear=settings.slack_linear,
             slack_quadratic=settings.slack_quadratic,
         )

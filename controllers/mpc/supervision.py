@@ -87,7 +87,7 @@ class Supervisor:
 
     def _backup(self, loop: LoopState) -> Backup:
         settings = self.settings
-        least, span = settings.floor * loop.margins.values, settings.horizon * settings.dt
+        least, span = settings.margin_share * loop.margins.values, settings.horizon * settings.dt
         collision = loop.surroundings.collision
         certificate = StopCertificate(self.limiter, collision, least, self.limits, span)
         return Backup(certificate, self.limiter, settings.dt)

@@ -30,7 +30,7 @@ class Problem:
         limits: of the robot.
         collision: the pairs that keep apart.
         margins: smallest distance wanted of each pair [m], (P,).
-        reach: distance beyond the margin at which a pair enters the problem [m].
+        activation_distance: distance beyond the margin at which a pair enters the problem [m].
         slack_linear: ρ₁.
         slack_quadratic: ρ₂.
     """
@@ -45,7 +45,7 @@ class Problem:
     limits: Limits
     collision: CollisionModel
     margins: FloatArray
-    reach: float
+    activation_distance: float
     slack_linear: float
     slack_quadratic: float
 
@@ -53,6 +53,11 @@ class Problem:
     def horizon(self) -> int:
         """Number of stages N."""
         return len(self.reference)
+
+    @property
+    def active_within(self) -> FloatArray:
+        """Distance below which each pair enters the problem, (P,) [m]."""
+        return self.margins + self.activation_distance
 
     def rollout(self, u: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return positions and velocities at the N + 1 nodes under accelerations u, (N, n)."""

@@ -25,8 +25,8 @@ class MpcSettings:
         terminal_velocity: weight of the last velocity that nobody commands: the terminal cost V_f.
         margin: signed distance kept between shapes [m].
         work_margin: the same between tool shapes and work surfaces [m].
-        floor: signed distance below which a stop must never come, as a share of the margin.
-        reach: distance beyond the margin at which a pair enters the problem [m].
+        margin_share: share of the margin below which no pair comes in a stop.
+        activation_distance: distance beyond the margin at which a pair enters the problem [m].
         slack_linear: linear penalty of the slack.
         slack_quadratic: quadratic penalty of the slack.
         largest_speed: speed above which a commanded translation of the tool is taken as this [m/s].
@@ -49,8 +49,8 @@ class MpcSettings:
     terminal_velocity: float = 0.1
     margin: float = 0.10
     work_margin: float = 0.008
-    floor: float = 0.3
-    reach: float = 0.15
+    margin_share: float = 0.3
+    activation_distance: float = 0.15
     slack_linear: float = 1e6
     slack_quadratic: float = 1e6
     largest_speed: float = 2.0

@@ -77,7 +77,7 @@ class StopCertificate:
         Where obstacles move, the robot has to be safe for some time, moving or waiting.
         """
         left = self.span - times[-1]
-        if self.collision.moves and left > 0.0:
+        if self.collision.any_moving and left > 0.0:
             path = np.vstack([path, np.broadcast_to(path[-1], (len(_SAMPLES), path.shape[1]))])
             times = np.append(times, times[-1] + left * _SAMPLES)
         return Violation(*self.along(path, times, now).max(axis=0).tolist())

@@ -191,7 +191,7 @@ def _rolled_out(problem: Problem, guess: FloatArray, change: FloatArray) -> tupl
 
 def _measured(problem: Problem, q: FloatArray, v: FloatArray, u: FloatArray) -> _Guess:
     nodes = Nodes(problem, q, v)
-    distances = problem.collision.distances(nodes.q, problem.margins + problem.reach, nodes.times)
+    distances = problem.collision.distances(nodes.q, problem.active_within, nodes.times)
     return _Guess(q, v, u, nodes, distances, depth(distances.values))
 
 

@@ -55,7 +55,7 @@ def test_what_is_skipped_is_far():
         start = rng.uniform(-1.5, 1.5, MODEL.size)
         path = start + np.cumsum(rng.uniform(-0.05, 0.05, (30, MODEL.size)), axis=0)
         exact = collision.values(path)
-        distances = collision.distances(path, reach=0.3)
+        distances = collision.distances(path, within=0.3)
         assert np.all(distances.values <= exact + 1e-5)
         near = exact < 0.3
         np.testing.assert_allclose(distances.values[near], exact[near], atol=1e-5)
@@ -77,8 +77,8 @@ def test_what_is_skipped_is_far_after_a_similar_trajectory():
     path = MODEL.description.home + np.cumsum(rng.uniform(-0.2, 0.2, (12, MODEL.size)), axis=0)
     for _ in range(30):
         path = path + rng.uniform(-0.01, 0.02, (12, MODEL.size))
-        exact, fresh = collision.values(path), CollisionModel(MODEL, obstacles).distances(path, reach=0.3)
-        distances = collision.distances(path, reach=0.3)
+        exact, fresh = collision.values(path), CollisionModel(MODEL, obstacles).distances(path, within=0.3)
+        distances = collision.distances(path, within=0.3)
         assert np.all(distances.values <= exact + 1e-5)
         np.testing.assert_array_equal(distances.near, fresh.near)
         np.testing.assert_allclose(distances.gradients, fresh.gradients, atol=1e-6)
@@ -90,10 +90,10 @@ def test_what_is_skipped_is_far_after_a_similar_trajectory():
 def test_what_was_far_of_an_obstacle_is_forgotten_when_it_has_moved():
     far, near = (Obstacle("ball", Shape("sphere", [0.1]), [x, 0.0, 0.14]) for x in (9.0, -0.8))
     collision, path = CollisionModel(MODEL, (far,)), np.tile(MODEL.description.home, (3, 1))
-    assert not np.any(collision.distances(path, reach=0.3).values[:, -1] < 0.3)
+    assert not np.any(collision.distances(path, within=0.3).values[:, -1] < 0.3)
     collision.update_scene((near,))
     exact = collision.values(path)
-    distances = collision.distances(path, reach=0.3)
+    distances = collision.distances(path, within=0.3)
     np.testing.assert_allclose(distances.values[exact < 0.3], exact[exact < 0.3], atol=1e-5)
     row = collision.pairs.index(("chassis", "ball"))
     assert np.all(distances.values[:, row] < 0.3)
@@ -129,9 +129,9 @@ def test_the_distance_to_a_wall_is_the_gap():
 def test_only_near_pairs_have_gradients():
     collision = CollisionModel(MODEL)
     home = np.tile(MODEL.description.home, (3, 1))
-    distances = collision.distances(home, reach=0.3)
+    distances = collision.distances(home, within=0.3)
     assert len(distances.near) == np.sum(distances.values < 0.3) > 0
-    assert not len(collision.distances(home, reach=-np.inf).near)
+    assert not len(collision.distances(home, within=-np.inf).near)
 
 
 def test_work_pairs_are_tools_at_work_surfaces():

@@ -98,7 +98,7 @@ def test_what_is_asked_of_distances_is_what_the_real_time_solver_asks():
     u = np.random.default_rng(2).uniform(-0.3, 0.3, (10, 9))
     q, v = problem.rollout(u)
     nodes = Nodes(problem, q, v)
-    found = problem.collision.distances(nodes.q, problem.margins + problem.reach, nodes.times)
+    found = problem.collision.distances(nodes.q, problem.active_within, nodes.times)
     matrix = mpc.solver.cost.matrix
     rows = constraints_around(problem, (q, v, u), nodes, found, matrix).distances
     node, pair = found.near[found.near[:, 0] > 0].T

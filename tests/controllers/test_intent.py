@@ -274,7 +274,7 @@ def test_an_unsafe_plan_is_replaced_by_a_full_stop(monkeypatch):
 
 
 @pytest.mark.parametrize(
-    "change", [{"horizon": 1}, {"dt": 0.0}, {"decay": 1.5}, {"margin": np.nan}, {"reach": -1.0}]
+    "change", [{"horizon": 1}, {"dt": 0.0}, {"decay": 1.5}, {"margin": np.nan}, {"activation_distance": -1.0}]
 )
 def test_wrong_settings_are_refused(change):
     with pytest.raises(HandrailError, match="MPC setting"):

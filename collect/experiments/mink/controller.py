@@ -30,14 +30,14 @@ class MinkSettings:
         base_cost: of base velocities, relative to the tool's.
         arm_cost: of arm velocities.
         margin: signed distance kept between shapes [m].
-        reach: distance beyond the margin at which a pair enters the problem [m].
+        activation_distance: distance beyond the margin at which a pair enters the problem [m].
         approach: how fast a distance may shrink, relative to what is left above the margin [1/s].
     """
 
     base_cost: float = 0.0055
     arm_cost: float = 0.01
     margin: float = 0.10
-    reach: float = 0.15
+    activation_distance: float = 0.15
     approach: float = 2.0
 
 
@@ -115,7 +115,7 @@ class MinkController:
                 self._shapes,
                 tuple(pair for pair, own in zip(pairs, margins, strict=True) if own == margin),
                 margin,
-                margin + settings.reach,
+                margin + settings.activation_distance,
                 gain,
             )
             for margin in np.unique(margins).tolist()

@@ -69,7 +69,7 @@ class Profile:
             lane, every = self._lanes[name], max(self._config.updates // max(solves, 1), 1)
             self._rivals[name].append(Converged(lane, every))
         lane = self._lanes["pairs_30"]
-        for reach in (settings.reach, _SHORT_REACH):
+        for reach in (settings.activation_distance, _SHORT_REACH):
             self._rivals["pairs_30"].append(Mink(lane, settings.margin + reach))
 
     def _turn(self, name: str, lane: TimingLoop, warm_up: bool) -> None:
@@ -110,7 +110,7 @@ def _case(case: Case, updates: list[Update]) -> dict[str, Any]:
         for name in names
     }
     rest = [update.seconds - sum(seconds for _, seconds in update.plan.phases) for update in updates]
-    near = [int(np.sum(u.plan.distances < u.problem.margins + u.problem.reach)) for u in updates]
+    near = [int(np.sum(u.plan.distances < u.problem.active_within)) for u in updates]
     statuses = [update.status for update in updates]
     return {
         **times([update.seconds for update in updates]),

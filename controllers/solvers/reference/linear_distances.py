@@ -62,7 +62,7 @@ def linear_distances(problem: Problem, u: FloatArray) -> LinearDistances:
     """
     q, v = problem.rollout(u)
     nodes = Nodes(problem, q, v)
-    found = problem.collision.distances(nodes.q, problem.margins + problem.reach, nodes.times)
+    found = problem.collision.distances(nodes.q, problem.active_within, nodes.times)
     keep = found.near[:, 0] > 0
     node, pair = found.near[keep].T
     counts = np.bincount(node, minlength=len(nodes.q))
