@@ -1,7 +1,6 @@
 """The report as one page that needs nothing else: the answer first, then how it came about."""
 
 from collections.abc import Iterable, Sequence
-from html import escape
 
 from handrail.datasets.comparison.collection import Collected
 from handrail.datasets.comparison.compare import MIXED, Comparison
@@ -27,6 +26,7 @@ from handrail.datasets.presentation.markup import (
     paragraph,
     section,
 )
+from handrail.datasets.presentation.table import Table
 from handrail.datasets.presentation.wording import (
     DASH,
     duration,
@@ -64,8 +64,7 @@ _TURNED = f" {TURNED}: less is better, so the metric is drawn the other way roun
 
 def report_page(comparison: Comparison, found: list[Finding]) -> str:
     """Return the page."""
-    title = _title(comparison)
-    parts = [_first_screen(comparison, found), section("Findings", _findings(found))]
+    parts = [*_first_screen(comparison, found), section("Findings", _findings(found))]
     if comparison.outcomes:
         shown = tables.arms_table(comparison.outcomes), tables.outcome_differences_table(comparison.outcomes)
         parts.append(section("Policies", *shown))
@@ -79,7 +78,7 @@ def report_page(comparison: Comparison, found: list[Finding]) -> str:
     parts += [section("What does not apply, or is not comparable", missing)] if missing else []
     how = paragraph(_HOW), paragraph(_families(comparison))
     parts.append(section("How to read this", *how, folded("What every metric means", _meanings())))
-    return page(title, "".join(parts))
+    return page(_title(comparison), *parts, what=_what(comparison))
 
 
 def _drawn(shown: Iterable[Panel], look: str = "") -> str:
@@ -107,17 +106,19 @@ def _families(comparison: Comparison) -> str:
     return f"Families of Holm's correction: {'; '.join(told)}.{mixed if MIXED in told[0] else ''}"
 
 
-def _first_screen(comparison: Comparison, found: list[Finding]) -> str:
+def _what(comparison: Comparison) -> str:
     sources = sorted({str(group.info.root.name) for group in comparison.everything.groups})
     tasks = {
         task for group in comparison.everything.groups for e in group.episodes for task in e.meta["tasks"]
     }
-    what = f"{', '.join(sources)} – {'; '.join(sorted(tasks)[:2])}{' …' if len(tasks) > 2 else ''}"
+    return f"{', '.join(sources)} – {'; '.join(sorted(tasks)[:2])}{' …' if len(tasks) > 2 else ''}"
+
+
+def _first_screen(comparison: Comparison, found: list[Finding]) -> list[str]:
     shown = [_card(comparison, each) for each in comparison.everything.collected]
     answer = paragraph(headline(found), "headline")
-    heading = f"<header><h1>{escape(_title(comparison))}</h1>{paragraph(what)}</header>"
-    figure = f"<section>{_legend(comparison)}{_drawn(answer_panels(comparison))}</section>"
-    return heading + answer + cards(shown) + figure
+    figure = section("", _legend(comparison), _drawn(answer_panels(comparison)))
+    return [answer, cards(shown), figure]
 
 
 def _title(comparison: Comparison) -> str:
@@ -159,9 +160,9 @@ def _findings(found: list[Finding]) -> str:
     return items(looks)
 
 
-def _quality(comparison: Comparison) -> list[str]:
+def _quality(comparison: Comparison) -> list[str | Table]:
     turned = "" if comparison.unlike else _TURNED
-    parts = [
+    parts: list[str | Table] = [
         _legend(comparison),
         _drawn(effects_panels(comparison), "wide"),
         paragraph(_EFFECTS + turned, "quiet"),

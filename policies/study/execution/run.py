@@ -13,6 +13,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from handrail.controllers.errors import HandrailError
+from handrail.datasets.presentation.markdown import read_page, with_part
 from handrail.datasets.storage.atomic import explained, make_folder
 from handrail.datasets.storage.lock import DatasetLock
 from handrail.policies.imitation.training.installed import check_installed
@@ -23,7 +24,6 @@ from handrail.policies.study.design.load import load_design
 from handrail.policies.study.design.settings import check_policies
 from handrail.policies.study.execution.child import do
 from handrail.policies.study.progress.progress import Standing
-from handrail.policies.study.report.marks import between_marks, read_page
 
 FAILED = 1
 _PRELOAD = "handrail.policies.study.execution.preload"
@@ -75,7 +75,7 @@ def run_study(config: StudyConfig, start: Start = start_job) -> int:
     standing, console = Standing(design, Layout(config.folder)), Console(stderr=True)
     check_installed("handrail-study", ("torch", "accelerate"), design.policy)
     if config.page:
-        between_marks(read_page(Path(config.page).expanduser()), design.name, "")
+        with_part(read_page(Path(config.page).expanduser()), f"study {design.name}", "")
     with _alone_in(config):
         state = _State(done=set(standing.done))
         if not config.report_only:

@@ -1,9 +1,9 @@
 """The tables of a study, for a page in HTML and one in Markdown alike."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 from handrail.datasets.comparison.outcomes import ArmOutcome, OutcomeDifference
+from handrail.datasets.presentation.table import Table
 from handrail.datasets.presentation.wording import (
     DASH,
     THESE_POLICIES,
@@ -19,21 +19,6 @@ from handrail.datasets.presentation.wording import (
 from handrail.policies.study.report.arms import StudyArm
 from handrail.policies.study.report.conditions import Condition
 from handrail.policies.study.report.results import TaskResults
-
-
-@dataclass(frozen=True)
-class Table:
-    """A table.
-
-    Attributes:
-        title: what it shows.
-        headings: of its columns.
-        rows: of text.
-    """
-
-    title: str
-    headings: tuple[str, ...]
-    rows: tuple[tuple[str, ...], ...]
 
 
 def tables(results: TaskResults) -> list[Table]:
@@ -68,7 +53,7 @@ def _collected(results: TaskResults) -> Table:
                 reasons or DASH,
             )
         )
-    return Table("Collecting", headings, tuple(rows))
+    return Table(headings, rows, "Collecting")
 
 
 def _policies(results: TaskResults) -> Table:
@@ -93,7 +78,7 @@ def _policies(results: TaskResults) -> Table:
                 _data(arm.trained_on),
             )
         )
-    return Table("Policies, undisturbed", headings, tuple(rows))
+    return Table(headings, rows, "Policies, undisturbed")
 
 
 def _differences(results: TaskResults) -> Table:
@@ -116,7 +101,7 @@ def _differences(results: TaskResults) -> Table:
         for each in (outcomes.differences if outcomes else ())
     ]
     found.sort(key=lambda pair: pair[0].arm.actions == "intent")  # like for like first
-    return Table("Differences", headings, tuple(_difference(each, what.arm) for what, each in found))
+    return Table(headings, [_difference(each, what.arm) for what, each in found], "Differences")
 
 
 def _difference(each: OutcomeDifference, arm: StudyArm) -> tuple[str, ...]:
@@ -146,7 +131,7 @@ def _conditions(results: TaskResults) -> Table:
         "contacts / 100 rollouts",
     )
     rows = [_condition(each) for each in (*results.disturbed.values(), *results.protected.values())]
-    return Table("Disturbed, protected; beside the same rollouts without", headings, tuple(rows))
+    return Table(headings, rows, "Disturbed, protected; beside the same rollouts without")
 
 
 def _condition(each: Condition) -> tuple[str, ...]:
@@ -184,7 +169,7 @@ def _sweep(results: TaskResults) -> Table:
         for label, points_ in results.sweep.items()
         for point in points_
     ]
-    return Table("Operators from perfect to clumsy", headings, tuple(rows))
+    return Table(headings, rows, "Operators from perfect to clumsy")
 
 
 def _share(arm: ArmOutcome) -> str:
