@@ -31,26 +31,23 @@ def benchmark_tables(results: Mapping[str, Any]) -> list[Table]:
 
 def profile_tables(results: Mapping[str, Any], profile: str) -> list[Table]:
     """Return the tables of one profile that have something in them."""
-    settled = () if results["config"]["early_stop"] else (SETTLED_METRICS,)
-    groups = (METRICS[:4], METRICS[4:], COST_METRICS, *settled)
-    made = [_measures(results, group, profile) for group in groups]
+    settled = {} if results["config"]["early_stop"] else {"at the planner's end": SETTLED_METRICS}
+    groups = {"outcome": METRICS[:4], "effort": METRICS[4:], "computing": COST_METRICS, **settled}
+    made = [_measures(results, group, profile, title) for title, group in groups.items()]
     made += [settling_table(results, profile)] if settled and results["config"]["closed_loop"] else []
     made.append(_safety(results, profile))
     made += [paired_table(results, _COMPARED, profile)] if results["paired"][profile] else []
     return [replace(each, title=f"{profile}: {each.title}") for each in made]
 
 
-def _measures(results: Mapping[str, Any], metrics: Sequence[str], profile: str) -> Table:
+def _measures(results: Mapping[str, Any], metrics: Sequence[str], profile: str, title: str) -> Table:
     """Return measures of every controller, and the published ones where they are of the same protocol."""
     config, rows = results["config"], _rows(results["profiles"][profile], metrics)
     if profile == "nominal" and config["early_stop"] and not (config["clutter"] or config["closed_loop"]):
         known = {name: each for name, each in PUBLISHED.items() if set(metrics) & set(each)}
         rows += [[_quiet(cell) for cell in row] for row in _rows(known, metrics)]
-    return Table(
-        ("controller", *(HEADINGS[metric] for metric in metrics)),
-        rows,
-        "mean ± SD (min … max) over the episodes",
-    )
+    headings = ("controller", *(HEADINGS[metric] for metric in metrics))
+    return Table(headings, rows, f"{title}, mean ± SD (min … max)")
 
 
 def _rows(summaries: Mapping[str, Any], metrics: Sequence[str]) -> list[list[Cell]]:
