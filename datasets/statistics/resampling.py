@@ -73,23 +73,23 @@ class Run:
     values: FloatArray
 
 
-def resample_runs(arms: Sequence[Sequence[Run]], rng: np.random.Generator) -> list[FloatArray]:
-    """Return bootstrapped means of arms whose rollouts are nested: dataset draw → training seed → rollout.
+def resample_runs(conditions: Sequence[Sequence[Run]], rng: np.random.Generator) -> list[FloatArray]:
+    """Return bootstrapped means of conditions with nested rollouts: dataset draw → training seed → rollout.
 
-    Each level is drawn with replacement within the one above. Where every run of every arm has the same
+    Each level is drawn with replacement within the one above. Where every run of every condition has the same
     evaluation seeds, one draw of these serves all, so that what is paired stays so.
 
     Args:
-        arms: The runs of each.
+        conditions: The runs of each.
         rng: Of the resampling.
 
     Returns:
-        For each arm the means, `(B,)`; the same row is the same resampling of the evaluation seeds.
+        For each condition the means, `(B,)`; the same row is the same resampling of the evaluation seeds.
     """
-    seeds = {run.seeds for runs in arms for run in runs}
+    seeds = {run.seeds for runs in conditions for run in runs}
     shared = _shares(len(next(iter(seeds))), rng) if len(seeds) == 1 else None
     means = []
-    for runs in arms:
+    for runs in conditions:
         each = [run.values @ (_shares(len(run.seeds), rng) if shared is None else shared) for run in runs]
         means.append((np.stack(each) * _weights(runs, rng)).sum(axis=0))
     return means

@@ -66,7 +66,10 @@ def report_page(comparison: Comparison, found: list[Finding]) -> str:
     """Return the page."""
     parts = [*_first_screen(comparison, found), section("Findings", _findings(found))]
     if comparison.outcomes:
-        shown = tables.arms_table(comparison.outcomes), tables.outcome_differences_table(comparison.outcomes)
+        shown = (
+            tables.conditions_table(comparison.outcomes),
+            tables.outcome_differences_table(comparison.outcomes),
+        )
         parts.append(section("Policies", *shown))
     parts += [
         section("What was collected", tables.collection_table(comparison.everything.collected)),
@@ -145,12 +148,14 @@ def _card(comparison: Comparison, each: Collected) -> str:
 
 def _policies(outcomes: Outcomes, label: str, labels: Sequence[str]) -> tuple[str, str]:
     """Return what a card says of a group's policies, in large and below: of the group's own name first."""
-    mine = [arm for arm in outcomes.arms if group_of(arm.label, labels) == label]
+    mine = [condition for condition in outcomes.conditions if group_of(condition.label, labels) == label]
     if not mine:
         return DASH, "no policy was evaluated"
-    arm = min(mine, key=lambda arm: arm.label != label)
-    whose = "" if arm.label == label else f" of {arm.label}"
-    return percent(arm.share), f"policy success{whose}, {percent_span(arm.nested or arm.wilson)} (95 %)"
+    condition = min(mine, key=lambda condition: condition.label != label)
+    whose = "" if condition.label == label else f" of {condition.label}"
+    return percent(
+        condition.share
+    ), f"policy success{whose}, {percent_span(condition.nested or condition.wilson)} (95 %)"
 
 
 def _findings(found: list[Finding]) -> str:

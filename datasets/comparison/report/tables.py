@@ -6,7 +6,7 @@ from handrail.datasets.comparison.collection import Collected
 from handrail.datasets.comparison.compare import Comparison, View
 from handrail.datasets.comparison.differences import FOLLOWS, Difference
 from handrail.datasets.comparison.means import Mean
-from handrail.datasets.comparison.outcomes import ArmOutcome, Outcomes
+from handrail.datasets.comparison.outcomes import ConditionOutcome, Outcomes
 from handrail.datasets.presentation.table import Cell, Table
 from handrail.datasets.presentation.wording import (
     DASH,
@@ -75,9 +75,9 @@ def matched_table(views: Sequence[View]) -> Table:
     return Table(headings, rows)
 
 
-def arms_table(outcomes: Outcomes) -> Table:
-    """Return how each arm's policies fared."""
-    names = list(dict.fromkeys(name for arm in outcomes.arms for name in arm.means))
+def conditions_table(outcomes: Outcomes) -> Table:
+    """Return how each condition's policies fared."""
+    names = list(dict.fromkeys(name for condition in outcomes.conditions for name in condition.means))
     headings = (
         "trained on",
         "success",
@@ -89,15 +89,15 @@ def arms_table(outcomes: Outcomes) -> Table:
     )
     rows = [
         [
-            arm.label,
-            f"{arm.successes} of {arm.rollouts}: {percent(arm.share)}",
-            percent_span(arm.wilson),
-            percent_span(arm.nested),
-            ", ".join(percent(share) for share in arm.seeds),
-            ", ".join(f"{name} {number(value)}" for name, value in arm.trained_on.items()) or DASH,
-            *(_outcome(arm, name) for name in names),
+            condition.label,
+            f"{condition.successes} of {condition.rollouts}: {percent(condition.share)}",
+            percent_span(condition.wilson),
+            percent_span(condition.nested),
+            ", ".join(percent(share) for share in condition.seeds),
+            ", ".join(f"{name} {number(value)}" for name, value in condition.trained_on.items()) or DASH,
+            *(_outcome(condition, name) for name in names),
         ]
-        for arm in outcomes.arms
+        for condition in outcomes.conditions
     ]
     return Table(headings, rows)
 
@@ -106,16 +106,16 @@ def _heading(name: str) -> str:
     return f"{name} / 100 rollouts" if name == "contacts" else name
 
 
-def _outcome(arm: ArmOutcome, name: str) -> Cell | str:
-    if name not in arm.means:
+def _outcome(condition: ConditionOutcome, name: str) -> Cell | str:
+    if name not in condition.means:
         return Cell(DASH, "quiet", "not every rollout has it")
-    mean, (low, high) = arm.means[name]
+    mean, (low, high) = condition.means[name]
     factor = 100.0 if name == "contacts" else 1.0
     return Cell(number(factor * mean), below=span((factor * low, factor * high)))
 
 
 def outcome_differences_table(outcomes: Outcomes) -> Table:
-    """Return how arms differ in success."""
+    """Return how conditions differ in success."""
     headings = ("", "difference", THESE_POLICIES, WITH_TRAINING, "test", "p after Holm", "detectable")
     rows = [
         [

@@ -20,7 +20,7 @@ from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import Controller
 from handrail.datasets.quality.safety import contacts_begun
 from handrail.datasets.recording.frames import Frame
-from handrail.policies.imitation.evaluation.conditions import Arm
+from handrail.policies.imitation.evaluation.conditions import PolicyCondition
 from handrail.policies.imitation.evaluation.operator import Policy, PolicyOperator
 from handrail.policies.imitation.evaluation.protection import build_protection
 from handrail.policies.imitation.evaluation.torch_state import one_thread, repeatable
@@ -38,7 +38,7 @@ class Rollout:
         seed: of the episode.
     """
 
-    arm: Arm
+    arm: PolicyCondition
     seed: int
 
 
@@ -70,7 +70,7 @@ def run_rollout(
     return _row(outcome, watch, operator.malformed)
 
 
-def _session_config(arm: Arm) -> SessionConfig:
+def _session_config(arm: PolicyCondition) -> SessionConfig:
     meta, pictures = arm.checkpoint.meta, arm.checkpoint.pictures
     sizes = {size for picture in pictures.values() for size in picture} or {128}
     if len(sizes) > 1:

@@ -9,11 +9,20 @@ import numpy as np
 from handrail.datasets.presentation.table import Table
 from handrail.datasets.statistics.paired import wilson
 
-_HEADINGS = ("arm", "policies", "success", "95 %", "time [s]", "contacts / 100", "brakes / 100", "failures")
+_HEADINGS = (
+    "condition",
+    "policies",
+    "success",
+    "95 %",
+    "time [s]",
+    "contacts / 100",
+    "brakes / 100",
+    "failures",
+)
 
 
 def evaluation_table(content: Mapping[str, Any]) -> Table:
-    """Return one line an arm: success with its Wilson interval, time to it, contacts, brakes, why it failed.
+    """Return a line a condition: success with its Wilson interval, time to it, contacts, brakes, why not.
 
     Args:
         content: of an evaluation file.

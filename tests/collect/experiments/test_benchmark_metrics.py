@@ -103,8 +103,7 @@ def test_what_an_update_costs_is_compared_on_the_same_goals():
     table = paired_table(results, ("update_ms_median",), "nominal")
     ((*_, cell),) = table.rows
     assert table.headings[1] == "update ms"
-    assert cell.text == "0.25"
-    assert cell.below.startswith("[0.25, 0.25], p ")
+    assert str(cell).startswith("0.25\n[0.25, 0.25], p ")
 
 
 def test_a_planner_that_sees_the_hand_is_held_to_its_aim():
