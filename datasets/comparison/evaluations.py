@@ -144,7 +144,7 @@ def _content(path: Path) -> dict[str, Any]:
     if given != FORMAT:
         raise HandrailError(f"evaluations {str(path)!r}: expected the format {FORMAT!r}, got {given!r}")
     if not isinstance(content.get("arms"), dict) or not content["arms"]:
-        raise HandrailError(f"evaluations {str(path)!r}: expected 'conditions' with one label or more")
+        raise HandrailError(f"evaluations {str(path)!r}: expected 'arms' with one label or more")
     return content
 
 

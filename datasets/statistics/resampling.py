@@ -29,10 +29,10 @@ def mean_interval(values: FloatArray, rng: np.random.Generator) -> Interval | No
     """
     if len(values) < FEWEST:
         return None
-    return bootstrap_mean(values, rng)
+    return bootstrap_mean(values, rng, RESAMPLES)
 
 
-def bootstrap_mean(values: FloatArray, rng: np.random.Generator, resamples: int = RESAMPLES) -> Interval:
+def bootstrap_mean(values: FloatArray, rng: np.random.Generator, resamples: int) -> Interval:
     """Return the 95 % bootstrap interval of a mean (percentiles), however few values there are."""
     found = stats.bootstrap((values,), np.mean, n_resamples=resamples, method="percentile", rng=rng)
     return float(found.confidence_interval.low), float(found.confidence_interval.high)

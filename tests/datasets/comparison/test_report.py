@@ -35,7 +35,7 @@ JUDGED = re.compile(r"\b(better|worse|best|worst)\b")
 def quick():
     """Few resamples: what is tested here does not hang on the third digit of p."""
     with pytest.MonkeyPatch.context() as patch:
-        for module in ("resampling", "differences", "productivity"):
+        for module in ("statistics.resampling", "comparison.differences", "comparison.productivity"):
             patch.setattr(f"handrail.datasets.{module}.RESAMPLES", 500)
         yield
 
