@@ -20,7 +20,7 @@ def _benchmark(config: BenchmarkConfig) -> int:
     console = Console()
     baselines = {name: BASELINES.find(name) for name in config.controller_names}
     results = benchmark(config, baselines, console)
-    console.print(benchmark_tables(results))
+    console.print(*benchmark_tables(results), sep="\n")
     for written in (config.json, config.report and f"{config.report}/benchmark.html", config.page):
         if written:
             console.print(f"Written: {written}", highlight=False, soft_wrap=True)

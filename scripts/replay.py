@@ -24,7 +24,7 @@ def _replay(config: ReplayConfig) -> int:
 
     from handrail.collect.commands.replay import replay_episode
     from handrail.collect.session.contact_sheet import save_sheet
-    from handrail.datasets.presentation.plain_table import PlainTable
+    from handrail.datasets.presentation.table import Table
     from handrail.datasets.reading.reader import read_episodes
 
     root = config.dataset.folder
@@ -37,7 +37,7 @@ def _replay(config: ReplayConfig) -> int:
         if pictures:
             save_sheet(pictures, Path(config.sheet).expanduser())
     console = Console(highlight=False, soft_wrap=True)
-    console.print(PlainTable(_HEADINGS, rows))
+    console.print(Table(_HEADINGS, rows))
     for written in filter(None, (config.sheet, config.video)):
         console.print(f"Written: {written}")
     return 0

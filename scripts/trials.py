@@ -1,5 +1,7 @@
 """`handrail-trials`: let the scripted operators do every task in every mode, and count how it went."""
 
+from dataclasses import replace
+
 from handrail.collect.experiments.trials.config import TrialsConfig
 from handrail.scripts import cli
 
@@ -15,7 +17,6 @@ def _trials(config: TrialsConfig) -> int:
 
     from handrail.collect.experiments.trials.table import trials_table, write_page
     from handrail.collect.experiments.trials.trials import run_trials
-    from handrail.datasets.presentation.plain_table import PlainTable
 
     console = Console(highlight=False, markup=False, soft_wrap=True)
     trials = run_trials(
@@ -25,8 +26,8 @@ def _trials(config: TrialsConfig) -> int:
         ),
     )
     for task in config.task_names:
-        headings, lines = trials_table([trial for trial in trials if trial.task == task], config.mode_names)
-        console.print(PlainTable(headings, lines, task))
+        of_task = [trial for trial in trials if trial.task == task]
+        console.print(replace(trials_table(of_task, config.mode_names), title=task))
     if config.page:
         write_page(trials, config)
         console.print(f"Written: {config.page}")

@@ -2,13 +2,13 @@
 
 from pathlib import Path
 
-from handrail.datasets.presentation.plain_table import PlainTable
+from handrail.datasets.presentation.table import Table
 from handrail.datasets.quality.summary import HEADINGS, QUALITY_HEADINGS, summarize
 
 _TASK = HEADINGS.index("task")
 
 
-def summary_table(root: Path) -> PlainTable:
+def summary_table(root: Path) -> Table:
     """Return a table with one line an episode of any LeRobot v3.0 dataset.
 
     Raises:
@@ -21,10 +21,10 @@ def summary_table(root: Path) -> PlainTable:
     shown = [index for index in range(len(HEADINGS)) if index != _TASK or len(tasks) > 1]
     title = f"{root}\n{tasks.pop()}" if len(tasks) == 1 else str(root)
     lines = [[row.cells()[index] for index in shown] for row in rows]
-    return PlainTable([HEADINGS[index] for index in shown], lines, title, caption)
+    return Table([HEADINGS[index] for index in shown], lines, title, caption)
 
 
-def quality_table(root: Path) -> PlainTable:
+def quality_table(root: Path) -> Table:
     """Return a table with the measures of quality of every episode of any LeRobot v3.0 dataset.
 
     Raises:
@@ -34,4 +34,4 @@ def quality_table(root: Path) -> PlainTable:
         "rate of change and high-frequency content of the commanded velocities;\n"
         "corrections of joints that were commanded one by one, switched on or off"
     )
-    return PlainTable(QUALITY_HEADINGS, [row.quality_cells() for row in summarize(root)], caption=caption)
+    return Table(QUALITY_HEADINGS, [row.quality_cells() for row in summarize(root)], caption=caption)

@@ -51,19 +51,21 @@ def _not_comparable(comparison: Comparison) -> Iterator[str]:
 
 def training_cautions(outcomes: Outcomes) -> Iterator[str]:
     """Return what the policies' intervals and tests leave out."""
-    few = [arm.label for arm in outcomes.arms if len(arm.seeds) < SEEDS]
+    few = [condition.label for condition in outcomes.conditions if len(condition.seeds) < SEEDS]
     if few:
         yield (
             f"Fewer than {SEEDS} training seeds ({', '.join(few)}): the seed alone moves success by 10 to 15"
             " points, so the policies may differ where their data do not."
         )
-    elif any(len(arm.seeds) < 5 for arm in outcomes.arms):
+    elif any(len(condition.seeds) < 5 for condition in outcomes.conditions):
         yield "Three or four training seeds say little of all trainings: only large differences are detected."
-    if all(arm.draws == 1 for arm in outcomes.arms):
+    if all(condition.draws == 1 for condition in outcomes.conditions):
         yield "One draw of each dataset: how much another recording would differ is not in the intervals."
     if any(not difference.rollouts.paired for difference in outcomes.differences):
-        yield "Training or evaluation seeds differ between arms, so rollouts were not compared as pairs."
+        yield "Training or evaluation seeds differ between conditions: rollouts were not compared as pairs."
     for name, title in (("episodes", "numbers of episodes"), ("operator_time", "operator times")):
-        values = {arm.trained_on[name] for arm in outcomes.arms if name in arm.trained_on}
+        values = {
+            condition.trained_on[name] for condition in outcomes.conditions if name in condition.trained_on
+        }
         if values and max(values) > 1.05 * min(values):
             yield f"The policies were trained on different {title}, which alone can make them differ."

@@ -15,7 +15,7 @@ from handrail.datasets.comparison.collection import (
 )
 from handrail.datasets.comparison.config import CompareConfig
 from handrail.datasets.comparison.differences import Difference, differences
-from handrail.datasets.comparison.evaluations import Arm, read_evaluations
+from handrail.datasets.comparison.evaluations import Condition, read_evaluations
 from handrail.datasets.comparison.groups import Group, baseline_of, group_of, load_groups
 from handrail.datasets.comparison.likeness import unlike
 from handrail.datasets.comparison.means import Means, means
@@ -105,8 +105,8 @@ def compare(config: CompareConfig) -> Comparison:
         check_whole(root, config.verify)
     groups = load_groups(config.datasets, config.by, config.labels, config.columns)
     baseline = baseline_of(groups, config.baseline)
-    arms = _arms(config, groups)
-    pairs = _pairs(list(arms), baseline, [group.label for group in groups])
+    conditions = _conditions(config, groups)
+    pairs = _pairs(list(conditions), baseline, [group.label for group in groups])
     rng = np.random.default_rng(config.seed)
     chosen = {
         "all episodes": groups,
@@ -119,7 +119,7 @@ def compare(config: CompareConfig) -> Comparison:
     success = {group.label: success_difference(group, base) for group in others}
     rates = {group.label: rate_interval(group, rng) for group in groups}
     ratios = {group.label: rate_ratio(group, base, rng) for group in others}
-    outcomes = judge_pairs(arms, pairs, rng) if arms else None
+    outcomes = judge_pairs(conditions, pairs, rng) if conditions else None
     return Comparison(config, baseline, views, success, rates, ratios, outcomes)
 
 
@@ -138,40 +138,43 @@ def _view(
     return View(title, measured, counted, measurements, means(measurements, rng), found)
 
 
-def _arms(config: CompareConfig, groups: Sequence[Group]) -> dict[str, Arm]:
-    """Return the evaluations' arms; each must say which group its policies were trained on."""
-    arms = read_evaluations(config.evaluations)
+def _conditions(config: CompareConfig, groups: Sequence[Group]) -> dict[str, Condition]:
+    """Return the evaluations' conditions; each must say which group its policies were trained on."""
+    conditions = read_evaluations(config.evaluations)
     labels = [group.label for group in groups]
-    for label in arms:
+    for label in conditions:
         if not group_of(label, labels):
             raise HandrailError(
-                f"evaluations: unknown arm {label!r}, expected one of {', '.join(labels)},"
+                f"evaluations: unknown condition {label!r}, expected one of {', '.join(labels)},"
                 " or one of these with more after a space"
             )
-    return arms
+    return conditions
 
 
-def _pairs(arms: Sequence[str], baseline: str, labels: Sequence[str]) -> list[Pair]:
-    """Return each arm of another group with the arm of the baseline's group that it is compared with.
+def _pairs(conditions: Sequence[str], baseline: str, labels: Sequence[str]) -> list[Pair]:
+    """Return each condition of another group with that of the baseline's group it is compared with.
 
     That is the one that shares most of the words after the label and has none of its own: `ee intent same
     number` is set against `direct same number`, not `direct`. Like for like are those with the same words. A
-    single arm is compared with nothing.
+    single condition is compared with nothing.
 
     Raises:
         HandrailError: There is none.
     """
-    words = {arm: set(arm.removeprefix(group_of(arm, labels)).strip(" /").split()) for arm in arms}
-    candidates = [arm for arm in arms if group_of(arm, labels) == baseline]
+    words = {
+        condition: set(condition.removeprefix(group_of(condition, labels)).strip(" /").split())
+        for condition in conditions
+    }
+    candidates = [condition for condition in conditions if group_of(condition, labels) == baseline]
     found = []
-    for arm in arms if len(arms) > 1 else ():
-        fitting = [each for each in candidates if words[each] <= words[arm]]
-        if arm not in candidates and not fitting:
+    for condition in conditions if len(conditions) > 1 else ():
+        fitting = [each for each in candidates if words[each] <= words[condition]]
+        if condition not in candidates and not fitting:
             raise HandrailError(
-                f"evaluations: expected an arm {baseline!r} to compare {arm!r} with, got {', '.join(arms)};"
-                " name another --baseline"
+                f"evaluations: expected a condition {baseline!r} to compare {condition!r} with, got "
+                f"{', '.join(conditions)}; name another --baseline"
             )
-        if arm not in candidates:
+        if condition not in candidates:
             other = max(fitting, key=lambda each: len(words[each]))
-            found.append(Pair(arm, other, LIKE_FOR_LIKE if words[other] == words[arm] else MIXED))
+            found.append(Pair(condition, other, LIKE_FOR_LIKE if words[other] == words[condition] else MIXED))
     return found

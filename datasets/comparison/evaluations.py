@@ -16,7 +16,7 @@
     }
 
 A rollout needs `seed` and `success`; other numbers (`contacts`, `length` [s], …) are outcomes too, reported
-where every rollout of an arm has them. Several files add up; the same rollout twice is an error.
+where every rollout of a condition has them. Several files add up; the same rollout twice is an error.
 """
 
 from collections.abc import Iterable, Mapping, Set
@@ -63,7 +63,7 @@ class Policy:
 
 
 @dataclass(frozen=True)
-class Arm:
+class Condition:
     """All policies of one dataset or mode.
 
     Attributes:
@@ -86,8 +86,8 @@ class Arm:
         """Draw, training seed and evaluation seed of every rollout."""
         return frozenset((*each.key, seed) for each in self.policies for seed in each.rollouts)
 
-    def only(self, rollouts: Set[tuple[int, int, int]]) -> "Arm | None":
-        """Return the arm with some of its rollouts; None if it has none of these.
+    def only(self, rollouts: Set[tuple[int, int, int]]) -> "Condition | None":
+        """Return the condition with some of its rollouts; None if it has none of these.
 
         Args:
             rollouts: Draw, training seed and evaluation seed of each.
@@ -97,15 +97,15 @@ class Arm:
             for each in self.policies
         ]
         kept = tuple(each for each in fewer if each.rollouts)
-        return Arm(self.label, kept) if kept else None
+        return Condition(self.label, kept) if kept else None
 
     def runs(self, outcome: str = SUCCESS) -> list[Run]:
         """Return one outcome of all policies."""
         return [policy.run(outcome) for policy in self.policies]
 
 
-def read_evaluations(paths: Iterable[str | Path]) -> dict[str, Arm]:
-    """Return the arms of evaluation files by label, in the order in which they come.
+def read_evaluations(paths: Iterable[str | Path]) -> dict[str, Condition]:
+    """Return the conditions of evaluation files by label, in the order in which they come.
 
     Raises:
         HandrailError: A file is not there or is none of these, or a rollout comes twice.
@@ -115,8 +115,8 @@ def read_evaluations(paths: Iterable[str | Path]) -> dict[str, Arm]:
         for label, entries in _content(path)["arms"].items():
             known = policies.setdefault(label, {})
             for policy in _policies(path, label, entries):
-                _add(known, policy, f"{str(path)!r}: arm {label!r}")
-    return {label: Arm(label, tuple(known.values())) for label, known in policies.items()}
+                _add(known, policy, f"{str(path)!r}: condition {label!r}")
+    return {label: Condition(label, tuple(known.values())) for label, known in policies.items()}
 
 
 def _add(known: dict[tuple[int, int], Policy], policy: Policy, where: str) -> None:
@@ -149,7 +149,7 @@ def _content(path: Path) -> dict[str, Any]:
 
 
 def _policies(path: Path, label: str, entries: Any) -> list[Policy]:
-    where = f"evaluations {str(path)!r}: arm {label!r}"
+    where = f"evaluations {str(path)!r}: condition {label!r}"
     if not isinstance(entries, list) or not entries:
         raise HandrailError(f"{where}: expected a list of trained policies, got {type(entries).__name__}")
     try:

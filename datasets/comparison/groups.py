@@ -92,9 +92,9 @@ def baseline_of(groups: Sequence[Group], name: str) -> str:
     return name or labels[0]
 
 
-def group_of(arm: str, labels: Sequence[str]) -> str:
-    """Return the group whose data an arm's policies saw: the longest label that it begins with, or ""."""
-    known = (label for label in labels if f"{arm} ".startswith((f"{label} ", f"{label}/")))
+def group_of(condition: str, labels: Sequence[str]) -> str:
+    """Return the group whose data a condition's policies saw: the longest label it begins with, or ""."""
+    known = (label for label in labels if f"{condition} ".startswith((f"{label} ", f"{label}/")))
     return max(known, key=len, default="")
 
 

@@ -3,40 +3,42 @@
 from collections.abc import Iterator
 
 from handrail.datasets.comparison.finding import Finding
-from handrail.datasets.comparison.outcomes import ArmOutcome, OutcomeDifference, Outcomes
+from handrail.datasets.comparison.outcomes import ConditionOutcome, OutcomeDifference, Outcomes
 from handrail.datasets.presentation.wording import counted, p_value, percent, percent_span, points_span
 from handrail.datasets.statistics.resampling import Interval
 
 
 def outcome_findings(outcomes: Outcomes) -> Iterator[Finding]:
-    """Return what the policies' success says: differences, then arms that are compared with none."""
-    arms = {arm.label: arm for arm in outcomes.arms}
+    """Return what the policies' success says: differences, then conditions that are compared with none."""
+    conditions = {condition.label: condition for condition in outcomes.conditions}
     for difference in outcomes.differences:
-        one, other = arms[difference.label], arms[difference.baseline]
+        one, other = conditions[difference.label], conditions[difference.baseline]
         more, less = (one, other) if one.share >= other.share else (other, one)
         interval = _toward(more, difference)
         text, short = _text(difference, more, less, interval), _short(difference, more, less, interval)
         yield Finding("outcome", text, difference.detected, short)
     compared = {label for each in outcomes.differences for label in (each.label, each.baseline)}
-    yield from (_alone(arm) for arm in outcomes.arms if arm.label not in compared)
+    yield from (_alone(condition) for condition in outcomes.conditions if condition.label not in compared)
 
 
-def _toward(more: ArmOutcome, difference: OutcomeDifference) -> Interval:
+def _toward(more: ConditionOutcome, difference: OutcomeDifference) -> Interval:
     """Return the interval of the larger share minus the smaller."""
     low, high = difference.nested or difference.rollouts.interval
     return (low, high) if difference.label == more.label else (-high, -low)
 
 
-def _alone(arm: ArmOutcome) -> Finding:
-    who = "Policies" if arm.nested else "The policy"
+def _alone(condition: ConditionOutcome) -> Finding:
+    who = "Policies" if condition.nested else "The policy"
     short = (
-        f"{who} trained on {arm.label} succeeded in {percent(arm.share)} of {arm.rollouts} rollouts"
-        f" (95 % {percent_span(arm.nested or arm.wilson)})"
+        f"{who} trained on {condition.label} succeeded in {percent(condition.share)}"
+        f" of {condition.rollouts} rollouts (95 % {percent_span(condition.nested or condition.wilson)})"
     )
     return Finding("outcome", f"{short}; compared with no other.", short=short)
 
 
-def _short(difference: OutcomeDifference, more: ArmOutcome, less: ArmOutcome, interval: Interval) -> str:
+def _short(
+    difference: OutcomeDifference, more: ConditionOutcome, less: ConditionOutcome, interval: Interval
+) -> str:
     shares = f"{more.label} {percent(more.share)}, {less.label} {percent(less.share)}"
     shares += f", difference {points_span(interval)} points"
     if not difference.detected:
@@ -46,7 +48,9 @@ def _short(difference: OutcomeDifference, more: ArmOutcome, less: ArmOutcome, in
     return f"{whose} {more.label} succeeded {word} ({shares})"
 
 
-def _text(difference: OutcomeDifference, more: ArmOutcome, less: ArmOutcome, interval: Interval) -> str:
+def _text(
+    difference: OutcomeDifference, more: ConditionOutcome, less: ConditionOutcome, interval: Interval
+) -> str:
     shares = f"{percent(more.share)} against {percent(less.share)}"
     told = f"difference {points_span(interval)} points (95 %; {_chance(difference)})"
     if not difference.detected:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray
-from handrail.datasets.comparison.evaluations import SUCCESS, Arm
+from handrail.datasets.comparison.evaluations import SUCCESS, Condition
 from handrail.datasets.statistics.paired import wilson
 from handrail.datasets.statistics.proportions import (
     ShareDifference,
@@ -30,8 +30,8 @@ LIKE_FOR_LIKE = "like-for-like"
 
 
 @dataclass(frozen=True)
-class ArmOutcome:
-    """One arm.
+class ConditionOutcome:
+    """One condition.
 
     Attributes:
         label: Its name.
@@ -65,7 +65,7 @@ class ArmOutcome:
 
 @dataclass(frozen=True)
 class Pair:
-    """Labels of an arm and of what it is compared with, and which family of comparisons that belongs to.
+    """Labels of a condition and of what it is compared with, and which family of comparisons that belongs to.
 
     A family is declared by the kind of comparison before anything is known of its result: Holm's correction
     is over all of one family, and the report names it.
@@ -78,22 +78,22 @@ class Pair:
 
 @dataclass(frozen=True)
 class OutcomeDifference:
-    """Success of an arm minus that of the baseline.
+    """Success of a condition minus that of the baseline.
 
     Attributes:
-        label: The arm.
+        label: The condition.
         baseline: The other one.
         rollouts: Over all rollouts, as if these policies were all there is.
         family: What kind of comparison it is: p is adjusted over all of this kind.
         nested: 95 % interval over dataset draw, training seed and evaluation seed, the wider of the nested
-            bootstrap's and Welch's t interval over replicates; None where an arm has only one replicate,
+            bootstrap's and Welch's t interval over replicates; None where a condition has only one replicate,
             since then nothing is known of how much the training seed matters.
         p: Two-sided, the largest of the exact test's, the nested bootstrap's, and Welch's t test of the
             replicates' success; resampling a handful of training seeds alone would see too much.
         p_adjusted: By Holm, over all differences of the family.
         tests: Number of differences in the family.
         training_error: Standard error over the replicates, and its degrees of freedom, as Welch has them;
-            None where an arm has only one replicate.
+            None where a condition has only one replicate.
         detectable: The difference that would be seen as one in 80 % of such experiments.
     """
 
@@ -117,34 +117,36 @@ class OutcomeDifference:
 
 @dataclass(frozen=True)
 class Outcomes:
-    """All arms, and each against the baseline."""
+    """All conditions, and each against the baseline."""
 
-    arms: tuple[ArmOutcome, ...]
+    conditions: tuple[ConditionOutcome, ...]
     differences: tuple[OutcomeDifference, ...]
 
 
-def judge(arms: Mapping[str, Arm], baseline: str, rng: np.random.Generator) -> Outcomes:
-    """Compare the success of all arms with the baseline's.
+def judge(conditions: Mapping[str, Condition], baseline: str, rng: np.random.Generator) -> Outcomes:
+    """Compare the success of all conditions with the baseline's.
 
     Args:
-        arms: By label.
+        conditions: By label.
         baseline: The label that the others are compared with.
         rng: Of the resampling.
     """
-    return judge_pairs(arms, [Pair(label, baseline) for label in arms if label != baseline], rng)
+    return judge_pairs(conditions, [Pair(label, baseline) for label in conditions if label != baseline], rng)
 
 
-def judge_pairs(arms: Mapping[str, Arm], pairs: Sequence[Pair], rng: np.random.Generator) -> Outcomes:
-    """Compare the success of arms, each with a baseline of its own, family by family.
+def judge_pairs(
+    conditions: Mapping[str, Condition], pairs: Sequence[Pair], rng: np.random.Generator
+) -> Outcomes:
+    """Compare the success of conditions, each with a baseline of its own, family by family.
 
     Args:
-        arms: By label.
+        conditions: By label.
         pairs: What is compared with what.
         rng: Of the resampling.
     """
-    runs = {label: arm.runs() for label, arm in arms.items()}
+    runs = {label: condition.runs() for label, condition in conditions.items()}
     resampled = dict(zip(runs, resample_runs(list(runs.values()), rng), strict=True))
-    found = tuple(_arm(arm, resampled[label], rng) for label, arm in arms.items())
+    found = tuple(_condition(condition, resampled[label], rng) for label, condition in conditions.items())
     return Outcomes(found, in_families([_difference(pair, runs, resampled) for pair in pairs]))
 
 
@@ -171,21 +173,21 @@ def _detectable(difference: OutcomeDifference, tests: int) -> float:
     return min(1.0, found)
 
 
-def _arm(arm: Arm, resampled: FloatArray, rng: np.random.Generator) -> ArmOutcome:
-    runs = arm.runs()
+def _condition(condition: Condition, resampled: FloatArray, rng: np.random.Generator) -> ConditionOutcome:
+    runs = condition.runs()
     values = np.concatenate([run.values for run in runs])
     worth = independent_trials(values, [seed for run in runs for seed in run.seeds])
-    names = [name for name in arm.outcomes if name != SUCCESS]
-    return ArmOutcome(
-        label=arm.label,
+    names = [name for name in condition.outcomes if name != SUCCESS]
+    return ConditionOutcome(
+        label=condition.label,
         successes=int(values.sum()),
         rollouts=len(values),
         wilson=wilson(float(values.mean()) * worth, worth),
         nested=_nested(runs, resampled),
         seeds=tuple(float(run.values.mean()) for run in runs),
         draws=len({run.draw for run in runs}),
-        means={name: _mean(arm.runs(name), rng) for name in names},
-        trained_on=arm.policies[0].trained_on,
+        means={name: _mean(condition.runs(name), rng) for name in names},
+        trained_on=condition.policies[0].trained_on,
     )
 
 
@@ -223,7 +225,7 @@ def _difference(
 
 
 def compare_rollouts(first: Sequence[Run], second: Sequence[Run]) -> ShareDifference:
-    """Compare all rollouts of two arms, as pairs where training and evaluation seeds are the same."""
+    """Compare all rollouts of two conditions, as pairs where training and evaluation seeds are the same."""
     one, other = _rollouts(first), _rollouts(second)
     scenes = [seed for *_, seed in one], [seed for *_, seed in other]
     if one.keys() == other.keys():

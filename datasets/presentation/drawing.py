@@ -63,7 +63,19 @@ def svg(figure: Any) -> str:
     stream = io.BytesIO()
     with matplotlib.rc_context({"svg.hashsalt": "handrail"}):
         figure.savefig(stream, format="svg", metadata={"Date": None})
-    return "data:image/svg+xml;base64," + base64.b64encode(stream.getvalue()).decode()
+    return address(stream.getvalue(), "image/svg+xml")
+
+
+def png(figure: Any) -> bytes:
+    """Return a figure as a file for a Markdown page."""
+    stream = io.BytesIO()
+    figure.savefig(stream, format="png", dpi=110, metadata={"Software": None})
+    return stream.getvalue()
+
+
+def address(data: bytes, kind: str) -> str:
+    """Return an address that holds all of a file, whose MIME type is `kind`."""
+    return f"data:{kind};base64,{base64.b64encode(data).decode()}"
 
 
 def tidy(axes: Any, grid: str = "both") -> None:

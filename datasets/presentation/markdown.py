@@ -1,22 +1,65 @@
-"""Tables in Markdown, and the part of a page that a command writes: between two marks, other text stays."""
+"""Markdown: tables, and the part of a page that a command writes: between two marks, other text stays."""
 
-from collections.abc import Sequence
+import re
+from pathlib import Path
 
-Table = tuple[Sequence[str], Sequence[Sequence[str]]]  # headings, rows
+from handrail.controllers.errors import HandrailError
+from handrail.datasets.presentation.table import Cell, Table
+from handrail.datasets.storage.atomic import write_whole
 
 
 def markdown_table(table: Table) -> str:
-    """Return a table as Markdown."""
-    headings, rows = table
-    lines = [headings, ["---"] * len(headings), *rows]
-    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
+    """Return a table as Markdown, its title above."""
+    rows = [
+        [_cell(cell) for cell in row] for row in (table.headings, ["---"] * len(table.headings), *table.rows)
+    ]
+    lines = "\n".join("| " + " | ".join(row) + " |" for row in rows)
+    return f"**{table.title}**\n\n{lines}" if table.title else lines
+
+
+def _cell(cell: Cell | str) -> str:
+    if isinstance(cell, Cell):
+        cell = f"{cell.text} ({cell.below})" if cell.below else cell.text
+    return cell.replace("|", "\\|")
+
+
+def read_page(page: Path, heading: str = "") -> str:
+    """Return the text of a page; a heading if there is no page yet.
+
+    Raises:
+        HandrailError: it is no text.
+    """
+    try:
+        return page.read_text(encoding="utf-8") if page.exists() else f"# {heading}\n"
+    except (OSError, UnicodeDecodeError) as error:
+        raise HandrailError(f"--page {page}: expected a text in UTF-8, got {error}") from error
+
+
+def write_part(page: Path, heading: str, label: str, body: str) -> None:
+    """Write a part of a page, which is made if need be.
+
+    Raises:
+        HandrailError: it is no text, or nobody knows what of it may go.
+    """
+    write_whole(page, with_part(read_page(page, heading), label, body).encode())
 
 
 def with_part(text: str, label: str, body: str) -> str:
-    """Return a page's text with the body between the label's marks; at its end where there are none."""
-    begin, end = f"<!-- {label} -->", f"<!-- end {label} -->"
+    """Return a page's text with the body between the label's marks; at its end where there are none.
+
+    Raises:
+        HandrailError: the marks are not a pair, so that nobody knows what may go.
+    """
+    begin, end = f"<!-- {label} -->", f"<!-- end of {label} -->"
     block = f"{begin}\n\n{body}\n\n{end}"
-    before, found, rest = text.partition(begin)
-    if not found:
+    name = re.escape(label)
+    begins = list(re.finditer(f"<!-- {name} -->", text))
+    ends = list(re.finditer(f"<!-- end (?:of )?{name} -->", text))
+    if not begins and not ends:
         return f"{text.rstrip()}\n\n{block}\n"
-    return before + block + rest.partition(end)[2]
+    if (len(begins), len(ends)) != (1, 1) or begins[0].end() > ends[0].start():
+        raise HandrailError(
+            f"--page: expected {begin} and {end} once each, in this order, or neither; "
+            f"got {len(begins)} and {len(ends)}"
+        )
+    return text[: begins[0].start()] + block + text[ends[0].end() :]

@@ -1,48 +1,39 @@
-"""The few pieces of HTML that the page is made of; everything that goes in is escaped."""
+"""The few pieces of HTML that a report is made of; everything that goes in is escaped."""
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable
 from html import escape
 
 from handrail.datasets.presentation.style import CSS
+from handrail.datasets.presentation.table import Cell, Table
 
 
-@dataclass(frozen=True)
-class Cell:
-    """A cell of a table.
-
-    Attributes:
-        text: What it says.
-        look: A class of the style: `detected`, `quiet` or "".
-        note: Shown when pointed at.
-        below: A second line, smaller.
-    """
-
-    text: str
-    look: str = ""
-    note: str = ""
-    below: str = ""
-
-
-def page(title: str, body: str) -> str:
-    """Return a whole page that needs nothing else."""
+def page(title: str, *parts: str | Table, what: str = "") -> str:
+    """Return a whole page that needs nothing else: its title, what it is about, and its parts."""
     return (
         f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><title>{escape(title)}</title>'
         f'<meta name="viewport" content="width=device-width, initial-scale=1"><style>{CSS}</style></head>'
-        f"<body><main>{body}</main></body></html>\n"
+        f"<body><main><header><h1>{escape(title)}</h1>{paragraph(what) if what else ''}</header>"
+        f"{_joined(parts)}</main></body></html>\n"
     )
 
 
-def section(title: str, *parts: str) -> str:
-    """Return a section with a heading."""
-    return f"<section><h2>{escape(title)}</h2>{''.join(parts)}</section>"
+def section(title: str, *parts: str | Table) -> str:
+    """Return a section, with a heading if it has a title."""
+    return f"<section>{f'<h2>{escape(title)}</h2>' if title else ''}{_joined(parts)}</section>"
 
 
-def table(headings: Sequence[str], rows: Iterable[Sequence[Cell | str]]) -> str:
-    """Return a table."""
-    head = "".join(f"<th>{escape(heading)}</th>" for heading in headings)
-    body = "".join(f"<tr>{''.join(map(_cell, row))}</tr>" for row in rows)
-    return f'<div class="wide"><table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>'
+def _joined(parts: Iterable[str | Table]) -> str:
+    return "".join(part if isinstance(part, str) else table(part) for part in parts)
+
+
+def table(shown: Table) -> str:
+    """Return a table, its title above and its caption below."""
+    title = f"<h3>{escape(shown.title)}</h3>" if shown.title else ""
+    head = "".join(f"<th>{escape(heading)}</th>" for heading in shown.headings)
+    body = "".join(f"<tr>{''.join(map(_cell, row))}</tr>" for row in shown.rows)
+    caption = paragraph(shown.caption, "quiet") if shown.caption else ""
+    rows = f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
+    return f'{title}<div class="wide">{rows}</div>{caption}'
 
 
 def _cell(cell: Cell | str) -> str:
@@ -51,6 +42,16 @@ def _cell(cell: Cell | str) -> str:
     note = f' title="{escape(cell.note)}"' if cell.note else ""
     below = f"<small>{escape(cell.below)}</small>" if cell.below else ""
     return f"<td{look}{note}>{escape(cell.text)}{below}</td>"
+
+
+def film(address: str) -> str:
+    """Return a video."""
+    return f'<video controls muted loop src="{address}"></video>'
+
+
+def link(text: str, address: str) -> str:
+    """Return a paragraph that leads somewhere."""
+    return f'<p><a href="{escape(address)}">{escape(text)}</a></p>'
 
 
 def items(texts: Iterable[tuple[str, str]]) -> str:

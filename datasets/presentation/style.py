@@ -1,4 +1,4 @@
-"""How the page looks."""
+"""How a report looks."""
 
 CSS = """
 :root { --ink: #1d2733; --quiet: #5d6874; --line: #e3e7ec; --paper: #ffffff; --wash: #f6f8fa; }
@@ -9,6 +9,8 @@ main { max-width: 1180px; margin: 0 auto; padding: 22px 20px 60px; }
 header p { margin: 0; color: var(--quiet); }
 h1 { font-size: 22px; margin: 0; }
 h2 { font-size: 18px; margin: 34px 0 10px; }
+h3 { font-size: 14.5px; margin: 18px 0 6px; }
+video { max-width: 100%; border-radius: 6px; }
 section { background: var(--paper); border: 1px solid var(--line); border-radius: 10px; padding: 16px 18px;
   margin: 12px 0; }
 section > h2:first-child { margin-top: 0; }

@@ -7,6 +7,7 @@ from scipy import stats
 
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import HandrailError
+from handrail.datasets.statistics.resampling import bootstrap_mean
 
 _RESAMPLES = 5000
 _Z = float(stats.norm.ppf(0.975))
@@ -62,10 +63,9 @@ def paired_difference(first: FloatArray, second: FloatArray, rng: np.random.Gene
     differences = _differences(first, second)
     count, mean = len(differences), float(differences.mean())
     half = float(stats.t.ppf(0.975, count - 1) * differences.std(ddof=1) / np.sqrt(count))
-    resampled = differences[rng.integers(count, size=(_RESAMPLES, count))].mean(axis=1)
-    low, high = np.percentile(resampled, [2.5, 97.5]).tolist()
+    resampled = bootstrap_mean(differences, rng, _RESAMPLES)
     p = float(np.asarray(stats.wilcoxon(differences))[1]) if differences.any() else 1.0
-    return PairedDifference(count, mean, (mean - half, mean + half), (low, high), p)
+    return PairedDifference(count, mean, (mean - half, mean + half), resampled, p)
 
 
 def paired_success(first: FloatArray, second: FloatArray) -> PairedSuccess:

@@ -40,18 +40,20 @@ def replicates(runs: Sequence[Run]) -> FloatArray:
     return np.array([np.mean(each) for each in members.values()])
 
 
-def standard_error(arms: Sequence[Sequence[Run]], chance: Chance = chance_of_shares) -> tuple[float, float]:
+def standard_error(
+    conditions: Sequence[Sequence[Run]], chance: Chance = chance_of_shares
+) -> tuple[float, float]:
     """Return the standard error of a mean, or of the difference of two, and its degrees of freedom.
 
     √Σ v with v = max(s², chance) / n of n replicates, and (Σ v)² / Σ v² / (n − 1): Welch and Satterthwaite.
     0 and ∞ where nothing varies at all, not even rollouts.
 
     Args:
-        arms: The runs of one arm or of two, with two replicates each or more.
+        conditions: The runs of one condition or of two, with two replicates each or more.
         chance: By how much a replicate varies at least.
     """
     parts, freedom = [], []
-    for runs in arms:
+    for runs in conditions:
         means = replicates(runs)
         parts.append(max(float(means.var(ddof=1)), chance(runs)) / len(means))
         freedom.append(len(means) - 1)

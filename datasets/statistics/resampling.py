@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import stats
 
 from handrail.controllers.arrays import FloatArray
 
@@ -28,13 +29,20 @@ def mean_interval(values: FloatArray, rng: np.random.Generator) -> Interval | No
     """
     if len(values) < FEWEST:
         return None
-    return percentiles(values[rng.integers(len(values), size=(RESAMPLES, len(values)))].mean(axis=1))
+    return bootstrap_mean(values, rng, RESAMPLES)
+
+
+def bootstrap_mean(values: FloatArray, rng: np.random.Generator, resamples: int) -> Interval:
+    """Return the 95 % bootstrap interval of a mean (percentiles), however few values there are."""
+    found = stats.bootstrap((values,), np.mean, n_resamples=resamples, method="percentile", rng=rng)
+    return float(found.confidence_interval.low), float(found.confidence_interval.high)
 
 
 def p_of_difference(first: FloatArray, second: FloatArray, paired: bool, rng: np.random.Generator) -> float:
     """Return the two-sided p of a difference of means by permutation; of paired ones by turning signs.
 
-    p = (1 + #{|d*| ≥ |d|}) / (B + 1), Phipson & Smyth 2010.
+    Exact where there are no more than B permutations; else the smaller of #{d* ≤ d} and #{d* ≥ d}, each
+    plus one, doubled, over B + 1 (Phipson & Smyth 2010).
 
     Args:
         first: `(N,)`.
@@ -42,18 +50,15 @@ def p_of_difference(first: FloatArray, second: FloatArray, paired: bool, rng: np
         paired: Whether they are.
         rng: Of the permutations.
     """
-    if paired:
-        difference = first - second
-        signs = rng.choice([-1.0, 1.0], size=(RESAMPLES, len(difference)))
-        permuted, observed = (signs * difference).mean(axis=1), difference.mean()
-    else:
-        pool = np.concatenate([first, second])
-        share = np.full(len(pool), -1.0 / len(second))
-        share[: len(first)] = 1.0 / len(first)
-        permuted = rng.permuted(np.tile(share, (RESAMPLES, 1)), axis=1) @ pool
-        observed = first.mean() - second.mean()
-    tolerance = 1e-12 * max(1.0, abs(float(observed)))
-    return float((1 + np.count_nonzero(np.abs(permuted) >= abs(observed) - tolerance)) / (RESAMPLES + 1))
+    kind = "samples" if paired else "independent"
+    found = stats.permutation_test(
+        (first, second), _difference, permutation_type=kind, n_resamples=RESAMPLES, rng=rng
+    )
+    return float(found.pvalue)
+
+
+def _difference(first: FloatArray, second: FloatArray, axis: int) -> FloatArray:
+    return first.mean(axis=axis) - second.mean(axis=axis)
 
 
 @dataclass(frozen=True)
@@ -73,23 +78,23 @@ class Run:
     values: FloatArray
 
 
-def resample_runs(arms: Sequence[Sequence[Run]], rng: np.random.Generator) -> list[FloatArray]:
-    """Return bootstrapped means of arms whose rollouts are nested: dataset draw → training seed → rollout.
+def resample_runs(conditions: Sequence[Sequence[Run]], rng: np.random.Generator) -> list[FloatArray]:
+    """Return bootstrapped means of conditions with nested rollouts: dataset draw → training seed → rollout.
 
-    Each level is drawn with replacement within the one above. Where every run of every arm has the same
+    Each level is drawn with replacement within the one above. Where every run of every condition has the same
     evaluation seeds, one draw of these serves all, so that what is paired stays so.
 
     Args:
-        arms: The runs of each.
+        conditions: The runs of each.
         rng: Of the resampling.
 
     Returns:
-        For each arm the means, `(B,)`; the same row is the same resampling of the evaluation seeds.
+        For each condition the means, `(B,)`; the same row is the same resampling of the evaluation seeds.
     """
-    seeds = {run.seeds for runs in arms for run in runs}
+    seeds = {run.seeds for runs in conditions for run in runs}
     shared = _shares(len(next(iter(seeds))), rng) if len(seeds) == 1 else None
     means = []
-    for runs in arms:
+    for runs in conditions:
         each = [run.values @ (_shares(len(run.seeds), rng) if shared is None else shared) for run in runs]
         means.append((np.stack(each) * _weights(runs, rng)).sum(axis=0))
     return means

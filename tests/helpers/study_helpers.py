@@ -59,19 +59,19 @@ def make(job, design, layout):
                 for index in range(12):
                     writer.add_frame(frame_of(episode, index, cameras=False), "reach")
                 writer.save_episode({"success": episode > 0, "failure_reason": "timeout", "seed": episode})
-    if job.arm:
-        rng = np.random.default_rng(job.arm.seed)
-        share = 0.9 if job.arm.cell.mode == "ee" else 0.3
-        write_json(layout.policy(job.arm) / "checkpoints/000010/pretrained_model/handrail.json", {})
+    if job.policy:
+        rng = np.random.default_rng(job.policy.seed)
+        share = 0.9 if job.policy.cell.mode == "ee" else 0.3
+        write_json(layout.policy(job.policy) / "checkpoints/000010/pretrained_model/handrail.json", {})
         for what, config in evaluations(job, design).items():
             rollouts = [
                 {"seed": seed, "success": bool(rng.random() < share), "contacts": seed % 2, "length": 3.0}
                 for seed in config.seeds
             ]
             ending = {"nominal": "", "disturbed": " pushed", "protected": " filter"}[what]
-            entry = {"training_seed": job.arm.seed, "rollouts": rollouts}
-            arms = {job.arm.label + ending: [entry]}
-            write_json(layout.evaluation(job.arm, what), {"format": FORMAT, "arms": arms})
+            entry = {"training_seed": job.policy.seed, "rollouts": rollouts}
+            arms = {job.policy.label + ending: [entry]}
+            write_json(layout.evaluation(job.policy, what), {"format": FORMAT, "arms": arms})
     if job.task:
         write_json(layout.comparison(job.task) / "report.html", {})
     result = {"episodes": 6} if job.cell else {}

@@ -18,7 +18,7 @@ from rich.console import Console
 
 from handrail.controllers.errors import HandrailError, not_installed
 from handrail.datasets.lists import Names, Numbers, Words, split_list
-from handrail.datasets.presentation.plain_table import PlainTable
+from handrail.datasets.presentation.table import Table
 from handrail.policies.imitation.training.installed import check_installed
 from handrail.scripts import cli
 
@@ -155,7 +155,7 @@ def test_messages_name_flags(tmp_path):
     assert {"--resume", "--overwrite"} <= set(done.stderr.split())
 
 
-def shown(table: PlainTable) -> str:
+def shown(table: Table) -> str:
     out = io.StringIO()
     Console(width=80, file=out).print(table)
     return out.getvalue()
@@ -167,7 +167,7 @@ CELL = st.text(st.sampled_from("abcdefghij 0123456789[]±"), max_size=30)
 @given(st.lists(st.lists(CELL, min_size=9, max_size=9), min_size=2, max_size=5), st.integers(2, 9))
 def test_a_table_fits_in_80_columns_and_loses_nothing(cells, size):
     headings, *rows = [row[:size] for row in cells]
-    text = shown(PlainTable(headings, rows, "title [s]", "caption [m]"))
+    text = shown(Table(headings, rows, "title [s]", "caption [m]"))
     assert max(map(len, text.splitlines())) <= 80
     given_letters = Counter("".join(cell for row in [headings, *rows] for cell in row).replace(" ", ""))
     assert given_letters <= Counter(text)
@@ -179,5 +179,5 @@ def test_a_table_keeps_units_and_words_whole():
         *("smallest distance [m]", "smoothness", "contacts"),
     )
     row = ("0", "direct_filtered", "no", "timeout", "30.0", "0.088", "-2.20", "0")
-    words = shown(PlainTable(headings, [row])).split()
+    words = shown(Table(headings, [row])).split()
     assert {*" ".join(headings).split(), *row} <= set(words)

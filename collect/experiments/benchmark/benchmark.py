@@ -20,6 +20,7 @@ from handrail.collect.experiments.benchmark.video import film, strip
 from handrail.collect.simulation.gl import graphics_trouble
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.robot.model import load_model
+from handrail.datasets.presentation.drawing import png
 
 
 def benchmark(config: BenchmarkConfig, baselines: Mapping[str, Baseline], console: Console) -> dict[str, Any]:
@@ -42,12 +43,13 @@ def benchmark(config: BenchmarkConfig, baselines: Mapping[str, Baseline], consol
     results = summarise([episode.row for episode in episodes], config, present, skipped)
     if config.json:
         save_json(results, Path(config.json).expanduser())
-    pictures = figures(results, episodes, goals(config)) if report or config.page else {}
+    drawn = figures(results, episodes, goals(config)) if report or config.page else {}
     example = _example(config, present, console)
     if report:
         save_json(results, report / "benchmark.json")
-        write_report(results, pictures, _video(example, report), report / "benchmark.html")
+        write_report(results, drawn, _video(example, report), report / "benchmark.html")
     if config.page:
+        pictures = {name: png(figure) for name, figure in drawn.items()}
         pictures |= {"example": strip(load_model(), *example)} if example else {}
         write_page(results, pictures, Path(config.page).expanduser(), config)
     return results

@@ -5,24 +5,11 @@ from pathlib import Path
 from typing import Any
 
 from handrail.collect.experiments.benchmark.config import BenchmarkConfig
-from handrail.collect.experiments.benchmark.format import (
-    COMPARED,
-    main_table,
-    paired_table,
-    profile_table,
-    safety_table,
-    settles,
-    settling_table,
-)
-from handrail.collect.experiments.benchmark.metrics import COST_METRICS, METRICS, SETTLED_METRICS
+from handrail.collect.experiments.benchmark.figures import CAPTIONS
 from handrail.collect.experiments.benchmark.results import save_json
-from handrail.datasets.presentation.markdown import markdown_table, with_part
+from handrail.collect.experiments.benchmark.tables import benchmark_tables
+from handrail.datasets.presentation.markdown import markdown_table, write_part
 from handrail.datasets.storage.atomic import write_whole
-
-_PAIRED = (
-    "Paired differences: mean, 95 % bootstrap interval, p of Wilcoxon's test, for success of McNemar's; every"
-    " p is for itself, not corrected for how many there are."
-)
 
 
 def write_page(
@@ -42,40 +29,26 @@ def write_page(
     for name, data in pictures.items():
         write_whole(page.parent / f"{stem}_{name}.png", data)
     save_json({k: v for k, v in results.items() if k != "episodes"}, page.parent / f"{stem}.json")
-    body = "\n\n".join(_parts(results, pictures, stem))
-    text = page.read_text(encoding="utf-8") if page.exists() else "# Goal reaching\n"
-    write_whole(page, with_part(text, config.label, body).encode())
+    write_part(page, "Goal reaching", config.label, "\n\n".join(_parts(results, pictures, stem)))
 
 
 def _parts(results: Mapping[str, Any], pictures: Mapping[str, bytes], stem: str) -> list[str]:
     parts = [f"`{_command(results)}` wrote this. {_how(results)}"]
-    profiles = list(results["profiles"])
-    for profile in profiles:
-        parts += [f"**Profile {profile}**"] if len(profiles) > 1 else []
-        parts.append(markdown_table(main_table(results, METRICS, profile)))
-        parts.append(markdown_table(main_table(results, COST_METRICS, profile)))
-        if settles(results):
-            parts.append(markdown_table(settling_table(results, profile)))
-        if not results["config"]["early_stop"]:
-            parts.append(markdown_table(main_table(results, SETTLED_METRICS, profile)))
-        parts.append(markdown_table(safety_table(results, profile)))
-        if results["paired"][profile]:
-            parts.append(markdown_table(paired_table(results, COMPARED, profile)))
-    if len(profiles) > 1:
-        parts.append(markdown_table(profile_table(results)))
-    parts += [f"![{name}]({stem}_{name}.png)" for name in pictures]
+    for table in benchmark_tables(results):
+        parts += [markdown_table(table), table.caption]
+    parts += [f"![{CAPTIONS.get(name, name)}]({stem}_{name}.png)" for name in pictures]
+    parts = list(dict.fromkeys(filter(None, parts)))  # a caption once
     return parts + [f"Left out: {name} ({reason})." for name, reason in results["skipped"].items()]
 
 
 def _how(results: Mapping[str, Any]) -> str:
     """Return how the numbers are to be read, those that depend on the machine above all."""
     machine, workers = results["machine"], results["config"]["workers"]
-    said = (
+    return (
         "Mean ± SD (min, max) over the episodes. Update ms: the median over an episode's updates, without the"
         f" distances that rivals only report. {machine['cores']} cores; load at the end"
         f" {machine['load']:.1f}, of which {workers} by this run: times are longer where others computed too."
     )
-    return f"{said} {_PAIRED}" if any(results["paired"].values()) else said
 
 
 def _command(results: Mapping[str, Any]) -> str:

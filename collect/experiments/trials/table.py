@@ -8,9 +8,9 @@ import numpy as np
 
 from handrail.collect.experiments.trials.config import TrialsConfig
 from handrail.collect.experiments.trials.file import Trial
-from handrail.datasets.presentation.markdown import Table, markdown_table, with_part
+from handrail.datasets.presentation.markdown import markdown_table, write_part
+from handrail.datasets.presentation.table import Table
 from handrail.datasets.statistics.paired import wilson
-from handrail.datasets.storage.atomic import write_whole
 
 HEADINGS = (
     *("mode", "success", "95 %", "failures", "time of successes [s]", "episodes with contact"),
@@ -22,7 +22,7 @@ LABEL = "trials"
 def trials_table(trials: Sequence[Trial], modes: Sequence[str]) -> Table:
     """Return a task's table: a line for each mode that has trials."""
     groups = [[trial for trial in trials if trial.mode == mode] for mode in modes]
-    return HEADINGS, [_line(group) for group in groups if group]
+    return Table(HEADINGS, [_line(group) for group in groups if group])
 
 
 def write_page(trials: Sequence[Trial], config: TrialsConfig) -> None:
@@ -33,8 +33,7 @@ def write_page(trials: Sequence[Trial], config: TrialsConfig) -> None:
         of_task = [trial for trial in trials if trial.task == task]
         table = markdown_table(trials_table(of_task, config.mode_names))
         parts.append(f"### `{task}`\n\n{table}")
-    text = page.read_text(encoding="utf-8") if page.exists() else "# Scripted operators\n"
-    write_whole(page, with_part(text, LABEL, "\n\n".join(parts)).encode())
+    write_part(page, "Scripted operators", LABEL, "\n\n".join(parts))
 
 
 _WORDS = (

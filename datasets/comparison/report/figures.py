@@ -8,7 +8,7 @@ import numpy as np
 from handrail.datasets.comparison.collection import Collected
 from handrail.datasets.comparison.compare import Comparison
 from handrail.datasets.comparison.groups import Group, group_of
-from handrail.datasets.comparison.outcomes import ArmOutcome
+from handrail.datasets.comparison.outcomes import ConditionOutcome
 from handrail.datasets.presentation.drawing import COLOURS, GREY, Panel, new_figure, short, tidy
 
 _WIDTH = 5.2  # [inch]
@@ -18,35 +18,43 @@ Colours = Mapping[str, str]
 
 
 def colours(comparison: Comparison) -> dict[str, str]:
-    """Return a colour for each group, and each arm of policies that belongs to it."""
+    """Return a colour for each group, and each condition of policies that belongs to it."""
     found: dict[str, str] = dict(zip(comparison.labels, COLOURS, strict=False))
-    for arm in comparison.outcomes.arms if comparison.outcomes else ():
-        found.setdefault(arm.label, found[group_of(arm.label, comparison.labels)])
+    for condition in comparison.outcomes.conditions if comparison.outcomes else ():
+        found.setdefault(condition.label, found[group_of(condition.label, comparison.labels)])
     return found
 
 
 def answer_panels(comparison: Comparison) -> list[Panel]:
     """Return success of the policies, or else in collection, and how it came about."""
     known, everything = colours(comparison), comparison.everything
-    arms = comparison.outcomes.arms if comparison.outcomes else ()
-    height = max(2.4, 1.0 + 0.4 * max(len(arms), len(everything.collected)))
-    first = _arms(arms, known, height) if arms else _shares(everything.collected, known, height)
+    conditions = comparison.outcomes.conditions if comparison.outcomes else ()
+    height = max(2.4, 1.0 + 0.4 * max(len(conditions), len(everything.collected)))
+    first = (
+        _conditions(conditions, known, height) if conditions else _shares(everything.collected, known, height)
+    )
     return [first, _over_time(everything.groups, known, height)]
 
 
-def _arms(arms: Sequence[ArmOutcome], known: Colours, height: float) -> Panel:
+def _conditions(conditions: Sequence[ConditionOutcome], known: Colours, height: float) -> Panel:
     figure = new_figure(_WIDTH, height)
     axes = figure.subplots()
-    for row, arm in enumerate(arms):
-        colour = known[arm.label]
+    for row, condition in enumerate(conditions):
+        colour = known[condition.label]
         style = {"color": colour, "lw": 5.0, "alpha": 0.35, "solid_capstyle": "butt"}
-        axes.plot(np.multiply(100, arm.wilson), [row, row], **style)
-        if arm.nested:
-            axes.plot(np.multiply(100, arm.nested), [row, row], color=colour, lw=1.6)
-        axes.plot(np.multiply(100, arm.seeds), np.full(len(arm.seeds), row + 0.24), "|", color=colour, ms=6)
-        axes.plot(100 * arm.share, row, "o", color=colour, ms=8, mec="white")
+        axes.plot(np.multiply(100, condition.wilson), [row, row], **style)
+        if condition.nested:
+            axes.plot(np.multiply(100, condition.nested), [row, row], color=colour, lw=1.6)
+        axes.plot(
+            np.multiply(100, condition.seeds),
+            np.full(len(condition.seeds), row + 0.24),
+            "|",
+            color=colour,
+            ms=6,
+        )
+        axes.plot(100 * condition.share, row, "o", color=colour, ms=8, mec="white")
     axes.set(xlabel="%")
-    _labelled(axes, [arm.label for arm in arms])
+    _labelled(axes, [condition.label for condition in conditions])
     note = "95 %; thick: these policies, thin: with training too, ticks: each training seed"
     return Panel("Success of the policies", figure, note)
 

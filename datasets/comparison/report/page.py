@@ -1,7 +1,6 @@
 """The report as one page that needs nothing else: the answer first, then how it came about."""
 
 from collections.abc import Iterable, Sequence
-from html import escape
 
 from handrail.datasets.comparison.collection import Collected
 from handrail.datasets.comparison.compare import MIXED, Comparison
@@ -27,6 +26,7 @@ from handrail.datasets.presentation.markup import (
     paragraph,
     section,
 )
+from handrail.datasets.presentation.table import Table
 from handrail.datasets.presentation.wording import (
     DASH,
     duration,
@@ -64,10 +64,12 @@ _TURNED = f" {TURNED}: less is better, so the metric is drawn the other way roun
 
 def report_page(comparison: Comparison, found: list[Finding]) -> str:
     """Return the page."""
-    title = _title(comparison)
-    parts = [_first_screen(comparison, found), section("Findings", _findings(found))]
+    parts = [*_first_screen(comparison, found), section("Findings", _findings(found))]
     if comparison.outcomes:
-        shown = tables.arms_table(comparison.outcomes), tables.outcome_differences_table(comparison.outcomes)
+        shown = (
+            tables.conditions_table(comparison.outcomes),
+            tables.outcome_differences_table(comparison.outcomes),
+        )
         parts.append(section("Policies", *shown))
     parts += [
         section("What was collected", tables.collection_table(comparison.everything.collected)),
@@ -79,7 +81,7 @@ def report_page(comparison: Comparison, found: list[Finding]) -> str:
     parts += [section("What does not apply, or is not comparable", missing)] if missing else []
     how = paragraph(_HOW), paragraph(_families(comparison))
     parts.append(section("How to read this", *how, folded("What every metric means", _meanings())))
-    return page(title, "".join(parts))
+    return page(_title(comparison), *parts, what=_what(comparison))
 
 
 def _drawn(shown: Iterable[Panel], look: str = "") -> str:
@@ -107,17 +109,19 @@ def _families(comparison: Comparison) -> str:
     return f"Families of Holm's correction: {'; '.join(told)}.{mixed if MIXED in told[0] else ''}"
 
 
-def _first_screen(comparison: Comparison, found: list[Finding]) -> str:
+def _what(comparison: Comparison) -> str:
     sources = sorted({str(group.info.root.name) for group in comparison.everything.groups})
     tasks = {
         task for group in comparison.everything.groups for e in group.episodes for task in e.meta["tasks"]
     }
-    what = f"{', '.join(sources)} – {'; '.join(sorted(tasks)[:2])}{' …' if len(tasks) > 2 else ''}"
+    return f"{', '.join(sources)} – {'; '.join(sorted(tasks)[:2])}{' …' if len(tasks) > 2 else ''}"
+
+
+def _first_screen(comparison: Comparison, found: list[Finding]) -> list[str]:
     shown = [_card(comparison, each) for each in comparison.everything.collected]
     answer = paragraph(headline(found), "headline")
-    heading = f"<header><h1>{escape(_title(comparison))}</h1>{paragraph(what)}</header>"
-    figure = f"<section>{_legend(comparison)}{_drawn(answer_panels(comparison))}</section>"
-    return heading + answer + cards(shown) + figure
+    figure = section("", _legend(comparison), _drawn(answer_panels(comparison)))
+    return [answer, cards(shown), figure]
 
 
 def _title(comparison: Comparison) -> str:
@@ -144,12 +148,14 @@ def _card(comparison: Comparison, each: Collected) -> str:
 
 def _policies(outcomes: Outcomes, label: str, labels: Sequence[str]) -> tuple[str, str]:
     """Return what a card says of a group's policies, in large and below: of the group's own name first."""
-    mine = [arm for arm in outcomes.arms if group_of(arm.label, labels) == label]
+    mine = [condition for condition in outcomes.conditions if group_of(condition.label, labels) == label]
     if not mine:
         return DASH, "no policy was evaluated"
-    arm = min(mine, key=lambda arm: arm.label != label)
-    whose = "" if arm.label == label else f" of {arm.label}"
-    return percent(arm.share), f"policy success{whose}, {percent_span(arm.nested or arm.wilson)} (95 %)"
+    condition = min(mine, key=lambda condition: condition.label != label)
+    whose = "" if condition.label == label else f" of {condition.label}"
+    return percent(
+        condition.share
+    ), f"policy success{whose}, {percent_span(condition.nested or condition.wilson)} (95 %)"
 
 
 def _findings(found: list[Finding]) -> str:
@@ -159,9 +165,9 @@ def _findings(found: list[Finding]) -> str:
     return items(looks)
 
 
-def _quality(comparison: Comparison) -> list[str]:
+def _quality(comparison: Comparison) -> list[str | Table]:
     turned = "" if comparison.unlike else _TURNED
-    parts = [
+    parts: list[str | Table] = [
         _legend(comparison),
         _drawn(effects_panels(comparison), "wide"),
         paragraph(_EFFECTS + turned, "quiet"),

@@ -1,12 +1,12 @@
 """First pictures of the cameras, small, for the page."""
 
-import base64
 import io
 from typing import Any
 
 from handrail.datasets.comparison.groups import Group
 from handrail.datasets.format.path_pattern import fill
 from handrail.datasets.format.schema import video_keys
+from handrail.datasets.presentation.drawing import address
 from handrail.datasets.quality.demonstration import Demonstration
 from handrail.datasets.reading.reader import DatasetInfo
 
@@ -52,4 +52,4 @@ def _address(frame: Any) -> str:
     picture.thumbnail((_WIDTH, _WIDTH))
     stream = io.BytesIO()
     picture.save(stream, format="JPEG", quality=80)
-    return "data:image/jpeg;base64," + base64.b64encode(stream.getvalue()).decode()
+    return address(stream.getvalue(), "image/jpeg")

@@ -6,8 +6,8 @@ from handrail.datasets.comparison.collection import Collected
 from handrail.datasets.comparison.compare import Comparison, View
 from handrail.datasets.comparison.differences import FOLLOWS, Difference
 from handrail.datasets.comparison.means import Mean
-from handrail.datasets.comparison.outcomes import ArmOutcome, Outcomes
-from handrail.datasets.presentation.markup import Cell, table
+from handrail.datasets.comparison.outcomes import ConditionOutcome, Outcomes
+from handrail.datasets.presentation.table import Cell, Table
 from handrail.datasets.presentation.wording import (
     DASH,
     THESE_POLICIES,
@@ -28,7 +28,7 @@ from handrail.datasets.quality.catalogue import METRICS, Metric
 _UNTESTED = "described, not tested: episodes share neighbours"
 
 
-def collection_table(collected: Sequence[Collected]) -> str:
+def collection_table(collected: Sequence[Collected]) -> Table:
     """Return what each group consists of."""
     headings = (
         "",
@@ -40,7 +40,7 @@ def collection_table(collected: Sequence[Collected]) -> str:
         "successes / h",
         "why not",
     )
-    return table(headings, [_collected(each) for each in collected])
+    return Table(headings, [_collected(each) for each in collected])
 
 
 def _collected(each: Collected) -> list[str]:
@@ -57,7 +57,7 @@ def _collected(each: Collected) -> list[str]:
     ]
 
 
-def matched_table(views: Sequence[View]) -> str:
+def matched_table(views: Sequence[View]) -> Table:
     """Return how much of each group the views take."""
     headings = ("view", "", "episodes", "operator time", "successes", "frames")
     rows = [
@@ -72,12 +72,12 @@ def matched_table(views: Sequence[View]) -> str:
         for view in views
         for place, each in enumerate(view.collected)
     ]
-    return table(headings, rows)
+    return Table(headings, rows)
 
 
-def arms_table(outcomes: Outcomes) -> str:
-    """Return how each arm's policies fared."""
-    names = list(dict.fromkeys(name for arm in outcomes.arms for name in arm.means))
+def conditions_table(outcomes: Outcomes) -> Table:
+    """Return how each condition's policies fared."""
+    names = list(dict.fromkeys(name for condition in outcomes.conditions for name in condition.means))
     headings = (
         "trained on",
         "success",
@@ -89,33 +89,33 @@ def arms_table(outcomes: Outcomes) -> str:
     )
     rows = [
         [
-            arm.label,
-            f"{arm.successes} of {arm.rollouts}: {percent(arm.share)}",
-            percent_span(arm.wilson),
-            percent_span(arm.nested),
-            ", ".join(percent(share) for share in arm.seeds),
-            ", ".join(f"{name} {number(value)}" for name, value in arm.trained_on.items()) or DASH,
-            *(_outcome(arm, name) for name in names),
+            condition.label,
+            f"{condition.successes} of {condition.rollouts}: {percent(condition.share)}",
+            percent_span(condition.wilson),
+            percent_span(condition.nested),
+            ", ".join(percent(share) for share in condition.seeds),
+            ", ".join(f"{name} {number(value)}" for name, value in condition.trained_on.items()) or DASH,
+            *(_outcome(condition, name) for name in names),
         ]
-        for arm in outcomes.arms
+        for condition in outcomes.conditions
     ]
-    return table(headings, rows)
+    return Table(headings, rows)
 
 
 def _heading(name: str) -> str:
     return f"{name} / 100 rollouts" if name == "contacts" else name
 
 
-def _outcome(arm: ArmOutcome, name: str) -> Cell | str:
-    if name not in arm.means:
+def _outcome(condition: ConditionOutcome, name: str) -> Cell | str:
+    if name not in condition.means:
         return Cell(DASH, "quiet", "not every rollout has it")
-    mean, (low, high) = arm.means[name]
+    mean, (low, high) = condition.means[name]
     factor = 100.0 if name == "contacts" else 1.0
     return Cell(number(factor * mean), below=span((factor * low, factor * high)))
 
 
-def outcome_differences_table(outcomes: Outcomes) -> str:
-    """Return how arms differ in success."""
+def outcome_differences_table(outcomes: Outcomes) -> Table:
+    """Return how conditions differ in success."""
     headings = ("", "difference", THESE_POLICIES, WITH_TRAINING, "test", "p after Holm", "detectable")
     rows = [
         [
@@ -130,15 +130,15 @@ def outcome_differences_table(outcomes: Outcomes) -> str:
         ]
         for each in outcomes.differences
     ]
-    return table(headings, rows)
+    return Table(headings, rows)
 
 
-def metrics_table(comparison: Comparison, label: str) -> str:
+def metrics_table(comparison: Comparison, label: str) -> Table:
     """Return every metric of a group and the baseline, and how they differ in each view."""
     headings = ("metric", comparison.baseline, label)
     headings += ("difference", "same number", "same time", "same length", "p, Holm")
     rows = [row for metric in METRICS if (row := _metric(comparison, metric, label))]
-    return table(headings, rows)
+    return Table(headings, rows)
 
 
 def _metric(comparison: Comparison, metric: Metric, label: str) -> list[Cell | str]:
@@ -191,8 +191,8 @@ def _estimate(each: Difference) -> Cell:
     return Cell(signed(each.estimate), look, below=span(each.interval))
 
 
-def not_applicable_table(comparison: Comparison) -> str:
-    """Return which metrics do not apply or are not comparable, to whom, and why; "" where all do and are."""
+def not_applicable_table(comparison: Comparison) -> Table | None:
+    """Return which metrics do not apply or are not comparable, to whom and why; None if all are."""
     rows = []
     for metric in METRICS:
         reasons: dict[str, list[str]] = {}
@@ -204,4 +204,4 @@ def not_applicable_table(comparison: Comparison) -> str:
             if each.metric is metric and each.incomparable:
                 reasons.setdefault(each.reason, []).append(f"{each.label} against {each.baseline}")
         rows += [[metric.title, ", ".join(labels), reason] for reason, labels in reasons.items()]
-    return table(("metric", "whose", "why"), rows) if rows else ""
+    return Table(("metric", "whose", "why"), rows) if rows else None

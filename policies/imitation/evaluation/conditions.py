@@ -58,7 +58,7 @@ class Checkpoint:
 
 
 @dataclass(frozen=True)
-class Arm:
+class PolicyCondition:
     """A checkpoint under a condition.
 
     Attributes:
@@ -148,7 +148,7 @@ def _plain(place: Path, settings: Mapping[str, Any], config: EvaluateConfig) -> 
     )
 
 
-def arms(config: EvaluateConfig, refused: list[str] | None = None) -> tuple[Arm, ...]:
+def arms(config: EvaluateConfig, refused: list[str] | None = None) -> tuple[PolicyCondition, ...]:
     """Return every checkpoint under every condition of the settings.
 
     Args:
@@ -170,7 +170,7 @@ def arms(config: EvaluateConfig, refused: list[str] | None = None) -> tuple[Arm,
             f"--policy: expected policies for one task, got {', '.join(sorted(environments))}"
         )
     conditions = itertools.product(config.perturbations, config.protections, checkpoints)
-    found: dict[tuple[str, tuple[int, int]], Arm] = {}
+    found: dict[tuple[str, tuple[int, int]], PolicyCondition] = {}
     for perturbation, protection, checkpoint in conditions:
         arm = _tried(why, lambda: _arm(checkpoint, protection, perturbation, config))  # noqa: B023
         if arm is None:
@@ -196,7 +196,9 @@ def _tried[Value](refused: list[str], make: Callable[[], Value]) -> Value | None
         return None
 
 
-def _arm(checkpoint: Checkpoint, protection: str, perturbation: Perturbation, config: EvaluateConfig) -> Arm:
+def _arm(
+    checkpoint: Checkpoint, protection: str, perturbation: Perturbation, config: EvaluateConfig
+) -> PolicyCondition:
     own = own_protection(checkpoint.intent_mode)
     chosen = own if protection == "own" else protection
     if chosen in ("mpc", "filter") and chosen != own and not _fits(checkpoint, chosen):
@@ -205,7 +207,7 @@ def _arm(checkpoint: Checkpoint, protection: str, perturbation: Perturbation, co
             f"{checkpoint.folder} decides on the intent of mode {checkpoint.meta.mode}"
         )
     words = [config.label or _name(checkpoint), _protected(chosen, own), perturbation.words]
-    return Arm(checkpoint, chosen, perturbation, config.time_limit, " ".join(filter(None, words)))
+    return PolicyCondition(checkpoint, chosen, perturbation, config.time_limit, " ".join(filter(None, words)))
 
 
 def own_protection(mode: str) -> str:

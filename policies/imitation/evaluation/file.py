@@ -9,7 +9,7 @@ from handrail.controllers.errors import HandrailError
 from handrail.datasets.comparison.evaluations import FORMAT, read_evaluations
 from handrail.datasets.storage.atomic import explained, write_whole
 from handrail.datasets.storage.strict_json import read_json
-from handrail.policies.imitation.evaluation.conditions import Arm, Checkpoint
+from handrail.policies.imitation.evaluation.conditions import Checkpoint, PolicyCondition
 
 
 class EvaluationFile:
@@ -36,7 +36,7 @@ class EvaluationFile:
                     f"--json {path}: expected conditions by arm, got {self.content['conditions']!r:.80}"
                 )
 
-    def open(self, arms: Sequence[Arm]) -> None:
+    def open(self, arms: Sequence[PolicyCondition]) -> None:
         """Check that arms fit what is there.
 
         Raises:
@@ -60,11 +60,11 @@ class EvaluationFile:
                     f"than {arm.checkpoint.folder}; choose another --label or --json"
                 )
 
-    def done(self, arm: Arm) -> set[int]:
+    def done(self, arm: PolicyCondition) -> set[int]:
         """Return the seeds that have been run."""
         return {row["seed"] for row in (self._entry(arm) or {"rollouts": ()})["rollouts"]}
 
-    def add(self, arm: Arm, row: dict[str, Any]) -> None:
+    def add(self, arm: PolicyCondition, row: dict[str, Any]) -> None:
         """Add a rollout; they are kept in the order of their seeds."""
         entry = self._entry(arm)
         if entry is None:
@@ -85,7 +85,7 @@ class EvaluationFile:
         with explained(f"--json {self._path}"):
             write_whole(self._path, (json.dumps(self.content, indent=1, allow_nan=False) + "\n").encode())
 
-    def _entry(self, arm: Arm) -> dict[str, Any] | None:
+    def _entry(self, arm: PolicyCondition) -> dict[str, Any] | None:
         for entry in self.content["arms"].get(arm.label, ()):
             if (int(entry.get("dataset_draw", 0)), int(entry["training_seed"])) == arm.checkpoint.key:
                 return entry

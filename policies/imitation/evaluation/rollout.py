@@ -19,7 +19,7 @@ from handrail.collect.session.session import Observer, Session
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import Controller
-from handrail.policies.imitation.evaluation.conditions import Arm
+from handrail.policies.imitation.evaluation.conditions import PolicyCondition
 from handrail.policies.imitation.evaluation.operator import Policy, PolicyOperator
 from handrail.policies.imitation.evaluation.protection import build_protection
 from handrail.policies.imitation.evaluation.torch_state import one_thread, repeatable
@@ -37,7 +37,7 @@ class Rollout:
         seed: of the episode.
     """
 
-    arm: Arm
+    arm: PolicyCondition
     seed: int
 
 
@@ -69,7 +69,7 @@ def run_rollout(
     return _row(outcome, operator.malformed)
 
 
-def _session_config(arm: Arm) -> SessionConfig:
+def _session_config(arm: PolicyCondition) -> SessionConfig:
     meta, pictures = arm.checkpoint.meta, arm.checkpoint.pictures
     sizes = {size for picture in pictures.values() for size in picture} or {128}
     if len(sizes) > 1:

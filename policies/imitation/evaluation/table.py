@@ -6,14 +6,23 @@ from typing import Any
 
 import numpy as np
 
-from handrail.datasets.presentation.plain_table import PlainTable
+from handrail.datasets.presentation.table import Table
 from handrail.datasets.statistics.paired import wilson
 
-_HEADINGS = ("arm", "policies", "success", "95 %", "time [s]", "contacts / 100", "brakes / 100", "failures")
+_HEADINGS = (
+    "condition",
+    "policies",
+    "success",
+    "95 %",
+    "time [s]",
+    "contacts / 100",
+    "brakes / 100",
+    "failures",
+)
 
 
-def evaluation_table(content: Mapping[str, Any]) -> PlainTable:
-    """Return one line an arm: success with its Wilson interval, time to it, contacts, brakes, why it failed.
+def evaluation_table(content: Mapping[str, Any]) -> Table:
+    """Return a line a condition: success with its Wilson interval, time to it, contacts, brakes, why not.
 
     Args:
         content: of an evaluation file.
@@ -23,7 +32,7 @@ def evaluation_table(content: Mapping[str, Any]) -> PlainTable:
         (label, str(len(entries)), *_cells([row for entry in entries for row in entry["rollouts"]]))
         for label, entries in content["arms"].items()
     ]
-    return PlainTable(_HEADINGS, lines, str(content.get("task", "")), _caption(rollouts))
+    return Table(_HEADINGS, lines, str(content.get("task", "")), _caption(rollouts))
 
 
 def _cells(rows: Sequence[Mapping[str, Any]]) -> tuple[str, ...]:

@@ -29,7 +29,7 @@ class Cell:
 
 
 @dataclass(frozen=True)
-class PolicyArm:
+class StudyPolicy:
     """What one policy is trained on and what it writes.
 
     Attributes:
@@ -65,7 +65,7 @@ class Job:
         name: of the job, unique.
         needs: names of the jobs that come before.
         cell: to collect.
-        arm: to train and evaluate.
+        policy: to train and evaluate.
         task: to compare.
         robust: whether the policy also goes through the further conditions.
     """
@@ -74,7 +74,7 @@ class Job:
     name: str
     needs: tuple[str, ...] = ()
     cell: Cell | None = None
-    arm: PolicyArm | None = None
+    policy: StudyPolicy | None = None
     task: str = ""
     robust: bool = False
 
@@ -86,9 +86,11 @@ def jobs(design: StudyDesign) -> list[Job]:
         cells = [Cell(task, mode) for mode in design.modes]
         if seed == design.seeds[0]:
             found += map(_collect, cells)
-        arms = [arm for budget in design.budgets for cell in cells for arm in _arms(cell, budget, seed)]
+        policies = [
+            policy for budget in design.budgets for cell in cells for policy in _policies(cell, budget, seed)
+        ]
         robust = design.robustness is not None and seed in design.robustness.seeds
-        found += [_policy(arm, robust and arm.budget == design.budgets[0]) for arm in arms]
+        found += [_policy(policy, robust and policy.budget == design.budgets[0]) for policy in policies]
     found += [_compare(task, found) for task in design.tasks]
     return found + list(_sweep(design))
 
@@ -103,28 +105,30 @@ def _sweep(design: StudyDesign) -> Iterator[Job]:
     ]
     yield from map(_collect, cells)
     for seed, cell in product(design.sweep.seeds, cells):
-        yield from (_policy(arm, robust=False) for arm in _arms(cell, design.budgets[0], seed))
+        yield from (_policy(policy, robust=False) for policy in _policies(cell, design.budgets[0], seed))
 
 
-def _arms(cell: Cell, budget: str, seed: int) -> list[PolicyArm]:
+def _policies(cell: Cell, budget: str, seed: int) -> list[StudyPolicy]:
     completed = MODES[cell.mode].controller == "mpc"  # the others leave nothing for an intent to complete
     spaces: tuple[Actions, ...] = ("realised", "intent") if completed else ("realised",)
-    return [PolicyArm(cell, actions, budget, seed) for actions in spaces]
+    return [StudyPolicy(cell, actions, budget, seed) for actions in spaces]
 
 
 def _collect(cell: Cell) -> Job:
     return Job("collect", f"collect/{cell.name}", cell=cell)
 
 
-def _policy(arm: PolicyArm, robust: bool) -> Job:
-    return Job("policy", f"policy/{arm.name}", (f"collect/{arm.cell.name}",), arm=arm, robust=robust)
+def _policy(policy: StudyPolicy, robust: bool) -> Job:
+    return Job(
+        "policy", f"policy/{policy.name}", (f"collect/{policy.cell.name}",), policy=policy, robust=robust
+    )
 
 
 def _compare(task: str, others: list[Job]) -> Job:
     mine = [
         job.name
         for job in others
-        if (job.cell and job.cell.task == task) or (job.arm and job.arm.cell.task == task)
+        if (job.cell and job.cell.task == task) or (job.policy and job.policy.cell.task == task)
     ]
     return Job("compare", f"compare/{task}", tuple(mine), task=task)
 
@@ -139,14 +143,18 @@ class Layout:
         """Return the folder of a dataset."""
         return self.root / "datasets" / cell.name
 
-    def policy(self, arm: PolicyArm) -> Path:
+    def policy(self, policy: StudyPolicy) -> Path:
         """Return the folder of a training."""
-        return self.root / "policies" / arm.name
+        return self.root / "policies" / policy.name
 
-    def evaluation(self, arm: PolicyArm, what: str) -> Path:
+    def evaluation(self, policy: StudyPolicy, what: str) -> Path:
         """Return the file of a policy's rollouts: `nominal`, `disturbed` or `protected`."""
         return (
-            self.root / "evaluations" / arm.cell.name / what / f"{arm.actions}-{arm.budget}-{arm.seed}.json"
+            self.root
+            / "evaluations"
+            / policy.cell.name
+            / what
+            / f"{policy.actions}-{policy.budget}-{policy.seed}.json"
         )
 
     def comparison(self, task: str) -> Path:

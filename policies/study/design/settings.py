@@ -13,7 +13,7 @@ from handrail.policies.imitation.evaluation.config import EvaluateConfig
 from handrail.policies.imitation.training.presets import check_policy, resolved
 from handrail.policies.imitation.training.resume import as_json
 from handrail.policies.study.design.design import StudyDesign
-from handrail.policies.study.design.jobs import Cell, Job, PolicyArm, jobs
+from handrail.policies.study.design.jobs import Cell, Job, StudyPolicy, jobs
 
 BATCH = 10  # episodes, until the next person has a turn
 _FPS = 20  # [Hz]
@@ -48,18 +48,18 @@ def recording(cell: Cell, design: StudyDesign, root: Path, so_far: int = 0) -> R
     )
 
 
-def training(arm: PolicyArm, design: StudyDesign, dataset: Path, output: Path) -> TrainConfig:
+def training(policy: StudyPolicy, design: StudyDesign, dataset: Path, output: Path) -> TrainConfig:
     """Return how a policy is trained."""
-    task, timed = design.tasks[arm.cell.task], arm.budget == "time"
+    task, timed = design.tasks[policy.cell.task], policy.budget == "time"
     return TrainConfig(
         dataset=StoredConfig(root=str(dataset)),
         output=str(output),
         policy=design.policy,
-        actions=arm.actions,
+        actions=policy.actions,
         success_only=True,
         steps=task.steps,
         batch_size=task.batch_size,
-        seed=arm.seed,
+        seed=policy.seed,
         policy_options=task.policy_options,
         minutes=task.minutes if timed else 0.0,
         episodes=0 if timed else task.episodes,
@@ -67,27 +67,27 @@ def training(arm: PolicyArm, design: StudyDesign, dataset: Path, output: Path) -
     )
 
 
-def evaluations(job: Job, design: StudyDesign, policy: str = "policy") -> dict[str, EvaluateConfig]:
+def evaluations(job: Job, design: StudyDesign, folder: str = "policy") -> dict[str, EvaluateConfig]:
     """Return how the policy of a job is driven, by condition.
 
     Args:
         job: that trains it.
         design: of the study.
-        policy: folder of the policy.
+        folder: of the policy.
     """
-    arm, more = job.arm, design.robustness
-    assert arm is not None
+    policy, more = job.policy, design.robustness
+    assert policy is not None
     common: dict[str, Any] = {
-        "policy": (policy,),
+        "policy": (folder,),
         "seed": design.seed,
-        "label": arm.label,
-        "time_limit": design.tasks[arm.cell.task].rollout_limit,
+        "label": policy.label,
+        "time_limit": design.tasks[policy.cell.task].rollout_limit,
     }
     found = {"nominal": EvaluateConfig(episodes=design.rollouts, **common)}
     if job.robust and more:
         common["episodes"] = min(design.rollouts, more.rollouts)
         found["disturbed"] = EvaluateConfig(perturbation=",".join(more.perturbations), **common)
-        if arm.actions == "realised" and more.protections:
+        if policy.actions == "realised" and more.protections:
             found["protected"] = EvaluateConfig(protection=",".join(more.protections), **common)
     return found
 
@@ -100,11 +100,11 @@ def fingerprint(job: Job, design: StudyDesign) -> dict[str, Any]:
     """
     if job.cell:
         return _of_cell(job.cell, design)
-    if job.arm:
-        config = training(job.arm, design, Path("dataset"), Path("policy"))
+    if job.policy:
+        config = training(job.policy, design, Path("dataset"), Path("policy"))
         learnt = _some(config, _LEARNT) | {"sizes": as_json(resolved(config))}
         driven = {what: _some(each, _DRIVEN) for what, each in evaluations(job, design).items()}
-        return _of_cell(job.arm.cell, design) | {"training": learnt, "evaluations": driven}
+        return _of_cell(job.policy.cell, design) | {"training": learnt, "evaluations": driven}
     needed = {each.name: fingerprint(each, design) for each in jobs(design) if each.name in job.needs}
     return {"modes": list(design.modes), "baseline": design.baseline, "compared": needed}
 
@@ -120,8 +120,8 @@ def check_jobs(design: StudyDesign) -> None:
         with _named(design, job):
             if job.cell:
                 recording(job.cell, design, Path("dataset")).check()
-            if job.arm:
-                training(job.arm, design, Path("dataset"), Path("policy")).check()
+            if job.policy:
+                training(job.policy, design, Path("dataset"), Path("policy")).check()
                 for config in evaluations(job, design).values():
                     config.check()
     names = sorted(job.name for job in found)
@@ -136,11 +136,11 @@ def check_policies(design: StudyDesign) -> None:
     Raises:
         HandrailError: it cannot be built.
     """
-    firsts = {job.arm.cell.task: job for job in reversed(jobs(design)) if job.arm}
+    firsts = {job.policy.cell.task: job for job in reversed(jobs(design)) if job.policy}
     for job in firsts.values():
         with _named(design, job):
-            assert job.arm is not None
-            check_policy(training(job.arm, design, Path("dataset"), Path("policy")))
+            assert job.policy is not None
+            check_policy(training(job.policy, design, Path("dataset"), Path("policy")))
 
 
 def _of_cell(cell: Cell, design: StudyDesign) -> dict[str, Any]:

@@ -13,6 +13,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from handrail.controllers.errors import HandrailError
+from handrail.datasets.presentation.markdown import read_page, with_part
 from handrail.datasets.storage.atomic import explained, make_folder
 from handrail.datasets.storage.lock import DatasetLock
 from handrail.policies.imitation.training.installed import check_installed
@@ -22,8 +23,7 @@ from handrail.policies.study.design.jobs import Job, Layout, jobs
 from handrail.policies.study.design.load import load_design
 from handrail.policies.study.design.settings import check_policies
 from handrail.policies.study.execution.child import do
-from handrail.policies.study.progress.progress import Standing
-from handrail.policies.study.report.marks import between_marks, read_page
+from handrail.policies.study.progress.progress import StudyProgress
 
 FAILED = 1
 _PRELOAD = "handrail.policies.study.execution.preload"
@@ -72,20 +72,20 @@ def run_study(config: StudyConfig, start: Start = start_job) -> int:
     """
     config.check()
     design = load_design(config.preset)
-    standing, console = Standing(design, Layout(config.folder)), Console(stderr=True)
+    progress, console = StudyProgress(design, Layout(config.folder)), Console(stderr=True)
     check_installed("handrail-study", ("torch", "accelerate"), design.policy)
     if config.page:
-        between_marks(read_page(Path(config.page).expanduser()), design.name, "")
+        with_part(read_page(Path(config.page).expanduser()), f"study {design.name}", "")
     with _alone_in(config):
-        state = _State(done=set(standing.done))
+        state = _State(done=set(progress.done))
         if not config.report_only:
-            if any(name.startswith("policy/") for name in standing.missing):
+            if any(name.startswith("policy/") for name in progress.missing):
                 check_policies(design)
             with _terminating(state):
-                _run_all(start, config.workers, standing, state, console)
+                _run_all(start, config.workers, progress, state, console)
         from handrail.policies.study.report.report import write_study
 
-        files = write_study(config, Standing(design, standing.layout))
+        files = write_study(config, StudyProgress(design, progress.layout))
     for name, words in state.failed.items():
         console.print(f"failed: {name}: {words}", style="bold red", highlight=False, markup=False)
     console.print("Written: " + ", ".join(map(str, files)), highlight=False, soft_wrap=True)
@@ -103,8 +103,8 @@ def _alone_in(config: StudyConfig) -> Iterator[None]:
         lock.release()
 
 
-def _run_all(start: Start, workers: int, standing: Standing, state: _State, console: Console) -> None:
-    design, layout = standing.design, standing.layout
+def _run_all(start: Start, workers: int, progress: StudyProgress, state: _State, console: Console) -> None:
+    design, layout = progress.design, progress.layout
     todo = jobs(design)
     columns = (
         TextColumn("{task.description}"),
@@ -113,8 +113,8 @@ def _run_all(start: Start, workers: int, standing: Standing, state: _State, cons
         TimeElapsedColumn(),
         TextColumn("{task.fields[now]}"),
     )
-    with Progress(*columns, console=console) as progress:
-        bar = progress.add_task(f"study {design.name}", total=len(todo), completed=len(state.done), now="")
+    with Progress(*columns, console=console) as shown:
+        bar = shown.add_task(f"study {design.name}", total=len(todo), completed=len(state.done), now="")
         while True:
             for job in state.ready(todo):
                 if len(state.running) >= workers:
@@ -126,7 +126,7 @@ def _run_all(start: Start, workers: int, standing: Standing, state: _State, cons
             time.sleep(_ASLEEP)
             _collect_finished(state, layout)
             now = ", ".join(state.running)
-            progress.update(bar, completed=len(state.done), now=now)
+            shown.update(bar, completed=len(state.done), now=now)
     waiting = [job.name for job in todo if job.name not in state.done | state.failed.keys()]
     state.failed |= dict.fromkeys(waiting, "what it needs failed")
 

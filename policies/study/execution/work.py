@@ -12,10 +12,10 @@ from handrail.datasets.storage.atomic import remove
 from handrail.policies.imitation.evaluation.config import EvaluateConfig
 from handrail.policies.imitation.interface.checkpoint import last_checkpoint
 from handrail.policies.study.design.design import StudyDesign, TaskDesign
-from handrail.policies.study.design.jobs import CONDITIONS, Cell, Job, Layout, PolicyArm
+from handrail.policies.study.design.jobs import CONDITIONS, Cell, Job, Layout, StudyPolicy
 from handrail.policies.study.design.settings import evaluations, fingerprint, recording, training
 from handrail.policies.study.progress.notes import read_json, write_json
-from handrail.policies.study.progress.progress import Standing
+from handrail.policies.study.progress.progress import StudyProgress
 
 _MOST_ATTEMPTS = 6  # for each success that is wanted
 
@@ -46,14 +46,14 @@ def _stale(job: Job, now: Mapping[str, Any], before: Mapping[str, Any], layout: 
     """Return where something would be that does not go with the settings of now."""
     if job.cell:
         return [layout.dataset(job.cell)] if now["recording"] != before.get("recording") else []
-    if job.arm is None:
+    if job.policy is None:
         return []
-    arm, driven = job.arm, before.get("evaluations", {})
+    policy, driven = job.policy, before.get("evaluations", {})
     if any(now[part] != before.get(part) for part in ("recording", "wanted", "training")):
-        return [layout.policy(arm), *(layout.evaluation(arm, what) for what in CONDITIONS)]
-    gone = last_checkpoint(layout.policy(arm)) is None
+        return [layout.policy(policy), *(layout.evaluation(policy, what) for what in CONDITIONS)]
+    gone = last_checkpoint(layout.policy(policy)) is None
     others = [what for what in CONDITIONS if gone or now["evaluations"].get(what) != driven.get(what)]
-    return [layout.evaluation(arm, what) for what in others]
+    return [layout.evaluation(policy, what) for what in others]
 
 
 def work(job: Job, design: StudyDesign, layout: Layout) -> dict[str, Any]:
@@ -64,8 +64,8 @@ def work(job: Job, design: StudyDesign, layout: Layout) -> dict[str, Any]:
     """
     if job.cell:
         return _collect(job.cell, design, layout)
-    if job.arm:
-        return _policy(job, job.arm, design, layout)
+    if job.policy:
+        return _policy(job, job.policy, design, layout)
     return _compare(job.task, design, layout)
 
 
@@ -101,25 +101,25 @@ def _enough(found: Mapping[str, Any], wanted: TaskDesign) -> bool:
     return found["successes"] >= wanted.episodes and found["minutes"] >= wanted.minutes
 
 
-def _policy(job: Job, arm: PolicyArm, design: StudyDesign, layout: Layout) -> dict[str, Any]:
+def _policy(job: Job, policy: StudyPolicy, design: StudyDesign, layout: Layout) -> dict[str, Any]:
     """Train a policy and let it drive."""
     from handrail.policies.imitation.training.training import train
 
-    folder = train(training(arm, design, layout.dataset(arm.cell), layout.policy(arm)))
+    folder = train(training(policy, design, layout.dataset(policy.cell), layout.policy(policy)))
     driven = evaluations(job, design, str(folder))
-    shares = {what: _evaluate(config, layout.evaluation(arm, what)) for what, config in driven.items()}
+    shares = {what: _evaluate(config, layout.evaluation(policy, what)) for what, config in driven.items()}
     return {"checkpoint": str(folder.relative_to(layout.root)), "success": shares}
 
 
 def _evaluate(config: EvaluateConfig, file: Path) -> dict[str, float]:
-    """Run rollouts into a file of their own and return the success of each arm in it."""
+    """Run rollouts into a file of their own and return the success of each policy in it."""
     from handrail.datasets.comparison.evaluations import read_evaluations
     from handrail.policies.imitation.evaluation.evaluation import evaluate
 
     file.parent.mkdir(parents=True, exist_ok=True)
     evaluate(replace(config, json=str(file)))
-    arms = read_evaluations([file])
-    return {label: float(found.runs()[0].values.mean()) for label, found in arms.items()}
+    policies = read_evaluations([file])
+    return {label: float(found.runs()[0].values.mean()) for label, found in policies.items()}
 
 
 def _compare(task: str, design: StudyDesign, layout: Layout) -> dict[str, Any]:
@@ -129,8 +129,8 @@ def _compare(task: str, design: StudyDesign, layout: Layout) -> dict[str, Any]:
     from handrail.datasets.comparison.report.report import write_report
 
     cells = [Cell(task, mode) for mode in design.modes]
-    standing = Standing(design, layout)
-    files = [path for cell in cells for path in standing.evaluations(cell, "nominal")]
+    progress = StudyProgress(design, layout)
+    files = [path for cell in cells for path in progress.evaluations(cell, "nominal")]
     comparison = compare(
         CompareConfig(
             datasets=tuple(str(layout.dataset(cell)) for cell in cells),

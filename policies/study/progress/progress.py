@@ -20,7 +20,7 @@ _NAMED = 3  # jobs that are not done, in words
 
 
 @dataclass(frozen=True)
-class Standing:
+class StudyProgress:
     """What of a study is done; what is missing, or was made with other settings, is left out.
 
     Attributes:
@@ -59,9 +59,9 @@ class Standing:
     def evaluations(self, cell: Cell, what: str) -> list[Path]:
         """Return the files of the rollouts of a cell's policies under some condition."""
         return [
-            self.layout.evaluation(job.arm, what)
+            self.layout.evaluation(job.policy, what)
             for job in self._jobs
-            if job.arm and job.arm.cell == cell and job.name in self.done
+            if job.policy and job.policy.cell == cell and job.name in self.done
             if what in evaluations(job, self.design)
         ]
 
@@ -78,10 +78,10 @@ def is_done(job: Job, design: StudyDesign, layout: Layout) -> bool:
     try:
         if job.cell:
             return _has_dataset(layout.dataset(job.cell), note.get("result") or {})
-        if job.arm:
-            model_folder(layout.policy(job.arm))
+        if job.policy:
+            model_folder(layout.policy(job.policy))
             wanted = evaluations(job, design).items()
-            return all(_has_rollouts(layout.evaluation(job.arm, what), each) for what, each in wanted)
+            return all(_has_rollouts(layout.evaluation(job.policy, what), each) for what, each in wanted)
         return (layout.comparison(job.task) / "report.html").is_file()
     except HandrailError:
         return False
@@ -93,7 +93,7 @@ def _has_dataset(root: Path, result: Mapping[str, Any]) -> bool:
 
 def _has_rollouts(file: Path, config: EvaluateConfig) -> bool:
     """Return whether every seed was run under every condition."""
-    arms = read_evaluations([file]).values()
+    policies = read_evaluations([file]).values()
     wanted = set(config.seeds)
-    whole = [policy for arm in arms for policy in arm.policies if wanted <= policy.rollouts.keys()]
-    return len(arms) == len(whole) == len(config.protections) * len(config.perturbations)
+    whole = [policy for policy in policies for policy in policy.policies if wanted <= policy.rollouts.keys()]
+    return len(policies) == len(whole) == len(config.protections) * len(config.perturbations)

@@ -1,70 +1,101 @@
-"""Policies disturbed and protected, each beside the same policies in the same scenes without that."""
+"""What the conditions of a study are, and which of them are compared with which."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
 
-import numpy as np
+from handrail.controllers.errors import unknown_name
+from handrail.datasets.comparison.outcomes import LIKE_FOR_LIKE, Pair
+from handrail.policies.study.design.design import StudyDesign
+from handrail.policies.study.design.jobs import Actions, Cell, StudyPolicy
 
-from handrail.datasets.comparison.evaluations import Arm
-from handrail.datasets.comparison.outcomes import ArmOutcome, compare_rollouts, judge
-from handrail.datasets.statistics.proportions import ShareDifference
-from handrail.policies.study.report.arms import StudyArm
-
-CONTACTS = "contacts"
+UNPROTECTED = "joint velocities, unprotected"
+THROUGH_MPC = "intent through the MPC"
+CONTROLLER = "policy-plus-controller"  # families of comparisons, besides like for like
+PROTECTED = "protected"
 
 
 @dataclass(frozen=True)
-class Condition:
-    """All policies of an arm under one condition.
+class StudyCondition:
+    """What a condition is, field by field.
 
     Attributes:
-        arm: what it is.
-        outcome: success with its intervals.
-        touched: share of rollouts with a contact.
-        contacts: mean a rollout.
-        without: outcome of the same policies in the same scenes with neither disturbance nor protection; None
-            where this is it, or it is not known.
-        change: success minus that, as pairs.
+        mode: in which the demonstrations were made.
+        actions: what the policy writes, `realised` joint velocities or the operator's `intent`.
+        budget: how much it was trained on, `time` or `number`.
+        treatment: what disturbs or protects, `pushed` or `filter`; "" for neither.
     """
 
-    arm: StudyArm
-    outcome: ArmOutcome
-    touched: float
-    contacts: float
-    without: ArmOutcome | None = None
-    change: ShareDifference | None = None
+    mode: str
+    actions: Actions
+    budget: str
+    treatment: str = ""
+
+    @property
+    def label(self) -> str:
+        """What the policies are called under whatever treatment."""
+        return StudyPolicy(Cell("", self.mode), self.actions, self.budget, 0).label
+
+    @property
+    def family(self) -> str:
+        """Which family of comparisons it belongs to: p is adjusted over all of one, for every task."""
+        if self.actions == "intent":
+            return CONTROLLER
+        return PROTECTED if self.treatment else LIKE_FOR_LIKE
+
+    @property
+    def driven(self) -> str:
+        """What drives the robot: the policy alone, or a policy and a controller."""
+        return THROUGH_MPC if self.actions == "intent" else UNPROTECTED
 
 
-def conditions(
-    kinds: Mapping[str, StudyArm],
-    arms: Mapping[str, Arm],
-    undisturbed: Mapping[str, Arm],
-    rng: np.random.Generator,
-) -> dict[str, Condition]:
-    """Return every arm under its condition.
+def identify(design: StudyDesign, labels: Sequence[str]) -> dict[str, StudyCondition]:
+    """Return what the conditions of evaluation files are, like for like first: velocities, then intents.
 
-    Args:
-        kinds: what the arms are, by label, in the order to be shown.
-        arms: what they did.
-        undisturbed: what policies did with neither disturbance nor protection, by label.
-        rng: of the resampling.
+    A label says mode, actions and budget, then the treatment; this is the only place where one is read.
+
+    Raises:
+        HandrailError: a condition is not of the study.
     """
-    return {label: _condition(kind, arms[label], undisturbed, rng) for label, kind in kinds.items()}
+    spaces: tuple[Actions, ...] = ("realised", "intent")
+    kinds = [StudyCondition(*each) for each in product(design.modes, spaces, design.budgets)]
+    known = {kind.label: kind for kind in kinds}
+    found = {label: _identified(label, known) for label in labels}
+    return dict(sorted(found.items(), key=lambda item: _place(item[1], design)))
 
 
-def _condition(
-    kind: StudyArm, arm: Arm, undisturbed: Mapping[str, Arm], rng: np.random.Generator
-) -> Condition:
-    contacts = np.concatenate([run.values for run in arm.runs(CONTACTS)])
-    found = Condition(kind, outcome(arm, rng), float(np.mean(contacts > 0)), float(np.mean(contacts)))
-    whole = undisturbed.get(kind.label) if kind.condition else None
-    same = whole.only(arm.rollouts) if whole else None
-    if same is None or same.rollouts != arm.rollouts:
-        return found
-    return replace(found, without=outcome(same, rng), change=compare_rollouts(arm.runs(), same.runs()))
+def _identified(label: str, known: Mapping[str, StudyCondition]) -> StudyCondition:
+    own = max((each for each in known if f"{label} ".startswith(f"{each} ")), key=len, default=None)
+    if own is None:
+        raise unknown_name("condition of the evaluations", label, known)
+    kind = known[own]
+    return StudyCondition(kind.mode, kind.actions, kind.budget, label.removeprefix(own).strip())
 
 
-def outcome(arm: Arm, rng: np.random.Generator) -> ArmOutcome:
-    """Return how an arm fared, for itself."""
-    (found,) = judge({arm.label: arm}, arm.label, rng).arms
-    return found
+def _place(condition: StudyCondition, design: StudyDesign) -> tuple[int, bool, int]:
+    return (
+        design.budgets.index(condition.budget),
+        condition.actions == "intent",
+        design.modes.index(condition.mode),
+    )
+
+
+def pairs(conditions: Mapping[str, StudyCondition], baseline: str) -> list[Pair]:
+    """Return what is compared with what: like for like apart from a policy plus a controller.
+
+    That is the baseline mode's joint velocities on the same budget under the same treatment. A condition for
+    which there is none (yet) is compared with nothing.
+    """
+    base = {
+        (condition.budget, condition.treatment): label
+        for label, condition in conditions.items()
+        if (condition.mode, condition.actions) == (baseline, "realised")
+    }
+    against = {
+        label: base.get((condition.budget, condition.treatment)) for label, condition in conditions.items()
+    }
+    return [
+        Pair(label, other, conditions[label].family)
+        for label, other in against.items()
+        if other and other != label
+    ]

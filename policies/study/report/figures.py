@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from handrail.datasets.comparison.outcomes import ArmOutcome
+from handrail.datasets.comparison.outcomes import ConditionOutcome
 from handrail.datasets.presentation.drawing import COLOURS, new_figure, tidy
 from handrail.policies.study.design.design import StudyDesign
-from handrail.policies.study.report.arms import StudyArm
+from handrail.policies.study.report.conditions import StudyCondition
 from handrail.policies.study.report.results import TaskResults
 
 _WIDTH = 10.4  # [inch]
@@ -18,7 +18,7 @@ _WIDTH = 10.4  # [inch]
 def figures(design: StudyDesign, results: Sequence[TaskResults]) -> dict[str, Any]:
     """Return matplotlib figures by name; those for which there is something to show."""
     made: dict[str, Any] = {}
-    evaluated = [each for each in results if each.conditions]
+    evaluated = [each for each in results if each.undisturbed]
     if evaluated:
         made["answer"] = _answer(design, evaluated)
     if any(each.disturbed for each in evaluated):
@@ -29,36 +29,40 @@ def figures(design: StudyDesign, results: Sequence[TaskResults]) -> dict[str, An
     return made
 
 
-def _colour(design: StudyDesign, arm: StudyArm) -> str:
-    return COLOURS[design.modes.index(arm.mode) % len(COLOURS)]
+def _colour(design: StudyDesign, condition: StudyCondition) -> str:
+    return COLOURS[design.modes.index(condition.mode) % len(COLOURS)]
 
 
-def _mark(arm: StudyArm) -> str:
-    return "D" if arm.actions == "intent" else "o"
+def _mark(condition: StudyCondition) -> str:
+    return "D" if condition.actions == "intent" else "o"
 
 
-def _name(arm: StudyArm) -> str:
-    """Return what an arm is called: an intent is no policy alone."""
-    data = f"{arm.mode}, same number" if arm.budget == "number" else arm.mode
-    return f"{data}:\nintent through MPC" if arm.actions == "intent" else data
+def _name(condition: StudyCondition) -> str:
+    """Return what a condition is called: an intent is no policy alone."""
+    data = f"{condition.mode}, same number" if condition.budget == "number" else condition.mode
+    return f"{data}:\nintent through MPC" if condition.actions == "intent" else data
 
 
 def _answer(design: StudyDesign, results: Sequence[TaskResults]) -> Any:
-    """One panel a task: success of every arm; thick: these policies, thin: training too; ticks: seeds."""
-    rows = max(len(each.conditions) for each in results)
+    """One panel a task: success of every condition; thick: these policies, thin: training, ticks: seeds."""
+    rows = max(len(each.undisturbed) for each in results)
     figure = new_figure(_WIDTH, 1.2 + 0.4 * rows)
     grid = figure.subplots(1, len(results), squeeze=False)[0]
     for axes, each in zip(grid, results, strict=True):
-        for row, condition in enumerate(each.conditions.values()):
-            arm, colour = condition.outcome, _colour(design, condition.arm)
-            axes.plot(np.multiply(100, arm.wilson), [row, row], color=colour, lw=5.0, alpha=0.35)
-            if arm.nested:
-                axes.plot(np.multiply(100, arm.nested), [row, row], color=colour, lw=1.4)
+        for row, found in enumerate(each.undisturbed.values()):
+            outcome, colour = found.outcome, _colour(design, found.condition)
+            axes.plot(np.multiply(100, outcome.wilson), [row, row], color=colour, lw=5.0, alpha=0.35)
+            if outcome.nested:
+                axes.plot(np.multiply(100, outcome.nested), [row, row], color=colour, lw=1.4)
             axes.plot(
-                np.multiply(100, arm.seeds), np.full(len(arm.seeds), row + 0.26), "|", color=colour, ms=6
+                np.multiply(100, outcome.seeds),
+                np.full(len(outcome.seeds), row + 0.26),
+                "|",
+                color=colour,
+                ms=6,
             )
-            axes.plot(100 * arm.share, row, _mark(condition.arm), color=colour, ms=8, mec="white")
-        labels = [_name(condition.arm) for condition in each.conditions.values()]
+            axes.plot(100 * outcome.share, row, _mark(found.condition), color=colour, ms=8, mec="white")
+        labels = [_name(found.condition) for found in each.undisturbed.values()]
         axes.set(title=each.task.replace("_", " "), xlabel="policy success [%]", xlim=(-3, 103))
         axes.set(ylim=(len(labels) - 0.4, -0.6), yticks=range(len(labels)), yticklabels=labels)
         tidy(axes, "x")
@@ -66,25 +70,30 @@ def _answer(design: StudyDesign, results: Sequence[TaskResults]) -> Any:
 
 
 def _robustness(design: StudyDesign, results: Sequence[TaskResults]) -> Any:
-    """One panel a task: success of every arm under every condition."""
+    """One panel a task: success of every condition under every treatment."""
     figure = new_figure(_WIDTH, 3.2)
     grid = figure.subplots(1, len(results), squeeze=False, sharey=True)[0]
     for axes, each in zip(grid, results, strict=True):
-        names = ["undisturbed", *dict.fromkeys(found.arm.condition for found in each.disturbed.values())]
-        arms = list(dict.fromkeys(replace(found.arm, condition="") for found in each.disturbed.values()))
-        for place, arm in enumerate(arms):
-            shown = _by_condition(each, arm)
+        names = [
+            "undisturbed",
+            *dict.fromkeys(found.condition.treatment for found in each.disturbed.values()),
+        ]
+        conditions = list(
+            dict.fromkeys(replace(found.condition, treatment="") for found in each.disturbed.values())
+        )
+        for place, condition in enumerate(conditions):
+            shown = _by_treatment(each, condition)
             xs = [names.index(name) for name in shown]
-            shift = 0.5 * ((place + 0.5) / len(arms) - 0.5)
+            shift = 0.5 * ((place + 0.5) / len(conditions) - 0.5)
             values = np.array([outcome.share for outcome in shown.values()])
             spans = np.array([outcome.wilson for outcome in shown.values()])
             errors = np.abs(spans.T - values) * 100
             style = {
-                "color": _colour(design, arm),
-                "fmt": _mark(arm),
+                "color": _colour(design, condition),
+                "fmt": _mark(condition),
                 "ms": 5,
                 "lw": 1.2,
-                "label": _name(arm),
+                "label": _name(condition),
             }
             axes.errorbar(np.array(xs) + shift, 100 * values, yerr=errors, **style)
         axes.set(title=each.task.replace("_", " "), xticks=range(len(names)), ylim=(-3, 103))
@@ -97,12 +106,14 @@ def _robustness(design: StudyDesign, results: Sequence[TaskResults]) -> Any:
     return figure
 
 
-def _by_condition(results: TaskResults, arm: StudyArm) -> dict[str, ArmOutcome]:
-    """Return an arm disturbed, and undisturbed: the same policies in the same scenes."""
-    mine = [found for found in results.disturbed.values() if replace(found.arm, condition="") == arm]
+def _by_treatment(results: TaskResults, condition: StudyCondition) -> dict[str, ConditionOutcome]:
+    """Return a condition disturbed, and undisturbed: the same policies in the same scenes."""
+    mine = [
+        found for found in results.disturbed.values() if replace(found.condition, treatment="") == condition
+    ]
     without = next((found.without for found in mine if found.without), None)
     shown = {"undisturbed": without} if without else {}
-    return shown | {found.arm.condition: found.outcome for found in mine}
+    return shown | {found.condition.treatment: found.outcome for found in mine}
 
 
 def _sweep(design: StudyDesign, results: Sequence[TaskResults]) -> Any:
@@ -111,19 +122,19 @@ def _sweep(design: StudyDesign, results: Sequence[TaskResults]) -> Any:
     grid = figure.subplots(len(results), 2, squeeze=False)
     for (left, right), each in zip(grid, results, strict=True):
         for found in each.sweep.values():
-            arm = found[0].arm
+            condition = found[0].condition
             noises = [point.noise for point in found]
             shares = np.array([point.outcome.share for point in found])
             spans = np.array([point.outcome.wilson for point in found])
             style = {
-                "color": _colour(design, arm),
-                "marker": _mark(arm),
+                "color": _colour(design, condition),
+                "marker": _mark(condition),
                 "ms": 5,
                 "lw": 1.4,
-                "label": _name(arm),
+                "label": _name(condition),
             }
             left.errorbar(noises, 100 * shares, yerr=100 * np.abs(spans.T - shares), **style)
-            if arm.actions == "realised":
+            if condition.actions == "realised":
                 right.plot(noises, [point.seconds for point in found], **style)
         left.set(title=each.task.replace("_", " "), ylabel="policy success [%], 95 %", ylim=(-3, 103))
         right.set(title="operator's time", ylabel="s a successful demonstration", ylim=(0, None))

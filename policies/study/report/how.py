@@ -31,7 +31,9 @@ def _policies(design: StudyDesign, results: Sequence[TaskResults]) -> Iterator[s
             f"{', '.join(mixed)} against {design.baseline}: what the operator steers and the controller"
             " differ at once, so a difference does not say which of the two made it."
         )
-    intents = any(arm.arm.actions == "intent" for each in results for arm in each.conditions.values())
+    intents = any(
+        found.condition.actions == "intent" for each in results for found in each.undisturbed.values()
+    )
     yield (
         "Like for like are policies that write joint velocities, whatever the mode they learnt from: these go"
         " to the robot unprotected, or through the filter that is named."
@@ -54,10 +56,12 @@ def _differs_twice(mode: str, baseline: str) -> bool:
 
 
 def _intervals(results: Sequence[TaskResults]) -> Iterator[str]:
-    arms = [arm for each in results for arm in (each.policies.arms if each.policies else ())]
-    if not arms:
+    conditions = [
+        condition for each in results for condition in (each.policies.conditions if each.policies else ())
+    ]
+    if not conditions:
         return
-    several = any(len(arm.seeds) > 1 for arm in arms)
+    several = any(len(condition.seeds) > 1 for condition in conditions)
     together = "; rollouts of several policies in one scene count together" if several else ""
     yield f"Intervals are 95 %. “These policies”: Wilson, for these very policies in any scenes{together}."
     if several:

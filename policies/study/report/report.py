@@ -1,7 +1,6 @@
 """What a study writes: a page for people, JSON for programs, and its part of a Markdown page."""
 
 import importlib.metadata
-import io
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
@@ -15,15 +14,15 @@ from handrail.controllers.errors import HandrailError
 from handrail.datasets.comparison.finding import Finding
 from handrail.datasets.comparison.report.report import plain
 from handrail.datasets.presentation import markup
-from handrail.datasets.presentation.drawing import svg
+from handrail.datasets.presentation.drawing import png, svg
+from handrail.datasets.presentation.markdown import markdown_table, write_part
 from handrail.datasets.storage.atomic import write_whole
 from handrail.policies.study.config import StudyConfig
-from handrail.policies.study.progress.progress import Standing
+from handrail.policies.study.progress.progress import StudyProgress
 from handrail.policies.study.report.figures import figures
 from handrail.policies.study.report.how import how
-from handrail.policies.study.report.marks import between_marks, read_page
 from handrail.policies.study.report.results import TaskResults, gather
-from handrail.policies.study.report.tables import Table, tables
+from handrail.policies.study.report.tables import tables
 
 _CAPTIONS = {
     "answer": "Success of the policies; thick: 95 % for these policies, thin: with training, ticks: training"
@@ -32,58 +31,53 @@ _CAPTIONS = {
     "sweep": "How human the operator is, and what that does to policies and to the operator's time.",
 }
 _FORMAT = "handrail.study/1"
-_DPI = 110
 
 
-def write_study(config: StudyConfig, standing: Standing) -> list[Path]:
+def write_study(config: StudyConfig, progress: StudyProgress) -> list[Path]:
     """Write report.html and study.json, and the part of a Markdown page if asked; return the files.
 
     Args:
         config: says whether there is a page.
-        standing: of the study: only what is done is reported, and it says how much is not.
+        progress: of the study: only what is done is reported, and it says how much is not.
 
     Raises:
         HandrailError: a file cannot be written.
     """
-    design, root = standing.design, standing.layout.root
-    results = gather(standing, np.random.default_rng(design.seed))
+    design, root = progress.design, progress.layout.root
+    results = gather(progress, np.random.default_rng(design.seed))
     drawn = figures(design, results)
     files = {
-        root / "report.html": _html(standing, results, drawn),
-        root / "study.json": _json(standing, results),
+        root / "report.html": _html(progress, results, drawn),
+        root / "study.json": _json(progress, results),
     }
     try:
         for path, text in files.items():
             write_whole(path, text.encode())
         written = list(files)
         if config.page:
-            written += _write_page(Path(config.page).expanduser(), standing, results, drawn)
+            written += _write_page(Path(config.page).expanduser(), progress, results, drawn)
     except OSError as error:
         raise HandrailError(f"study: expected a folder that can be written, got {error}") from error
     return written
 
 
-def _html(standing: Standing, results: Sequence[TaskResults], drawn: Mapping[str, Any]) -> str:
-    design, layout = standing.design, standing.layout
+def _html(progress: StudyProgress, results: Sequence[TaskResults], drawn: Mapping[str, Any]) -> str:
+    design, layout = progress.design, progress.layout
     title = f"Study {design.name}: {', '.join(design.modes)}"
-    parts = [f"<header><h1>{title}</h1></header>"]
     answers = [f"{_title(each)}. {each.answer}" for each in results if each.answer]
-    parts += [markup.paragraph(answer, "headline") for answer in answers]
-    parts += [markup.paragraph(f"{standing.words}.")] if standing.words else []
+    parts = [markup.paragraph(answer, "headline") for answer in answers]
+    parts += [markup.paragraph(f"{progress.words}.")] if progress.words else []
     pictures = [(_CAPTIONS[name], "", svg(figure)) for name, figure in drawn.items()]
     parts += [markup.section("Figures", markup.panels(pictures, "wide"))] if pictures else []
     for each in results:
-        shown = [
-            f"<h3>{table.title}</h3>{markup.table(table.headings, table.rows)}" for table in tables(each)
-        ]
         words = [(_look(found), found.text) for found in each.findings]
         link = ""
         if (layout.comparison(each.task) / "report.html").is_file():
             address = f"comparisons/{each.task}/report.html"
-            link = f'<p><a href="{address}">The demonstrations compared: quality, trajectories</a></p>'
-        parts.append(markup.section(_title(each), markup.items(words), link, *shown))
+            link = markup.link("The demonstrations compared: quality, trajectories", address)
+        parts.append(markup.section(_title(each), markup.items(words), link, *tables(each)))
     parts.append(markup.section("How to read this", markup.paragraph(how(design, results))))
-    return markup.page(title, "".join(parts))
+    return markup.page(title, *parts)
 
 
 def _look(found: Finding) -> str:
@@ -98,12 +92,12 @@ def _title(results: TaskResults) -> str:
     return results.task.replace("_", " ").capitalize()
 
 
-def _json(standing: Standing, results: Sequence[TaskResults]) -> str:
+def _json(progress: StudyProgress, results: Sequence[TaskResults]) -> str:
     versions = software_versions() | {"torch": importlib.metadata.version("torch")}
     content = {
         "format": _FORMAT,
-        "design": asdict(standing.design),
-        "missing": standing.missing,
+        "design": asdict(progress.design),
+        "missing": progress.missing,
         "versions": versions,
         "tasks": {each.task: asdict(each) for each in results},
     }
@@ -111,31 +105,24 @@ def _json(standing: Standing, results: Sequence[TaskResults]) -> str:
 
 
 def _write_page(
-    page: Path, standing: Standing, results: Sequence[TaskResults], drawn: Mapping[str, Any]
+    page: Path, progress: StudyProgress, results: Sequence[TaskResults], drawn: Mapping[str, Any]
 ) -> list[Path]:
     """Put tables and figures between the study's marks; figures and JSON go beside the page."""
-    design = standing.design
+    design = progress.design
     stem = f"{page.stem}_{design.name}"
     parts = [f"`handrail-study --preset {design.name}` wrote this. {how(design, results)}"]
-    parts += [f"{standing.words}."] if standing.words else []
+    parts += [f"{progress.words}."] if progress.words else []
     written = [page]
     for name, figure in drawn.items():
         picture = page.parent / f"{stem}_{name}.png"
-        stream = io.BytesIO()
-        figure.savefig(stream, format="png", dpi=_DPI, metadata={"Software": None})
-        write_whole(picture, stream.getvalue())
+        write_whole(picture, png(figure))
         parts.append(f"![{_CAPTIONS[name]}]({picture.name})")
         written.append(picture)
     for each in results:
         parts += [f"### {_title(each)}", "\n".join(map(_bullet, each.findings))]
-        parts += [f"**{table.title}**\n\n{_markdown(table)}" for table in tables(each)]
+        parts += map(markdown_table, tables(each))
     data = page.parent / f"{stem}.json"
-    write_whole(data, _json(standing, results).encode())
+    write_whole(data, _json(progress, results).encode())
     body = "\n\n".join(filter(None, parts))
-    write_whole(page, between_marks(read_page(page), design.name, body).encode())
+    write_part(page, "Teleoperation modes", f"study {design.name}", body)
     return [*written, data]
-
-
-def _markdown(table: Table) -> str:
-    lines = [table.headings, ["---"] * len(table.headings), *table.rows]
-    return "\n".join("| " + " | ".join(cell.replace("|", "\\|") for cell in line) + " |" for line in lines)

@@ -1,9 +1,9 @@
 """The tables of a study, for a page in HTML and one in Markdown alike."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
-from handrail.datasets.comparison.outcomes import ArmOutcome, OutcomeDifference
+from handrail.datasets.comparison.outcomes import ConditionOutcome, OutcomeDifference
+from handrail.datasets.presentation.table import Table
 from handrail.datasets.presentation.wording import (
     DASH,
     THESE_POLICIES,
@@ -16,24 +16,9 @@ from handrail.datasets.presentation.wording import (
     points,
     points_span,
 )
-from handrail.policies.study.report.arms import StudyArm
-from handrail.policies.study.report.conditions import Condition
+from handrail.policies.study.report.conditions import StudyCondition
 from handrail.policies.study.report.results import TaskResults
-
-
-@dataclass(frozen=True)
-class Table:
-    """A table.
-
-    Attributes:
-        title: what it shows.
-        headings: of its columns.
-        rows: of text.
-    """
-
-    title: str
-    headings: tuple[str, ...]
-    rows: tuple[tuple[str, ...], ...]
+from handrail.policies.study.report.treatments import ConditionResult
 
 
 def tables(results: TaskResults) -> list[Table]:
@@ -42,7 +27,7 @@ def tables(results: TaskResults) -> list[Table]:
         _collected(results),
         _policies(results),
         _differences(results),
-        _conditions(results),
+        _treatments(results),
         _sweep(results),
     ]
     return [table for table in made if table.rows]
@@ -68,7 +53,7 @@ def _collected(results: TaskResults) -> Table:
                 reasons or DASH,
             )
         )
-    return Table("Collecting", headings, tuple(rows))
+    return Table(headings, rows, "Collecting")
 
 
 def _policies(results: TaskResults) -> Table:
@@ -77,23 +62,23 @@ def _policies(results: TaskResults) -> Table:
         "rollouts with contact", "trained on",
     )  # fmt: skip
     rows = []
-    for label, condition in results.conditions.items():
-        arm = condition.outcome
-        length = f"{number(arm.means['length'][0])}" if "length" in arm.means else DASH
+    for label, found in results.undisturbed.items():
+        outcome = found.outcome
+        length = f"{number(outcome.means['length'][0])}" if "length" in outcome.means else DASH
         rows.append(
             (
                 label,
-                condition.arm.driven,
-                _share(arm),
-                percent_span(arm.wilson),
-                percent_span(arm.nested),
-                ", ".join(percent(share) for share in arm.seeds),
+                found.condition.driven,
+                _share(outcome),
+                percent_span(outcome.wilson),
+                percent_span(outcome.nested),
+                ", ".join(percent(share) for share in outcome.seeds),
                 length,
-                percent(condition.touched),
-                _data(arm.trained_on),
+                percent(found.touched),
+                _data(outcome.trained_on),
             )
         )
-    return Table("Policies, undisturbed", headings, tuple(rows))
+    return Table(headings, rows, "Policies, undisturbed")
 
 
 def _differences(results: TaskResults) -> Table:
@@ -108,23 +93,27 @@ def _differences(results: TaskResults) -> Table:
         "detectable",
     )
     found = [
-        (conditions_[each.label], each)
-        for outcomes, conditions_ in (
-            (results.policies, results.conditions),
+        (results_[each.label], each)
+        for outcomes, results_ in (
+            (results.policies, results.undisturbed),
             (results.shielded, results.protected),
         )
         for each in (outcomes.differences if outcomes else ())
     ]
-    found.sort(key=lambda pair: pair[0].arm.actions == "intent")  # like for like first
-    return Table("Differences", headings, tuple(_difference(each, what.arm) for what, each in found))
+    found.sort(key=lambda pair: pair[0].condition.actions == "intent")  # like for like first
+    return Table(headings, [_difference(each, what.condition) for what, each in found], "Differences")
 
 
-def _difference(each: OutcomeDifference, arm: StudyArm) -> tuple[str, ...]:
-    alike = f"joint velocities, both through the {arm.condition}" if arm.condition else arm.driven
+def _difference(each: OutcomeDifference, condition: StudyCondition) -> tuple[str, ...]:
+    alike = (
+        f"joint velocities, both through the {condition.treatment}"
+        if condition.treatment
+        else condition.driven
+    )
     return (
         each.label,
         each.baseline,
-        "policy plus controller" if arm.actions == "intent" else alike,
+        "policy plus controller" if condition.actions == "intent" else alike,
         points(each.rollouts.estimate) + (" ●" if each.detected else ""),
         points_span(each.rollouts.interval),
         DASH if each.nested is None else points_span(each.nested),
@@ -133,10 +122,10 @@ def _difference(each: OutcomeDifference, arm: StudyArm) -> tuple[str, ...]:
     )
 
 
-def _conditions(results: TaskResults) -> Table:
+def _treatments(results: TaskResults) -> Table:
     headings = (
         "policy",
-        "condition",
+        "disturbed or protected by",
         "success",
         THESE_POLICIES,
         "without",
@@ -145,14 +134,14 @@ def _conditions(results: TaskResults) -> Table:
         "rollouts with contact",
         "contacts / 100 rollouts",
     )
-    rows = [_condition(each) for each in (*results.disturbed.values(), *results.protected.values())]
-    return Table("Disturbed, protected; beside the same rollouts without", headings, tuple(rows))
+    rows = [_treatment(each) for each in (*results.disturbed.values(), *results.protected.values())]
+    return Table(headings, rows, "Disturbed, protected; beside the same rollouts without")
 
 
-def _condition(each: Condition) -> tuple[str, ...]:
+def _treatment(each: ConditionResult) -> tuple[str, ...]:
     return (
-        each.arm.label,
-        each.arm.condition,
+        each.condition.label,
+        each.condition.treatment,
         _share(each.outcome),
         percent_span(each.outcome.wilson),
         _share(each.without) if each.without else DASH,
@@ -184,11 +173,11 @@ def _sweep(results: TaskResults) -> Table:
         for label, points_ in results.sweep.items()
         for point in points_
     ]
-    return Table("Operators from perfect to clumsy", headings, tuple(rows))
+    return Table(headings, rows, "Operators from perfect to clumsy")
 
 
-def _share(arm: ArmOutcome) -> str:
-    return f"{percent(arm.share)} ({arm.successes} of {arm.rollouts})"
+def _share(condition: ConditionOutcome) -> str:
+    return f"{percent(condition.share)} ({condition.successes} of {condition.rollouts})"
 
 
 def _data(trained_on: Mapping[str, float]) -> str:

@@ -7,7 +7,7 @@ from handrail.datasets.comparison.cautions import training_cautions
 from handrail.datasets.comparison.finding import Finding
 from handrail.datasets.comparison.outcome_findings import outcome_findings
 from handrail.datasets.comparison.outcomes import OutcomeDifference, Outcomes
-from handrail.policies.study.report.arms import StudyArm
+from handrail.policies.study.report.conditions import StudyCondition
 
 _UNPROTECTED = "Like for like, joint velocities, unprotected"
 _PROTECTED = "Like for like, joint velocities, both through the"
@@ -16,14 +16,14 @@ _CONTROLLER = "Policy plus controller, intent through the MPC against joint velo
 
 @dataclass(frozen=True)
 class Judged:
-    """Arms under conditions of one kind, and each against its baseline.
+    """Conditions under treatments of one kind, and each against its baseline.
 
     Attributes:
-        arms: what they are, by label.
+        conditions: what they are, by label.
         outcomes: how they fared; None before any was evaluated.
     """
 
-    arms: Mapping[str, StudyArm]
+    conditions: Mapping[str, StudyCondition]
     outcomes: Outcomes | None
 
 
@@ -47,34 +47,38 @@ def answer(undisturbed: Judged, shielded: Judged) -> str:
 def _titled(undisturbed: Judged, shielded: Judged) -> Iterator[tuple[str, Finding]]:
     """Yield findings with what they compare: joint velocities, these through a protection, then intents."""
     found = [*_of(undisturbed), *_of(shielded)]
-    for wanted in (_alike, lambda arm: bool(arm.condition), lambda arm: arm.actions == "intent"):
-        for arm, finding in found:
-            if wanted(arm):
-                yield _title(arm), finding
+    for wanted in (
+        _alike,
+        lambda condition: bool(condition.treatment),
+        lambda condition: condition.actions == "intent",
+    ):
+        for condition, finding in found:
+            if wanted(condition):
+                yield _title(condition), finding
 
 
-def _alike(arm: StudyArm) -> bool:
-    return arm.actions == "realised" and not arm.condition
+def _alike(condition: StudyCondition) -> bool:
+    return condition.actions == "realised" and not condition.treatment
 
 
-def _title(arm: StudyArm) -> str:
-    if arm.actions == "intent":
+def _title(condition: StudyCondition) -> str:
+    if condition.actions == "intent":
         return _CONTROLLER
-    return f"{_PROTECTED} {arm.condition}" if arm.condition else _UNPROTECTED
+    return f"{_PROTECTED} {condition.treatment}" if condition.treatment else _UNPROTECTED
 
 
-def _of(judged: Judged) -> Iterator[tuple[StudyArm, Finding]]:
-    """Yield what every difference says, arms called after their data alone: the title says the rest."""
+def _of(judged: Judged) -> Iterator[tuple[StudyCondition, Finding]]:
+    """Yield what every difference says, conditions called after their data alone: the title says the rest."""
     if judged.outcomes is None:
         return
-    by_label = {arm.label: arm for arm in judged.outcomes.arms}
+    by_label = {condition.label: condition for condition in judged.outcomes.conditions}
     for difference in judged.outcomes.differences:
         labels = [difference.label, difference.baseline]
-        names = [judged.arms[label].label for label in labels]
+        names = [judged.conditions[label].label for label in labels]
         both = tuple(replace(by_label[label], label=name) for label, name in zip(labels, names, strict=True))
         named = replace(difference, label=names[0], baseline=names[1])
         (finding,) = outcome_findings(Outcomes(both, (named,)))
-        yield judged.arms[difference.label], finding
+        yield judged.conditions[difference.label], finding
 
 
 def _missing(judged: Judged, baseline: str) -> Iterator[str]:
@@ -82,8 +86,8 @@ def _missing(judged: Judged, baseline: str) -> Iterator[str]:
     compared = {each.label for each in differences}
     alone = [
         label
-        for label, arm in judged.arms.items()
-        if label not in compared and (arm.mode, arm.actions) != (baseline, "realised")
+        for label, condition in judged.conditions.items()
+        if label not in compared and (condition.mode, condition.actions) != (baseline, "realised")
     ]
     if alone:
         yield (
@@ -95,11 +99,11 @@ def _missing(judged: Judged, baseline: str) -> Iterator[str]:
 def _cautions(judged: Judged) -> Iterator[str]:
     """Yield what the intervals leave out; budgets differ on purpose, so each for itself."""
     found = judged.outcomes
-    for budget in dict.fromkeys(arm.budget for arm in judged.arms.values()):
-        mine = {label for label, arm in judged.arms.items() if arm.budget == budget}
+    for budget in dict.fromkeys(condition.budget for condition in judged.conditions.values()):
+        mine = {label for label, condition in judged.conditions.items() if condition.budget == budget}
         if found and any(each.label in mine for each in found.differences):
-            arms = tuple(arm for arm in found.arms if arm.label in mine)
-            yield from training_cautions(Outcomes(arms, _only(found.differences, mine)))
+            conditions = tuple(condition for condition in found.conditions if condition.label in mine)
+            yield from training_cautions(Outcomes(conditions, _only(found.differences, mine)))
 
 
 def _only(differences: Sequence[OutcomeDifference], labels: set[str]) -> tuple[OutcomeDifference, ...]:

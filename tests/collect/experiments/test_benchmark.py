@@ -65,8 +65,8 @@ def test_the_report_carries_everything_with_it(written):
     html = (folder / "report" / "benchmark.html").read_text()
     sources = re.findall(r'(?:src|href)="([^"]+)"', html)
     assert len(sources) == 4  # paths, distributions, profiles, paired
-    assert all(source.startswith("data:image/png;base64,") for source in sources)
-    assert all(base64.b64decode(s.split(",")[1]).startswith(b"\x89PNG") for s in sources)
+    assert all(source.startswith("data:image/svg+xml;base64,") for source in sources)
+    assert all(base64.b64decode(s.split(",")[1]).startswith(b"<?xml") for s in sources)
     for words in ("masked MPC", "paper: proposed", "0.098 ± 0.047", "Wilcoxon", "fast3", "dt 0."):
         assert words in html
 
@@ -100,7 +100,7 @@ def test_page_report_and_terminal_hold_a_closed_loop_to_its_aim(tmp_path):
     config = BenchmarkConfig(controllers="dls", goals=1, physics=False, video=False, **places)
     results = benchmark(replace(config, early_stop=False, closed_loop=True), BASELINES, QUIET)
     console = Console(width=200, record=True, file=StringIO())
-    console.print(benchmark_tables(results))
+    console.print(*benchmark_tables(results))
     html = (tmp_path / "report" / "benchmark.html").read_text()
     for text in ((tmp_path / "page.md").read_text(), html, console.export_text()):
         assert "beyond 10 mm" in text
@@ -109,7 +109,7 @@ def test_page_report_and_terminal_hold_a_closed_loop_to_its_aim(tmp_path):
 
 def test_tables_show_every_controller(written):
     console = Console(width=200, record=True, file=StringIO())
-    console.print(benchmark_tables(written[1]))
+    console.print(*benchmark_tables(written[1]))
     text = console.export_text()
     for words in ("mpc", "dls", "paper: RL", "success %", "mpc minus"):
         assert words in text

@@ -5,9 +5,9 @@ import pytest
 
 from handrail.collect.experiments.benchmark.catalogue import BASELINES
 from handrail.collect.experiments.benchmark.config import BenchmarkConfig
-from handrail.collect.experiments.benchmark.format import paired_table, settles, settling_table
 from handrail.collect.experiments.benchmark.metrics import METRICS, Trace, arm_effort, jerkiness, measure
 from handrail.collect.experiments.benchmark.results import summarise
+from handrail.collect.experiments.benchmark.tables import paired_table, profile_tables
 from handrail.collect.tasks.goal_reaching import STEP
 from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.interface.command import Status
@@ -100,9 +100,10 @@ def test_what_an_update_costs_is_compared_on_the_same_goals():
     config = BenchmarkConfig(controllers="mpc,dls", goals=3)
     results = summarise(rows, config, [BASELINES["mpc"], BASELINES["dls"]], {})
     assert results["paired"]["nominal"]["dls"]["update_ms_median"]["mean"] == pytest.approx(0.25)
-    headings, ((*_, cell),) = paired_table(results, ("update_ms_median",), "nominal")
-    assert headings[1] == "update ms"
-    assert cell.startswith("0.25 [0.25, 0.25]")
+    table = paired_table(results, ("update_ms_median",), "nominal")
+    ((*_, cell),) = table.rows
+    assert table.headings[1] == "update ms"
+    assert str(cell).startswith("0.25\n[0.25, 0.25], p ")
 
 
 def test_a_planner_that_sees_the_hand_is_held_to_its_aim():
@@ -114,12 +115,12 @@ def test_a_planner_that_sees_the_hand_is_held_to_its_aim():
     ]
     whole = BenchmarkConfig(controllers="mpc", goals=3, closed_loop=True, early_stop=False)
     results = summarise(rows, whole, [BASELINES["mpc"]], {})
-    assert settles(results)
-    headings, found = settling_table(results, "nominal")
-    assert headings[-1] == "beyond 10 mm"
-    assert found == [
+    (table,) = [each for each in profile_tables(results, "nominal") if each.title == "nominal: settling"]
+    assert table.headings[-1] == "beyond 10 mm"
+    assert table.rows == [
         ["mpc", "the planner's last step", "7.0", "14.0", "1 of 3"],
         ["mpc", "4 s later", "8.0", "12.0", "1 of 3"],
     ]
     for other in (BenchmarkConfig(closed_loop=True), BenchmarkConfig(early_stop=False)):
-        assert not settles(summarise(rows, other, [BASELINES["mpc"]], {}))
+        others = profile_tables(summarise(rows, other, [BASELINES["mpc"]], {}), "nominal")
+        assert not [each for each in others if "settling" in each.title]

@@ -148,9 +148,9 @@ def test_policies_come_first(ours, tmp_path):
     assert "Policies trained on quick succeeded more often" in headline(found)
     assert content["outcomes"]["differences"][0]["nested"][1] < 0
     assert any("training seeds" in text["text"] for text in content["findings"])
-    assert as_json(comparison, found)["outcomes"]["arms"][0]["label"] == "quick"
+    assert as_json(comparison, found)["outcomes"]["conditions"][0]["label"] == "quick"
     wrong = evaluations(tmp_path / "wrong.json", telepathy=0.9)
-    with pytest.raises(HandrailError, match="unknown arm 'telepathy', expected one of quick, slow"):
+    with pytest.raises(HandrailError, match="unknown condition 'telepathy', expected one of quick, slow"):
         compare(CompareConfig(tuple(ours), evaluations=(str(wrong),)))
 
 

@@ -9,7 +9,7 @@ from handrail.datasets.comparison import compare as comparing
 from handrail.datasets.comparison.collection import collected, success_difference
 from handrail.datasets.comparison.config import CompareConfig
 from handrail.datasets.comparison.differences import differences
-from handrail.datasets.comparison.evaluations import Arm, Policy
+from handrail.datasets.comparison.evaluations import Condition, Policy
 from handrail.datasets.comparison.findings import findings
 from handrail.datasets.comparison.groups import Group
 from handrail.datasets.comparison.outcomes import LIKE_FOR_LIKE, Pair, in_families, judge, judge_pairs
@@ -150,7 +150,7 @@ def arm(label, mean, policies, generator, scenes=100, luck=0.0, hard=0.0, diffic
         share = mean + luck * generator.normal() + (0.0 if difficulty is None else hard * difficulty)
         values = generator.random(scenes) < np.clip(share, 0.0, 1.0)
         found.append(Policy(0, seed, {}, {k: {"success": float(value)} for k, value in enumerate(values)}))
-    return Arm(label, tuple(found))
+    return Condition(label, tuple(found))
 
 
 @pytest.mark.parametrize(("policies", "luck"), [(1, 0.0), (3, 0.05), (3, 0.1), (5, 0.1)])
@@ -197,7 +197,7 @@ def test_an_interval_over_scenes_covers(quick, hard):
     for _ in range(200):
         difficulty = generator.choice([-1.0, 1.0], size=60)
         found = arm("a", 0.5, 3, generator, scenes=60, hard=hard, difficulty=difficulty)
-        (outcome,) = judge({"a": found}, "a", generator).arms
+        (outcome,) = judge({"a": found}, "a", generator).conditions
         covered += outcome.wilson[0] <= 0.5 <= outcome.wilson[1]
         low, high = wilson(outcome.successes, outcome.rollouts)
         naive += low <= 0.5 <= high
@@ -240,6 +240,6 @@ def test_an_arm_is_compared_with_the_baseline_of_its_own_kind():
     ]
     assert comparing._pairs(["ee"], "direct", labels) == []
     with pytest.raises(
-        HandrailError, match="expected an arm 'direct' to compare 'ee' with, got ee, direct same"
+        HandrailError, match="expected a condition 'direct' to compare 'ee' with, got ee, direct same"
     ):
         comparing._pairs(["ee", "direct same number"], "direct", labels)

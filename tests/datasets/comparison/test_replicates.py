@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from handrail.datasets.comparison.evaluations import Arm, Policy
+from handrail.datasets.comparison.evaluations import Condition, Policy
 from handrail.datasets.comparison.outcomes import judge
 from handrail.datasets.statistics.paired import paired_success
 from handrail.datasets.statistics.proportions import mcnemar_by_scene, paired_shares
@@ -38,7 +38,7 @@ def arm(label, shares):
         Policy(0, run.training_seed, {}, {k: {"success": v} for k, v in enumerate(run.values.tolist())})
         for run in runs(shares)
     ]
-    return Arm(label, tuple(policies))
+    return Condition(label, tuple(policies))
 
 
 def test_welch_knows_how_few_training_seeds_there_are():
@@ -73,7 +73,7 @@ def test_intervals_over_three_seeds_are_as_wide_as_t():
     low, high = t_interval(0.4, error, freedom)
     assert found.differences[0].nested == pytest.approx((low, high), abs=1e-6)
     assert high - low == pytest.approx(2 * stats.t.ppf(0.975, freedom) * error)
-    assert found.arms[0].nested == pytest.approx((0.7 - 4.3027 * 0.2 / np.sqrt(3), 1.0), abs=1e-4)
+    assert found.conditions[0].nested == pytest.approx((0.7 - 4.3027 * 0.2 / np.sqrt(3), 1.0), abs=1e-4)
 
 
 def test_an_interval_over_three_seeds_covers():
@@ -86,7 +86,7 @@ def test_an_interval_over_three_seeds_covers():
             Policy(0, place, {}, {k: {"success": float(v)} for k, v in enumerate(each)})
             for place, each in enumerate(values)
         )
-        (found,) = judge({"a": Arm("a", policies)}, "a", generator).arms
+        (found,) = judge({"a": Condition("a", policies)}, "a", generator).conditions
         covered += found.nested[0] <= 0.5 <= found.nested[1]
     assert covered >= 182
 

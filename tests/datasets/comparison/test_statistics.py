@@ -164,7 +164,7 @@ def test_a_clear_difference_is_detected_and_chance_is_not(tmp_path):
     assert clear.rollouts.paired
     assert clear.nested[1] < 0
     assert clear.p <= clear.p_adjusted
-    assert outcomes.arms[0].means["contacts"][0] == pytest.approx(0.5)
+    assert outcomes.conditions[0].means["contacts"][0] == pytest.approx(0.5)
 
 
 def test_training_seeds_are_not_taken_for_a_difference_of_data():
@@ -199,7 +199,7 @@ def test_one_training_seed_says_nothing_of_training(tmp_path):
     outcomes = judge(read_evaluations([arms(tmp_path, a=[0.9], b=[0.5])]), "a", rng())
     (difference,) = outcomes.differences
     assert difference.nested is None
-    assert outcomes.arms[0].nested is None
+    assert outcomes.conditions[0].nested is None
 
 
 def test_two_training_seeds_are_too_few_where_they_differ_much(tmp_path):
@@ -215,8 +215,11 @@ GOOD = {"training_seed": 0, "rollouts": [{"seed": 1, "success": True}]}
 WRONG = {
     "format": ({"arms": {"a": [GOOD]}}, "expected the format 'handrail.evaluations/1', got None"),
     "no arms": ({"format": FORMAT, "arms": {}}, "expected 'arms' with one label or more"),
-    "no policies": ({"format": FORMAT, "arms": {"a": []}}, "arm 'a': expected a list of trained policies"),
-    "no seed": ({"format": FORMAT, "arms": {"a": [{"rollouts": []}]}}, "arm 'a': expected"),
+    "no policies": (
+        {"format": FORMAT, "arms": {"a": []}},
+        "condition 'a': expected a list of trained policies",
+    ),
+    "no seed": ({"format": FORMAT, "arms": {"a": [{"rollouts": []}]}}, "condition 'a': expected"),
     "no rollouts": (
         {"format": FORMAT, "arms": {"a": [GOOD | {"rollouts": []}]}},
         "expected one rollout or more, got none",

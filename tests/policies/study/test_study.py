@@ -68,7 +68,7 @@ def test_report_says_what_is_in_the_files(tmp_path, preset):
     config = StudyConfig(preset, str(tmp_path / "study"), page=str(page))
     assert run_study(config, Starter()) == 0
     content = json.loads((tmp_path / "study/study.json").read_text())
-    arms = {arm["label"]: arm for arm in content["tasks"]["reach"]["policies"]["arms"]}
+    arms = {arm["label"]: arm for arm in content["tasks"]["reach"]["policies"]["conditions"]}
     assert set(arms) == {"ee", "ee intent", "direct"}
     assert all(arm["rollouts"] == 80 for arm in arms.values())
     (ee,) = [d for d in content["tasks"]["reach"]["policies"]["differences"] if d["label"] == "ee"]

@@ -7,13 +7,13 @@ import pytest
 from study_helpers import DESIGN, Starter
 
 from handrail.controllers.errors import HandrailError
+from handrail.datasets.presentation.markdown import with_part
 from handrail.datasets.storage.lock import DatasetLock
 from handrail.policies.study.config import StudyConfig
 from handrail.policies.study.design import design as design_module
 from handrail.policies.study.design.design import Robustness, StudyDesign, Sweep, TaskDesign
 from handrail.policies.study.design.load import load_design
 from handrail.policies.study.execution.run import _last_words, _mark, run_study
-from handrail.policies.study.report.marks import between_marks
 from handrail.scripts.study import main
 
 
@@ -114,10 +114,10 @@ def test_a_page_whose_marks_are_no_pair_is_left_alone_before_anything_begins(mar
 def test_a_page_keeps_all_that_is_not_between_the_marks():
     parts = [f"<!-- study {name} -->\n{name}\n<!-- end of study {name} -->" for name in "ab"]
     old = "\n".join(["before", parts[0], "between", parts[1], "after"])
-    new = between_marks(old, "a", "new")
+    new = with_part(old, "study a", "new")
     assert new == old.replace("\na\n", "\n\nnew\n\n")
-    assert between_marks(new, "a", "new") == new
-    assert between_marks("text", "c", "new").startswith("text\n")
+    assert with_part(new, "study a", "new") == new
+    assert with_part("text", "study c", "new").startswith("text\n")
 
 
 @pytest.mark.parametrize("place", ["file", "file/below", "/proc/nope"])

@@ -17,7 +17,7 @@ from handrail.policies.study.design.settings import fingerprint
 from handrail.policies.study.execution.run import run_study
 from handrail.policies.study.execution.work import begin
 from handrail.policies.study.progress.notes import read_json, write_json
-from handrail.policies.study.progress.progress import Standing, is_done
+from handrail.policies.study.progress.progress import StudyProgress, is_done
 
 
 @pytest.fixture
@@ -45,8 +45,8 @@ def test_what_other_settings_made_is_removed_and_nothing_else(change, goes, tmp_
     design, layout, found = everything(tmp_path, preset)
     names = {"collect/reach/ee", "policy/reach/ee/realised-time-0"}
     collect, policy = (job for job in found if job.name in names)
-    made = {"dataset": layout.dataset(collect.cell), "policy": layout.policy(policy.arm)}
-    made |= {what: layout.evaluation(policy.arm, what) for what in ("nominal", "disturbed", "protected")}
+    made = {"dataset": layout.dataset(collect.cell), "policy": layout.policy(policy.policy)}
+    made |= {what: layout.evaluation(policy.policy, what) for what in ("nominal", "disturbed", "protected")}
     for job in (collect, policy):
         begin(job, change(design), layout)
     assert {name for name, path in made.items() if not path.exists()} == (
@@ -56,26 +56,26 @@ def test_what_other_settings_made_is_removed_and_nothing_else(change, goes, tmp_
 
 def test_rollouts_of_a_policy_that_is_gone_go_too(tmp_path, preset):
     design, layout, found = everything(tmp_path, preset)
-    job = next(job for job in found if job.arm)
-    shutil.rmtree(layout.policy(job.arm))
+    job = next(job for job in found if job.policy)
+    shutil.rmtree(layout.policy(job.policy))
     begin(job, design, layout)
-    assert not layout.evaluation(job.arm, "nominal").exists()
+    assert not layout.evaluation(job.policy, "nominal").exists()
 
 
 def test_what_nobody_knows_the_settings_of_is_neither_used_nor_removed(tmp_path, preset):
     design, layout, found = everything(tmp_path, preset)
-    for job in found[:1] + [job for job in found if job.arm][:1]:
+    for job in found[:1] + [job for job in found if job.policy][:1]:
         layout.begun(job).unlink()
         with pytest.raises(HandrailError, match="expected a note"):
             begin(job, design, layout)
-        made = layout.dataset(job.cell) if job.cell else layout.policy(job.arm)
+        made = layout.dataset(job.cell) if job.cell else layout.policy(job.policy)
         assert made.exists()
 
 
 def test_the_preset_s_sizes_are_part_of_what_a_policy_depends_on(tmp_path, preset, monkeypatch):
     design, layout, found = everything(tmp_path, preset)
-    policies = {job.name for job in found if job.arm}
-    assert Standing(design, layout).missing == []
+    policies = {job.name for job in found if job.policy}
+    assert StudyProgress(design, layout).missing == []
     monkeypatch.setitem(presets._ACT_CPU, "dropout", 0.1)
     lost = {job.name for job in found if not is_done(job, design, layout)}
     assert lost == policies | {job.name for job in found if job.task}
@@ -137,7 +137,7 @@ def test_done_means_that_everything_is_there(case, tmp_path, preset):
         "policy": "policy/reach/ee/realised-time-0",
         "compare": "compare/reach",
     }
-    assert Standing(design, layout).missing == [name[kind]]
+    assert StudyProgress(design, layout).missing == [name[kind]]
 
 
 def test_the_report_has_nothing_of_other_settings_and_counts_what_is_missing(tmp_path, preset):
@@ -153,7 +153,7 @@ def test_the_report_has_nothing_of_other_settings_and_counts_what_is_missing(tmp
 
     results, missing = report(DESIGN.replace("seeds = [0, 1]", "seeds = [0]"))
     assert missing == ["compare/reach"]
-    assert [arm["rollouts"] for arm in results["policies"]["arms"]] == [40, 40, 40]
+    assert [arm["rollouts"] for arm in results["policies"]["conditions"]] == [40, 40, 40]
     results, missing = report(DESIGN.replace("steps = 10", "steps = 11"))
     assert results["policies"] is None
     assert not results["disturbed"]

@@ -8,14 +8,14 @@ from compare_helpers import check_texts
 
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.comparison.collection import Collected
-from handrail.datasets.comparison.evaluations import Arm, Policy
+from handrail.datasets.comparison.evaluations import Condition, Policy
 from handrail.datasets.comparison.outcomes import LIKE_FOR_LIKE
 from handrail.datasets.statistics.proportions import holm
 from handrail.policies.study.design.design import Robustness, StudyDesign, Sweep, TaskDesign
 from handrail.policies.study.design.jobs import jobs
 from handrail.policies.study.report import results as studied
-from handrail.policies.study.report.arms import CONTROLLER, PROTECTED, identify
-from handrail.policies.study.report.figures import _by_condition, figures
+from handrail.policies.study.report.conditions import CONTROLLER, PROTECTED, identify
+from handrail.policies.study.report.figures import _by_treatment, figures
 from handrail.policies.study.report.how import how
 from handrail.policies.study.report.tables import tables
 
@@ -32,7 +32,7 @@ def arm(label, share, seeds, scenes, trained_on=None):
         luck = np.random.default_rng([seed, *label.encode()]).random(scenes)
         rollouts = {k: {"success": float(luck[k] < share), "contacts": k % 2} for k in range(scenes)}
         found.append(Policy(0, seed, trained_on or {"episodes": 5.0}, rollouts))
-    return Arm(label, tuple(found))
+    return Condition(label, tuple(found))
 
 
 @pytest.fixture
@@ -42,7 +42,7 @@ def gathered(monkeypatch):
     def made(design, task, what, noise):
         found = {}
         for job in jobs(design):
-            own = job.arm
+            own = job.policy
             if own and (own.cell.task, own.cell.noise) == (task, noise) and (what == "nominal" or job.robust):
                 ending = {"nominal": "", "disturbed": " pushed", "protected": " filter"}[what]
                 if what != "protected" or own.actions == "realised":
@@ -56,7 +56,7 @@ def gathered(monkeypatch):
         def read(design, _, task, what, noise=1.0):
             return {k: v for k, v in made(design, task, what, noise).items() if k not in missing}
 
-        monkeypatch.setattr(studied, "_arms", read)
+        monkeypatch.setattr(studied, "_conditions", read)
         monkeypatch.setattr(
             studied, "_collected", lambda _, cell: Collected(cell.mode, 10, 9, (0.6, 1.0), 90.0, 900, {})
         )
@@ -95,7 +95,7 @@ def test_without_the_baseline_nothing_is_compared(gathered):
 
 def test_an_arm_of_another_study_is_refused():
     with pytest.raises(
-        HandrailError, match="unknown arm of the evaluations 'leader': expected one of direct"
+        HandrailError, match="unknown condition of the evaluations 'leader': expected one of direct"
     ):
         identify(DESIGN, ["ee", "leader"])
 
@@ -143,16 +143,16 @@ def test_a_family_is_one_kind_of_comparison_over_all_tasks(gathered):
 
 def test_undisturbed_beside_disturbed_is_the_same_policies_in_the_same_scenes(gathered):
     (found,) = gathered(ROBUST)
-    assert found.conditions["ee"].outcome.rollouts == 120
+    assert found.undisturbed["ee"].outcome.rollouts == 120
     for each in (*found.disturbed.values(), *found.protected.values()):
         assert each.without.rollouts == each.outcome.rollouts == 15
-        share = 0.9 if each.arm.mode == "ee" else 0.3
-        values = arm(each.arm.label, share, [0], 40).runs()[0].values[:15]
+        share = 0.9 if each.condition.mode == "ee" else 0.3
+        values = arm(each.condition.label, share, [0], 40).runs()[0].values[:15]
         assert each.without.seeds == (values.mean(),)
         assert (each.change.paired, each.change.trials) == (True, (15,))
         assert each.change.estimate == pytest.approx(each.outcome.share - each.without.share)
     pushed = found.disturbed["ee pushed"]
-    shown = _by_condition(found, found.conditions["ee"].arm)
+    shown = _by_treatment(found, found.undisturbed["ee"].condition)
     assert shown == {"undisturbed": pushed.without, "pushed": pushed.outcome}
 
 

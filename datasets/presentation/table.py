@@ -1,12 +1,12 @@
-"""A table for a terminal of 80 columns: lines break between words, nothing is cut off."""
+"""One value for a table, wherever it is shown: here on a terminal, in `markup` as HTML, in `markdown`."""
 
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from rich import box
+from rich import table as rich_table
 from rich.console import Console, ConsoleOptions
-from rich.table import Column, Table
 from rich.text import Text
 
 _NUMBER = re.compile(r"[-+]?\d[\d.]*(e[-+]?\d+)?|[-–]|")
@@ -15,22 +15,47 @@ _GAP = 2  # between two columns
 
 
 @dataclass(frozen=True)
-class PlainTable:
-    """Headings and rows; what does not fit side by side follows below, the first column once more beside it.
+class Cell:
+    """A cell of a table.
+
+    Attributes:
+        text: What it says.
+        look: A class of the style: `detected`, `quiet` or ""; only of HTML.
+        note: Shown when pointed at; only of HTML.
+        below: A second line, smaller.
+    """
+
+    text: str
+    look: str = ""
+    note: str = ""
+    below: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.text}\n{self.below}" if self.below else self.text
+
+
+@dataclass(frozen=True)
+class Table:
+    """Headings and rows.
+
+    On a terminal lines break between words and nothing is cut off: what does not fit side by side follows
+    below, the first column once more beside it.
 
     Attributes:
         headings: of the columns; a unit in brackets is text like the rest.
-        rows: one cell a column each.
+        rows: one cell a column each, a text or more than that.
         title: above it.
         caption: below it.
     """
 
     headings: Sequence[str]
-    rows: Sequence[Sequence[str]]
+    rows: Sequence[Sequence[Cell | str]]
     title: str = ""
     caption: str = ""
 
-    def __rich_console__(self, console: Console, options: ConsoleOptions) -> Iterator[Table | Text]:
+    def __rich_console__(
+        self, console: Console, options: ConsoleOptions
+    ) -> Iterator[rich_table.Table | Text]:
         """Yield the parts that fit."""
         if self.title:
             yield Text(self.title, "bold")
@@ -41,7 +66,7 @@ class PlainTable:
             yield Text(f"{self.caption}\n", "dim")
 
     def _cells(self, column: int) -> list[str]:
-        return [row[column] for row in self.rows]
+        return [str(row[column]) for row in self.rows]
 
     def _least(self, column: int) -> int:
         """Return the width below which a column reads badly."""
@@ -63,11 +88,11 @@ class PlainTable:
             part.append(column)
         yield part
 
-    def _table(self, part: Sequence[int], width: int) -> Table:
+    def _table(self, part: Sequence[int], width: int) -> rich_table.Table:
         widths = self._widths(part, width)
         columns = [self._column(column, widths[column]) for column in part]
         tall = any("\n" in cell or len(cell) > widths[each] for each in part for cell in self._cells(each))
-        table = Table(
+        table = rich_table.Table(
             *columns,
             box=box.SIMPLE_HEAD,
             leading=int(tall),
@@ -76,7 +101,7 @@ class PlainTable:
             show_edge=False,
         )
         for row in self.rows:
-            table.add_row(*(Text(row[column]) for column in part))
+            table.add_row(*(Text(str(row[column])) for column in part))
         return table
 
     def _widths(self, part: Sequence[int], width: int) -> dict[int, int]:
@@ -90,10 +115,10 @@ class PlainTable:
             widths[widest] -= 1
         return widths
 
-    def _column(self, column: int, width: int) -> Column:
+    def _column(self, column: int, width: int) -> rich_table.Column:
         cells = self._cells(column)
         numbers = all(map(_NUMBER.fullmatch, cells)) and any(map(str.strip, "".join(cells).strip("–")))
-        return Column(
+        return rich_table.Column(
             Text(self.headings[column]), width=width, overflow="fold", justify="right" if numbers else "left"
         )
 

@@ -1,0 +1,64 @@
+"""One value for a table: a terminal, a report and a Markdown page show the same cells."""
+
+import html
+import io
+
+import numpy as np
+import pytest
+from places import ROOT
+from rich.console import Console
+
+from handrail.controllers.errors import HandrailError
+from handrail.datasets.presentation.markdown import markdown_table, with_part
+from handrail.datasets.presentation.markup import page, section
+from handrail.datasets.presentation.table import Cell, Table
+from handrail.datasets.statistics.resampling import p_of_difference
+
+TABLE = Table(
+    ("who", "how much [m]"),
+    [["a|b", Cell("1.0", "quiet", "why", "0.5 … 1.5")], ["<c>", "2"]],
+    "Sizes",
+    "All.",
+)
+
+
+def test_every_cell_is_shown_everywhere():
+    console = Console(width=80, record=True, file=io.StringIO())
+    console.print(TABLE)
+    shown = page("t", section("s", TABLE))
+    words = ("who", "how much [m]", "a|b", "1.0", "0.5 … 1.5", "<c>", "2", "Sizes")
+    for text in (console.export_text(), html.unescape(shown), markdown_table(TABLE).replace("\\|", "|")):
+        assert [word for word in words if word not in text] == []
+    assert "<c>" not in shown
+    assert '<td class="quiet" title="why">' in shown
+    assert "a\\|b" in markdown_table(TABLE)
+
+
+def test_there_is_one_page_one_stylesheet_and_one_table():
+    """A report that writes its own would drift away from the others."""
+    floors = ("datasets", "collect/experiments", "policies", "scripts")
+    files = [path for floor in floors for path in (ROOT / floor).rglob("*.py")]
+    made = {
+        mark: [path.name for path in files if mark in path.read_text()]
+        for mark in ("<style", "<table", "<!doctype")
+    }
+    assert made == {"<style": ["markup.py"], "<table": ["markup.py"], "<!doctype": ["markup.py"]}
+
+
+def test_a_part_is_replaced_between_either_kind_of_mark():
+    for end in ("end", "end of"):
+        old = f"before\n\n<!-- run -->\nold\n<!-- {end} run -->\n\nafter\n"
+        new = with_part(old, "run", "new")
+        assert "old" not in new
+        assert new.startswith("before\n\n<!-- run -->\n\nnew\n")
+        assert new.endswith("\n\nafter\n")
+    with pytest.raises(HandrailError, match="once each"):
+        with_part("<!-- run -->\nold\n", "run", "new")
+
+
+def test_the_p_of_a_few_values_counts_every_permutation():
+    low, high = np.arange(4.0), np.arange(4.0) + 10.0
+    for seed in range(3):
+        rng = np.random.default_rng(seed)
+        assert p_of_difference(low, high, False, rng) == pytest.approx(2 / 70)  # of 8 over 4
+        assert p_of_difference(low, high, True, rng) == pytest.approx(2 / 16)
