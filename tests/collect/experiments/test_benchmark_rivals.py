@@ -18,6 +18,7 @@ from handrail.collect.experiments.benchmark.run import trace_of
 from handrail.collect.tasks.goal_reaching import STEP
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import State
+from handrail.controllers.interface.prediction import after
 from handrail.controllers.mpc.masked_mpc import MaskedMpc
 from handrail.controllers.registry import resolved
 from handrail.controllers.robot.model import load_model
@@ -36,7 +37,9 @@ def test_a_rival_s_low_pass_is_the_mpc_s():
     times = np.cumsum(np.random.default_rng(1).choice([STEP, 0.0, 0.5], 40, p=[0.8, 0.1, 0.1]))
     hand, smooth, predict = HandIntent(MODEL), SmoothedHandIntent(MODEL), goal_reaching_prediction(CHANNELS)
     for twist, time in zip(twists, times, strict=True):
-        expected = predict(hand(twist, STATE, time), np.array([0.0, 0.5, 1.0]))[0]
+        asked = hand(twist, STATE, time)
+        predict = after(predict, asked)
+        expected = predict(asked, np.array([0.0, 0.5, 1.0]))[0]
         sent = smooth(twist, STATE, time)
         np.testing.assert_allclose(sent.values, expected)
         assert (sent.time, sent.mask.tolist()) == (time, CHANNELS.mask("ee").tolist())
