@@ -106,7 +106,7 @@ def test_the_correction_is_the_smallest():
     velocity = mpc.update(state, intent).velocity(PERIOD)
     evaluate = Evaluator(mpc.residuals, problem.horizon)
     found = evaluate(problem, mpc.plan.u)
-    solver = ConvergedSolver(mpc.residuals, problem.horizon, MODEL.size, problem.dt, "ipopt")
+    solver = ConvergedSolver(mpc.residuals, problem.horizon, MODEL.size, problem.dt)
     best = evaluate(problem, solver.solve(problem, mpc.plan.u).u)
     assert velocity[0] < 0.7  # it does correct
     assert found.collision_slack < 1e-3

@@ -6,7 +6,7 @@ import re
 import shlex
 from collections import Counter
 from pathlib import Path
-from typing import get_type_hints
+from typing import Any, get_type_hints
 
 import pytest
 from command_helpers import command
@@ -74,13 +74,24 @@ def test_the_demo_s_folder_is_given_either_way():
     assert (done.returncode, done.stderr.count("\n")) == (2, 1), done.stderr
 
 
+def is_list(hint: Any) -> bool:
+    """Whether a type is that of a list with a flag, perhaps with help of its own."""
+    given = getattr(hint, "__metadata__", ())
+    positional = "Positional" in map(str, given)
+    return not positional and any(given[:1] == kind.__metadata__[:1] for kind in LISTS)
+
+
 def list_flags(config: type, prefix: str = "") -> list[str]:
     """Return the flags and fields of a config that take a list."""
     found = []
     for name, hint in get_type_hints(config, include_extras=True).items():
         if dataclasses.is_dataclass(hint):
             found += list_flags(hint, f"{prefix}{name}.")
-        elif hint in LISTS:
+        elif any(
+            hint.__metadata__[: len(kind.__metadata__)] == kind.__metadata__
+            for kind in LISTS
+            if hasattr(hint, "__metadata__")
+        ):
             found.append(f"{prefix}{name}")
     return found
 

@@ -80,6 +80,8 @@ def turns(node: ast.expr, value: ast.expr, function: Function) -> list[str]:
     """Return the words that a name takes in the innermost loop around it; "…" for the name of a setting."""
     if (isinstance(value, ast.Attribute) and value.attr == "name") or names_a_setting(value, function):
         return ["…"]
+    if isinstance(value, ast.Attribute) and value.attr == "_thing":  # of a registry whose names files may say
+        return ["task", "mode", "operator", "robot"]
     words: list[str] = []
     for around in ast.walk(function):  # from the outside in
         if any(inner is node for inner in ast.walk(around)):

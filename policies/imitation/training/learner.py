@@ -83,7 +83,7 @@ def build_accelerator(policy: Any) -> Accelerator:
     )
     kind = accelerator.distributed_type
     if kind not in _WHOLE_MODEL:
-        raise HandrailError(f"accelerate: expected one process, --multi_gpu or --cpu; got {kind.value}")
+        raise HandrailError(f"accelerate launch: expected one process or --multi_gpu, got {kind.value}")
     return accelerator
 
 

@@ -154,7 +154,7 @@ def read_source(config: TrainConfig, began: PolicyMeta | None = None) -> Source:
 def _check_one_mode(selection: Selection, said: str) -> None:
     """Check that an intent can be completed when the policy drives: as in its mode, and there is but one."""
     modes = Counter(str(row.get("mode") or "") for row in selection.rows)
-    if len(modes) == 1 and modes.keys() <= {*MODES, said}:
+    if len(modes) == 1 and modes.keys() <= {*MODES, said} - {""}:
         return
     found = ", ".join(f"{mode or 'no mode'} ({count})" for mode, count in modes.most_common())
     known = next((mode for mode, _ in modes.most_common() if mode in MODES), None)

@@ -158,7 +158,7 @@ def test_one_bad_policy_is_named_and_the_others_run(workers, folder, tmp_path):
     assert [reason.count("\n") for reason in raised.value.reasons] == [0, 0, 0]
     for name, words in (
         ("nothing", "found none"),
-        ("mixed", "unknown teleop mode 'mixed'"),
+        ("mixed", "unknown mode 'mixed'"),
         ("broken", "no weights"),
     ):
         assert any(words in reason for reason in raised.value.reasons), name
@@ -196,5 +196,5 @@ def test_a_label_is_shown_as_it_is(folder, tmp_path):
 
 
 def test_only_bad_policies_are_bad_input(folder):
-    with pytest.raises(HandrailError, match="found none; unknown teleop mode"):
+    with pytest.raises(HandrailError, match="found none; unknown mode"):
         evaluate(config(folder / "nothing", folder / "mixed"), load=unable)
