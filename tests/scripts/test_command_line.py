@@ -87,11 +87,7 @@ def list_flags(config: type, prefix: str = "") -> list[str]:
     for name, hint in get_type_hints(config, include_extras=True).items():
         if dataclasses.is_dataclass(hint):
             found += list_flags(hint, f"{prefix}{name}.")
-        elif any(
-            hint.__metadata__[: len(kind.__metadata__)] == kind.__metadata__
-            for kind in LISTS
-            if hasattr(hint, "__metadata__")
-        ):
+        elif is_list(hint):
             found.append(f"{prefix}{name}")
     return found
 
