@@ -6,7 +6,7 @@ import re
 import shlex
 from collections import Counter
 from pathlib import Path
-from typing import Any, get_type_hints
+from typing import Any, get_args, get_type_hints
 
 import pytest
 from command_helpers import command
@@ -76,9 +76,8 @@ def test_the_demo_s_folder_is_given_either_way():
 
 def is_list(hint: Any) -> bool:
     """Whether a type is that of a list with a flag, perhaps with help of its own."""
-    given = getattr(hint, "__metadata__", ())
-    positional = "Positional" in map(str, given)
-    return not positional and any(given[:1] == kind.__metadata__[:1] for kind in LISTS)
+    _, *given = get_args(hint) or (hint,)
+    return "Positional" not in map(str, given) and any(given[:1] == [get_args(kind)[1]] for kind in LISTS)
 
 
 def list_flags(config: type, prefix: str = "") -> list[str]:
