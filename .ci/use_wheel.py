@@ -10,7 +10,7 @@ import tomllib
 from importlib import metadata
 from pathlib import Path
 
-EXTRAS = ("stable_baselines3", "mink")  # imported at the top of modules that only an extra's users import
+EXTRAS = ("accelerate", "stable_baselines3", "mink")  # imported at the top of modules that only an extra's users import
 FOLDERS = ("collect", "controllers", "datasets", "policies", "scripts")
 
 
