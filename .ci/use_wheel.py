@@ -10,7 +10,8 @@ import tomllib
 from importlib import metadata
 from pathlib import Path
 
-EXTRAS = ("accelerate", "stable_baselines3", "mink")  # imported at the top of modules that only an extra's users import
+# imported at the top of modules that only an extra's users import
+EXTRAS = ("accelerate", "stable_baselines3", "mink")
 FOLDERS = ("collect", "controllers", "datasets", "policies", "scripts")
 
 
