@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import ArrayLike, DTypeLike, NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from handrail.collect.simulation.gate import Gate
 from handrail.collect.simulation.scene import Scene
@@ -26,7 +26,7 @@ class IdealRobot:
         step: from one command to the next [s].
         meshes: taken for the sake of MuJoCo's robot; there is nothing to draw.
         grip: None, for nothing can be held.
-        precision: of the numbers that are sent.
+        gate: what every command passes; by default one that sends a dataset's numbers.
 
     Raises:
         HandrailError: something in the scene can be moved, or is held: that takes physics.
@@ -42,13 +42,13 @@ class IdealRobot:
         step: float,
         meshes: bool = False,
         grip: float | None = None,
-        precision: DTypeLike = np.float32,
+        gate: Gate | None = None,
     ) -> None:
         if scene.movables or grip is not None:
             things = ", ".join(item.name for item in scene.movables)
             raise HandrailError(f"ideal robot: expected a scene where nothing can be moved, got {things}")
         self._model, self._scene, self._step = model, scene, step
-        self._gate = Gate(model, step, precision=precision)
+        self._gate = gate or Gate(model, step)
         self._collision = CollisionModel(model, scene.obstacles())
         self._q, self._steps = np.array(q), 0
         self._distances = self._collision.values(self._q[None])[0]

@@ -6,7 +6,7 @@ from contextlib import contextmanager
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import ArrayLike, DTypeLike, NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from handrail.collect.simulation.contacts import ContactMonitor, GraspMonitor
 from handrail.collect.simulation.gate import Gate
@@ -37,7 +37,7 @@ class Simulation:
         grip: width of what the gripper is closed around at the beginning [m]; None where it is open.
         grips: whether the gripper can move; else it stays open.
         timestep: longest step of the integrator [s].
-        precision: of the numbers that are sent.
+        gate: what every command passes; by default one that sends a dataset's numbers.
 
     Raises:
         HandrailError: the gripper is closed around something, and cannot move.
@@ -58,7 +58,7 @@ class Simulation:
         grip: float | None = None,
         grips: bool = True,
         timestep: float = _TIMESTEP,
-        precision: DTypeLike = np.float32,
+        gate: Gate | None = None,
     ) -> None:
         if grip is not None and not grips:
             raise HandrailError(f"grip of a simulation: expected none without grips, got {grip}")
@@ -81,7 +81,7 @@ class Simulation:
         portable = [item.name for item in scene.movables if item.portable]
         self._grasp = GraspMonitor(self.mujoco_model, fingers, portable)
         self._index()
-        self._gate = Gate(model, step, float(grip is not None), precision)
+        self._gate = gate or Gate(model, step, float(grip is not None))
         self._place(q, grip)
 
     def _index(self) -> None:

@@ -1,6 +1,6 @@
 """Random clutter, movers, and random, rude intents, for the safety fuzz.
 
-The robot is MuJoCo's; excesses are those of what the controller says, before the robot's own limits.
+The robot is MuJoCo's, and its gate stands open: what the controller says is what is sent.
 Contacts and distances are MuJoCo's too.
 """
 
@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from handrail.collect.simulation.gate import Gate
 from handrail.collect.simulation.gl import mujoco
 from handrail.collect.simulation.robot import FINGERS
 from handrail.collect.simulation.scene import Scene, SceneObject, View
@@ -81,6 +82,14 @@ def _thing(name: str, q: np.ndarray, rng: np.random.Generator) -> SceneObject:
     else:
         shape = Shape("box", [*rng.uniform(0.1, 0.6, 2), height])
     return SceneObject(name, shape, np.array([x, y, raised + height / 2]), rgba=(0.5, 0.5, 0.5, 1.0))
+
+
+class OpenGate(Gate):
+    """Sends what comes: nothing but the controller keeps the limits."""
+
+    def limit(self, command, q):
+        self.velocity = np.array(np.asarray(command)[:-1])
+        return np.asarray(command)
 
 
 class RudeOperator:
@@ -166,7 +175,7 @@ class OwnDistances:
 
 
 class _Around:
-    """Says how near things are, to explain a contact."""
+    """Says how near things are, and when the movers turned round, to explain a contact."""
 
     def __init__(self, model, scene):
         self._scene, self._collision = scene, CollisionModel(model, scene.obstacles())
@@ -175,14 +184,16 @@ class _Around:
         self._collision.update_scene(self._scene.obstacles(state.time))
         distances = self._collision.values(state.q[None])[0]
         still = distances[self._collision.kinds != MOVING].min()
-        return f"robot at {np.abs(state.v).max():.2f}, nearest that stands {still:.3f} m"
+        since = [f"{state.time % (m.patrol.length / m.patrol.speed):.2f} s" for m in self._scene.movers]
+        turned = f", movers turned {', '.join(since)} before" if since else ""
+        return f"robot at {np.abs(state.v).max():.2f}, nearest that stands {still:.3f} m{turned}"
 
 
 def run(model: RobotModel, controller, seed: int, seconds: float, movers: int = 0) -> FuzzResult:
     """Drive a robot through a scene of a seed with whatever comes; return what happened."""
     rng = np.random.default_rng([seed, movers])
     scene, q = cluttered(model, movers, rng)
-    simulation = Simulation(model, scene, q, PERIOD)
+    simulation = Simulation(model, scene, q, PERIOD, gate=OpenGate(model, PERIOD))
     own = OwnDistances(model, simulation.mujoco_model)
     around = _Around(model, scene)
     controller.reset(scene.obstacles(0.0))

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from rl_helpers import random_actor
 
+from handrail.collect.simulation.gate import Gate
 from handrail.collect.simulation.ideal_robot import IdealRobot
 from handrail.collect.simulation.scene import Scene
 from handrail.collect.tasks.goal_reaching import STEP, Goal
@@ -40,7 +41,7 @@ def test_the_controller_moves_like_the_environment(controller):
         observation, _ = env.reset(seed=seed)
         controller.reset()
         controller.aim(env.planner.goal)
-        robot = IdealRobot(MODEL, Scene(), home, STEP, precision=np.float64)
+        robot = IdealRobot(MODEL, Scene(), home, STEP, gate=Gate(MODEL, STEP, precision=np.float64))
         for t in range(80):
             command = controller.update(robot.state(), intent(env.planner.twist(t), t * STEP))
             observation, *_ = env.step(actor(observation))
