@@ -148,7 +148,7 @@ class _Recorded:
         action, before = self._actions[self._frame].astype(np.float64), np.array(state.commanded)
         self._frame += 1
         velocities = np.stack([before, action[:-1], np.zeros(len(before))])
-        return Command(velocities, self._period, float(action[-1]))
+        return Command(velocities, self._period, gripper=float(action[-1]))
 
 
 class _Nobody:

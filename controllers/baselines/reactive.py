@@ -8,6 +8,7 @@ import numpy as np
 from handrail.controllers.arrays import BoolArray, FloatArray
 from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.collision.surroundings import Surroundings
+from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.command import Command, Diagnostics, Status
 from handrail.controllers.interface.controller import State
@@ -18,7 +19,10 @@ from handrail.controllers.robot.shape import Obstacle
 from handrail.controllers.safety.limiter import Limiter
 
 Ask = Callable[[State, Intent, FloatArray], FloatArray]
-"""State, intent, velocity commanded last (n,) → velocity wanted (n,) [m/s, rad/s]."""
+"""State, intent, velocity commanded last (n,) → velocity wanted (n,) [m/s, rad/s].
+
+Raises HandrailError where there is none.
+"""
 
 
 class ReactiveController:
@@ -33,6 +37,13 @@ class ReactiveController:
         period: time in which a velocity is reached, one control period [s].
         intent_timeout: age from which an intent is stale [s].
         understood: channels that may be commanded, (m,); all of them when None.
+        margins: that `ask` keeps: between shapes, and between tool shapes and work surfaces [m].
+
+    Attributes:
+        channels: the robot's command channels.
+        surroundings: what stands around.
+        slack: by how much `ask` could not keep what it keeps, at the last update.
+        distances: of all pairs then, if `ask` has measured them, (P,) [m].
     """
 
     def __init__(
@@ -42,6 +53,7 @@ class ReactiveController:
         period: float = 0.05,
         intent_timeout: float = 0.25,
         understood: BoolArray | None = None,
+        margins: tuple[float, float] = (0.0, 0.0),
     ) -> None:
         self.channels = Channels.of(model.description)
         self._model = model
@@ -50,48 +62,50 @@ class ReactiveController:
         self._validator = InputValidator(self.channels, intent_timeout)
         self._period = period
         self._foreign = np.zeros(self.channels.size, dtype=bool) if understood is None else ~understood
+        self._margins = margins
         self.reset()
 
     def reset(self, obstacles: tuple[Obstacle, ...] = ()) -> None:
         """Forget when inputs came, and the gripper; take the obstacles whose distance is reported."""
-        self._surroundings = Surroundings(CollisionModel(self._model, obstacles))
+        self.surroundings = Surroundings.of(CollisionModel(self._model, obstacles), *self._margins)
         self._inputs = InputHistory()
         self._gripper = 0.0
 
     def update_scene(self, obstacles: tuple[Obstacle, ...]) -> None:
-        """Take where the obstacles are now, and what the hand holds."""
-        self._surroundings = self._surroundings.among(obstacles)
+        """Take where the obstacles are now, how fast they move, and what the hand holds."""
+        self.surroundings = self.surroundings.among(obstacles)
 
     def update(self, state: State, intent: Intent) -> Command:
-        """Return the command from now on."""
+        """Return the command from now on; brakes on an input that is invalid or stale."""
         start = perf_counter()
-        makes_sense = self._surroundings.make_sense
+        self.slack = 0.0
+        self.distances: FloatArray | None = None
+        makes_sense = self.surroundings.make_sense
         status, self._inputs = self._validator.check(state, intent, makes_sense, self._inputs)
         if status is Status.OK and np.any(intent.mask & self._foreign):
             status = Status.INVALID_INTENT
         previous = state.sent(self._model.description.limits)
         target = np.zeros(self._model.size)
         if status is Status.OK:
-            target = self._ask(state, intent, previous)
             self._gripper = min(max(intent.gripper, 0.0), 1.0)
+            try:
+                target = self._ask(state, intent, previous)
+            except HandrailError:
+                status = Status.SOLVER_FAILED
         q = state.q if state.is_of(self._model.size) else None
         velocity, clipped = self._limiter.limit(previous, target, self._period, q)
         if status is Status.OK and clipped:
             status = Status.CLIPPED
         velocities = self._limiter.to_rest(np.stack([previous, velocity]), self._period)
-        diagnostics = self._diagnostics(state, status, start)
-        return Command(velocities, self._period, self._gripper, diagnostics)
-
-    def _diagnostics(self, state: State, status: Status, start: float) -> Diagnostics:
         solve_time = perf_counter() - start
-        if not state.is_of(self._model.size):
-            return Diagnostics(status, solve_time)
-        collision = self._surroundings.collision
-        distances = collision.values(state.q[None, :])[0]
-        work = collision.work
-        return Diagnostics(
-            status=status,
-            solve_time=solve_time,
-            smallest_distance=float(np.min(distances[~work], initial=np.inf)),
-            work_distance=float(np.min(distances[work], initial=np.inf)),
-        )
+        near = (np.inf, np.inf) if q is None else self._smallest(q)
+        diagnostics = Diagnostics(status, solve_time, self.slack, *near)
+        return Command(velocities, self._period, gripper=self._gripper, diagnostics=diagnostics)
+
+    def _smallest(self, q: FloatArray) -> tuple[float, float]:
+        """Return the smallest distances now [m]; margins of what is held are seen by the way."""
+        distances = self.distances
+        if distances is None:
+            distances = self.surroundings.collision.values(q[None])[0]
+        self.surroundings = self.surroundings.seen(distances)
+        return self.surroundings.smallest(distances)

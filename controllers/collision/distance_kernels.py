@@ -127,34 +127,3 @@ def _add_gradient(witness, start, jacobian, moves, sign, out):
             linear = nx * jacobian[0, j] + ny * jacobian[1, j] + nz * jacobian[2, j]
             angular = mx * jacobian[3, j] + my * jacobian[4, j] + mz * jacobian[5, j]
             out[j] += sign * (linear + angular)
-
-
-@jit
-def smallest_distances(distances, work):
-    """Return the smallest of all pairs but tools against work surfaces, and of those; infinite if none [m].
-
-    Args:
-        distances: (P,) [m].
-        work: which pairs are a tool against a work surface, (P,).
-    """
-    smallest, at_work = np.inf, np.inf
-    for p in range(len(distances)):
-        if work[p]:
-            at_work = min(at_work, distances[p])
-        else:
-            smallest = min(smallest, distances[p])
-    return smallest, at_work
-
-
-@jit
-def depth(values):
-    """Return by how much pairs overlap along a path that do not at its start, or not as much [m].
-
-    Args:
-        values: distances, (K, P) [m].
-    """
-    deepest = 0.0
-    for k in range(values.shape[0]):
-        for p in range(values.shape[1]):
-            deepest = max(deepest, min(values[0, p], 0.0) - values[k, p])
-    return deepest

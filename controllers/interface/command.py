@@ -2,11 +2,9 @@
 
 from dataclasses import dataclass, field
 from enum import StrEnum
-from functools import cached_property
 
 import numpy as np
 
-from handrail.controllers.arrays import FloatArray, frozen
 from handrail.controllers.interface.trajectory import Trajectory
 
 
@@ -38,8 +36,6 @@ class Diagnostics:
         slack: largest violation of a soft limit in the plan, in its own unit.
         smallest_distance: smallest signed distance now, tool against work surfaces left out [m].
         work_distance: smallest signed distance of the tool against work surfaces now [m].
-        tracking_error: norm of the commanded channels' error at the end of the plan [m/s, rad/s].
-        phases: where the update's time went [s].
     """
 
     status: Status = Status.OK
@@ -47,37 +43,18 @@ class Diagnostics:
     slack: float = 0.0
     smallest_distance: float = np.inf
     work_distance: float = np.inf
-    tracking_error: float = 0.0
-    phases: tuple[tuple[str, float], ...] = ()
 
 
 @dataclass(frozen=True)
-class Command:
+class Command(Trajectory):
     """A velocity trajectory from now on, linear between its knots, at rest after the last.
 
+    It began before now, `elapsed` > 0, where an earlier plan is being followed.
+
     Attributes:
-        velocities: generalised velocities at times 0, dt, 2 dt, … since the first knot, (k, n) [m/s, rad/s].
-        dt: time between knots [s].
         gripper: 0 open, 1 closed.
         diagnostics: how the controller fared.
-        elapsed: how long ago the first knot was [s]; zero but where an earlier plan is being followed.
     """
 
-    velocities: FloatArray
-    dt: float
     gripper: float = 0.0
     diagnostics: Diagnostics = field(default_factory=Diagnostics)
-    elapsed: float = 0.0
-
-    def __post_init__(self) -> None:
-        """Copy the array and make it read-only."""
-        object.__setattr__(self, "velocities", frozen(self.velocities))
-
-    @cached_property
-    def trajectory(self) -> Trajectory:
-        """The velocities as a trajectory."""
-        return Trajectory(self.velocities, self.dt, self.elapsed)
-
-    def velocity(self, time: float) -> FloatArray:
-        """Return the commanded velocity `time` [s] from the update on, (n,)."""
-        return self.trajectory.velocity(time)

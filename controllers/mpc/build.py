@@ -9,7 +9,13 @@ from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import State
 from handrail.controllers.interface.intent import Intent
 from handrail.controllers.mpc.loop_state import LoopState
-from handrail.controllers.ocp.motion import cut, resumed
+from handrail.controllers.objectives.objective import Objective
+from handrail.controllers.objectives.regularisation import (
+    acceleration_regularisation,
+    posture,
+    velocity_regularisation,
+)
+from handrail.controllers.objectives.tracking import tracking
 from handrail.controllers.ocp.problem import Problem
 from handrail.controllers.ocp.residuals import StageResiduals
 from handrail.controllers.ocp.settings import MpcSettings
@@ -42,20 +48,19 @@ class ProblemBuilder:
         settings = self._settings
         reference, parameters = self._reference.copy(), loop.parameters.copy()
         predicted = np.asarray(loop.predict(intent, self._times), dtype=np.float64)
-        cut(predicted, intent.mask, self._largest, reference)
+        bounded = np.minimum(np.maximum(predicted, -self._largest), self._largest)
+        reference[:, : self._channels.size] = np.where(intent.mask, bounded, 0.0)
         parameters[self._residuals.parameter_slice("tracking")] = intent.frames.parameters
-        limit = self._limits.velocity
         return Problem(
             q=state.q,
-            v=resumed(state.sent(self._limits), state.v, self._tolerance, limit),
+            v=resumed(state.sent(self._limits), state.v, self._tolerance),
             dt=settings.dt,
             reference=reference,
             weights=self._weights_of(intent.mask.tobytes()),
             parameters=parameters,
-            channels=self._channels.size,
             limits=self._limits,
             collision=loop.surroundings.collision,
-            margins=loop.margins.values,
+            margins=loop.surroundings.margins,
             activation_distance=settings.activation_distance,
             slack_linear=settings.slack_linear,
             slack_quadratic=settings.slack_quadratic,
@@ -76,3 +81,36 @@ class ProblemBuilder:
         velocity = slice(size, size + self._size)
         weights[-1, velocity] += settings.terminal_velocity * (weights[-1, velocity] > 0)
         return weights
+
+
+def built_in_objectives(
+    model: RobotModel, channels: Channels, settings: MpcSettings
+) -> tuple[Objective, ...]:
+    """Return the objectives that every masked MPC has: tracking first, then the regularisation."""
+    base = len(model.description.base_joints)
+    arm = np.arange(model.size) >= base
+    velocity = np.where(arm, settings.arm_velocity, settings.base_velocity)
+    commanded = np.full(channels.size, settings.tracking)
+    commanded[channels.tool_slice][3:] = settings.turn_tracking
+    return (
+        tracking(channels, commanded),
+        velocity_regularisation(channels, velocity),
+        acceleration_regularisation(np.full(model.size, settings.acceleration)),
+        posture(channels, model.description.home, settings.posture * arm),
+    )
+
+
+def resumed(commanded: FloatArray, measured: FloatArray, tolerance: FloatArray) -> FloatArray:
+    """Return the velocity from which a command goes on, (n,).
+
+    `min(max(c, v - tolerance), v + tolerance)`, but between rest and c. A robot that cannot follow is waited
+    for, the tolerance ahead of it; one that is pushed onward keeps what was commanded; one pushed back is
+    asked to rest. So its servos hold against a push.
+
+    Args:
+        commanded: c, (n,) [m/s, rad/s].
+        measured: v, (n,).
+        tolerance: how far they may differ, (n,).
+    """
+    close = np.minimum(np.maximum(commanded, measured - tolerance), measured + tolerance)
+    return np.minimum(np.maximum(close, np.minimum(commanded, 0.0)), np.maximum(commanded, 0.0))

@@ -1,22 +1,47 @@
 """What lasts from one update of the masked MPC to the next, as one value."""
 
+import math
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray, IntArray
-from handrail.controllers.collision.margins import Margins
 from handrail.controllers.collision.surroundings import Surroundings
+from handrail.controllers.interface.command import Command
 from handrail.controllers.interface.controller import State
 from handrail.controllers.interface.intent import Intent
 from handrail.controllers.interface.prediction import Prediction, after
 from handrail.controllers.interface.trajectory import Trajectory
 from handrail.controllers.interface.validation import InputHistory
-from handrail.controllers.mpc.last_command import LastCommand
 from handrail.controllers.ocp.problem import Plan
-from handrail.controllers.ocp.settings import MpcSettings
 from handrail.controllers.robot.shape import Obstacle
 from handrail.controllers.solvers.active_set import NOTHING_ACTIVE
+
+
+@dataclass(frozen=True)
+class LastCommand:
+    """A command that was sent: the motion that the robot follows.
+
+    Attributes:
+        command: it.
+        time: when [s].
+        period: time from the command before it [s].
+    """
+
+    command: Command
+    time: float
+    period: float
+
+    def elapsed(self, time: float) -> float:
+        """Return how long ago it was sent [s]; one period where the time is no number, or not later."""
+        return time - self.time if math.isfinite(time) and time > self.time else self.period
+
+    def then(self, command: Command, time: float) -> "LastCommand":
+        """Return the command that is sent next, at a time that may be no number [s]."""
+        elapsed = self.elapsed(time)
+        late = self.command.is_over(elapsed)
+        now = time if math.isfinite(time) else self.time + elapsed
+        return LastCommand(command, now, self.period if late else elapsed)
 
 
 @dataclass(frozen=True)
@@ -25,7 +50,6 @@ class LoopState:
 
     Attributes:
         surroundings: what stands around.
-        margins: of its pairs.
         parameters: of all objectives, (k,).
         predict: the intent prediction, which knows the intents so far.
         inputs: when states and intents came.
@@ -36,7 +60,6 @@ class LoopState:
     """
 
     surroundings: Surroundings
-    margins: Margins
     parameters: FloatArray
     predict: Prediction
     inputs: InputHistory = field(default_factory=InputHistory)
@@ -45,20 +68,28 @@ class LoopState:
     stored: Trajectory | None = None
     active: IntArray = field(default_factory=lambda: NOTHING_ACTIVE)
 
-    def among(self, obstacles: tuple[Obstacle, ...], settings: MpcSettings) -> "LoopState":
-        """Return the state among the obstacles as they are now; margins of what is held are kept."""
+    def among(self, obstacles: tuple[Obstacle, ...]) -> "LoopState":
+        """Return the state among the obstacles as they are now."""
         around = self.surroundings.among(obstacles)
-        if around.collision is self.surroundings.collision:
-            return replace(self, surroundings=around)
-        margins = Margins.of(around.collision, settings.margin, settings.work_margin, self.margins)
-        return replace(self, surroundings=around, margins=margins, active=NOTHING_ACTIVE)
+        same = around.collision is self.surroundings.collision
+        return replace(self, surroundings=around, active=self.active if same else NOTHING_ACTIVE)
 
     def facing(self, state: State, intent: Intent) -> "LoopState":
         """Return the state in which the problem of a robot's state and an intent is built."""
-        margins = self.margins
-        if margins.unknown:
-            margins = margins.seen(self.surroundings.collision.values(state.q[None, :])[0])
-        return replace(self, margins=margins, predict=after(self.predict, intent))
+        around = self.surroundings.known_at(state.q)
+        return replace(self, surroundings=around, predict=after(self.predict, intent))
+
+    def following(self, command: Command, time: float, period: float) -> LastCommand:
+        """Return a command that is sent now as the last one.
+
+        Args:
+            command: it.
+            time: now, which may be no number [s].
+            period: from one command to the next, if it is not known yet [s].
+        """
+        if self.last is None:
+            return LastCommand(command, time if math.isfinite(time) else 0.0, period)
+        return self.last.then(command, time)
 
     def elapsed(self, time: float) -> float:
         """Return how long ago the last command was sent [s]; 0 before the first."""
@@ -69,5 +100,5 @@ class LoopState:
         if self.last is None:
             return np.zeros((horizon, size))
         command = self.last.command
-        followed = command.trajectory if self.plan is None else Trajectory(self.plan.v, command.dt)
+        followed = command if self.plan is None else Trajectory(self.plan.v, command.dt)
         return followed.accelerations(horizon, self.last.elapsed(time))

@@ -4,7 +4,6 @@ from dataclasses import replace
 from time import perf_counter
 
 from handrail.controllers.arrays import FloatArray, IntArray
-from handrail.controllers.collision.margins import Margins
 from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.collision.surroundings import Surroundings
 from handrail.controllers.errors import HandrailError, unknown_name
@@ -14,8 +13,7 @@ from handrail.controllers.interface.controller import State
 from handrail.controllers.interface.intent import Intent
 from handrail.controllers.interface.prediction import Prediction, constant
 from handrail.controllers.interface.validation import InputValidator
-from handrail.controllers.mpc.build import ProblemBuilder
-from handrail.controllers.mpc.built_in import built_in_objectives
+from handrail.controllers.mpc.build import ProblemBuilder, built_in_objectives
 from handrail.controllers.mpc.loop_state import LoopState
 from handrail.controllers.mpc.supervision import Attempt, Supervisor
 from handrail.controllers.objectives.objective import Objective
@@ -76,13 +74,13 @@ class MaskedMpc:
 
     def reset(self, obstacles: tuple[Obstacle, ...] = ()) -> None:
         """Forget the past (warm start, last command); take the obstacles of a new episode."""
-        surroundings = Surroundings(CollisionModel(self.model, obstacles))
-        margins = Margins.of(surroundings.collision, self.settings.margin, self.settings.work_margin)
-        self.loop = LoopState(surroundings, margins, self.residuals.parameters, self._predict)
+        collision = CollisionModel(self.model, obstacles)
+        around = Surroundings.of(collision, self.settings.margin, self.settings.work_margin)
+        self.loop = LoopState(around, self.residuals.parameters, self._predict)
 
     def update_scene(self, obstacles: tuple[Obstacle, ...]) -> None:
         """Take what stands around now, where, how fast it moves, and what the hand holds."""
-        self.loop = self.loop.among(obstacles, self.settings)
+        self.loop = self.loop.among(obstacles)
 
     def set_parameters(self, objective: str, values: FloatArray) -> None:
         """Change an objective's parameters from the next update on.

@@ -6,12 +6,11 @@ from time import perf_counter
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray
-from handrail.controllers.collision.distance_kernels import smallest_distances
+from handrail.controllers.collision.surroundings import Surroundings
 from handrail.controllers.interface.command import Command, Diagnostics, Status
 from handrail.controllers.interface.controller import State
 from handrail.controllers.interface.intent import Intent
 from handrail.controllers.interface.trajectory import Trajectory
-from handrail.controllers.mpc.last_command import LastCommand
 from handrail.controllers.mpc.loop_state import LoopState
 from handrail.controllers.ocp.problem import Plan
 from handrail.controllers.ocp.settings import MpcSettings
@@ -53,14 +52,14 @@ class Supervisor:
         plan, status = attempt.plan, attempt.status
         distances = self._distances(loop, state, plan)
         if distances is not None:
-            loop = replace(loop, margins=loop.margins.seen(distances))
+            loop = replace(loop, surroundings=loop.surroundings.seen(distances))
         motion, stored, planned = self._motion(loop, state, attempt, distances)
         if plan is not None and not planned:
             status = Status.BACKUP
-        diagnostics = _diagnostics(replace(attempt, status=status), distances, loop)
+        diagnostics = _diagnostics(replace(attempt, status=status), distances, loop.surroundings)
         gripper = _gripper(loop, intent, status)
-        command = Command(motion.velocities, motion.dt, gripper, diagnostics, motion.elapsed)
-        last = LastCommand.after(loop.last, command, state.time, self.settings.dt)
+        command = Command(motion.velocities, motion.dt, motion.elapsed, gripper, diagnostics)
+        last = loop.following(command, state.time, self.settings.dt)
         return command, replace(loop, last=last, plan=plan if planned else None, stored=stored)
 
     def _motion(
@@ -87,9 +86,8 @@ class Supervisor:
 
     def _backup(self, loop: LoopState) -> Backup:
         settings = self.settings
-        least, span = settings.margin_share * loop.margins.values, settings.horizon * settings.dt
-        collision = loop.surroundings.collision
-        certificate = StopCertificate(self.limiter, collision, least, self.limits, span)
+        least, span = settings.margin_share * loop.surroundings.margins, settings.horizon * settings.dt
+        certificate = StopCertificate(self.limiter, loop.surroundings.collision, least, self.limits, span)
         return Backup(certificate, self.limiter, settings.dt)
 
     def _distances(self, loop: LoopState, state: State, plan: Plan | None) -> FloatArray | None:
@@ -106,18 +104,8 @@ def _gripper(loop: LoopState, intent: Intent, status: Status) -> float:
     return min(max(intent.gripper, 0.0), 1.0)
 
 
-def _diagnostics(attempt: Attempt, distances: FloatArray | None, loop: LoopState) -> Diagnostics:
-    if distances is None:
-        return Diagnostics(attempt.status, perf_counter() - attempt.start)
-    smallest, at_work = smallest_distances(distances, loop.surroundings.collision.work)
-    known = Diagnostics(
-        attempt.status,
-        solve_time=perf_counter() - attempt.start,
-        smallest_distance=smallest,
-        work_distance=at_work,
-    )
+def _diagnostics(attempt: Attempt, distances: FloatArray | None, surroundings: Surroundings) -> Diagnostics:
     plan = attempt.plan
-    if plan is None:
-        return known
-    slack = max(plan.collision_slack, plan.limit_slack)
-    return replace(known, slack=slack, tracking_error=plan.tracking_error, phases=plan.phases)
+    slack = 0.0 if plan is None else max(plan.collision_slack, plan.limit_slack)
+    near = (np.inf, np.inf) if distances is None else surroundings.smallest(distances)
+    return Diagnostics(attempt.status, perf_counter() - attempt.start, slack, *near)

@@ -6,7 +6,7 @@ import numpy as np
 
 from handrail.controllers.arrays import FloatArray, IntArray, frozen
 from handrail.controllers.collision.model import CollisionModel
-from handrail.controllers.ocp.motion import approach, cumulated, is_motion, largest_share, rollout
+from handrail.controllers.ocp.motion import approach, cumulated, rollout
 from handrail.controllers.robot.description import Limits
 
 
@@ -26,7 +26,6 @@ class Problem:
         reference: of every residual row, (N, r).
         weights: of every residual row, (N, r).
         parameters: p of the objectives, (k,).
-        channels: number of channels m; their rows come first.
         limits: of the robot.
         collision: the pairs that keep apart.
         margins: smallest distance wanted of each pair [m], (P,).
@@ -41,7 +40,6 @@ class Problem:
     reference: FloatArray
     weights: FloatArray
     parameters: FloatArray
-    channels: int
     limits: Limits
     collision: CollisionModel
     margins: FloatArray
@@ -81,7 +79,6 @@ class Plan:
         distances: signed distances now, (P,).
         solved: whether the solver reports a solution.
         iterations: of the solver.
-        tracking_error: norm of the commanded channels' error at the last tracked stage.
         rows: inequality rows of the last QP, bounds left out.
         active: names of those that hold with equality, for the next problem among the same pairs.
         phases: where the time went: `residuals`, `distances`, `solve` [s].
@@ -95,7 +92,6 @@ class Plan:
     distances: FloatArray
     solved: bool
     iterations: int
-    tracking_error: float = 0.0
     rows: int = 0
     active: IntArray = field(default_factory=lambda: np.empty(0, dtype=int))
     phases: tuple[tuple[str, float], ...] = ()
@@ -111,7 +107,7 @@ class Plan:
         Cutting is monotone, so that no acceleration becomes larger.
         """
         limit = problem.limits.velocity
-        if largest_share(self.v[1:], limit) <= 1.0:
+        if np.all(np.abs(self.v[1:]) / limit <= 1.0):
             return self
         v = np.vstack([self.v[0], np.minimum(np.maximum(self.v[1:], -limit), limit)])
         u = np.diff(v, axis=0) / problem.dt
@@ -132,6 +128,8 @@ class Plan:
 
     def is_solution(self, problem: Problem, tolerance: float = 1e-6) -> bool:
         """Whether the plan is finite, obeys the dynamics from the state and the hard acceleration limits."""
-        limit = problem.limits.acceleration
-        motion = problem.q, problem.v, problem.dt, self.u, self.q, self.v
-        return self.solved and is_motion(*motion, limit, tolerance)
+        bound = problem.limits.acceleration * (1.0 + tolerance) + tolerance
+        if not (self.solved and np.all(np.abs(self.u) <= bound)):
+            return False
+        q, v = problem.rollout(self.u)
+        return bool(np.all(np.abs(self.q - q) <= tolerance) and np.all(np.abs(self.v - v) <= tolerance))

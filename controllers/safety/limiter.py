@@ -45,20 +45,13 @@ class Limiter:
         tolerance = _TOLERANCE * (maximum + step)
         return allowed, not valid or bool(np.any(np.abs(allowed - wanted) > tolerance))
 
-    def stopping_time(self, velocity: FloatArray) -> float:
-        """Return how long the fastest stop from a velocity takes, (n,) [s]."""
-        return float(np.max(np.abs(velocity) / self._limits.acceleration))
-
-    def brake(self, velocity: FloatArray, dt: float, steps: int) -> FloatArray:
-        """Return the velocities of the fastest stop, (steps + 1, n)."""
-        times = dt * np.arange(steps + 1)[:, None]
-        speed = np.maximum(np.abs(velocity) - self._limits.acceleration * times, 0.0)
-        return np.sign(velocity) * speed
-
     def to_rest(self, velocities: FloatArray, dt: float) -> FloatArray:
         """Return velocities at knots, (k, n), and the fastest stop from the last one."""
-        steps = max(1, int(np.ceil(self.stopping_time(velocities[-1]) / dt)))
-        return np.vstack([velocities, self.brake(velocities[-1], dt, steps)[1:]])
+        last, deceleration = velocities[-1], self._limits.acceleration
+        steps = max(1, int(np.ceil(float(np.max(np.abs(last) / deceleration)) / dt)))
+        times = dt * np.arange(1, steps + 1)[:, None]
+        speeds = np.maximum(np.abs(last) - deceleration * times, 0.0)
+        return np.vstack([velocities, np.sign(last) * speeds])
 
     def stop(self, q: FloatArray, v: FloatArray, shares: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return configurations along the fastest stop, (K, n), and their times, (K,) [s].

@@ -23,8 +23,7 @@ from handrail.controllers.solvers.constraints import Constraints, existing, most
 
 _DEPENDENT = 1e-12  # squared sine to the active rows, below which a row is a combination of them
 _CHANGES = 10  # of the active rows, for each variable: an answer that takes more is none
-NOTHING_ACTIVE = np.arange(SLACKS)
-"""Numbers of the active rows where only the slacks are at rest: none is negative."""
+NOTHING_ACTIVE = np.arange(SLACKS)  # only the slacks are at rest: none is negative
 
 
 class QuadraticProgram(NamedTuple):

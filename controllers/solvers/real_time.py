@@ -6,10 +6,9 @@ from typing import NamedTuple
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray, IntArray
-from handrail.controllers.collision.distance_kernels import depth
 from handrail.controllers.collision.model import Distances
 from handrail.controllers.collision.slacks import LIMITS
-from handrail.controllers.ocp.motion import changed, largest_share
+from handrail.controllers.ocp.motion import changed
 from handrail.controllers.ocp.nodes import Nodes
 from handrail.controllers.ocp.problem import Plan, Problem
 from handrail.controllers.ocp.residuals import StageResiduals
@@ -79,7 +78,6 @@ class RealTimeSolver:
             distances=step.distances,
             solved=step.answer.solved,
             iterations=step.answer.changes,
-            tracking_error=self.cost.tracking_error(problem),
             rows=step.rows,
             active=active,
             phases=tuple(zip(_PHASES, spent, strict=True)),
@@ -107,7 +105,7 @@ class RealTimeSolver:
         spent[0] += measured - start
         spent[1] += built - measured
         spent[2] += perf_counter() - built
-        return _Step(answer, moved, begin.distances.values[0], len(constraints.distances.row), again)
+        return _Step(answer, moved, begin.distances.values[0], len(constraints.row), again)
 
     def _is_far(
         self, problem: Problem, constraints: Constraints, before: float, answer: Answer, moved: "_Moved"
@@ -116,8 +114,8 @@ class RealTimeSolver:
         wrong = abs(moved.cost - before - answer.descent)
         if wrong > _COARSE * max(abs(answer.descent), _SMALL * moved.cost):
             return True
-        large = largest_share(moved.change, problem.limits.acceleration) > _LARGE
-        return large and bool(np.any(answer.active >= constraints.distances.first))
+        large = np.any(np.abs(moved.change) / problem.limits.acceleration > _LARGE)
+        return bool(large and np.any(answer.active >= constraints.first))
 
     def _linearisation(self, problem: Problem, guess: FloatArray) -> _Guess:
         """Return what to linearise around: the guess, or a full stop where the guess runs into something.
@@ -192,7 +190,9 @@ def _rolled_out(problem: Problem, guess: FloatArray, change: FloatArray) -> tupl
 def _measured(problem: Problem, q: FloatArray, v: FloatArray, u: FloatArray) -> _Guess:
     nodes = Nodes(problem, q, v)
     distances = problem.collision.distances(nodes.q, problem.active_within, nodes.times)
-    return _Guess(q, v, u, nodes, distances, depth(distances.values))
+    values = distances.values
+    depth = np.max(np.minimum(values[0], 0.0) - values, initial=0.0)
+    return _Guess(q, v, u, nodes, distances, float(depth))
 
 
 def _penalty(problem: Problem, slack: FloatArray) -> float:

@@ -64,15 +64,7 @@ class StageCost:
     def value(self, problem: Problem, q: FloatArray, v: FloatArray, u: FloatArray) -> float:
         """Return the cost itself of q and v at the nodes, (N + 1, n), and u, (N, n)."""
         z, values = self.residuals.values(q[1:], v[1:], u, problem.parameters)
-        self._last = values
         return _value(self._affine, self._curved, z, values, problem.weights, problem.reference)
-
-    def tracking_error(self, problem: Problem) -> float:
-        """Return the norm of the commanded twists' error at the last tracked stage, where `value` was last.
-
-        Joint channels, which are always met when free, are left out.
-        """
-        return _tracking_error(self._curved, self._last, problem.weights, problem.reference, problem.channels)
 
     def _constant_band(self, weights: FloatArray) -> FloatArray:
         key = weights.tobytes()
@@ -128,19 +120,6 @@ def _value(affine, curved, z, values, weights, reference):
             if weight > 0.0:
                 total += weight * (values[k, row] - reference[k, curved[row]]) ** 2
     return 0.5 * total
-
-
-@jit
-def _tracking_error(curved, values, weights, reference, channels):
-    for k in range(len(values) - 1, -1, -1):
-        tracked, total = False, 0.0
-        for row in range(len(curved)):
-            if curved[row] < channels and weights[k, curved[row]] > 0.0:
-                tracked = True
-                total += (values[k, row] - reference[k, curved[row]]) ** 2
-        if tracked:
-            return total**0.5
-    return 0.0
 
 
 @jit

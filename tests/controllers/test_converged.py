@@ -9,12 +9,12 @@ from handrail.controllers.interface.controller import State
 from handrail.controllers.interface.intent import Intent
 from handrail.controllers.mpc.masked_mpc import MaskedMpc
 from handrail.controllers.numerics.threads import single_threaded
+from handrail.controllers.ocp.nodes import Nodes
 from handrail.controllers.robot.model import RobotModel, load_model
 from handrail.controllers.robot.shape import Obstacle, Shape
 from handrail.controllers.solvers.basis import to_motion
-from handrail.controllers.solvers.reference.converged import ConvergedSolver
-from handrail.controllers.solvers.reference.evaluation import Evaluator, distance_bounds
-from handrail.controllers.solvers.reference.linear_distances import linear_distances
+from handrail.controllers.solvers.constraints import constraints_around
+from handrail.controllers.solvers.converged import ConvergedSolver
 
 DESCRIPTION = load_model().description
 ALONE = RobotModel(replace(DESCRIPTION, collision=(), self_pairs=(), self_margins=np.zeros(0)))
@@ -58,7 +58,8 @@ def fixed_point(mpc, problem, steps=100):
 
 def test_both_solvers_agree_where_the_real_time_one_rests():
     mpc = MaskedMpc(ALONE)
-    converged, evaluate = solver(mpc), Evaluator(mpc.residuals, mpc.settings.horizon)
+    converged = solver(mpc)
+    evaluate = converged.evaluate
     rng = np.random.default_rng(1)
     for _ in range(4):
         mpc.reset()
@@ -87,32 +88,36 @@ def test_both_solvers_agree_where_limits_bind():
     np.testing.assert_allclose(converged.limit_slack, real_time.limit_slack, atol=1e-4)
 
 
-def test_what_is_asked_of_distances_is_what_the_real_time_solver_asks():
-    from handrail.controllers.ocp.nodes import Nodes
-    from handrail.controllers.solvers.constraints import constraints_around
-
+def test_the_rows_of_the_distances_are_the_distances():
+    """What is left of every distance is exact, `d - margin + deficit 0.8ᵏ`; the rows say how it changes."""
     post = Obstacle("post", Shape("cylinder", [0.2, 1.2]), [0.4, 0.5, 0.6])
     mpc = MaskedMpc(load_model())
     mpc.reset((post,))
     problem = mpc.build_problem(State(DESCRIPTION.home, 0.2 * LIMITS.velocity), Intent.idle(mpc.channels))
-    u = np.random.default_rng(2).uniform(-0.3, 0.3, (10, 9))
-    q, v = problem.rollout(u)
-    nodes = Nodes(problem, q, v)
-    found = problem.collision.distances(nodes.q, problem.active_within, nodes.times)
-    matrix = mpc.solver.cost.matrix
-    rows = constraints_around(problem, (q, v, u), nodes, found, matrix).distances
+    rng = np.random.default_rng(2)
+    u, s, motion = rng.uniform(-0.3, 0.3, (10, 9)), rng.uniform(-1.0, 1.0, 90), np.zeros((10, 3, 9))
+    matrix, step = mpc.solver.cost.matrix, 1e-4
+    to_motion(matrix, step * s, motion)
+
+    def at(u):
+        q, v = problem.rollout(u)
+        nodes = Nodes(problem, q, v)
+        found = problem.collision.distances(nodes.q, problem.active_within, nodes.times)
+        return found, constraints_around(problem, (q, v, u), nodes, found, matrix)
+
+    (found, rows), (_, after) = at(u), at(u + motion[:, 2])
     node, pair = found.near[found.near[:, 0] > 0].T
-    bounds = distance_bounds(problem, found.values[0], len(nodes.q))
-    np.testing.assert_allclose(rows.left, found.values[node, pair] - bounds[node, pair], atol=1e-12)
-    s, motion = np.random.default_rng(3).uniform(-0.1, 0.1, 90), np.zeros((10, 3, 9))
-    to_motion(matrix, s, motion)  # and so is how they change
-    change = motion[:, 2]
+    deficit = np.maximum(problem.margins - found.values[0], 0.0)[pair]
+    expected = found.values[node, pair] - problem.margins[pair] + deficit * 0.8**node
+    np.testing.assert_allclose(rows.left, expected, atol=1e-12)
     padded = np.append(np.zeros(18), s)  # nothing changes before the first stage
     moved = [row @ padded[9 * k : 9 * k + 27] for row, k in zip(rows.coefficients, rows.stage, strict=True)]
-    linear = linear_distances(problem, u)
-    left = (linear.at(*problem.rollout(u + change)) - linear.lower)[linear.pairs >= 0]
-    expected = rows.left - moved
-    np.testing.assert_allclose(np.sort(left), np.sort(expected), atol=1e-9)
+    both, ours, theirs = np.intersect1d(rows.row, after.row, return_indices=True)
+    assert len(both) > 50
+    slopes = (rows.left[ours] - after.left[theirs]) / step
+    error = np.abs(np.array(moved)[ours] - slopes)
+    assert np.median(error) < 1e-3
+    assert np.quantile(error, 0.95) < 2e-2  # coal's own tolerance, and kinks at edges
 
 
 def test_an_obstacle_is_kept_away_from():
@@ -120,7 +125,7 @@ def test_an_obstacle_is_kept_away_from():
     wall = Obstacle("wall", Shape("box", [0.2, 3.0, 2.0]), [0.45, 0.0, 1.0])
     mpc = MaskedMpc(load_model())
     mpc.reset((wall,))
-    evaluate = Evaluator(mpc.residuals, 10)
+    evaluate = solver(mpc).evaluate
     mask = mpc.channels.mask("ee.vx", "ee.vy", "ee.vz")
     values = np.zeros(18)
     values[3] = 0.5
@@ -155,7 +160,8 @@ class Gap:
 def closed_loops(count, updates, seed):
     """Run closed loops from random states; compare every warm-started update with the converged solution."""
     mpc = MaskedMpc(ALONE)
-    converged, evaluate = solver(mpc), Evaluator(mpc.residuals, mpc.settings.horizon)
+    converged = solver(mpc)
+    evaluate = converged.evaluate
     rng = np.random.default_rng(seed)
     gaps = []
     for _ in range(count):

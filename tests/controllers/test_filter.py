@@ -9,10 +9,10 @@ from collect_helpers import environment
 from handrail.collect.simulation.scene import Scene
 from handrail.collect.tasks.furniture import pillar
 from handrail.collect.tasks.task import Episode
-from handrail.controllers.baselines.cbf_filter import CbfFilter, CbfSettings
+from handrail.controllers.baselines.cbf_filter import ALPHA, MARGIN, CbfFilter
 from handrail.controllers.baselines.direct import DirectController
 from handrail.controllers.collision.model import CollisionModel
-from handrail.controllers.errors import HandrailError
+from handrail.controllers.collision.slacks import LIMITS as DISTANCES
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.command import Status
 from handrail.controllers.interface.controller import State
@@ -21,8 +21,7 @@ from handrail.controllers.mpc.safety_filter import filter_settings, safety_filte
 from handrail.controllers.numerics.threads import single_threaded
 from handrail.controllers.robot.model import RobotModel, load_model
 from handrail.controllers.robot.shape import Obstacle, Shape
-from handrail.controllers.solvers.reference.converged import ConvergedSolver
-from handrail.controllers.solvers.reference.evaluation import Evaluator
+from handrail.controllers.solvers.converged import ConvergedSolver
 
 MODEL = load_model()
 ALONE = RobotModel(replace(MODEL.description, collision=(), self_pairs=(), self_margins=np.zeros(0)))
@@ -104,12 +103,11 @@ def test_the_correction_is_the_smallest():
     state, intent = State(path[-1], sent[-1], 14 * PERIOD), asked(AHEAD, 14 * PERIOD)
     problem = mpc.build_problem(state, intent)
     velocity = mpc.update(state, intent).velocity(PERIOD)
-    evaluate = Evaluator(mpc.residuals, problem.horizon)
-    found = evaluate(problem, mpc.plan.u)
     solver = ConvergedSolver(mpc.residuals, problem.horizon, MODEL.size, problem.dt)
-    best = evaluate(problem, solver.solve(problem, mpc.plan.u).u)
+    found = solver.evaluate(problem, mpc.plan.u)
+    best = solver.evaluate(problem, solver.solve(problem, mpc.plan.u).u)
     assert velocity[0] < 0.7  # it does correct
-    assert found.collision_slack < 1e-3
+    assert found.slack[:DISTANCES].max() < 1e-3
     assert found.tracking < 1.01 * best.tracking
 
 
@@ -149,32 +147,32 @@ def test_nothing_is_touched_in_physics(make, touches):
     assert moved > 1.0  # of 5 s: the filter does not just stand there
 
 
-def barriers(q, settings):
+def barriers(q):
     """Return how far all pairs are beyond their margins, (P,), and the gradients, (P, n)."""
     collision = CollisionModel(MODEL, (POST,))
     found = collision.distances(q[None])
     assert len(found.near) == collision.size
-    return found.values[0] - np.minimum(settings.margin, collision.largest_margin), found.gradients
+    return found.values[0] - np.minimum(MARGIN, collision.largest_margin), found.gradients
 
 
 def test_the_cbf_filter_projects_onto_the_barriers():
     """Optimal for a convex QP: (u* - u_cmd)ᵀ W (u - u*) ≥ 0 for every allowed u; and u* is allowed."""
-    settings, rng = CbfSettings(), np.random.default_rng(0)
+    rng = np.random.default_rng(0)
     weights, corrected = LIMITS.velocity**-2.0, 0
     for _ in range(20):
         q = np.array(HOME)
         q[0] += rng.uniform(0.0, 0.35)
         v, wanted = (rng.uniform(-1, 1, 9) * share * LIMITS.velocity for share in (0.05, 0.3))
-        controller = CbfFilter(MODEL, PERIOD, settings)
+        controller = CbfFilter(MODEL, PERIOD)
         controller.reset((POST,))
         command = controller.update(State(q, v), asked(wanted))
         u = command.velocity(PERIOD)
-        left, gradients = barriers(q, settings)
-        assert np.all(gradients @ u >= -settings.alpha * left - command.diagnostics.slack - 1e-5)
+        left, gradients = barriers(q)
+        assert np.all(gradients @ u >= -ALPHA * left - command.diagnostics.slack - 1e-5)
         corrected += np.abs(u - wanted).max() > 1e-3
         step = LIMITS.acceleration * PERIOD
         others = np.clip(v + rng.uniform(-1, 1, (3000, 9)) * step, -LIMITS.velocity, LIMITS.velocity)
-        allowed = others[np.all(others @ gradients.T >= -settings.alpha * left, axis=1)]
+        allowed = others[np.all(others @ gradients.T >= -ALPHA * left, axis=1)]
         assert command.diagnostics.slack > 1e-6 or np.all((allowed - u) @ (weights * (u - wanted)) >= -1e-6)
     assert corrected > 10
 
@@ -216,8 +214,3 @@ def test_a_failed_qp_brakes(monkeypatch):
     command = controller.update(State(HOME, sent[-1], 0.25), asked(AHEAD, 0.25))
     assert command.diagnostics.status is Status.SOLVER_FAILED
     assert np.all(np.abs(command.velocity(PERIOD)) <= np.abs(sent[-1]))
-
-
-def test_wrong_cbf_settings_are_refused():
-    with pytest.raises(HandrailError, match="CBF setting alpha: expected a finite number >= 0, got nan"):
-        CbfSettings(alpha=float("nan"))

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from handrail.controllers.collision.margins import Margins
 from handrail.controllers.collision.model import CollisionModel
+from handrail.controllers.collision.surroundings import Surroundings
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.command import Status
 from handrail.controllers.interface.controller import State
@@ -202,21 +202,17 @@ def test_a_frame_that_does_not_exist_brakes(frames):
     MPC.reset()
     command = MPC.update(State(HOME, np.zeros(9)), intent(np.full(18, 0.2), "ee", frames=frames))
     assert command.diagnostics.status is Status.INVALID_INTENT
-    with pytest.raises(HandrailError):
-        frames.check()
 
 
 def test_an_over_determined_command_is_a_compromise():
-    """Hand and all joints at once: no robot can do both; the error is between the two and is reported."""
+    """Hand and all joints at once: no robot can do both; what it does is between the two."""
     MPC.reset()
     values = np.zeros(18)
     values[3] = 0.2  # the hand forward, all joints at rest
     both = lambda time: intent(values, "ee", "joint", time=time)  # noqa: E731
     q, v = roll(MPC, both)
-    command = MPC.update(State(q, v, 1.5), both(1.5))
     hand = (MODEL.jacobian(q) @ v)[0]
     assert 0.02 < hand < 0.19
-    assert command.diagnostics.tracking_error > 0.01
 
 
 def test_a_feasible_command_has_no_tracking_error():
@@ -224,8 +220,7 @@ def test_a_feasible_command_has_no_tracking_error():
     values = np.zeros(18)
     values[3] = 0.1
     q, v = roll(MPC, lambda time: intent(values, "ee", time=time))
-    command = MPC.update(State(q, v, 1.5), intent(values, "ee", time=1.5))
-    assert command.diagnostics.tracking_error < 0.002
+    np.testing.assert_allclose((MODEL.jacobian(q) @ v)[:6], values[3:9], atol=0.002)
 
 
 def test_the_certificate_measures_the_stop():
@@ -236,7 +231,7 @@ def test_the_certificate_measures_the_stop():
     for gap, safe in ((0.2, False), (0.5, True)):
         wall = Obstacle("wall", Shape("box", [0.2, 4.0, 0.2]), [HOME[0] + 0.48 + gap + 0.1, 0.0, 0.1])
         collision = CollisionModel(MODEL, (wall,))
-        least = 0.3 * Margins.of(collision, 0.1, 0.1).values
+        least = 0.3 * Surroundings.of(collision, 0.1, 0.1).margins
         certificate = StopCertificate(limiter, collision, least, MODEL.description.limits, span=1.0)
         now = collision.values(HOME[None])[0]
         violation = certificate.violation(HOME, v, (HOME, now))

@@ -54,6 +54,6 @@ def test_a_target_of_the_wrong_size_brakes():
 
 @given(INSIDE)
 def test_braking_is_the_fastest_stop(velocity):
-    braking = LIMITER.brake(velocity, 0.1, 40)
+    braking = LIMITER.to_rest(velocity[None], 0.1)
     assert np.all(np.abs(np.diff(braking, axis=0)) <= LIMITS.acceleration * 0.1 + 1e-9)
     np.testing.assert_allclose(braking[-1], 0.0)

@@ -10,9 +10,7 @@ from handrail.controllers.solvers.active_set import ActiveSet, QuadraticProgram,
 from handrail.controllers.solvers.banded import backward, factor, forward
 from handrail.controllers.solvers.basis import REACH, stage_matrix, to_motion
 from handrail.controllers.solvers.constraints import Constraints
-from handrail.controllers.solvers.distance_limits import DistanceLimits
-from handrail.controllers.solvers.joint_limits import JointLimits
-from handrail.controllers.solvers.reference.dense import dense
+from handrail.controllers.solvers.dense import dense
 
 DT, N = 0.1, 3  # N coordinates
 NONE = np.arange(SLACKS)  # the rows that an update begins with
@@ -44,15 +42,15 @@ def random_rows(rng, horizon, distances, tight):
     first = SLACKS + 2 * value.size
     return Constraints(
         stage_matrix(DT),
-        JointLimits(value, rng.uniform(0.5, 2.0, (3, N)), False),
-        DistanceLimits(
-            stage=rng.integers(0, horizon, distances),
-            kind=rng.integers(0, LIMITS, distances),
-            coefficients=coefficients,
-            left=rng.uniform(-tight, 0.1, distances),
-            row=first + 5 + rng.permutation(distances),
-            first=first,
-        ),
+        value,
+        rng.uniform(0.5, 2.0, (3, N)),
+        stage=rng.integers(0, horizon, distances),
+        kind=rng.integers(0, LIMITS, distances),
+        coefficients=coefficients,
+        left=rng.uniform(-tight, 0.1, distances),
+        row=first + 5 + rng.permutation(distances),
+        first=first,
+        broken=False,
     )
 
 
@@ -167,7 +165,7 @@ def test_a_hessian_that_is_not_positive_is_no_solution():
 
 def test_rows_that_are_the_same_twice_do_no_harm():
     program = random_program(np.random.default_rng(5), 6, 10, 0.05)
-    near = program.constraints.distances
+    near = program.constraints
     thrice = near._replace(
         stage=np.tile(near.stage, 3),
         kind=np.tile(near.kind, 3),
@@ -177,9 +175,7 @@ def test_rows_that_are_the_same_twice_do_no_harm():
     )
     once, solved, *_ = solved_by_ours(program)
     assert solved
-    again, solved, *_ = solved_by_ours(
-        program._replace(constraints=program.constraints._replace(distances=thrice))
-    )
+    again, solved, *_ = solved_by_ours(program._replace(constraints=thrice))
     assert solved
     np.testing.assert_allclose(again, once, atol=1e-6)
 

@@ -13,7 +13,7 @@ from handrail.collect.experiments.profiling.timing_loop import Case, TimingLoop,
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import not_installed
 from handrail.controllers.solvers.active_set import NOTHING_ACTIVE, ActiveSet, QuadraticProgram
-from handrail.controllers.solvers.reference.dense import DenseProgram, dense
+from handrail.controllers.solvers.dense import DenseProgram, dense
 
 _CASES = (
     Case("no_collision", own="none"),

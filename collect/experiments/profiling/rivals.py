@@ -13,7 +13,7 @@ from handrail.collect.experiments.mink.scene import (
 )
 from handrail.collect.experiments.profiling.timing_loop import PERIOD, TimingLoop, Update
 from handrail.controllers.ocp.settings import MpcSettings
-from handrail.controllers.solvers.reference.converged import ConvergedSolver
+from handrail.controllers.solvers.converged import ConvergedSolver
 
 
 class Converged:

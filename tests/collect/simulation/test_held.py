@@ -7,8 +7,8 @@ import pytest
 
 from handrail.controllers.baselines.cbf_filter import CbfFilter
 from handrail.controllers.baselines.direct import DirectController
-from handrail.controllers.collision.margins import Margins
 from handrail.controllers.collision.model import CollisionModel
+from handrail.controllers.collision.surroundings import Surroundings
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.command import Status
 from handrail.controllers.interface.controller import State
@@ -77,11 +77,13 @@ def test_gradients_and_bounds_of_held_things():
 def test_what_is_held_does_not_come_nearer_because_other_things_come():
     """What it keeps once it keeps on; to what came while it was held, what there was then."""
     other = replace(POST, name="other")
-    first, second = (CollisionModel(MODEL, things) for things in ((POST, BOX), (POST, other, BOX)))
-    before = Margins.of(first, 0.1, 0.008).seen(np.full(first.size, 1.0))
-    margins = Margins.of(second, 0.1, 0.008, before).seen(np.full(second.size, 0.02))
+    first = CollisionModel(MODEL, (POST, BOX))
+    around = Surroundings.of(first, 0.1, 0.008).seen(np.full(first.size, 1.0)).among((POST, other, BOX))
+    assert around.unknown
+    second = around.collision
+    margins = around.seen(np.full(second.size, 0.02)).margins
     for row in held_rows(second):
-        assert margins.values[row] == (0.02 if "other" in second.pairs[row] else 0.1)
+        assert margins[row] == (0.02 if "other" in second.pairs[row] else 0.1)
 
 
 def test_things_come_and_go_and_change():

@@ -45,7 +45,7 @@ def dense(program: QuadraticProgram) -> DenseProgram:
     for j in range(size):
         column = band[j, : size - j]
         hessian[j, j : j + len(column)] = hessian[j : j + len(column), j] = column
-    rows = np.append(np.arange(constraints.distances.first), constraints.distances.row)
+    rows = np.append(np.arange(constraints.first), constraints.row)
     matrix, upper = np.empty((len(rows), size + SLACKS)), np.empty(len(rows))
     for index, row in enumerate(rows):
         upper[index], _ = write_row(constraints, row, matrix[index])
