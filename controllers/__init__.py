@@ -10,27 +10,18 @@ from handrail.controllers.lazy import lazily
 
 if TYPE_CHECKING:
     from handrail.controllers.baselines.cbf_filter import CbfFilter as CbfFilter
-    from handrail.controllers.baselines.cbf_filter import CbfSettings as CbfSettings
     from handrail.controllers.baselines.direct import DirectController as DirectController
-    from handrail.controllers.baselines.reactive import ReactiveController as ReactiveController
-    from handrail.controllers.baselines.split_controller import split_controller as split_controller
     from handrail.controllers.errors import HandrailError as HandrailError
-    from handrail.controllers.interface.channel_matrix import channel_matrix as channel_matrix
     from handrail.controllers.interface.channels import Channels as Channels
     from handrail.controllers.interface.command import Command as Command
     from handrail.controllers.interface.command import Diagnostics as Diagnostics
     from handrail.controllers.interface.command import Status as Status
     from handrail.controllers.interface.controller import Controller as Controller
     from handrail.controllers.interface.controller import State as State
-    from handrail.controllers.interface.frames import Frames as Frames
     from handrail.controllers.interface.intent import Intent as Intent
     from handrail.controllers.mpc.masked_mpc import MaskedMpc as MaskedMpc
     from handrail.controllers.mpc.safety_filter import safety_filter as safety_filter
-    from handrail.controllers.objectives.objective import Objective as Objective
-    from handrail.controllers.ocp.problem import Plan as Plan
-    from handrail.controllers.ocp.problem import Problem as Problem
     from handrail.controllers.ocp.settings import MpcSettings as MpcSettings
-    from handrail.controllers.robot.description import robot_names as robot_names
     from handrail.controllers.robot.model import Pose as Pose
     from handrail.controllers.robot.model import RobotModel as RobotModel
     from handrail.controllers.robot.model import load_model as load_model
@@ -40,32 +31,23 @@ if TYPE_CHECKING:
 
 _MODULES = {
     "CbfFilter": "baselines.cbf_filter",
-    "CbfSettings": "baselines.cbf_filter",
     "Channels": "interface.channels",
     "Command": "interface.command",
     "Controller": "interface.controller",
     "Diagnostics": "interface.command",
     "DirectController": "baselines.direct",
-    "Frames": "interface.frames",
     "HandrailError": "errors",
     "Intent": "interface.intent",
     "MaskedMpc": "mpc.masked_mpc",
     "MpcSettings": "ocp.settings",
-    "Objective": "objectives.objective",
     "Obstacle": "robot.shape",
-    "Plan": "ocp.problem",
     "Pose": "robot.model",
-    "Problem": "ocp.problem",
-    "ReactiveController": "baselines.reactive",
     "RobotModel": "robot.model",
     "Shape": "robot.shape",
     "State": "interface.controller",
     "Status": "interface.command",
-    "channel_matrix": "interface.channel_matrix",
     "load_model": "robot.model",
-    "robot_names": "robot.description",
     "safety_filter": "mpc.safety_filter",
-    "split_controller": "baselines.split_controller",
 }
 
 __all__ = sorted(_MODULES)  # pyright: ignore[reportUnsupportedDunderAll]

@@ -20,8 +20,8 @@ from handrail.controllers.baselines.catalogue import CONTROLLERS
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import Controller
-from handrail.controllers.objectives.narrow_joints import narrow_joint_centring
 from handrail.controllers.objectives.objective import Objective
+from handrail.controllers.objectives.regularisation import narrow_joint_centring
 from handrail.controllers.registry import resolved
 from handrail.controllers.robot.model import RobotModel
 from handrail.datasets.format.schema import Feature

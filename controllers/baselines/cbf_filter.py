@@ -70,8 +70,8 @@ class CbfFilter(ReactiveController):
         around, times = self.surroundings.known_at(q), np.array([0.0, self._period])
         within = around.margins + _ACTIVATION_DISTANCE
         distances = around.collision.distances(np.stack([q, q]), within, times)
-        self.distances = distances.values[0]
-        margins = around.seen(self.distances).margins
+        self.distances = seen = distances.values[0]
+        margins = around.seen(seen).margins
         keep = distances.near[:, 0] == 1
         pair = distances.near[keep, 1]
         now, then = distances.values[:, pair]

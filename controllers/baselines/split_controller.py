@@ -12,9 +12,7 @@ from handrail.controllers.interface.intent import Intent
 from handrail.controllers.robot.model import RobotModel
 
 
-def split_controller(
-    model: RobotModel, period: float = 0.05, intent_timeout: float = 0.25
-) -> ReactiveController:
+def split_controller(model: RobotModel, period: float = 0.05) -> ReactiveController:
     """Return the controller that sends the base where its stick says, and the hand by the arm's joints alone.
 
     v_base as commanded; `q̇_arm = (JᵀJ + λW²)⁻¹ Jᵀ (twist − J_b v_base)` while the hand is, else 0.
@@ -23,7 +21,6 @@ def split_controller(
     Args:
         model: of the robot.
         period: of the control loop [s].
-        intent_timeout: age from which an intent is stale [s].
     """
     channels, arm = Channels.of(model.description), ArmCompletion(model)
     understood = channels.mask(*(("base",) if channels.base else ()), "ee")
@@ -35,4 +32,4 @@ def split_controller(
         twist = tool_twist(intent, channels, model.pose(state.q))
         return arm.velocity(state.q, previous, base, twist, period)
 
-    return ReactiveController(model, ask, period, intent_timeout, understood)
+    return ReactiveController(model, ask, period, understood=understood)

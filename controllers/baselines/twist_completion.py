@@ -19,6 +19,54 @@ The twist is (v, ω), world-aligned at the tool point.
 """
 
 
+class WholeBodyCompletion:
+    """Damped least squares, `v = argmin ‖J v − twist‖² + λ ‖W v‖²`, `W = diag(1 / v_max)`; a completion.
+
+    Args:
+        model: of the robot.
+        damping: λ.
+    """
+
+    def __init__(self, model: RobotModel, damping: float = 0.01) -> None:
+        self._model = model
+        self._inverse = model.description.limits.velocity**2 / damping  # of λ W², (n,)
+
+    def __call__(self, q: FloatArray, previous: FloatArray, twist: FloatArray, duration: float) -> FloatArray:
+        """Return the velocity, (n,)."""
+        return damped_least_squares(self._model.jacobian(q), twist, self._inverse)
+
+
+def damped_least_squares(matrix: FloatArray, values: FloatArray, inverse: FloatArray) -> FloatArray:
+    """Return `v = argmin ‖A v − b‖² + vᵀ D⁻¹ v = D Aᵀ (A D Aᵀ + I)⁻¹ b`, (n,).
+
+    Args:
+        matrix: A, (c, n).
+        values: b, (c,).
+        inverse: the diagonal of D, (n,).
+    """
+    scaled = inverse[:, None] * matrix.T
+    return scaled @ np.linalg.solve(matrix @ scaled + np.eye(len(values)), values)
+
+
+def blended(operator: Completion, autonomy: Completion, share: float = 0.5) -> Completion:
+    """Return `v = α v_operator + (1 − α) v_autonomy`: weighted averaging, the paper's blended control.
+
+    What both do with the hand passes whole, since a twist is linear in v; of what only one of them does with
+    it, its share passes. An actor that knows nothing of the hand thus takes 1 − α of the operator's command.
+
+    Args:
+        operator: completes what the operator asks for.
+        autonomy: what the autonomous actor does at the same time.
+        share: α, the operator's, from 0 to 1.
+    """
+
+    def blend(q: FloatArray, previous: FloatArray, twist: FloatArray, duration: float) -> FloatArray:
+        operated = operator(q, previous, twist, duration)
+        return share * operated + (1.0 - share) * autonomy(q, previous, twist, duration)
+
+    return blend
+
+
 def twist_controller(
     model: RobotModel, complete: Completion, period: float = 0.05, intent_timeout: float = 0.25
 ) -> ReactiveController:

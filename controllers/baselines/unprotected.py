@@ -1,10 +1,8 @@
 """A completion that protects nothing: what is asked for, by damped least squares, clipped to limits."""
 
-import numpy as np
-
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.baselines.reactive import ReactiveController
-from handrail.controllers.baselines.twist_completion import base_velocity, tool_twist
+from handrail.controllers.baselines.twist_completion import base_velocity, damped_least_squares, tool_twist
 from handrail.controllers.interface.channel_matrix import channel_matrix
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import State
@@ -15,9 +13,7 @@ from handrail.controllers.robot.model import RobotModel
 _DAMPING = 0.01  # λ, as in WholeBodyCompletion
 
 
-def unprotected_controller(
-    model: RobotModel, period: float = 0.05, intent_timeout: float = 0.25
-) -> ReactiveController:
+def unprotected_controller(model: RobotModel, period: float = 0.05) -> ReactiveController:
     """Return the controller for any mask that looks neither ahead nor at obstacles.
 
     `v = argmin ‖M (C v − u)‖² + λ ‖W v‖²`, C the channels' matrix, M the mask, `W = diag(1 / v_max)`: what a
@@ -26,7 +22,6 @@ def unprotected_controller(
     Args:
         model: of the robot.
         period: of the control loop [s].
-        intent_timeout: age from which an intent is stale [s].
     """
     channels = Channels.of(model.description)
     inverse = model.description.limits.velocity**2 / _DAMPING  # of λ W², (n,)
@@ -34,10 +29,9 @@ def unprotected_controller(
     def ask(state: State, intent: Intent, previous: FloatArray) -> FloatArray:
         matrix = channel_matrix(model, channels, state.q)[intent.mask]  # (c, n)
         asked = _world_values(model, channels, state, intent)[intent.mask]
-        scaled = inverse[:, None] * matrix.T  # (n, c)
-        return scaled @ np.linalg.solve(matrix @ scaled + np.eye(len(asked)), asked)
+        return damped_least_squares(matrix, asked, inverse)
 
-    return ReactiveController(model, ask, period, intent_timeout)
+    return ReactiveController(model, ask, period)
 
 
 def _world_values(model: RobotModel, channels: Channels, state: State, intent: Intent) -> FloatArray:

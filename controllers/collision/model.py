@@ -12,7 +12,7 @@ from handrail.controllers.collision.shape_pairs import ShapePairs
 from handrail.controllers.collision.slacks import MOVING, OWN, STANDING
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.robot.model import RobotModel
-from handrail.controllers.robot.shape import Kept, Obstacle
+from handrail.controllers.robot.shape import Obstacle
 
 _STRETCH = 13  # configurations after which all pairs are measured again
 _FAR = 0.15  # a pair that stays farther apart than this need not be measured exactly [m]
@@ -192,8 +192,8 @@ class CollisionModel:
         Raises:
             HandrailError: they are not the obstacles that the model was built with.
         """
-        if _kept(obstacles) != self._kept:
-            expected, got = (", ".join(kept.name for kept in kind) for kind in (self._kept, _kept(obstacles)))
+        if (kept := _kept(obstacles)) != self._kept:
+            expected, got = (", ".join(str(name) for name, *_ in things) for things in (self._kept, kept))
             raise HandrailError(f"obstacles: expected {expected} as they were, got {got}")
         self._last: tuple[FloatArray, FloatArray] | None = None
         self._shapes.update_scene(obstacles)
@@ -215,7 +215,7 @@ class CollisionModel:
         return self
 
 
-def _kept(obstacles: tuple[Obstacle, ...]) -> tuple[Kept, ...]:
+def _kept(obstacles: tuple[Obstacle, ...]) -> tuple[tuple[object, ...], ...]:
     """Return what of every obstacle stays the same while it moves."""
     return tuple(obstacle.kept for obstacle in obstacles)
 

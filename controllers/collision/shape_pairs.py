@@ -1,13 +1,13 @@
 """Which shapes must keep apart: those of the robot, of the scene, and of what the hand holds."""
 
 from collections.abc import Iterable
+from functools import lru_cache
 
 import coal
 import numpy as np
 import pinocchio as pin
 
 from handrail.controllers.arrays import BoolArray, FloatArray, frozen
-from handrail.controllers.collision.motion_bounds import all_motion_bounds, motion_bounds
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.robot.description import PlacedShape, Placement
 from handrail.controllers.robot.model import RobotModel
@@ -59,7 +59,7 @@ class ShapePairs:
         self.largest_margin: FloatArray = frozen(np.concatenate(margins))
         self.moves = self._pair_moves()
         self.motion_bounds = np.zeros((model.size, len(self.names)))
-        self._shape_bounds = dict(all_motion_bounds(model))
+        self._shape_bounds = dict(_all_motion_bounds(model))
         held = [obstacle.name for obstacle in obstacles if obstacle.held]
         self._rows = {name: [row for row, pair in enumerate(self.names) if name in pair] for name in held}
         self.held = np.array([row for rows in self._rows.values() for row in rows], dtype=int)
@@ -71,7 +71,7 @@ class ShapePairs:
         for obstacle in obstacles:
             self.place(obstacle)
             if obstacle.held:
-                self._shape_bounds[obstacle.name] = motion_bounds(self._model, _placed(obstacle))
+                self._shape_bounds[obstacle.name] = _motion_bounds(self._model, _placed(obstacle))
                 self._bound_motions(self._rows[obstacle.name])
 
     def place(self, obstacle: Obstacle, time: float = 0.0) -> None:
@@ -151,3 +151,29 @@ def _placed(obstacle: Obstacle) -> PlacedShape:
 def _coal_shape(shape: Shape) -> coal.ShapeBase:
     make = {"box": coal.Box, "capsule": coal.Capsule, "sphere": coal.Sphere, "cylinder": coal.Cylinder}
     return make[shape.kind](*(float(length) for length in shape.size))
+
+
+@lru_cache(maxsize=8)
+def _all_motion_bounds(model: RobotModel) -> dict[str, FloatArray]:
+    return {shape.name: _motion_bounds(model, shape) for shape in model.description.collision}
+
+
+def _motion_bounds(model: RobotModel, placed: PlacedShape) -> FloatArray:
+    """Return bounds on how far a point of a shape moves per unit of each coordinate, (n,) [m].
+
+    1 for a prismatic joint; for a revolute one the length of the chain from its axis to the shape, and the
+    shape's own size; 0 for a joint that does not move it.
+    """
+    pinocchio, arms = model.pinocchio, np.zeros(model.size)
+    frame = pinocchio.frames[model.frame_id(placed.frame)]
+    size = float(np.linalg.norm(placed.shape.size)) if placed.shape.kind == "box" else placed.shape.size.sum()
+    radius = size + float(
+        np.linalg.norm(frame.placement.translation + frame.placement.rotation @ placed.placement.translation)
+    )
+    joint = frame.parentJoint
+    while joint > 0:
+        prismatic = pinocchio.joints[joint].shortname().startswith("JointModelP")
+        arms[pinocchio.joints[joint].idx_v] = 1.0 if prismatic else radius
+        radius += float(np.linalg.norm(pinocchio.jointPlacements[joint].translation))
+        joint = pinocchio.parents[joint]
+    return arms

@@ -8,7 +8,6 @@ import numpy as np
 from handrail.controllers.arrays import FloatArray, frozen, real
 from handrail.controllers.interface.command import Command
 from handrail.controllers.interface.intent import Intent
-from handrail.controllers.numerics.jit import exact_jit
 from handrail.controllers.robot.description import Limits
 from handrail.controllers.robot.shape import Obstacle
 
@@ -61,16 +60,7 @@ class State:
 
 def _known(values: FloatArray, size: int) -> bool:
     """Whether values are as many finite numbers."""
-    return values.shape == (size,) and bool(_finite(values))
-
-
-@exact_jit
-def _finite(values):
-    """Whether all values are numbers, whatever their shape."""
-    finite = True
-    for value in values.flat:
-        finite &= np.isfinite(value)
-    return finite
+    return values.shape == (size,) and bool(np.isfinite(values).all())
 
 
 class Controller(Protocol):

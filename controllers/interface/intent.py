@@ -6,10 +6,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from handrail.controllers.arrays import BoolArray, FloatArray, frozen, real
-from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.frames import USUAL, Frames
-from handrail.controllers.numerics.jit import exact_jit
 
 
 @dataclass(frozen=True)
@@ -74,32 +72,9 @@ class Intent:
         """Return the intent of an operator who touches nothing."""
         return cls(np.zeros(channels.size), np.zeros(channels.size, dtype=bool), time=time)
 
-    def check(self, channels: Channels) -> None:
-        """Check the shapes against the robot's channels.
-
-        Raises:
-            HandrailError: values or mask have the wrong size.
-        """
-        for name in ("values", "mask"):
-            shape = getattr(self, name).shape
-            if shape != (channels.size,):
-                raise HandrailError(
-                    f"{name} of an intent: expected {channels.size} channels "
-                    f"({channels.names[0]} … {channels.names[-1]}), got shape {shape}"
-                )
-
     @property
     def is_finite(self) -> bool:
         """Whether every commanded value, the gripper and the time are numbers, and each value has a mask."""
         scalars = math.isfinite(self.gripper) and math.isfinite(self.time)
         scalars = scalars and self.values.ndim == 1 and self.values.shape == self.mask.shape
-        return scalars and _commanded_finite(self.values, self.mask)
-
-
-@exact_jit
-def _commanded_finite(values, mask):
-    """Whether all values that a mask picks are numbers, (m,)."""
-    finite = True
-    for channel in range(len(values)):
-        finite &= np.isfinite(values[channel]) or not mask[channel]
-    return finite
+        return scalars and bool(np.all(np.isfinite(self.values) | ~self.mask))

@@ -8,7 +8,6 @@ import numpy as np
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.intent import Intent
-from handrail.controllers.numerics.jit import copy, exact_jit, jit
 
 Prediction = Callable[[Intent, FloatArray], FloatArray]
 """The intent now and times ahead, (N,) [s] → predicted values on every channel, (N, m).
@@ -87,25 +86,13 @@ class Bounded:
 
     def __call__(self, intent: Intent, times: FloatArray) -> FloatArray:
         """Return the predicted values, (N, m)."""
-        return _bounded(intent.values, intent.mask, times, self._tool, self._distance, self._angle)
-
-
-@jit
-def _bounded(values, mask, times, tool, distance, angle):
-    speed, rate = 0.0, 0.0
-    for axis in range(3):
-        if mask[tool + axis]:
-            speed += values[tool + axis] ** 2
-        if mask[tool + 3 + axis]:
-            rate += values[tool + 3 + axis] ** 2
-    pace = max(speed**0.5 / distance, rate**0.5 / angle)
-    predicted = np.empty((len(times), len(values)))
-    for k in range(len(times)):
-        copy(values, len(values), predicted[k])
-        if times[k] * pace > 1.0 and times[k] > times[0]:
-            for axis in range(6):
-                predicted[k, tool + axis] = 0.0
-    return predicted
+        tool = slice(self._tool, self._tool + 6)
+        twist = np.where(intent.mask, intent.values, 0.0)[tool]
+        speed, rate = np.linalg.norm(twist[:3]), np.linalg.norm(twist[3:])
+        pace = max(speed / self._distance, rate / self._angle)
+        predicted = np.tile(intent.values, (len(times), 1))
+        predicted[(times * pace > 1.0) & (times > times[0]), tool] = 0.0
+        return predicted
 
 
 @dataclass(frozen=True)
@@ -140,7 +127,8 @@ class Smoothed:
         rest = np.zeros(len(intent.values))
         last = self.last or Level(intent.time, rest, rest)
         left = np.exp(-max(intent.time - last.time, 0.0) / (self.time_constant + rest))
-        command, level = _taken_up(intent.values, intent.mask, last.command, last.level, left)
+        command = np.where(intent.mask, intent.values, 0.0)
+        level = np.where(intent.mask, last.command + left * (last.level - last.command), 0.0)
         return replace(self, predict=after(self.predict, intent), last=Level(intent.time, command, level))
 
     def __call__(self, intent: Intent, times: FloatArray) -> FloatArray:
@@ -149,14 +137,3 @@ class Smoothed:
             return self.after(intent)(intent, times)
         faded = np.exp(-times[:, None] / (self.time_constant + np.zeros(len(intent.values))))
         return self.predict(intent, times) + faded * (self.last.level - self.last.command)
-
-
-@exact_jit
-def _taken_up(values, mask, before, level, left):
-    """Return command and level now: what is left of the way to the command before is `left` of it, (m,)."""
-    command, now = np.zeros(len(values)), np.zeros(len(values))
-    for channel in range(len(values)):
-        if mask[channel]:
-            command[channel] = values[channel]
-            now[channel] = before[channel] + left[channel] * (level[channel] - before[channel])
-    return command, now

@@ -9,33 +9,21 @@ def safety_filter(model: RobotModel, period: float = 0.05) -> MaskedMpc:
     """Return the safety filter: what is commanded passes unless a plan that keeps all limits forbids it.
 
     For intents whose mask is the identity on the joint channels, `channels.mask("joint")`, it is the special
-    case M = I of the masked MPC: nothing is left to complete, so the optimum is the smallest correction.
+    case M = I of the masked MPC: nothing is left to complete, so the optimum is the smallest correction. The
+    tracking cost is that of the multi-step filter, `‖u_L - u_0‖² + Σ_{h=1}^{M-1} wʰ ‖û_h - v_h‖²`, u_L the
+    command now and û_h the predicted ones. After the M tracked stages nothing but the limits counts: they are
+    the way to a stop. Many steps let the filter step in earlier, to chatter less.
 
     Args:
         model: of the robot.
-        period: of the control loop; a command is reached after it [s].
+        period: of the control loop; a command is reached after it [s]. It is the length of a stage too, so
+            that the first planned velocity is the filtered command.
     """
-    return MaskedMpc(model, filter_settings(period))
-
-
-def filter_settings(period: float = 0.05, steps: int = 5, decay: float = 0.85) -> MpcSettings:
-    """Return the settings with which the tracking cost is that of the multi-step filter.
-
-    `‖u_L - u_0‖² + Σ_{h=1}^{M-1} wʰ ‖û_h - v_h‖²`, u_L the command now and û_h the predicted ones, held
-    constant unless the MPC is given another prediction. After the M tracked stages nothing but the limits
-    counts: they are the way to a stop. Many steps let the filter step in earlier, to chatter less; with
-    `steps=1` it is the classical one-step filter.
-
-    Args:
-        period: length of a stage [s]: one control period, so that the first planned velocity is the filtered
-            command.
-        steps: M.
-        decay: w.
-    """
-    return MpcSettings(
+    settings = MpcSettings(
         dt=period,
-        decay=decay,
-        tracked_stages=steps,
+        decay=0.85,
+        tracked_stages=5,
         acceleration=1e-4,  # only so that the stages that are not tracked have an optimum
         posture=0.0,
     )
+    return MaskedMpc(model, settings)

@@ -7,12 +7,6 @@ from scipy.spatial.transform import Rotation
 from handrail.controllers.arrays import FloatArray
 
 
-def skew(vector: ArrayLike) -> FloatArray:
-    """Return the matrix of the cross product: `skew(a) @ b = a × b`, (3, 3)."""
-    x, y, z = np.asarray(vector, dtype=float)
-    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-
-
 def turned(planar: ArrayLike, angle: ArrayLike) -> FloatArray:
     """Return planar vectors or twists turned about z: `(c x − s y, s x + c y)`; what comes after x, y stays.
 

@@ -7,23 +7,16 @@ from handrail.controllers.arrays import BoolArray, FloatArray
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.objectives.objective import Objective, Stage
 from handrail.controllers.objectives.ownership import leaves_freedom
-from handrail.controllers.objectives.smooth import bounded_pull
 from handrail.controllers.robot.model import Pose
 
 _TINY = 1e-9
+_REACH = 0.05  # distance [m] and angle [rad] from which the pull grows no more
 
 
-def end_effector_hold(
-    channels: Channels,
-    position: float = 5.0,
-    orientation: float = 0.0,
-    frame: str = "tool",
-    reach: float = 0.05,
-    name: str = "hold",
-) -> Objective:
+def end_effector_hold(channels: Channels, position: float = 5.0, orientation: float = 0.0) -> Objective:
     """Hold the hand at a pose: `‖p - p*‖²` and `‖2 sin(θ/2) a‖²` of the turn (a, θ) from R* to R.
 
-    Far from the pose the pull is bounded (`bounded_pull`). Parameters: `hold_parameters(pose)`. The rows of
+    Far from the pose the pull is bounded. Parameters: `hold_parameters(pose)`. The rows of
     the position rest while the operator owns a linear channel of the hand, those of the orientation while
     an angular one is owned.
 
@@ -31,16 +24,13 @@ def end_effector_hold(
         channels: of the robot.
         position: weight of the position [1/m²].
         orientation: weight of the orientation [1/rad²]; 0 holds the point only.
-        frame: of the robot.
-        reach: distance [m] and angle [rad] from which the pull grows no more.
-        name: of the objective.
     """
 
     def residual(stage: Stage, p: ca.SX) -> ca.SX:
-        pose = stage.pose(frame)
-        parts = [bounded_pull(pose.position - p[:3], reach)]
+        pose = stage.pose()
+        parts = [_bounded_pull(pose.position - p[:3])]
         if orientation:
-            parts.append(bounded_pull(_turn(ca.reshape(p[3:12], 3, 3).T, pose.rotation), reach))
+            parts.append(_bounded_pull(_turn(ca.reshape(p[3:12], 3, 3).T, pose.rotation)))
         return ca.vertcat(*parts)
 
     def weights(mask: BoolArray) -> FloatArray:
@@ -51,7 +41,7 @@ def end_effector_hold(
         return np.concatenate(parts)
 
     return Objective(
-        name=name,
+        name="hold",
         residual=residual,
         reference=np.zeros(6 if orientation else 3),
         weights=weights,
@@ -69,3 +59,13 @@ def _turn(goal: ca.SX, rotation: ca.SX) -> ca.SX:
     turn = rotation @ goal.T
     twice = ca.vertcat(turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1])
     return twice / ca.sqrt(1.0 + ca.trace(turn) + _TINY)
+
+
+def _bounded_pull(error: ca.SX) -> ca.SX:
+    """Return e scaled to `‖r‖² = 2 δ² (√(1 + ‖e‖²/δ²) - 1)`, the pseudo-Huber loss, δ = reach.
+
+    Near the goal r = e; far from it the cost grows linearly, so that its pull, at most weight times δ,
+    cannot outweigh the tracking of a command.
+    """
+    root = ca.sqrt(1.0 + ca.dot(error, error) / _REACH**2)
+    return error * ca.sqrt(2.0 / (root + 1.0))

@@ -7,7 +7,6 @@ from handrail.controllers.arrays import BoolArray, FloatArray
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.objectives.objective import Objective, Stage
 from handrail.controllers.objectives.ownership import leaves_freedom, leaves_hand
-from handrail.controllers.objectives.smooth import hinge, norm
 
 GRAVITY = 9.81  # [m/s²]
 _WIDTH = 0.05  # of the smooth length [m/s²]
@@ -21,8 +20,6 @@ def tray_levelling(
     level: float = 2.0,
     slip: float = 0.5,
     friction: float = 0.2,
-    frame: str = "tool",
-    name: str = "tray",
 ) -> Objective:
     """Keep a tray level and what stands on it in place.
 
@@ -33,21 +30,19 @@ def tray_levelling(
 
     Args:
         channels: of the robot.
-        up: the tray's normal in the frame, a unit vector, (3,).
+        up: the tray's normal in the tool frame, a unit vector, (3,).
         level: weight of the tilt [1/rad²].
         slip: weight of the tangential acceleration beyond the cone [s⁴/m²].
         friction: μ.
-        frame: of the robot that the tray is fixed to, at its origin.
-        name: of the objective.
     """
     axis = np.array(up, dtype=float) / np.linalg.norm(up)
 
     def residual(stage: Stage, p: ca.SX) -> ca.SX:
-        normal = stage.pose(frame).rotation @ axis
-        force = acceleration(stage, frame) + ca.DM([0.0, 0.0, GRAVITY])
+        normal = stage.pose().rotation @ axis
+        force = acceleration(stage) + ca.DM([0.0, 0.0, GRAVITY])
         pressing = ca.dot(force, normal)
         sliding = force - pressing * normal
-        beyond = hinge(1.0 - friction * pressing / norm(sliding, _WIDTH), _SHARPNESS)
+        beyond = _hinge(1.0 - friction * pressing / _norm(sliding, _WIDTH), _SHARPNESS)
         return ca.vertcat(normal - ca.DM([0.0, 0.0, 1.0]), (_INSIDE + beyond) * sliding)
 
     def weights(mask: BoolArray) -> FloatArray:
@@ -56,10 +51,20 @@ def tray_levelling(
         slips = leaves_freedom(channels, mask) and not tool[:3].all()
         return np.repeat([level * tilts, slip * slips], 3)
 
-    return Objective(name, residual, np.zeros(6), weights)
+    return Objective("tray", residual, np.zeros(6), weights)
 
 
-def acceleration(stage: Stage, frame: str) -> ca.SX:
-    """Return the linear acceleration of a frame's origin, `J u + J̇ v`, (3, 1) [m/s²]."""
-    linear = stage.pose(frame).jacobian[:3, :]
+def acceleration(stage: Stage) -> ca.SX:
+    """Return the linear acceleration of the tool point, `J u + J̇ v`, (3, 1) [m/s²]."""
+    linear = stage.pose().jacobian[:3, :]
     return linear @ stage.u + ca.jtimes(linear @ stage.v, stage.q, stage.v)
+
+
+def _hinge(x: ca.SX, width: float) -> ca.SX:
+    """Return a smooth `max(x, 0)`: `½ (x + √(x² + width²)) `, off by at most width / 2, at x = 0."""
+    return 0.5 * (x + ca.sqrt(x * x + width * width))
+
+
+def _norm(vector: ca.SX, width: float) -> ca.SX:
+    """Return a smooth length `√(‖vector‖² + width²)`."""
+    return ca.sqrt(ca.dot(vector, vector) + width * width)

@@ -116,7 +116,6 @@ def check_description(content: Mapping[str, Any], where: str) -> None:
         HandrailError: an entry is missing, unknown or wrong, or two of them do not fit together.
     """
     check_entries(content, _WHOLE, where)
-    _refuse_lists(content["self_collision"], where)
     for name, entries in _TABLES.items():
         if name in content:
             check_entries(content[name], entries, f"{where}: [{name}]")
@@ -126,16 +125,6 @@ def check_description(content: Mapping[str, Any], where: str) -> None:
             _check_shape(shape, f"{where}: {name} of [[{kind}]]", kind == "collision")
     _check_joints(content, where)
     _check_names(content, where)
-
-
-def _refuse_lists(self_collision: Mapping[str, Any], where: str) -> None:
-    """Refuse the lists of older files: what they left out nobody looked at."""
-    for entry in ("scene", "floor"):
-        if entry in self_collision:
-            raise HandrailError(
-                f"{where}: entry {entry} of [self_collision]: expected none, got one; which shapes meet "
-                "scene and floor follows from how they move: remove it"
-            )
 
 
 def _check_shape(shape: Mapping[str, Any], where: str, named: bool) -> None:

@@ -1,13 +1,12 @@
 """Convex shapes and scene obstacles, the vocabulary of collision avoidance."""
 
 from dataclasses import dataclass, field
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray, frozen
 from handrail.controllers.errors import HandrailError
-from handrail.controllers.numerics.jit import exact_jit
 
 ShapeKind = Literal["box", "capsule", "sphere", "cylinder"]
 
@@ -44,16 +43,6 @@ class Shape:
             )
 
 
-class Kept(NamedTuple):
-    """What of an obstacle stays the same while it moves; two of them can be compared."""
-
-    name: str
-    frame: str
-    kind: ShapeKind
-    size: bytes
-    work_surface: bool
-
-
 @dataclass(frozen=True)
 class Obstacle:
     """A shape in the scene, or one that the robot holds.
@@ -84,7 +73,7 @@ class Obstacle:
         """
         for name in ("position", "velocity"):
             values = frozen(getattr(self, name), what=f"{name} of obstacle {self.name!r}")
-            if values.shape != (3,) or not _all_finite(values):
+            if values.shape != (3,) or not np.isfinite(values).all():
                 raise HandrailError(
                     f"{name} of obstacle {self.name!r}: expected three finite numbers, got {values.tolist()}"
                 )
@@ -102,26 +91,13 @@ class Obstacle:
         return bool(self.frame)
 
     @property
-    def kept(self) -> Kept:
+    def kept(self) -> tuple[object, ...]:
         """What stays the same while it moves."""
-        return Kept(self.name, self.frame, self.shape.kind, self.shape.size.tobytes(), self.work_surface)
+        return self.name, self.frame, self.shape.kind, self.shape.size.tobytes(), self.work_surface
 
 
-@exact_jit
-def _all_finite(values):
-    """Whether all values are numbers, (3,)."""
-    return np.isfinite(values[0]) and np.isfinite(values[1]) and np.isfinite(values[2])
-
-
-@exact_jit
-def _is_rotation(R):
+def _is_rotation(R: FloatArray) -> bool:
     """Whether `RᵀR = I` and `det R = 1`, (3, 3)."""
-    right = True
-    for i in range(3):
-        for j in range(3):
-            product = R[0, i] * R[0, j] + R[1, i] * R[1, j] + R[2, i] * R[2, j]
-            right &= abs(product - (i == j)) < _ROTATION_ERROR
-    volume = R[0, 0] * (R[1, 1] * R[2, 2] - R[1, 2] * R[2, 1])
-    volume -= R[0, 1] * (R[1, 0] * R[2, 2] - R[1, 2] * R[2, 0])
-    volume += R[0, 2] * (R[1, 0] * R[2, 1] - R[1, 1] * R[2, 0])
-    return right and volume > 0.0
+    if not np.all(np.abs(R) < 2.0):  # nor may its squares overflow
+        return False
+    return bool(np.all(np.abs(R.T @ R - np.eye(3)) < _ROTATION_ERROR) and np.linalg.det(R) > 0.0)

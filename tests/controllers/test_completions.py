@@ -12,11 +12,13 @@ from hypothesis.extra.numpy import arrays
 from handrail.collect.experiments.benchmark.catalogue import BASELINES
 from handrail.collect.tasks.goal_reaching import STEP
 from handrail.controllers.baselines.arm_completion import WeldedBaseCompletion
-from handrail.controllers.baselines.blended_completion import BlendedCompletion
-from handrail.controllers.baselines.decoupled_completion import DecoupledCompletion, DecoupledSettings
-from handrail.controllers.baselines.twist_completion import tool_twist, twist_controller
-from handrail.controllers.baselines.whole_body_completion import WholeBodyCompletion
-from handrail.controllers.errors import HandrailError
+from handrail.controllers.baselines.base_following import FREE, BaseFollowingCompletion
+from handrail.controllers.baselines.twist_completion import (
+    WholeBodyCompletion,
+    blended,
+    tool_twist,
+    twist_controller,
+)
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.command import Status
 from handrail.controllers.interface.controller import State
@@ -92,7 +94,7 @@ def test_less_damping_tracks_better():
 def test_a_blend_gives_the_hand_what_both_give_it(twist, alpha):
     """The twist of the blend is the weighted mean of the two twists; at the ends it is one of the two."""
     parts = WholeBodyCompletion(MODEL), WeldedBaseCompletion(MODEL)
-    blend = BlendedCompletion(*parts, alpha)(HOME, REST, twist, STEP)
+    blend = blended(*parts, alpha)(HOME, REST, twist, STEP)
     operator, autonomy = (part(HOME, REST, twist, STEP) for part in parts)
     jacobian = MODEL.jacobian(HOME)
     np.testing.assert_allclose(
@@ -102,20 +104,15 @@ def test_a_blend_gives_the_hand_what_both_give_it(twist, alpha):
         np.testing.assert_allclose(blend, operator if alpha else autonomy, atol=1e-12)
 
 
-def test_a_share_is_a_share():
-    with pytest.raises(HandrailError, match=r"alpha: expected 0 to 1, got 1\.5"):
-        BlendedCompletion(WholeBodyCompletion(MODEL), WholeBodyCompletion(MODEL), 1.5)
-
-
-def test_a_decoupled_base_keeps_the_hand_in_its_place():
+def test_a_base_that_follows_keeps_the_hand_in_its_place():
     """Pull the hand away: the base follows until the hand is back within the free distance of its place."""
-    rule = DecoupledCompletion(MODEL)
+    rule = BaseFollowingCompletion(MODEL)
     np.testing.assert_allclose(rule.base_velocity(HOME), 0.0, atol=1e-12)
     q = HOME.copy()
     q[:2] -= [0.6, 0.3]  # the same as the hand 0.67 m ahead of where it should be, were it held in the world
     held = MODEL.pose(HOME).position
 
-    class Held(DecoupledCompletion):
+    class Held(BaseFollowingCompletion):
         """The hand stays where it is in the world."""
 
         def _seen_from_base(self, q):
@@ -126,13 +123,13 @@ def test_a_decoupled_base_keeps_the_hand_in_its_place():
     held_rule = Held(MODEL)
     for _ in range(2000):
         q[:3] += 0.01 * held_rule.base_velocity(q)
-    assert abs(np.linalg.norm(q[:2] - HOME[:2]) - DecoupledSettings().free) < 0.02
+    assert abs(np.linalg.norm(q[:2] - HOME[:2]) - FREE) < 0.02
 
 
-def test_a_decoupled_base_rests_when_nothing_is_asked():
+def test_a_base_that_follows_rests_when_nothing_is_asked():
     q = HOME.copy()
     q[3] += 0.8  # the hand is out of its place
-    rule = DecoupledCompletion(MODEL)
+    rule = BaseFollowingCompletion(MODEL)
     assert np.linalg.norm(rule.base_velocity(q)) > 0.05
     np.testing.assert_allclose(rule(q, REST, np.zeros(6), STEP), 0.0, atol=1e-9)
 
@@ -227,7 +224,7 @@ def test_an_arm_without_a_base_completes_too():
     )
     arm = RobotModel(fixed)
     twist = np.array([0.02, 0.01, 0.02, 0.0, 0.0, 0.0])
-    for complete in (WholeBodyCompletion(arm, 1e-4), DecoupledCompletion(arm)):
+    for complete in (WholeBodyCompletion(arm, 1e-4), BaseFollowingCompletion(arm)):
         v = complete(fixed.home, np.zeros(6), twist, STEP)
         assert v.shape == (6,)
         assert (arm.jacobian(fixed.home) @ v) @ twist > 0

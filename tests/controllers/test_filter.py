@@ -17,7 +17,7 @@ from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.command import Status
 from handrail.controllers.interface.controller import State
 from handrail.controllers.interface.intent import Intent
-from handrail.controllers.mpc.safety_filter import filter_settings, safety_filter
+from handrail.controllers.mpc.safety_filter import safety_filter
 from handrail.controllers.numerics.threads import single_threaded
 from handrail.controllers.robot.model import RobotModel, load_model
 from handrail.controllers.robot.shape import Obstacle, Shape
@@ -92,7 +92,6 @@ def test_the_cost_is_that_of_the_multi_step_filter():
     others = np.delete(problem.weights, np.arange(JOINTS.start, JOINTS.stop), axis=1)
     assert others.max() <= 1e-6 * tracked[0, 0]
     assert problem.dt == PERIOD  # the first planned velocity is the command
-    assert filter_settings(0.1, steps=3, decay=0.5).discounts[:4].tolist() == [1.0, 0.5, 0.25, 0.0]
 
 
 def test_the_correction_is_the_smallest():

@@ -10,7 +10,7 @@ from handrail.collect.operators.modes import MODES
 from handrail.collect.session.build import build_controller, build_env, build_session
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.mpc.masked_mpc import MaskedMpc
-from handrail.controllers.objectives.narrow_joints import narrow_joint_centring
+from handrail.controllers.objectives.regularisation import narrow_joint_centring
 from handrail.controllers.robot.model import load_model
 
 

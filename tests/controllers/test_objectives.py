@@ -103,7 +103,7 @@ def test_residuals_are_finite_where_they_are_kinked(objective):
 def test_the_tray_s_acceleration_is_that_of_the_hand():
     rng = np.random.default_rng(1)
     q, v, u = (ca.SX.sym(name, 9) for name in "qvu")
-    symbolic = ca.Function("a", [q, v, u], [acceleration(Stage(MODEL, q, v, u), "tool")])
+    symbolic = ca.Function("a", [q, v, u], [acceleration(Stage(MODEL, q, v, u))])
     state = HOME + rng.uniform(-0.5, 0.5, 9), rng.uniform(-1, 1, 9), rng.uniform(-1, 1, 9)
 
     def position(t):

@@ -14,8 +14,7 @@ from handrail.collect.simulation.scene import Scene
 from handrail.collect.tasks.catalogue import TaskSpec
 from handrail.collect.tasks.task import Episode, Verdict
 from handrail.controllers.baselines.catalogue import ControllerSpec
-from handrail.controllers.baselines.twist_completion import twist_controller
-from handrail.controllers.baselines.whole_body_completion import WholeBodyCompletion
+from handrail.controllers.baselines.twist_completion import WholeBodyCompletion, twist_controller
 from handrail.controllers.robot.catalogue import ROBOTS, RobotSpec
 from handrail.controllers.robot.model import Pose
 

@@ -9,12 +9,11 @@ from handrail.collect.experiments.mink.controller import MinkController
 from handrail.collect.tasks.goal_reaching import STEP
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.baselines.arm_completion import WeldedBaseCompletion
-from handrail.controllers.baselines.blended_completion import BlendedCompletion
+from handrail.controllers.baselines.base_following import BaseFollowingCompletion
 from handrail.controllers.baselines.cbf_filter import CbfFilter
-from handrail.controllers.baselines.decoupled_completion import DecoupledCompletion
 from handrail.controllers.baselines.direct import DirectController
-from handrail.controllers.baselines.twist_completion import twist_controller
-from handrail.controllers.baselines.whole_body_completion import WholeBodyCompletion
+from handrail.controllers.baselines.twist_completion import WholeBodyCompletion, twist_controller
+from handrail.controllers.baselines.twist_completion import blended as blend
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import Controller, State
 from handrail.controllers.interface.intent import Intent
@@ -170,15 +169,15 @@ def nominal_base(model: RobotModel) -> Controller:
     return twist_controller(model, WeldedBaseCompletion(model), STEP)
 
 
-def decoupled(model: RobotModel) -> Controller:
+def base_following(model: RobotModel) -> Controller:
     """Return base and arm that share nothing but the robot."""
-    return twist_controller(model, DecoupledCompletion(model), STEP)
+    return twist_controller(model, BaseFollowingCompletion(model), STEP)
 
 
 def blended(model: RobotModel) -> Controller:
     """Return the average of two completions."""
-    blend = BlendedCompletion(WholeBodyCompletion(model), WeldedBaseCompletion(model))
-    return twist_controller(model, blend, STEP)
+    both = blend(WholeBodyCompletion(model), WeldedBaseCompletion(model))
+    return twist_controller(model, both, STEP)
 
 
 def direct(model: RobotModel) -> Controller:

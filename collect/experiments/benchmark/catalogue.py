@@ -48,7 +48,7 @@ BASELINES = Registry(
         Baseline("mink_low_pass", "mink behind the MPC's low-pass", f"{_HERE}:mink", _SMOOTHED),
         Baseline("dls", "damped least squares, whole body", f"{_HERE}:whole_body"),
         Baseline("dls_arm", "damped least squares on the arm, nominal base", f"{_HERE}:nominal_base"),
-        Baseline("decoupled", "decoupled base and arm", f"{_HERE}:decoupled"),
+        Baseline("decoupled", "decoupled base and arm", f"{_HERE}:base_following"),
         Baseline("blended", "blended control, α = 0.5", f"{_HERE}:blended"),
         Baseline("direct", "direct joint control", f"{_HERE}:direct", _JOINTS),
         Baseline("cbf_filter", "CBF safety filter on joint commands", f"{_HERE}:cbf", _JOINTS),

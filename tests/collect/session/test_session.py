@@ -20,7 +20,7 @@ from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.command import Status
 from handrail.controllers.interface.intent import Intent
 from handrail.controllers.mpc.masked_mpc import MaskedMpc
-from handrail.controllers.mpc.safety_filter import filter_settings, safety_filter
+from handrail.controllers.mpc.safety_filter import safety_filter
 from handrail.datasets.format.schema import check_frame
 from handrail.datasets.recording.frames import frame_row
 
@@ -159,7 +159,7 @@ def test_controllers_follow_the_mode():
     assert isinstance(build_controller(MODES["direct_cbf"], env.model, 20), CbfFilter)
     filtered = build_controller(MODES["direct_filtered"], env.model, 25)
     assert isinstance(filtered, MaskedMpc)
-    assert filtered.settings == filter_settings(0.04)
+    assert filtered.settings == safety_filter(env.model, 0.04).settings
 
 
 def test_a_second_robot_is_a_new_description_and_nothing_else(tmp_path):
