@@ -107,11 +107,8 @@ class Registry[Spec: Named](Mapping[str, Spec]):
         return self[name] if name in self else self._spec(name, name)
 
     def _installed(self) -> dict[str, str]:
-        return {entry.name: entry.value for entry in _entry_points(tuple(sys.path)).select(group=self._group)}
-
-    @property
-    def _group(self) -> str:
-        return f"handrail.{self._thing}s"
+        entries = _entry_points(tuple(sys.path)).select(group=f"handrail.{self._thing}s")
+        return {entry.name: entry.value for entry in entries}
 
     def _spec(self, name: str, reference: str) -> Spec:
         spec = resolved(reference, f"{self._thing} {name}")

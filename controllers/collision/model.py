@@ -15,7 +15,6 @@ from handrail.controllers.robot.model import RobotModel
 from handrail.controllers.robot.shape import Obstacle
 
 _STRETCH = 13  # configurations after which all pairs are measured again
-_FAR = 0.15  # a pair that stays farther apart than this need not be measured exactly [m]
 
 
 @dataclass(frozen=True)
@@ -61,7 +60,6 @@ class CollisionModel:
         self._motion_bounds = self._shapes.motion_bounds  # (n, P), which `update_scene` brings up to date
         self._data = self._model.createData()
         self._every = np.arange(len(self.pairs))
-        self._far = np.full(len(self.pairs), _FAR)
         neutral = pin.neutral(self._model)
         self._all, self._along, self._after = (
             PairData(self._model, self._data, self._geometry, neutral) for _ in range(3)
@@ -93,7 +91,8 @@ class CollisionModel:
             times: of the configurations from now on, (K,) [s]; moving obstacles are where they will be then.
         """
         if not self.size:
-            return _nothing(len(q), self._model.nv)
+            nothing = np.zeros((0, 2), dtype=int), np.zeros((0, self._model.nv))
+            return Distances(np.zeros((len(q), 0)), *nothing)
         times = np.zeros(len(q)) if times is None else times
         limits = within if isinstance(within, np.ndarray) else np.full(self.size, float(within))
         witnesses = np.empty((len(q), self.size, 9))
@@ -135,7 +134,7 @@ class CollisionModel:
             times: from now on [s].
             now: a configuration, (n,), and its distances, (P,), if they are known: pairs that cannot come
                 below their limit then get a lower bound instead, infinitely cheaper.
-            within: distance below which a pair's own value is wanted, (P,) [m]; 0.15 m when None.
+            within: distance below which a pair's own value is wanted then, (P,) [m].
         """
         if not self.size:
             return np.empty((len(q), 0))
@@ -144,7 +143,6 @@ class CollisionModel:
             data, chosen, values = self._all, self._every, np.empty((len(q), self.size))
         else:
             data, (start, there) = self._after, now
-            within = self._far if within is None else within
             values, close = lower_bounds(there, start, q, times, self._motion_bounds, self._speeds, within)
             if not close.any():
                 return values
@@ -156,7 +154,7 @@ class CollisionModel:
 
     def _measure(
         self,
-        data: "PairData",
+        data: PairData,
         q: FloatArray,
         times: FloatArray,
         witnesses: FloatArray,
@@ -172,19 +170,14 @@ class CollisionModel:
             jacobians: filled with the joints' spatial Jacobians, if wanted, (K, 6, n).
         """
         model, kinematics, geometry = self._model, self._data, self._geometry
-        pairs, results = data.geometry, data.results
         for k in range(len(q)):
             if self._moving:
-                self._move_obstacles(times[k])
-            pin.computeDistances(model, kinematics, geometry, pairs, q[k])
-            witnesses[k] = results.read()
+                for obstacle in self._moving:
+                    self._shapes.place(obstacle, times[k])
+            pin.computeDistances(model, kinematics, geometry, data.geometry, q[k])
+            witnesses[k] = data.read()
             if jacobians is not None:
                 jacobians[k] = pin.computeJointJacobians(model, kinematics)
-
-    def _move_obstacles(self, time: float) -> None:
-        """Put moving obstacles where they are after a time."""
-        for obstacle in self._moving:
-            self._shapes.place(obstacle, time)
 
     def update_scene(self, obstacles: tuple[Obstacle, ...]) -> None:
         """Take where the obstacles are now and how fast they move.
@@ -218,8 +211,3 @@ class CollisionModel:
 def _kept(obstacles: tuple[Obstacle, ...]) -> tuple[tuple[object, ...], ...]:
     """Return what of every obstacle stays the same while it moves."""
     return tuple(obstacle.kept for obstacle in obstacles)
-
-
-def _nothing(count: int, size: int) -> Distances:
-    """Return the distances of no pairs at all at `count` configurations."""
-    return Distances(np.zeros((count, 0)), np.zeros((0, 2), dtype=int), np.zeros((0, size)))

@@ -9,14 +9,20 @@ _STRIDES: set[int] = set()  # between coal's results, that were seen to be right
 
 
 class PairData:
-    """Coal's working data for some pairs, with a reader of its results."""
+    """Coal's working data for some pairs, which reads normals and nearest points of all pairs at once.
+
+    Coal's results lie in one C++ vector, each with normal and both nearest points side by side, and the
+    binding hands out views of that memory: one strided view reads them all. Where a build lays them out
+    otherwise, they are read one by one.
+    """
 
     def __init__(
         self, model: pin.Model, data: pin.Data, geometry: pin.GeometryModel, neutral: FloatArray
     ) -> None:
         self.geometry = pin.GeometryData(geometry)
         pin.computeDistances(model, data, geometry, self.geometry, neutral)
-        self.results = ResultReader(self.geometry.distanceResults)
+        self._results = self.geometry.distanceResults
+        self._view = self._strided(self._results)
         self._selected = np.ones(len(geometry.collisionPairs), dtype=bool)
         self._chosen = np.flatnonzero(self._selected)
         self._key = self._selected.tobytes()
@@ -33,22 +39,6 @@ class PairData:
                 self.geometry.deactivateCollisionPair(pair)
         self._key, self._selected, self._chosen = key, wanted, np.flatnonzero(wanted)
         return self._chosen
-
-
-class ResultReader:
-    """Reads normals and nearest points of all pairs at once.
-
-    Coal's results lie in one C++ vector, each with normal and both nearest points side by side, and the
-    binding hands out views of that memory: one strided view reads them all. Where a build lays them out
-    otherwise, they are read one by one.
-
-    Args:
-        results: of pairs that have been computed at least once.
-    """
-
-    def __init__(self, results: pin.StdVec_DistanceResult) -> None:
-        self._results = results
-        self._view = self._strided(results)
 
     def read(self) -> FloatArray:
         """Return normals, first and second nearest points in the world, side by side, (P, 9)."""

@@ -38,7 +38,3 @@ class Frames:
     def parameters(self) -> FloatArray:
         """The parameters of the tracking objective, (5,): base in world, tool in tool, point."""
         return frozen([self.base == "world", self.tool == "tool", *self.point])
-
-
-USUAL = Frames()
-"""Those of an operator who says nothing about it."""

@@ -7,7 +7,9 @@ import numpy as np
 
 from handrail.controllers.arrays import BoolArray, FloatArray, frozen, real
 from handrail.controllers.interface.channels import Channels
-from handrail.controllers.interface.frames import USUAL, Frames
+from handrail.controllers.interface.frames import Frames
+
+_USUAL = Frames()
 
 
 @dataclass(frozen=True)
@@ -30,9 +32,6 @@ class RawInput:
         object.__setattr__(self, "values", frozen(self.values, what="raw input of an intent"))
 
 
-_UNKNOWN = RawInput()
-
-
 @dataclass(frozen=True)
 class Intent:
     """A partial command.
@@ -53,8 +52,8 @@ class Intent:
     gripper: float = 0.0
     mode: str = ""
     time: float = 0.0
-    frames: Frames = USUAL
-    raw: RawInput = _UNKNOWN
+    frames: Frames = _USUAL
+    raw: RawInput = RawInput()
 
     def __post_init__(self) -> None:
         """Copy the arrays and make them read-only.

@@ -67,7 +67,7 @@ class Trajectory:
         step = self.dt / samples
         ahead = step * np.arange(samples * (len(self.velocities) - 1) + 1) - self.elapsed
         times = np.append(0.0, ahead[ahead > 0.0])
-        velocities = self._interpolated(times)
+        velocities = _interpolated(self.velocities, (times + self.elapsed) / self.dt)
         moves = 0.5 * np.diff(times)[:, None] * (velocities[:-1] + velocities[1:])
         return np.vstack([q, q + np.cumsum(moves, axis=0)]), times
 
@@ -77,13 +77,10 @@ class Trajectory:
         whole = min(int(passed / self.dt), len(self.velocities) - 2)
         return whole, passed - whole * self.dt
 
-    def _interpolated(self, times: FloatArray) -> FloatArray:
-        """Return the velocities at times from now, (K,), the last one held after the end, (K, n)."""
-        return _interpolated(self.velocities, (times + self.elapsed) / self.dt)
-
 
 @jit
 def _interpolated(velocities, knots):
+    """Return velocities at times in units of dt, (K,), the last one held after the end, (K, n)."""
     last, n = len(velocities) - 1, velocities.shape[1]
     result = np.empty((len(knots), n))
     for k in range(len(knots)):

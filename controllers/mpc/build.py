@@ -40,7 +40,9 @@ class ProblemBuilder:
         self._times = settings.dt * np.arange(1, settings.horizon + 1)
         self._tolerance = settings.velocity_tolerance * self._limits.velocity
         self._reference = np.tile(residuals.reference, (settings.horizon, 1))
-        self._largest = self._largest_intent()
+        velocity, tool = self._limits.velocity, [settings.largest_speed] * 3 + [settings.largest_rate] * 3
+        # what a command of each channel is cut to, (m,): nothing faster is possible, or wise
+        self._largest = np.concatenate([velocity[: len(self._channels.base)], tool, velocity])
         self._weights_of = lru_cache(_MASKS)(self._weights)
 
     def build(self, loop: LoopState, state: State, intent: Intent) -> Problem:
@@ -65,12 +67,6 @@ class ProblemBuilder:
             slack_linear=settings.slack_linear,
             slack_quadratic=settings.slack_quadratic,
         )
-
-    def _largest_intent(self) -> FloatArray:
-        """Return what a command of each channel is cut to, (m,): nothing faster is possible, or wise."""
-        velocity = self._limits.velocity
-        tool = [self._settings.largest_speed] * 3 + [self._settings.largest_rate] * 3
-        return np.concatenate([velocity[: len(self._channels.base)], tool, velocity])
 
     def _weights(self, mask: bytes) -> FloatArray:
         """Return the weights of all rows under a mask's bytes, (N, r)."""

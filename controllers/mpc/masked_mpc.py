@@ -15,7 +15,7 @@ from handrail.controllers.interface.prediction import Prediction, constant
 from handrail.controllers.interface.validation import InputValidator
 from handrail.controllers.mpc.build import ProblemBuilder, built_in_objectives
 from handrail.controllers.mpc.loop_state import LoopState
-from handrail.controllers.mpc.supervision import Attempt, Supervisor
+from handrail.controllers.mpc.supervision import Supervisor
 from handrail.controllers.objectives.objective import Objective
 from handrail.controllers.ocp.problem import Plan, Problem
 from handrail.controllers.ocp.residuals import StageResiduals
@@ -62,8 +62,7 @@ class MaskedMpc:
         self.solver = RealTimeSolver(self.residuals, horizon, model.size, self.settings.dt)
         self._builder = ProblemBuilder(model, self.settings, self.residuals)
         self._validator = InputValidator(self.channels, self.settings.intent_timeout)
-        limiter = Limiter(model.description)
-        self._supervisor = Supervisor(model.description.limits, limiter, self.settings)
+        self._supervisor = Supervisor(Limiter(model.description), self.settings)
         self._predict = predict
         self.reset()
 
@@ -106,8 +105,7 @@ class MaskedMpc:
             plan, active = self.solve(self._builder.build(loop, state, intent), loop, state)
             loop = replace(loop, active=active)
             status = Status.SOLVER_FAILED if plan is None else Status.OK
-        attempt = Attempt(plan, status, start)
-        command, self.loop = self._supervisor.supervise(loop, state, intent, attempt)
+        command, self.loop = self._supervisor.supervise(loop, state, intent, plan, status, start)
         return command
 
     def build_problem(self, state: State, intent: Intent) -> Problem:

@@ -14,7 +14,6 @@ from handrail.controllers.interface.trajectory import Trajectory
 from handrail.controllers.mpc.loop_state import LoopState
 from handrail.controllers.ocp.problem import Plan
 from handrail.controllers.ocp.settings import MpcSettings
-from handrail.controllers.robot.description import Limits
 from handrail.controllers.safety.backup import Backup, Situation, full_stop
 from handrail.controllers.safety.certificate import StopCertificate
 from handrail.controllers.safety.limiter import Limiter
@@ -23,76 +22,73 @@ _UNHEARD = (Status.INVALID_STATE, Status.INVALID_SCENE, Status.INVALID_INTENT, S
 
 
 @dataclass(frozen=True)
-class Attempt:
-    """What came of an update's problem: a plan or none, why, and when the update began [s]."""
-
-    plan: Plan | None
-    status: Status
-    start: float
-
-
-@dataclass(frozen=True)
 class Supervisor:
     """Says what is sent.
 
     Attributes:
-        limits: of the robot.
-        limiter: knows the full stop.
+        limiter: knows the limits and the full stop.
         settings: margins, horizon.
     """
 
-    limits: Limits
     limiter: Limiter
     settings: MpcSettings
 
     def supervise(
-        self, loop: LoopState, state: State, intent: Intent, attempt: Attempt
+        self, loop: LoopState, state: State, intent: Intent, plan: Plan | None, status: Status, start: float
     ) -> tuple[Command, LoopState]:
-        """Return the command of an update, which ends at rest, and the loop's state after it."""
-        plan, status = attempt.plan, attempt.status
+        """Return the command of an update, which ends at rest, and the loop's state after it.
+
+        Args:
+            loop: the state before it.
+            state: of the robot.
+            intent: of the operator.
+            plan: what came of the update's problem, if anything.
+            status: why there is none; or `ok`.
+            start: when the update began [s].
+        """
         distances = self._distances(loop, state, plan)
         if distances is not None:
             loop = replace(loop, surroundings=loop.surroundings.seen(distances))
-        motion, stored, planned = self._motion(loop, state, attempt, distances)
+        motion, stored, planned = self._motion(loop, state, plan, distances, halt=status in _UNHEARD)
         if plan is not None and not planned:
             status = Status.BACKUP
-        diagnostics = _diagnostics(replace(attempt, status=status), distances, loop.surroundings)
+        diagnostics = _diagnostics(plan, status, start, distances, loop.surroundings)
         gripper = _gripper(loop, intent, status)
         command = Command(motion.velocities, motion.dt, motion.elapsed, gripper, diagnostics)
         last = loop.following(command, state.time, self.settings.dt)
         return command, replace(loop, last=last, plan=plan if planned else None, stored=stored)
 
     def _motion(
-        self, loop: LoopState, state: State, attempt: Attempt, distances: FloatArray | None
+        self, loop: LoopState, state: State, plan: Plan | None, distances: FloatArray | None, halt: bool
     ) -> tuple[Trajectory, Trajectory, bool]:
         """Return how the robot moves, to rest at last; what is stored; whether it begins with the plan."""
-        dt, plan = self.settings.dt, attempt.plan
+        dt = self.settings.dt
         if distances is None:
             stop = full_stop(self.limiter, self._sent_unseen(loop, state), dt)
             return stop, stop, False
-        sent, elapsed = state.sent(self.limits), loop.elapsed(state.time)
+        sent, elapsed = state.sent(self.limiter.limits), loop.elapsed(state.time)
         situation = Situation(state.q, sent, distances, loop.stored, elapsed)
-        way = self._backup(loop).choose(situation, plan, halt=attempt.status in _UNHEARD)
+        way = self._backup(loop).choose(situation, plan, halt)
         if plan is not None and way.planned:
             return Trajectory(self.limiter.to_rest(plan.v, dt), dt), way.motion, True
         return way.motion, way.motion, False
 
     def _sent_unseen(self, loop: LoopState, state: State) -> FloatArray:
         """Return what a robot is being sent whose state is nonsense, (n,): what it follows, if anything."""
-        said = state.commanded
-        if loop.last is None or (said.shape == self.limits.velocity.shape and np.isfinite(said).all()):
-            return state.sent(self.limits)
+        said, limits = state.commanded, self.limiter.limits
+        if loop.last is None or (said.shape == limits.velocity.shape and np.isfinite(said).all()):
+            return state.sent(limits)
         return loop.last.command.velocity(loop.last.elapsed(state.time))
 
     def _backup(self, loop: LoopState) -> Backup:
         settings = self.settings
         least, span = settings.margin_share * loop.surroundings.margins, settings.horizon * settings.dt
-        certificate = StopCertificate(self.limiter, loop.surroundings.collision, least, self.limits, span)
+        certificate = StopCertificate(self.limiter, loop.surroundings.collision, least, span)
         return Backup(certificate, self.limiter, settings.dt)
 
     def _distances(self, loop: LoopState, state: State, plan: Plan | None) -> FloatArray | None:
         """Return the signed distances now, (P,); None where nobody knows where the robot is."""
-        if not state.is_of(len(self.limits.velocity)):
+        if not state.is_of(len(self.limiter.limits.velocity)):
             return None
         return loop.surroundings.collision.values(state.q[None, :])[0] if plan is None else plan.distances
 
@@ -104,8 +100,13 @@ def _gripper(loop: LoopState, intent: Intent, status: Status) -> float:
     return min(max(intent.gripper, 0.0), 1.0)
 
 
-def _diagnostics(attempt: Attempt, distances: FloatArray | None, surroundings: Surroundings) -> Diagnostics:
-    plan = attempt.plan
+def _diagnostics(
+    plan: Plan | None,
+    status: Status,
+    start: float,
+    distances: FloatArray | None,
+    surroundings: Surroundings,
+) -> Diagnostics:
     slack = 0.0 if plan is None else max(plan.collision_slack, plan.limit_slack)
     near = (np.inf, np.inf) if distances is None else surroundings.smallest(distances)
-    return Diagnostics(attempt.status, perf_counter() - attempt.start, slack, *near)
+    return Diagnostics(status, perf_counter() - start, slack, *near)

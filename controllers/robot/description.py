@@ -198,7 +198,8 @@ def _find_urdf(urdf: str, folder: Path) -> tuple[Path, Path]:
     """
     name = PurePosixPath(urdf)
     beside = folder / name
-    if not name.parts or name.is_absolute() or ".." in name.parts or not _inside(beside, folder):
+    inside = beside.resolve().is_relative_to(folder.resolve())
+    if not name.parts or name.is_absolute() or ".." in name.parts or not inside:
         raise HandrailError(f"URDF {urdf}: expected a path inside a package, or beside the description")
     if beside.is_file():
         return beside, folder
@@ -215,7 +216,3 @@ def _find_urdf(urdf: str, folder: Path) -> tuple[Path, Path]:
         f"URDF {urdf}: expected it beside the description or in an installed package {distribution}, "
         "found it in neither"
     )
-
-
-def _inside(path: Path, folder: Path) -> bool:
-    return path.resolve().is_relative_to(folder.resolve())

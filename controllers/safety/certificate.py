@@ -9,7 +9,6 @@ from handrail.controllers.arrays import FloatArray
 from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.collision.slacks import MOVING
 from handrail.controllers.numerics.jit import jit
-from handrail.controllers.robot.description import Limits
 from handrail.controllers.safety.limiter import Limiter
 
 _SAMPLES = np.array([0.25, 0.5, 0.75, 1.0])  # of the time that a stop takes, or that the robot waits after it
@@ -40,17 +39,15 @@ class StopCertificate:
     is beyond already, no farther than now.
 
     Attributes:
-        limiter: knows the full stop.
+        limiter: knows the limits and the full stop.
         collision: the pairs.
         least: distance of each pair that is kept, (P,) [m].
-        limits: of the joints.
         span: time for which the robot has to be safe, where obstacles move [s].
     """
 
     limiter: Limiter
     collision: CollisionModel
     least: FloatArray
-    limits: Limits
     span: float
 
     def violation(
@@ -85,7 +82,7 @@ class StopCertificate:
     def along(self, path: FloatArray, times: FloatArray, now: tuple[FloatArray, FloatArray]) -> FloatArray:
         """Return the same at every point of a motion, hard and of all, (K, 2)."""
         distances = self.collision.values(path, times, now, self.least)
-        bounds = self.limits.position_lower, self.limits.position_upper
+        bounds = self.limiter.limits.position_lower, self.limiter.limits.position_upper
         return _violations(path, distances, *now, self.least, self.collision.kinds, *bounds)
 
 

@@ -15,10 +15,13 @@ class Limiter:
     With the previous command v⁻ and the target v, over a step of h seconds:
     `v⁺ = clip(clip(v, ±v_max), v⁻ ± h a_max)`. With a position given, the velocity towards a position
     limit is also kept below what can brake before it, `sqrt(2 a_max distance)`.
+
+    Attributes:
+        limits: of the robot.
     """
 
     def __init__(self, description: RobotDescription) -> None:
-        self._limits = description.limits
+        self.limits = description.limits
 
     def limit(
         self, previous: FloatArray, target: FloatArray, duration: float, q: FloatArray | None = None
@@ -36,18 +39,18 @@ class Limiter:
         target = np.asarray(target, dtype=np.float64)
         valid = target.shape == previous.shape and bool(np.all(np.isfinite(target)))
         wanted = target if valid else np.zeros_like(previous)
-        maximum = self._limits.velocity
+        maximum = self.limits.velocity
         allowed = np.clip(wanted, -maximum, maximum)
         if q is not None:
             allowed = np.clip(allowed, *self._braking_range(q))
-        step = self._limits.acceleration * duration
+        step = self.limits.acceleration * duration
         allowed = np.clip(allowed, previous - step, previous + step)
         tolerance = _TOLERANCE * (maximum + step)
         return allowed, not valid or bool(np.any(np.abs(allowed - wanted) > tolerance))
 
     def to_rest(self, velocities: FloatArray, dt: float) -> FloatArray:
         """Return velocities at knots, (k, n), and the fastest stop from the last one."""
-        last, deceleration = velocities[-1], self._limits.acceleration
+        last, deceleration = velocities[-1], self.limits.acceleration
         steps = max(1, int(np.ceil(float(np.max(np.abs(last) / deceleration)) / dt)))
         times = dt * np.arange(1, steps + 1)[:, None]
         speeds = np.maximum(np.abs(last) - deceleration * times, 0.0)
@@ -61,12 +64,12 @@ class Limiter:
             v: how fast, (n,).
             shares: of the time until every joint rests, (K,).
         """
-        return _stop(q, v, self._limits.acceleration, shares)
+        return _stop(q, v, self.limits.acceleration, shares)
 
     def _braking_range(self, q: FloatArray) -> tuple[FloatArray, FloatArray]:
-        above = np.maximum(self._limits.position_upper - q, 0.0)
-        below = np.maximum(q - self._limits.position_lower, 0.0)
-        twice = 2.0 * self._limits.acceleration
+        above = np.maximum(self.limits.position_upper - q, 0.0)
+        below = np.maximum(q - self.limits.position_lower, 0.0)
+        twice = 2.0 * self.limits.acceleration
         return -np.sqrt(twice * below), np.sqrt(twice * above)
 
 

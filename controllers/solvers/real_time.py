@@ -14,7 +14,7 @@ from handrail.controllers.ocp.problem import Plan, Problem
 from handrail.controllers.ocp.residuals import StageResiduals
 from handrail.controllers.solvers.active_set import NOTHING_ACTIVE, ActiveSet, Answer, QuadraticProgram
 from handrail.controllers.solvers.constraints import Constraints, constraints_around
-from handrail.controllers.solvers.stage_cost import Quadratic, StageCost
+from handrail.controllers.solvers.stage_cost import StageCost
 
 _PHASES = ("distances", "residuals", "solve")
 _MORE_STEPS = 2  # at most, in one update
@@ -86,10 +86,17 @@ class RealTimeSolver:
     def program(self, problem: Problem, guess: FloatArray) -> QuadraticProgram:
         """Return the QP of the step from a guess, (N, n); H and g last until the next update."""
         begin = self._linearisation(problem, guess)
-        return _program(problem, self.cost.expand(problem, *begin[:3]), self._constraints(problem, begin))
+        return self._program(problem, begin, self._constraints(problem, begin))[1]
 
     def _constraints(self, problem: Problem, begin: _Guess) -> Constraints:
         return constraints_around(problem, begin[:3], begin.nodes, begin.distances, self.cost.matrix)
+
+    def _program(
+        self, problem: Problem, begin: _Guess, constraints: Constraints
+    ) -> tuple[float, QuadraticProgram]:
+        value, gradient, band = self.cost.expand(problem, *begin[:3])
+        penalty = (problem.slack_linear, problem.slack_quadratic)
+        return value, QuadraticProgram(band, gradient, penalty, constraints)
 
     def _step(self, problem: Problem, guess: FloatArray, active: IntArray, spent: list[float]) -> "_Step":
         """Take one step; add the time that its phases take."""
@@ -97,11 +104,11 @@ class RealTimeSolver:
         begin = self._linearisation(problem, guess)
         constraints = self._constraints(problem, begin)
         measured = perf_counter()
-        quadratic = self.cost.expand(problem, *begin[:3])
+        value, program = self._program(problem, begin, constraints)
         built = perf_counter()
-        answer = self.qp.solve(_program(problem, quadratic, constraints), active)
-        moved = self._damped(problem, begin.u, quadratic.value, answer.slack, constraints)
-        again = answer.solved and self._is_far(problem, constraints, quadratic.value, answer, moved)
+        answer = self.qp.solve(program, active)
+        moved = self._damped(problem, begin.u, value, answer.slack, constraints)
+        again = answer.solved and self._is_far(problem, constraints, value, answer, moved)
         spent[0] += measured - start
         spent[1] += built - measured
         spent[2] += perf_counter() - built
@@ -138,13 +145,6 @@ class RealTimeSolver:
 
         The QP's constraints are convex, so that from a guess within them a share α of the change needs no
         more slack than α times that of the whole; a guess that breaks a limit is left behind whole.
-
-        Args:
-            problem: of this update.
-            guess: accelerations, (N, n).
-            allowed: cost of the guess.
-            slack: of the QP's solution, (4,).
-            constraints: around the guess.
         """
         change, share = self.qp.motion[:, 2].copy(), 1.0
         while True:
@@ -175,11 +175,6 @@ class _Moved(NamedTuple):
     u: FloatArray
     change: FloatArray
     cost: float
-
-
-def _program(problem: Problem, quadratic: Quadratic, constraints: Constraints) -> QuadraticProgram:
-    penalty = (problem.slack_linear, problem.slack_quadratic)
-    return QuadraticProgram(quadratic.band, quadratic.gradient, penalty, constraints)
 
 
 def _rolled_out(problem: Problem, guess: FloatArray, change: FloatArray) -> tuple[FloatArray, ...]:

@@ -1,7 +1,5 @@
 """The Gauss-Newton cost of all stages in variables of local support (basis.py): value, gradient, Hessian."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray, IntArray
@@ -11,21 +9,6 @@ from handrail.controllers.ocp.residuals import StageResiduals
 from handrail.controllers.solvers.basis import REACH, stage_matrix, to_variables
 
 _CACHED = 64
-
-
-@dataclass(frozen=True)
-class Quadratic:
-    """`value + gᵀ s + ½ sᵀ H s`; the arrays belong to the cost and last until its next `expand`.
-
-    Attributes:
-        value: `½ Σ ‖r - ref‖²_W` at the guess.
-        gradient: g, (N n,).
-        band: H as a band, (N n, 3n); see banded.py.
-    """
-
-    value: float
-    gradient: FloatArray
-    band: FloatArray
 
 
 class StageCost:
@@ -45,8 +28,19 @@ class StageCost:
         self._band = np.zeros((horizon * size, REACH * size))
         self._constant: dict[bytes, FloatArray] = {}
 
-    def expand(self, problem: Problem, q: FloatArray, v: FloatArray, u: FloatArray) -> Quadratic:
-        """Return the quadratic around a guess: q and v at the nodes, (N + 1, n), and u, (N, n)."""
+    def expand(
+        self, problem: Problem, q: FloatArray, v: FloatArray, u: FloatArray
+    ) -> tuple[float, FloatArray, FloatArray]:
+        """Return the cost `value + gᵀ s + ½ sᵀ H s` around a guess: value, g (N n,), H as a band (N n, 3n).
+
+        See banded.py for the band; both arrays last until the next `expand`.
+
+        Args:
+            problem: of the update.
+            q: positions at the nodes, (N + 1, n).
+            v: velocities there, (N + 1, n).
+            u: accelerations, (N, n).
+        """
         self._band[:] = self._constant_band(problem.weights)
         self._gradient[:] = 0.0
         z, values, jacobians = self.residuals.evaluate(q[1:], v[1:], u, problem.parameters)
@@ -59,7 +53,7 @@ class StageCost:
             self._gradient,
             self._band,
         )
-        return Quadratic(value, self._gradient, self._band)
+        return value, self._gradient, self._band
 
     def value(self, problem: Problem, q: FloatArray, v: FloatArray, u: FloatArray) -> float:
         """Return the cost itself of q and v at the nodes, (N + 1, n), and u, (N, n)."""

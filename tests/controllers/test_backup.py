@@ -293,7 +293,7 @@ def test_where_obstacles_move_rest_is_not_safe_for_ever():
         )
         collision = CollisionModel(MODEL, (pillar,))
         least = 0.3 * Surroundings.of(collision, 0.1, 0.1).margins
-        certificate = StopCertificate(LIMITER, collision, least, LIMITS, span=1.0)
+        certificate = StopCertificate(LIMITER, collision, least, span=1.0)
         now = collision.values(HOME[None])[0]
         violation = certificate.violation(HOME, np.zeros(9), (HOME, now))
         assert violation.all == pytest.approx(0.0 if safe else 0.5 - away + 0.03, abs=1e-6)

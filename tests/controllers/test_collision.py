@@ -40,7 +40,7 @@ def test_gradients_are_the_derivatives_of_the_distances():
 
 def test_bulk_reading_is_reading_one_by_one():
     collision = CollisionModel(MODEL, scene(np.random.default_rng(1)))
-    reader = collision._all.results
+    reader = collision._all
     assert reader._view is not None, "coal lays its results out differently: updates will be slow"
     for q in np.random.default_rng(2).uniform(-2, 2, (10, MODEL.size)):
         collision.values(q[None])
@@ -59,7 +59,7 @@ def test_what_is_skipped_is_far():
         assert np.all(distances.values <= exact + 1e-5)
         near = exact < 0.3
         np.testing.assert_allclose(distances.values[near], exact[near], atol=1e-5)
-        cheap = collision.values(path, None, (path[0], exact[0]))
+        cheap = collision.values(path, None, (path[0], exact[0]), np.full(collision.size, 0.15))
         assert np.all(cheap <= exact + 1e-5)
         np.testing.assert_allclose(cheap[exact < 0.15], exact[exact < 0.15], atol=1e-5)
         reach = rng.uniform(0.0, 0.4, collision.size)

@@ -232,7 +232,7 @@ def test_the_certificate_measures_the_stop():
         wall = Obstacle("wall", Shape("box", [0.2, 4.0, 0.2]), [HOME[0] + 0.48 + gap + 0.1, 0.0, 0.1])
         collision = CollisionModel(MODEL, (wall,))
         least = 0.3 * Surroundings.of(collision, 0.1, 0.1).margins
-        certificate = StopCertificate(limiter, collision, least, MODEL.description.limits, span=1.0)
+        certificate = StopCertificate(limiter, collision, least, span=1.0)
         now = collision.values(HOME[None])[0]
         violation = certificate.violation(HOME, v, (HOME, now))
         assert (violation.all == 0.0) is safe

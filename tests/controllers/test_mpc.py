@@ -214,7 +214,7 @@ def test_the_quadratic_is_that_of_the_cost():
 
     q, v = problem.rollout(u)
     cost = MPC.solver.cost
-    quadratic = cost.expand(problem, q, v, u)
+    value, gradient, hessian = cost.expand(problem, q, v, u)
     h, jacobian = 1e-6, []
     motion = np.zeros((10, 3, 9))
     for index in range(90):
@@ -223,14 +223,14 @@ def test_the_quadratic_is_that_of_the_cost():
         jacobian.append(((residuals(u + step) - residuals(u - step)) / (2 * h)).ravel())
     jacobian = np.array(jacobian).T
     expected = jacobian.T @ jacobian
-    width = quadratic.band.shape[1]
+    width = hessian.shape[1]
     assert np.abs(expected[np.tril_indices(90, -width)]).max() < 1e-6  # nothing outside the band
     inside = [(i, j) for i in range(90) for j in range(max(0, i - width + 1), i + 1)]
-    found = [quadratic.band[j, i - j] for i, j in inside]
+    found = [hessian[j, i - j] for i, j in inside]
     band = [expected[i, j] for i, j in inside]
-    np.testing.assert_allclose(quadratic.value, 0.5 * np.sum(residuals(u) ** 2), rtol=1e-9)
-    np.testing.assert_allclose(cost.value(problem, q, v, u), quadratic.value, rtol=1e-12)
-    np.testing.assert_allclose(quadratic.gradient, jacobian.T @ residuals(u).ravel(), rtol=1e-4, atol=1e-3)
+    np.testing.assert_allclose(value, 0.5 * np.sum(residuals(u) ** 2), rtol=1e-9)
+    np.testing.assert_allclose(cost.value(problem, q, v, u), value, rtol=1e-12)
+    np.testing.assert_allclose(gradient, jacobian.T @ residuals(u).ravel(), rtol=1e-4, atol=1e-3)
     np.testing.assert_allclose(found, band, rtol=1e-4, atol=1e-2)
 
 
