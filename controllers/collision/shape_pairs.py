@@ -101,10 +101,7 @@ class ShapePairs:
         ]
 
     def _add(self, placed: PlacedShape) -> int:
-        parent = self._model.pinocchio.frames[self._model.frame_id(placed.frame)]
-        local = pin.SE3(np.array(placed.placement.rotation), np.array(placed.placement.translation))
-        shape = _coal_shape(placed.shape)
-        thing = pin.GeometryObject(placed.name, parent.parentJoint, parent.placement * local, shape)
+        thing = pin.GeometryObject(placed.name, *self._model.mount(placed), _coal_shape(placed.shape))
         return self.geometry.addGeometryObject(thing)
 
     def _add_floor(self) -> int:

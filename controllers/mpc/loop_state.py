@@ -19,32 +19,6 @@ from handrail.controllers.solvers.active_set import NOTHING_ACTIVE
 
 
 @dataclass(frozen=True)
-class LastCommand:
-    """A command that was sent: the motion that the robot follows.
-
-    Attributes:
-        command: it.
-        time: when [s].
-        period: time from the command before it [s].
-    """
-
-    command: Command
-    time: float
-    period: float
-
-    def elapsed(self, time: float) -> float:
-        """Return how long ago it was sent [s]; one period where the time is no number, or not later."""
-        return time - self.time if math.isfinite(time) and time > self.time else self.period
-
-    def then(self, command: Command, time: float) -> "LastCommand":
-        """Return the command that is sent next, at a time that may be no number [s]."""
-        elapsed = self.elapsed(time)
-        late = self.command.is_over(elapsed)
-        now = time if math.isfinite(time) else self.time + elapsed
-        return LastCommand(command, now, self.period if late else elapsed)
-
-
-@dataclass(frozen=True)
 class LoopState:
     """The memory of a control loop. The velocity that was sent last is not in it: the robot knows that.
 
@@ -53,7 +27,9 @@ class LoopState:
         parameters: of all objectives, (k,).
         predict: the intent prediction, which knows the intents so far.
         inputs: when states and intents came.
-        last: the command that the robot follows; None before the first.
+        command: that the robot follows; None before the first.
+        time: when that was sent [s].
+        period: time from the command before it [s].
         plan: of the last update; None where the robot follows something else.
         stored: the motion that `Backup` goes on with; None before the first.
         active: names of the rows that were active in the last problem among these pairs.
@@ -63,7 +39,9 @@ class LoopState:
     parameters: FloatArray
     predict: Prediction
     inputs: InputHistory = field(default_factory=InputHistory)
-    last: LastCommand | None = None
+    command: Command | None = None
+    time: float = 0.0
+    period: float = 0.0
     plan: Plan | None = None
     stored: Trajectory | None = None
     active: IntArray = field(default_factory=lambda: NOTHING_ACTIVE)
@@ -79,26 +57,31 @@ class LoopState:
         around = self.surroundings.known_at(state.q)
         return replace(self, surroundings=around, predict=after(self.predict, intent))
 
-    def following(self, command: Command, time: float, period: float) -> LastCommand:
-        """Return a command that is sent now as the last one.
+    def elapsed(self, time: float) -> float:
+        """Return how long ago the command was sent [s]; 0 before the first.
+
+        It is one period where the time is no number, or not later.
+        """
+        if self.command is None:
+            return 0.0
+        return time - self.time if math.isfinite(time) and time > self.time else self.period
+
+    def following(self, command: Command, time: float, period: float) -> "LoopState":
+        """Return the state after a command is sent.
 
         Args:
             command: it.
             time: now, which may be no number [s].
             period: from one command to the next, if it is not known yet [s].
         """
-        if self.last is None:
-            return LastCommand(command, time if math.isfinite(time) else 0.0, period)
-        return self.last.then(command, time)
-
-    def elapsed(self, time: float) -> float:
-        """Return how long ago the last command was sent [s]; 0 before the first."""
-        return 0.0 if self.last is None else self.last.elapsed(time)
+        elapsed, known = self.elapsed(time), math.isfinite(time)
+        if self.command is not None:
+            period = self.period if self.command.is_over(elapsed) else elapsed
+        return replace(self, command=command, time=time if known else self.time + elapsed, period=period)
 
     def guess(self, time: float, horizon: int, size: int) -> FloatArray:
         """Return the accelerations that the robot follows from a time on, (N, n): the warm start."""
-        if self.last is None:
+        if self.command is None:
             return np.zeros((horizon, size))
-        command = self.last.command
-        followed = command if self.plan is None else Trajectory(self.plan.v, command.dt)
-        return followed.accelerations(horizon, self.last.elapsed(time))
+        followed = self.command if self.plan is None else Trajectory(self.plan.v, self.command.dt)
+        return followed.accelerations(horizon, self.elapsed(time))

@@ -6,7 +6,7 @@ from time import perf_counter
 from handrail.controllers.arrays import FloatArray, IntArray
 from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.collision.surroundings import Surroundings
-from handrail.controllers.errors import HandrailError, unknown_name
+from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.command import Command, Status
 from handrail.controllers.interface.controller import State
@@ -87,9 +87,6 @@ class MaskedMpc:
         Raises:
             HandrailError: there is no such objective.
         """
-        names = [entry.name for entry in self.residuals.objectives]
-        if objective not in names:
-            raise unknown_name("objective", objective, names)
         parameters = self.loop.parameters.copy()
         parameters[self.residuals.parameter_slice(objective)] = values
         self.loop = replace(self.loop, parameters=parameters)

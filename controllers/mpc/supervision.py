@@ -55,8 +55,8 @@ class Supervisor:
         diagnostics = _diagnostics(plan, status, start, distances, loop.surroundings)
         gripper = _gripper(loop, intent, status)
         command = Command(motion.velocities, motion.dt, motion.elapsed, gripper, diagnostics)
-        last = loop.following(command, state.time, self.settings.dt)
-        return command, replace(loop, last=last, plan=plan if planned else None, stored=stored)
+        loop = loop.following(command, state.time, self.settings.dt)
+        return command, replace(loop, plan=plan if planned else None, stored=stored)
 
     def _motion(
         self, loop: LoopState, state: State, plan: Plan | None, distances: FloatArray | None, halt: bool
@@ -76,9 +76,9 @@ class Supervisor:
     def _sent_unseen(self, loop: LoopState, state: State) -> FloatArray:
         """Return what a robot is being sent whose state is nonsense, (n,): what it follows, if anything."""
         said, limits = state.commanded, self.limiter.limits
-        if loop.last is None or (said.shape == limits.velocity.shape and np.isfinite(said).all()):
+        if loop.command is None or (said.shape == limits.velocity.shape and np.isfinite(said).all()):
             return state.sent(limits)
-        return loop.last.command.velocity(loop.last.elapsed(state.time))
+        return loop.command.velocity(loop.elapsed(state.time))
 
     def _backup(self, loop: LoopState) -> Backup:
         settings = self.settings
@@ -96,7 +96,7 @@ class Supervisor:
 def _gripper(loop: LoopState, intent: Intent, status: Status) -> float:
     """Return how far the gripper is closed: as asked; as before where nobody is listened to."""
     if status in _UNHEARD:
-        return 0.0 if loop.last is None else loop.last.command.gripper
+        return 0.0 if loop.command is None else loop.command.gripper
     return min(max(intent.gripper, 0.0), 1.0)
 
 

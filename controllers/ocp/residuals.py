@@ -7,7 +7,7 @@ import casadi as ca
 import numpy as np
 
 from handrail.controllers.arrays import BoolArray, FloatArray, IntArray
-from handrail.controllers.errors import HandrailError
+from handrail.controllers.errors import HandrailError, unknown_name
 from handrail.controllers.numerics.compiled import compiled
 from handrail.controllers.objectives.objective import Objective, Stage
 from handrail.controllers.robot.model import RobotModel
@@ -33,7 +33,6 @@ class StageResiduals:
 
     Attributes:
         objectives: in the order of the rows.
-        size: number of rows r.
         reference: stacked references, (r,).
         affine: the rows with a constant Jacobian.
         curved: where the other rows lie, (c,).
@@ -53,7 +52,6 @@ class StageResiduals:
         parts = [objective.residual(stage, p[self._slices[objective.name]]) for objective in objectives]
         residual = ca.vertcat(*parts)
         _check_rows(objectives, parts)
-        self.size = residual.shape[0]
         self.reference = np.concatenate([objective.reference for objective in objectives])
         self.expression = ca.Function("residual", [z, p], [residual])
         self.affine, self.curved = _split(residual, z, p)
@@ -66,7 +64,13 @@ class StageResiduals:
         return np.concatenate([objective.parameters for objective in self.objectives])
 
     def parameter_slice(self, name: str) -> slice:
-        """Return where an objective's parameters lie."""
+        """Return where an objective's parameters lie.
+
+        Raises:
+            HandrailError: there is no such objective.
+        """
+        if name not in self._slices:
+            raise unknown_name("objective", name, self._slices)
         return self._slices[name]
 
     def weights(self, mask: BoolArray) -> FloatArray:

@@ -12,7 +12,7 @@ import pinocchio as pin
 
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import HandrailError, message_of
-from handrail.controllers.robot.description import Placement, RobotDescription, load_description
+from handrail.controllers.robot.description import PlacedShape, Placement, RobotDescription, load_description
 
 _BASE_JOINTS = {"x": pin.JointModelPX, "y": pin.JointModelPY, "theta": pin.JointModelRZ}
 
@@ -56,6 +56,11 @@ class RobotModel:
             names = ", ".join(f.name for f in self.pinocchio.frames)
             raise HandrailError(f"frame {frame!r} of robot {self.description.name}: expected one of {names}")
         return self.pinocchio.getFrameId(frame)
+
+    def mount(self, placed: PlacedShape) -> tuple[int, pin.SE3]:
+        """Return the joint that carries a shape, and where the shape is on it."""
+        frame = self.pinocchio.frames[self.frame_id(placed.frame)]
+        return frame.parentJoint, frame.placement * _se3(placed.placement)
 
     def pose(self, q: FloatArray, frame: str = "tool") -> Pose:
         """Return the pose of a frame at q, (n,)."""

@@ -32,7 +32,7 @@ class _Height:
 @lru_cache(maxsize=8)
 def scene_shapes(model: RobotModel) -> tuple[str, ...]:
     """Return the names of the shapes that move: all of them keep from what stands around."""
-    return tuple(placed.name for placed in model.description.collision if _mount(model, placed)[0] > 0)
+    return tuple(placed.name for placed in model.description.collision if model.mount(placed)[0] > 0)
 
 
 @lru_cache(maxsize=8)
@@ -42,7 +42,7 @@ def floor_shapes(model: RobotModel) -> tuple[str, ...]:
     return tuple(
         placed.name
         for placed in model.description.collision
-        if heights[_mount(model, placed)[0]].varies and lowest_height(model, placed) < _UNEVEN
+        if heights[model.mount(placed)[0]].varies and lowest_height(model, placed) < _UNEVEN
     )
 
 
@@ -52,19 +52,12 @@ def lowest_height(model: RobotModel, placed: PlacedShape) -> float:
     Up to the first joint that tilts the heights are exact; from there on the chain hangs straight down:
     `z ≥ z_joint − Σ |offsets| − reach of the shape`.
     """
-    joint, placement = _mount(model, placed)
+    joint, placement = model.mount(placed)
     height = _heights(model)[joint]
     if height.up is None:
         return height.lowest - _farthest(placed.shape, placement)
     up = placement.rotation.T @ height.up
     return float(height.lowest + height.up @ placement.translation - _extent(placed.shape, up))
-
-
-def _mount(model: RobotModel, placed: PlacedShape) -> tuple[int, pin.SE3]:
-    """Return the joint that carries a shape, and where the shape is on it."""
-    frame = model.pinocchio.frames[model.frame_id(placed.frame)]
-    local = pin.SE3(np.array(placed.placement.rotation), np.array(placed.placement.translation))
-    return frame.parentJoint, frame.placement * local
 
 
 @lru_cache(maxsize=8)

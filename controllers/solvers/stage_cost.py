@@ -44,15 +44,9 @@ class StageCost:
         self._band[:] = self._constant_band(problem.weights)
         self._gradient[:] = 0.0
         z, values, jacobians = self.residuals.evaluate(q[1:], v[1:], u, problem.parameters)
-        value = _expand(
-            (self._affine, self._curved),
-            self.matrix,
-            (z, values, jacobians),
-            problem.weights,
-            problem.reference,
-            self._gradient,
-            self._band,
-        )
+        asked, found = (problem.weights, problem.reference), (self._gradient, self._band)
+        value = _add_affine(self._affine, self.matrix, z, *asked, self._gradient)
+        value += _add_curved(self._curved, self.matrix, values, jacobians, *asked, *found)
         return value, self._gradient, self._band
 
     def value(self, problem: Problem, q: FloatArray, v: FloatArray, u: FloatArray) -> float:
@@ -114,14 +108,6 @@ def _value(affine, curved, z, values, weights, reference):
             if weight > 0.0:
                 total += weight * (values[k, row] - reference[k, curved[row]]) ** 2
     return 0.5 * total
-
-
-@jit
-def _expand(indices, matrix, motion, weights, reference, gradient, band):
-    affine, curved = indices
-    z, values, jacobians = motion
-    value = _add_affine(affine, matrix, z, weights, reference, gradient)
-    return value + _add_curved(curved, matrix, values, jacobians, weights, reference, gradient, band)
 
 
 @jit
