@@ -153,5 +153,5 @@ def test_a_file_with_a_list_of_its_own_is_refused(tmp_path, entry):
     text = ROBOTS["ridgeback_ur10"].file.read_text()
     path = tmp_path / "robot.toml"
     path.write_text(text.replace("[self_collision]", f'[self_collision]\n{entry} = ["chassis"]', 1))
-    with pytest.raises(HandrailError, match=rf"robot.toml: entry {entry} of .*: remove it"):
+    with pytest.raises(HandrailError, match=rf"robot.toml: .*unknown entry '{entry}'"):
         load_description(path)
