@@ -13,13 +13,13 @@ def _profile(config: ProfileConfig) -> int:
     config.check()
     from rich.console import Console
 
-    from handrail.collect.experiments.profiling.profiling import Profile, save
+    from handrail.collect.experiments.profiling.profiling import profile, save
     from handrail.collect.experiments.profiling.tables import profile_tables
 
-    results = Profile(config).run()
+    results = profile(config)
     if config.json:
         save(results, config.json)
-    Console().print(profile_tables(results))
+    Console().print(*profile_tables(results), sep="\n")
     return 0
 
 

@@ -9,6 +9,7 @@ from handrail.controllers.arrays import FloatArray
 from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.robot.model import RobotModel
+from handrail.controllers.robot.shape import Obstacle
 
 VIEW = View(position=(-2.9, -3.4, 3.0), target=(-0.3, 0.0, 0.4), fovy=36.0)
 _LOW, _TALL = (0.3, 0.3), (0.25, 1.5)  # radius and height of the showcase's cylinders [m]
@@ -64,20 +65,17 @@ def _place(
             np.linalg.norm(other.position[:2] - centre) - footprint(other) - size[0] >= _CLEAR_EACH_OTHER
             for other in placed
         )
-        if apart and (not clear or _distance_to_line(centre, start, end) >= clear) and _free(model, item):
+        way_is_free = not clear or _distance_to_line(centre, start, end) >= clear
+        if apart and way_is_free and clearance(model, item.obstacle()) >= _CLEAR_START:
             return item
     raise HandrailError(f"cluttered floor: no room for cylinder {len(placed)} after {_TRIES} tries")
 
 
-def _free(model: RobotModel, item: SceneObject) -> bool:
-    """Whether an object is clear of the robot at home."""
-    collision = CollisionModel(model, (item.obstacle(),))
+def clearance(model: RobotModel, obstacle: Obstacle) -> float:
+    """Return how far an obstacle is from the robot at home [m]."""
+    collision = CollisionModel(model, (obstacle,))
     distances = collision.values(model.description.home[None])[0]
-    return all(
-        distance >= _CLEAR_START
-        for distance, pair in zip(distances, collision.pairs, strict=True)
-        if pair[1] == item.name
-    )
+    return min(d for d, pair in zip(distances, collision.pairs, strict=True) if pair[1] == obstacle.name)
 
 
 def _distance_to_line(point: FloatArray, start: FloatArray, end: FloatArray) -> float:

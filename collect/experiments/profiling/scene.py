@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from handrail.collect.experiments.benchmark.scenes import clearance
 from handrail.controllers.arrays import FloatArray
-from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import State
 from handrail.controllers.interface.intent import Intent
@@ -36,15 +36,11 @@ def robot_for(robot: str, pairs: str) -> RobotModel:
 
 def random_scene(model: RobotModel, count: int, rng: np.random.Generator) -> tuple[Obstacle, ...]:
     """Return obstacles of all kinds, each 0.12 to 0.3 m from the robot at home."""
+    home = model.description.home
     obstacles: list[Obstacle] = []
     while len(obstacles) < count:
-        obstacle = _random_obstacle(f"obstacle_{len(obstacles)}", model.description.home, rng)
-        collision = CollisionModel(model, (obstacle,))
-        distances = collision.values(model.description.home[None])[0]
-        nearest = min(
-            d for d, pair in zip(distances, collision.pairs, strict=True) if pair[1] == obstacle.name
-        )
-        if _NEAREST < nearest < _FARTHEST:
+        obstacle = _random_obstacle(f"obstacle_{len(obstacles)}", home, rng)
+        if _NEAREST < clearance(model, obstacle) < _FARTHEST:
             obstacles.append(obstacle)
     return tuple(obstacles)
 
@@ -60,31 +56,20 @@ def _random_obstacle(name: str, home: FloatArray, rng: np.random.Generator) -> O
     return Obstacle(name, shape, position, turned(np.eye(3), rng.uniform(-np.pi, np.pi)))
 
 
-class Driver:
-    """Somebody who steers at the obstacles in one mode after another.
-
-    Args:
-        model: of the robot.
-        rng: of modes and values.
-    """
-
-    def __init__(self, model: RobotModel, rng: np.random.Generator) -> None:
-        self._model, self._rng = model, rng
-        self._channels = Channels.of(model.description)
-
-    def choose(self, state: State, obstacles: tuple[Obstacle, ...]) -> Intent:
-        """Return a new intent: random, and towards an obstacle where there is one."""
-        rng, channels = self._rng, self._channels
-        mask = channels.mask(*(group for group in _MODES[rng.integers(len(_MODES))] if group != "base"))
-        mask[channels.base_slice] = bool(channels.base) and rng.random() < 0.5
-        values = rng.uniform(-_SPEED, _SPEED, channels.size)
-        if obstacles:
-            target = obstacles[rng.integers(len(obstacles))].position
-            tool = self._model.pose(state.q).position
-            values[channels.tool_slice][:3] = _SPEED * _unit(target - tool)
-            if channels.base:
-                values[:2] = _SPEED * turned(_unit(target[:2] - state.q[:2]), -state.q[2])
-        return Intent(np.where(mask, values, 0.0), mask)
+def random_intent(
+    model: RobotModel, state: State, obstacles: tuple[Obstacle, ...], rng: np.random.Generator
+) -> Intent:
+    """Return an intent in one mode or another: random, and towards an obstacle where there is one."""
+    channels = Channels.of(model.description)
+    mask = channels.mask(*(group for group in _MODES[rng.integers(len(_MODES))] if group != "base"))
+    mask[channels.base_slice] = bool(channels.base) and rng.random() < 0.5
+    values = rng.uniform(-_SPEED, _SPEED, channels.size)
+    if obstacles:
+        target = obstacles[rng.integers(len(obstacles))].position
+        values[channels.tool_slice][:3] = _SPEED * _unit(target - model.pose(state.q).position)
+        if channels.base:
+            values[:2] = _SPEED * turned(_unit(target[:2] - state.q[:2]), -state.q[2])
+    return Intent(np.where(mask, values, 0.0), mask, time=state.time)
 
 
 def _unit(vector: FloatArray) -> FloatArray:

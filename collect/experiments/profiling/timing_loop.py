@@ -5,8 +5,9 @@ from time import perf_counter
 
 import numpy as np
 
-from handrail.collect.experiments.profiling.scene import Driver, random_scene, robot_for
-from handrail.controllers.arrays import FloatArray, IntArray
+from handrail.collect.experiments.profiling.scene import random_intent, random_scene, robot_for
+from handrail.controllers.arrays import FloatArray
+from handrail.controllers.interface.command import Status
 from handrail.controllers.interface.controller import State
 from handrail.controllers.interface.intent import Intent
 from handrail.controllers.mpc.masked_mpc import MaskedMpc
@@ -21,7 +22,7 @@ _EPISODE = 100  # updates in one scene
 
 @dataclass(frozen=True)
 class Case:
-    """What one lane measures.
+    """What one loop measures.
 
     Attributes:
         name: unique.
@@ -38,34 +39,34 @@ class Case:
     robot: str = "ridgeback_ur10"
 
 
+CASES = (
+    Case("no_collision", own="none"),
+    Case("pairs_30", own="few", obstacles=2),
+    Case("pairs_100", obstacles=7),
+)
+
+
+def longer(*horizons: int) -> list[Case]:
+    """Return the cases with other numbers of stages."""
+    return [
+        replace(case, name=f"{case.name}_horizon_{horizon}", horizon=horizon)
+        for case in CASES
+        for horizon in horizons
+    ]
+
+
 @dataclass(frozen=True)
 class Update:
     """One timed update: what went in, what came out, and how long it took [s]."""
 
     seconds: float
+    obstacles: tuple[Obstacle, ...]
     state: State
     intent: Intent
     problem: Problem
     guess: FloatArray
-    plan: Plan
-    status: str
-
-
-class _Watched:
-    """Passes problems on to the solver and keeps the last one."""
-
-    def __init__(self, solver: object) -> None:
-        self._solver = solver
-
-    def solve(self, problem: Problem, guess: FloatArray, active: IntArray) -> Plan:
-        """Solve, and remember."""
-        plan = self._solver.solve(problem, guess, active)  # type: ignore[attr-defined]
-        self.last = problem, guess, plan
-        return plan
-
-    def __getattr__(self, name: str) -> object:
-        """Be the solver in everything else."""
-        return getattr(self._solver, name)
+    plan: Plan | None
+    status: Status
 
 
 class TimingLoop:
@@ -80,40 +81,36 @@ class TimingLoop:
         self.case = case
         self.model = robot_for(case.robot, case.own)
         self.mpc = MaskedMpc(self.model, MpcSettings(horizon=case.horizon))
-        self._watched = _Watched(self.mpc.solver)
-        self.mpc.solver = self._watched  # type: ignore[assignment]
         self._rng = np.random.default_rng(seed)
-        self._driver = Driver(self.model, self._rng)
         self._count = 0
-        self.obstacles: tuple[Obstacle, ...] = ()
-
-    @property
-    def at_new_scene(self) -> bool:
-        """Whether the next update begins a scene."""
-        return self._count % _EPISODE == 0
-
-    def begin(self) -> None:
-        """Put the robot at home in a new scene."""
-        self.obstacles = random_scene(self.model, self.case.obstacles, self._rng)
-        self.mpc.reset(self.obstacles)
-        self._state = State(self.model.description.home, np.zeros(self.model.size))
 
     def run(self, count: int) -> list[Update]:
         """Return some updates, timed one by one."""
         return [self._update() for _ in range(count)]
 
+    def _begin(self) -> None:
+        """Put the robot at home in a new scene."""
+        self._obstacles = random_scene(self.model, self.case.obstacles, self._rng)
+        self.mpc.reset(self._obstacles)
+        self._state = State(self.model.description.home, np.zeros(self.model.size))
+
     def _update(self) -> Update:
+        if self._count % _EPISODE == 0:
+            self._begin()
         state = self._state
         if self._count % _INTENT == 0:
-            self._intent = self._driver.choose(state, self.obstacles)
+            self._intent = random_intent(self.model, state, self._obstacles, self._rng)
         intent = replace(self._intent, time=state.time)
+        problem = self.mpc.build_problem(state, intent)
+        guess = self.mpc.loop.guess(state.time, self.case.horizon, self.model.size)
         start = perf_counter()
         command = self.mpc.update(state, intent)
         seconds = perf_counter() - start
         after = command.velocity(PERIOD)
         self._state = State(state.q + 0.5 * PERIOD * (state.v + after), after, state.time + PERIOD)
         self._count += 1
-        return Update(seconds, state, intent, *self._watched.last, command.diagnostics.status.value)
+        asked = self._obstacles, state, intent, problem, guess
+        return Update(seconds, *asked, self.mpc.plan, command.diagnostics.status)
 
 
 def times(seconds: list[float]) -> dict[str, float]:
