@@ -87,9 +87,7 @@ def check_whole(config: Any, **least: int) -> None:
     """
     for name, smallest in least.items():
         if getattr(config, name) < smallest:
-            raise HandrailError(
-                f"--{name} {getattr(config, name)}: expected a whole number >= {smallest}"
-            )
+            raise HandrailError(f"--{name} {getattr(config, name)}: expected a whole number >= {smallest}")
 
 
 def command_line(command: str, config: Any) -> str:
