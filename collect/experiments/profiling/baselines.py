@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from handrail.collect.experiments.mink.controller import MinkController, MinkSettings
+from handrail.collect.experiments.benchmark.mink import MinkController
 from handrail.collect.experiments.profiling.timing_loop import PERIOD, TimingLoop, Update, times
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.robot.shape import Obstacle
@@ -84,7 +84,7 @@ def mink(loop: TimingLoop, activation_distance: float) -> Solve:
     Raises:
         HandrailError: mink is not installed.
     """
-    controller = MinkController(loop.model, PERIOD, MinkSettings(activation_distance=activation_distance))
+    controller = MinkController(loop.model, PERIOD, activation_distance)
     hand = Channels.of(loop.model.description).mask("ee")
     among: list[tuple[Obstacle, ...]] = []
 

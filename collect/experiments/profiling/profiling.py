@@ -1,14 +1,12 @@
 """Times the controller's update against other solvers, interleaved so that noise hits all alike."""
 
-import json
 import os
 from importlib import metadata
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from handrail.collect.experiments.mink.controller import MinkSettings
+from handrail.collect.experiments.benchmark.mink import ACTIVATION_DISTANCE
 from handrail.collect.experiments.profiling.baselines import Baseline, converged, mink
 from handrail.collect.experiments.profiling.config import ProfileConfig
 from handrail.collect.experiments.profiling.qp import compare_qp
@@ -21,7 +19,6 @@ from handrail.collect.experiments.profiling.timing_loop import (
     times,
 )
 from handrail.controllers.numerics.threads import single_threaded
-from handrail.datasets.storage.atomic import write_whole
 
 _BLOCK = 10  # updates of one loop before the next has its turn
 _SHORT = 0.05  # beyond the margin: a mink that looks no farther than it needs to [m]
@@ -74,11 +71,10 @@ def _baselines(config: ProfileConfig, loops: dict[str, TimingLoop]) -> dict[str,
     """Return what is measured besides, by the name of the ratio."""
     bare, pairs = loops["no_collision"], loops["pairs_30"]
     every, seldom = (max(config.updates // max(count, 1), 1) for count in (config.solves, config.solves // 4))
-    far = MinkSettings().activation_distance
     return {
         "ratio_vs_ipopt": Baseline("ipopt", bare, converged(bare), every),
         "ratio_vs_ipopt_pairs_30": Baseline("ipopt", pairs, converged(pairs), seldom),
-        "ratio_vs_mink": Baseline("mink", pairs, mink(pairs, far)),
+        "ratio_vs_mink": Baseline("mink", pairs, mink(pairs, ACTIVATION_DISTANCE)),
         "ratio_vs_mink_short_reach": Baseline("mink_short_reach", pairs, mink(pairs, _SHORT)),
     }
 
@@ -110,8 +106,3 @@ def _case(case: Case, updates: list[Update]) -> dict[str, Any]:
         "braked": sum(update.status.brakes for update in updates),
         "phases_ms": {name: 1e3 * float(np.median(seconds)) for name, seconds in phases.items()},
     }
-
-
-def save(results: dict[str, Any], path: str) -> None:
-    """Write the results as JSON."""
-    write_whole(Path(path).expanduser(), (json.dumps(results, indent=2) + "\n").encode())

@@ -5,10 +5,11 @@ import json
 import pytest
 
 from handrail.collect.experiments.profiling.config import ProfileConfig
-from handrail.collect.experiments.profiling.profiling import profile, save
+from handrail.collect.experiments.profiling.profiling import profile
 from handrail.collect.experiments.profiling.qp import compare_qp
 from handrail.collect.experiments.profiling.tables import profile_tables
 from handrail.controllers.errors import HandrailError
+from handrail.datasets.storage.strict_json import write_json
 
 CASE_KEYS = {"median_ms", "p95_ms", "p99_ms", "worst_ms", "pairs", "rows_mean", "phases_ms"}
 
@@ -26,7 +27,7 @@ def test_a_tiny_run_writes_what_it_promises(tmp_path):
     results = profile(ProfileConfig(updates=10, rivals=False, growth=False, qps=0))
     check(results)
     assert results["rivals"] == {}
-    save(results, str(tmp_path / "profile.json"))
+    write_json(tmp_path / "profile.json", results)
     check(json.loads((tmp_path / "profile.json").read_text()))
     assert len(profile_tables(results)) == 3
 
