@@ -7,11 +7,7 @@ from typing import Any
 
 from handrail.collect.experiments.benchmark.config import BenchmarkConfig
 from handrail.collect.experiments.benchmark.figures import CAPTIONS
-from handrail.collect.experiments.benchmark.tables import (
-    all_profiles_table,
-    benchmark_tables,
-    profile_tables,
-)
+from handrail.collect.experiments.benchmark.tables import benchmark_tables
 from handrail.collect.flags import command_line
 from handrail.datasets.presentation.drawing import address, svg
 from handrail.datasets.presentation.markdown import markdown_table, write_part
@@ -36,9 +32,7 @@ def write_report(
         video: a file to embed.
         path: of the HTML file.
     """
-    profiles = list(results["profiles"])
-    parts = [section(f"Profile {profile}", *profile_tables(results, profile)) for profile in profiles]
-    parts += [section("All profiles", all_profiles_table(results))] if len(profiles) > 1 else []
+    parts = [section("Tables", *benchmark_tables(results))]
     parts.append(
         section("Figures", panels([(CAPTIONS[name], "", svg(each)) for name, each in drawn.items()], "wide"))
     )

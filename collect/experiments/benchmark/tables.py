@@ -79,7 +79,7 @@ PUBLISHED: Mapping[str, Mapping[str, Mapping[str, float]]] = {
 def benchmark_tables(results: Mapping[str, Any]) -> list[Table]:
     """Return everything worth a look, profile by profile."""
     tables = [table for profile in results["profiles"] for table in profile_tables(results, profile)]
-    return [*tables, all_profiles_table(results)] if len(results["profiles"]) > 1 else tables
+    return [*tables, _all_profiles(results)] if len(results["profiles"]) > 1 else tables
 
 
 def profile_tables(results: Mapping[str, Any], profile: str) -> list[Table]:
@@ -174,7 +174,7 @@ def _difference(metric: str, entry: Mapping[str, Any]) -> Cell:
     return Cell(_number(metric, entry["mean"]), below=f"[{low}, {high}], p {entry['p_wilcoxon']:.2g}")
 
 
-def all_profiles_table(results: Mapping[str, Any]) -> Table:
+def _all_profiles(results: Mapping[str, Any]) -> Table:
     """Return success and jerkiness of every controller under every profile."""
     shown, profiles = ("success", "jerkiness"), results["profiles"]
     rows = [
