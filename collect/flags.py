@@ -1,6 +1,7 @@
 """What settings of several commands have in common: two ways to say one thing, names from a list, a page."""
 
 from collections.abc import Collection
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -66,3 +67,36 @@ def check_page(page: str) -> None:
     path = Path(page).expanduser()
     if page and not (path.suffix == ".md" and path.absolute().parent.is_dir()):
         raise HandrailError(f"--page {page}: expected a .md file in an existing folder")
+
+
+def check_json(path: str) -> None:
+    """Check that a file for `--json` can be written, if one is asked for.
+
+    Raises:
+        HandrailError: it cannot.
+    """
+    if path and not Path(path).expanduser().absolute().parent.is_dir():
+        raise HandrailError(f"--json {path}: expected a file in an existing folder")
+
+
+def check_whole(config: Any, **least: int) -> None:
+    """Check that settings are no smaller than they may be, by their names.
+
+    Raises:
+        HandrailError: one is.
+    """
+    for name, smallest in least.items():
+        if getattr(config, name) < smallest:
+            raise HandrailError(f"--{name} {getattr(config, name)}: expected a whole number >= {smallest}")
+
+
+def command_line(command: str, config: Any) -> str:
+    """Return the command that gives these settings: the flags that differ from their defaults."""
+    words = [command]
+    for entry in fields(config):
+        value = getattr(config, entry.name)
+        if isinstance(value, bool) and value != entry.default:
+            words.append(f"--{entry.name}" if value else f"--no_{entry.name}")
+        elif value != entry.default:
+            words.append(f"--{entry.name} {value}")
+    return " ".join(words)

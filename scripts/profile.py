@@ -1,5 +1,7 @@
 """`handrail-profile`: time the controller's update against IPOPT and mink."""
 
+from pathlib import Path
+
 from handrail.collect.experiments.profiling.config import ProfileConfig
 from handrail.scripts import cli
 
@@ -13,13 +15,14 @@ def _profile(config: ProfileConfig) -> int:
     config.check()
     from rich.console import Console
 
-    from handrail.collect.experiments.profiling.profiling import Profile, save
+    from handrail.collect.experiments.profiling.profiling import profile
     from handrail.collect.experiments.profiling.tables import profile_tables
+    from handrail.datasets.storage.strict_json import write_json
 
-    results = Profile(config).run()
+    results = profile(config)
     if config.json:
-        save(results, config.json)
-    Console().print(profile_tables(results))
+        write_json(Path(config.json).expanduser(), results)
+    Console().print(*profile_tables(results), sep="\n")
     return 0
 
 

@@ -1,7 +1,5 @@
 """`handrail-trials`: let the scripted operators do every task in every mode, and count how it went."""
 
-from dataclasses import replace
-
 from handrail.collect.experiments.trials.config import TrialsConfig
 from handrail.scripts import cli
 
@@ -26,8 +24,7 @@ def _trials(config: TrialsConfig) -> int:
         ),
     )
     for task in config.task_names:
-        of_task = [trial for trial in trials if trial.task == task]
-        console.print(replace(trials_table(of_task, config.mode_names), title=task))
+        console.print(trials_table(trials, config.mode_names, task))
     if config.page:
         write_page(trials, config)
         console.print(f"Written: {config.page}")

@@ -1,6 +1,7 @@
 """The video of an episode: the scene camera's pictures with a caption."""
 
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from types import TracebackType
 
@@ -12,6 +13,7 @@ from handrail.collect.envs.env import HandrailEnv
 from handrail.collect.session.video_file import VideoFile
 from handrail.datasets.recording.frames import Frame
 
+_font = cache(ImageFont.load_default)
 SIZE = (540, 960)  # height, width [px]
 _BAR = 64  # height of the caption [px]; both even, as h264 wants
 
@@ -31,7 +33,6 @@ class Filmer:
     def __init__(self, path: Path, fps: int, title: str, words: Callable[[Frame], str]) -> None:
         self._title, self._words = title, words
         self._file = VideoFile(path, (SIZE[0] + _BAR, SIZE[1]), fps)
-        self._large, self._small = (ImageFont.load_default(size) for size in (20, 16))
 
     def __enter__(self) -> "Filmer":
         """Begin."""
@@ -51,15 +52,21 @@ class Filmer:
         """Add the picture of this moment."""
         picture = self._env.render()
         if picture is not None:
-            self._file.add(self._captioned(picture, frame))
+            self._file.add(captioned(picture, _BAR, (self._title, 9, 20), (self._words(frame), 37, 16)))
 
-    def _captioned(self, picture: NDArray[np.uint8], frame: Frame) -> NDArray[np.uint8]:
-        """Return the picture on top of a bar with the caption."""
-        height, width = picture.shape[:2]
-        image = Image.new("RGB", (width, height + _BAR), (24, 26, 30))
-        image.paste(Image.fromarray(picture))
-        draw = ImageDraw.Draw(image)
-        draw.text((16, height + 9), self._title, font=self._large, fill=(245, 245, 245))
-        words = self._words(frame)
-        draw.text((16, height + 37), words, font=self._small, fill=(190, 195, 205))
-        return np.array(image)
+
+def captioned(picture: NDArray[np.uint8], bar: int, *lines: tuple[str, int, int]) -> NDArray[np.uint8]:
+    """Return a picture on top of a dark bar with a title and a quieter line.
+
+    Args:
+        picture: (height, width, 3).
+        bar: its height [px].
+        lines: what each says, how far below the picture, and in which size [px].
+    """
+    height, width = picture.shape[:2]
+    image = Image.new("RGB", (width, height + bar), (24, 26, 30))
+    image.paste(Image.fromarray(picture))
+    draw = ImageDraw.Draw(image)
+    for (text, below, size), colour in zip(lines, ((245, 245, 245), (190, 195, 205)), strict=True):
+        draw.text((12, height + below), text, font=_font(size), fill=colour)
+    return np.array(image)

@@ -1,4 +1,4 @@
-"""Reading JSON that somebody else may have written: small, shallow, finite, or not at all."""
+"""JSON: written whole; what somebody else may have written is read small, shallow, finite, or not at all."""
 
 import json
 import math
@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from handrail.controllers.errors import HandrailError, message_of
+from handrail.datasets.storage.atomic import write_whole
 
 MOST_BYTES = 16 * 1024 * 1024
 MOST_DEPTH = 50
@@ -42,6 +43,16 @@ def load_json(path: Path, what: str) -> Any:
         return read_json(path)
     except (OSError, ValueError) as error:
         raise HandrailError(f"{str(path)!r}: expected {what}, got {message_of(error)}") from error
+
+
+def write_json(path: Path, content: Any) -> None:
+    """Write a file that `read_json` takes, whole or not at all; what is no finite number becomes null.
+
+    Raises:
+        OSError: The disk is full, or the folder cannot be made or written.
+    """
+    finite = json.loads(json.dumps(content), parse_constant=lambda _: None)
+    write_whole(path, (json.dumps(finite, indent=1) + "\n").encode())
 
 
 def parse_json(data: bytes) -> Any:

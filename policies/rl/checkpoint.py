@@ -4,11 +4,10 @@ Stable-Baselines3's own loader unpickles what it finds, and so runs the code of 
 are read here: networks and optimisers from `model.zip`, transitions from `replay_buffer.npz`.
 """
 
-import json
 import re
 import shutil
 from collections.abc import Mapping
-from dataclasses import asdict, fields
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any, cast
 
@@ -20,17 +19,22 @@ from stable_baselines3.common.save_util import load_from_zip_file
 
 from handrail.controllers.entries import is_amounts
 from handrail.controllers.errors import HandrailError, message_of
-from handrail.datasets.storage.atomic import publish_folder, write_whole
-from handrail.datasets.storage.strict_json import load_json
+from handrail.datasets.storage.atomic import publish_folder
+from handrail.datasets.storage.strict_json import load_json, write_json
 from handrail.policies.imitation.interface.trust import check_links
 from handrail.policies.rl.config import TrainRlConfig
-from handrail.policies.rl.figure import PUBLISHED
 from handrail.policies.rl.policy import Actor
 
 Curve = list[dict[str, float]]
+SHOWN = {
+    "success": "share of goals reached",
+    "arm_effort": "arm effort Σ‖q̇‖² [rad²/s²]",
+    "jerkiness": "jerkiness [m/s², rad/s²]",
+}
+"""What the figure of a curve shows."""
 _NETWORKS, _TRANSITIONS, _CURVE = "model.zip", "replay_buffer.npz", "curve.json"
 _ARRAYS = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
-_ROW = {"steps", "updates", "seconds", *PUBLISHED}  # what every row of the curve has
+_ROW = {"steps", "updates", "seconds", *SHOWN}  # what every row of the curve has
 _STEPS = re.compile(r"\d{8}", re.ASCII)  # name of a checkpoint
 _ENTROPY = "log_ent_coef"
 _WRITTEN = ("config.json", "actor.json", "actor.npz", "curve.png")
@@ -53,7 +57,7 @@ def begin_run(config: TrainRlConfig) -> None:
             raise HandrailError(f"--overwrite: expected only a training run in {folder}, found {found}")
         shutil.rmtree(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    write_whole(settings, (json.dumps(asdict(config), indent=1) + "\n").encode())
+    write_json(settings, asdict(config))
 
 
 def check_resumes(config: TrainRlConfig) -> Path:
@@ -65,12 +69,12 @@ def check_resumes(config: TrainRlConfig) -> Path:
     last = _there(config.folder, "--resume")
     path = config.folder / "config.json"
     settings = load_json(path, "settings of a training run")
-    names = {entry.name for entry in fields(TrainRlConfig)}
-    if not isinstance(settings, dict) or not settings.keys() <= names or "layers" not in settings:
-        raise HandrailError(f"{str(path)!r}: expected settings of a training run, got {settings!r:.80}")
-    layers = settings["layers"]
-    earlier = {**settings, "layers": tuple(layers) if isinstance(layers, list) else layers}
-    config.check_continues(TrainRlConfig(**earlier))
+    try:
+        earlier = TrainRlConfig(**{**settings, "layers": tuple(settings["layers"])})
+    except (TypeError, KeyError) as error:
+        found = f"{settings!r:.80}"
+        raise HandrailError(f"{str(path)!r}: expected settings of a training run, got {found}") from error
+    config.check_continues(earlier)
     return last
 
 
@@ -121,9 +125,11 @@ def write_checkpoint(folder: Path, model: SAC, actor: Actor, curve: Curve) -> No
     shutil.rmtree(partial, ignore_errors=True)
     partial.mkdir(parents=True)
     model.save(partial / _NETWORKS)
-    assert model.replay_buffer is not None
-    _write_transitions(partial / _TRANSITIONS, model.replay_buffer)
-    write_whole(partial / _CURVE, (json.dumps(curve, indent=1) + "\n").encode())
+    buffer = model.replay_buffer
+    assert buffer is not None
+    arrays: dict[str, Any] = {name: getattr(buffer, name)[: buffer.size()] for name in _ARRAYS}
+    np.savez(partial / _TRANSITIONS, place=np.array([buffer.pos, buffer.full]), **arrays)
+    write_json(partial / _CURVE, curve)
     publish_folder(partial, final)
     if last is not None:
         shutil.rmtree(last)
@@ -161,12 +167,6 @@ def _tensors(path: Path) -> tuple[Mapping[str, Any], Mapping[str, torch.Tensor]]
     return parameters, variables or {}
 
 
-def _write_transitions(path: Path, buffer: ReplayBuffer) -> None:
-    count = buffer.size()
-    arrays: dict[str, Any] = {name: getattr(buffer, name)[:count] for name in _ARRAYS}
-    np.savez(path, place=np.array([buffer.pos, buffer.full]), **arrays)
-
-
 def _read_transitions(path: Path, buffer: ReplayBuffer) -> None:
     if not path.is_file():
         raise HandrailError(
@@ -176,19 +176,17 @@ def _read_transitions(path: Path, buffer: ReplayBuffer) -> None:
     try:
         with open(path, "rb") as file, np.load(file, allow_pickle=False) as arrays:
             place, full = map(int, arrays["place"])
-            count = buffer.buffer_size if full else place
-            for name in _ARRAYS:
-                target = getattr(buffer, name)[:count]
-                if arrays[name].shape != target.shape or not np.isfinite(arrays[name]).all():
-                    raise _broken(path, f"{name} of shape {arrays[name].shape}, finite or not")
-                target[...] = arrays[name]
-    except HandrailError:
-        raise
+            found = {name: arrays[name] for name in _ARRAYS}
     except Exception as error:  # of NumPy and zipfile: whatever the file holds, it is refused
         raise _broken(path, error) from error
     if not 0 <= place < buffer.buffer_size:
         raise _broken(path, f"place {place}")
     buffer.pos, buffer.full = place, bool(full)
+    for name, values in found.items():
+        target = getattr(buffer, name)[: buffer.size()]
+        if values.shape != target.shape or values.dtype.kind not in "fi" or not np.isfinite(values).all():
+            raise _broken(path, f"{name} of shape {values.shape}, numbers or not, finite or not")
+        target[...] = values
 
 
 def _curve(path: Path, steps: int) -> Curve:

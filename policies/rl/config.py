@@ -3,12 +3,23 @@
 from dataclasses import dataclass, fields
 from pathlib import Path
 
+from handrail.collect.flags import check_whole
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.lists import Numbers
 
 _FREE_ON_RESUME = (
     *("output_dir", "steps", "learning_rate", "save_every", "final_goals", "average"),
     *("threads", "resume", "overwrite"),
+)
+_COUNTS = (
+    *("steps", "batch_size", "buffer_size", "train_freq", "gradient_steps", "save_every"),
+    *("goals", "final_goals", "average", "threads"),
+)
+_RANGES = (
+    (("action_change", "action_size", "failure_cost"), lambda value: value >= 0.0, "0 or more"),
+    (("gamma", "tau", "learning_rate"), lambda value: 0.0 < value <= 1.0, "a number in (0, 1]"),
+    (("repeat_missed",), lambda value: 0.0 <= value <= 1.0, "a share from 0 to 1"),
+    (("temperature", "reward_scale"), lambda value: value > 0.0, "a positive number"),
 )
 
 
@@ -82,21 +93,11 @@ class TrainRlConfig:
         Raises:
             HandrailError: one is wrong.
         """
-        whole = ("steps", "batch_size", "buffer_size", "train_freq", "gradient_steps", "save_every")
-        for name in (*whole, "goals", "final_goals", "average", "threads"):
-            if getattr(self, name) < 1:
-                raise HandrailError(f"--{name} {getattr(self, name)}: expected 1 or more")
-        for name in ("seed", "random_steps", "action_change", "action_size", "failure_cost"):
-            if not getattr(self, name) >= 0:
-                raise HandrailError(f"--{name} {getattr(self, name)}: expected 0 or more")
-        for name in ("gamma", "tau", "learning_rate"):
-            if not 0.0 < getattr(self, name) <= 1.0:
-                raise HandrailError(f"--{name} {getattr(self, name)}: expected a number in (0, 1]")
-        if not 0.0 <= self.repeat_missed <= 1.0:
-            raise HandrailError(f"--repeat_missed {self.repeat_missed}: expected a share from 0 to 1")
-        for name in ("temperature", "reward_scale"):
-            if not getattr(self, name) > 0.0:
-                raise HandrailError(f"--{name} {getattr(self, name)}: expected a positive number")
+        check_whole(self, **dict.fromkeys(_COUNTS, 1), seed=0, random_steps=0)
+        for names, fits, expected in _RANGES:
+            for name in names:
+                if not fits(getattr(self, name)):
+                    raise HandrailError(f"--{name} {getattr(self, name)}: expected {expected}")
         if not self.layers or min(self.layers) < 1:
             raise HandrailError(f"--layers {self.layers}: expected sizes of 1 or more")
         if self.resume and self.overwrite:

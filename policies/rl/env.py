@@ -9,8 +9,7 @@ import gymnasium
 import numpy as np
 from gymnasium import spaces
 
-from handrail.collect.experiments.benchmark.plants import plant
-from handrail.collect.experiments.benchmark.scenes import empty_floor
+from handrail.collect.experiments.benchmark.scenes import empty_floor, plant
 from handrail.collect.tasks.goal_reaching import (
     ORIENTATION_TOLERANCE,
     POSITION_TOLERANCE,
@@ -24,18 +23,19 @@ from handrail.collect.tasks.goal_reaching import (
 )
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.baselines.arm_completion import ArmCompletion, clamp_twist
-from handrail.controllers.errors import HandrailError
 from handrail.controllers.robot.model import load_model
 from handrail.policies.rl.observation import (
     ACTION_SIZE,
     OBSERVATION_SIZE,
     Situation,
     base_velocity,
+    check_robot,
     observe,
 )
 
 _BOUND = 20.0  # of any number in an observation
 _MISSED = 200  # goals kept to be tried again
+_FAILURES = 20  # steps off the planner's pose, by more than a success allows, that end an episode
 
 
 @dataclass(frozen=True)
@@ -47,15 +47,12 @@ class Reward:
         change: w_Δ.
         size: w_a.
         failure: s times this is subtracted when an episode is given up.
-        failures: steps off the planner's pose, by more than a success allows, that end an episode; a contact
-            ends it at once.
     """
 
     scale: float = 1.0
     change: float = 0.05
     size: float = 0.05
     failure: float = 0.0
-    failures: int = 20
 
     def value(self, d: float, r: float, action: FloatArray, previous: FloatArray) -> float:
         """Return the reward of a step that ended d [m] and r off the planner's pose."""
@@ -77,7 +74,6 @@ class GoalReachingEnv(gymnasium.Env[FloatArray, FloatArray]):
         robot: name or description file; its base must be planar and its arm must have six joints.
         early_failure: whether to give up an episode that has left the planner's pose.
         reward: of every step.
-        speed: of the planner, 1 as in the paper.
         physics: MuJoCo, or an ideal robot whose overlapping shapes count as contacts.
         repeat_missed: share of the episodes that try again a goal that was missed before.
     """
@@ -87,18 +83,16 @@ class GoalReachingEnv(gymnasium.Env[FloatArray, FloatArray]):
         robot: str | Path = "ridgeback_ur10",
         early_failure: bool = True,
         reward: Reward | None = None,
-        speed: float = 1.0,
         physics: bool = True,
         repeat_missed: float = 0.0,
     ) -> None:
         self.model = load_model(robot)
-        if len(self.model.description.base_joints) != 3 or self.model.size != 9:
-            raise HandrailError(f"robot {robot}: expected a planar base and six arm joints")
+        check_robot(self.model)
         self.observation_space = spaces.Box(-_BOUND, _BOUND, (OBSERVATION_SIZE,), np.float32)
         self.action_space = spaces.Box(-1.0, 1.0, (ACTION_SIZE,), np.float32)
         self._arm = ArmCompletion(self.model)
         self._reward = reward or Reward()
-        self._early_failure, self._speed, self._physics = early_failure, speed, physics
+        self._early_failure, self._physics = early_failure, physics
         self._repeat_missed = repeat_missed
         self._missed: deque[Goal] = deque(maxlen=_MISSED)
 
@@ -112,7 +106,7 @@ class GoalReachingEnv(gymnasium.Env[FloatArray, FloatArray]):
         self._plant = plant(self._physics)(self.model, empty_floor(), home, STEP)
         self.command = np.zeros(self.model.size)
         self._measure()
-        self.planner = StraightPlanner.plan(*self._pose, goal, speed=self._speed)
+        self.planner = StraightPlanner.plan(*self._pose, goal)
         self._start, self._previous = self.q[:3].copy(), np.zeros(ACTION_SIZE)
         self._time = self._failures = 0
         return self._observation(), {}
@@ -130,7 +124,7 @@ class GoalReachingEnv(gymnasium.Env[FloatArray, FloatArray]):
         reward = self._reward.value(d, r, action, self._previous)
         self._previous = action
         self._failures += not reached(d, r)
-        failed = self._early_failure and (touches or self._failures >= self._reward.failures)
+        failed = self._early_failure and (touches or self._failures >= _FAILURES)
         reward -= self._reward.scale * self._reward.failure * failed
         d_p, d_r = pose_error(*self._pose, self.planner.goal)
         success = reached(d_p, d_r) and not failed

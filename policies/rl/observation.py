@@ -5,7 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray
+from handrail.controllers.errors import HandrailError
 from handrail.controllers.numerics.rotation import turned
+from handrail.controllers.robot.model import RobotModel
 
 OBSERVATION_SIZE = 54
 ACTION_SIZE = 3
@@ -35,6 +37,19 @@ class Situation:
     desired: RigidPose
     goal: RigidPose
     previous: FloatArray
+
+
+def check_robot(model: RobotModel) -> None:
+    """Check that a robot is of the kind that a policy drives.
+
+    Raises:
+        HandrailError: it is another kind.
+    """
+    if len(model.description.base_joints) != 3 or model.size != 9:
+        raise HandrailError(
+            f"robot {model.description.name} of the reinforcement-learning baseline: "
+            f"expected a planar base and six arm joints, got {', '.join(model.joints)}"
+        )
 
 
 def observe(situation: Situation) -> FloatArray:

@@ -1,7 +1,10 @@
 """Training of the reinforcement-learning baseline with soft actor-critic from Stable-Baselines3."""
 
-import json
+import importlib.metadata
+import os
+import platform
 import time
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +17,12 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from stable_baselines3 import SAC
 from stable_baselines3.common.callbacks import BaseCallback
 
+from handrail.collect.experiments.benchmark.tables import PUBLISHED
+from handrail.datasets.presentation.drawing import COLOURS, GREY, new_figure, png, tidy
 from handrail.datasets.storage.atomic import write_whole
+from handrail.datasets.storage.strict_json import write_json
 from handrail.policies.rl.checkpoint import (
+    SHOWN,
     Curve,
     begin_run,
     check_resumes,
@@ -27,12 +34,12 @@ from handrail.policies.rl.checkpoint import (
 from handrail.policies.rl.config import TrainRlConfig
 from handrail.policies.rl.env import GoalReachingEnv, Reward
 from handrail.policies.rl.evaluation import FINAL_SEED, evaluate, evaluation_goals, means, spreads
-from handrail.policies.rl.figure import save_curve
 from handrail.policies.rl.observation import conditioning
 from handrail.policies.rl.policy import Actor
-from handrail.policies.rl.record import training_record
 
 _TARGET_ENTROPY = -3.0
+_VERSIONED = ("handrail", "stable-baselines3", "torch", "gymnasium", "numpy", "pin")
+_PLACES = ("output_dir", "resume", "overwrite")  # of a run, not of what came out
 
 
 def train(config: TrainRlConfig) -> dict[str, Any]:
@@ -54,9 +61,9 @@ def train(config: TrainRlConfig) -> dict[str, Any]:
     actor = Actor.mean(evaluated_actors(config.folder, config.average))
     actor.save(config.folder / "actor.npz")
     final = spreads(evaluate(actor, evaluation_goals(config.final_goals, FINAL_SEED), config.physics))
-    record = training_record(config, curve, final)
-    write_whole(config.folder / "actor.json", (json.dumps(record, indent=1) + "\n").encode())
-    save_curve(curve, config.folder / "curve.png")
+    record = _record(config, curve, final)
+    write_json(config.folder / "actor.json", record)
+    write_whole(config.folder / "curve.png", png(_figure(curve)))
     return record
 
 
@@ -164,3 +171,45 @@ def _environment(config: TrainRlConfig) -> gymnasium.Env:
     space = spaces.Box(-np.inf, np.inf, (len(matrix),), np.float32)
     env = GoalReachingEnv(reward=reward, physics=config.physics, repeat_missed=config.repeat_missed)
     return TransformObservation(env, lambda values: (matrix @ values).astype(np.float32), space)
+
+
+def _record(config: TrainRlConfig, curve: Curve, final: dict[str, dict[str, float]]) -> dict[str, Any]:
+    """Return what a reader needs to repeat a training, the seed too."""
+    settings = {name: value for name, value in asdict(config).items() if name not in _PLACES}
+    if config.start_from:
+        settings["start_from"] = Path(config.start_from).name
+    return {
+        "algorithm": "soft actor-critic",
+        "settings": settings,
+        "seconds": curve[-1]["seconds"],
+        "updates": curve[-1]["updates"],
+        "hardware": {"processor": _processor(), "cores": os.cpu_count(), "threads": config.threads},
+        "versions": {
+            "python": platform.python_version(),
+            **{name: importlib.metadata.version(name) for name in _VERSIONED},
+        },
+        "final": final,
+        "curve": curve,
+    }
+
+
+def _processor() -> str:
+    """Return the processor's name, or at least its architecture."""
+    info = Path("/proc/cpuinfo")
+    lines = info.read_text().splitlines() if info.is_file() else []
+    names = [line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")]
+    return names[0] if names else platform.machine()
+
+
+def _figure(curve: Curve) -> Any:
+    """Return what the evaluations said over steps, with the published figures, as a figure."""
+    figure = new_figure(11, 3.4)
+    axes = figure.subplots(1, len(SHOWN))
+    for ax, (name, title) in zip(axes, SHOWN.items(), strict=True):
+        published = PUBLISHED["paper: RL"][name]["mean"]
+        ax.plot([row["steps"] / 1000 for row in curve], [row[name] for row in curve], color=COLOURS[0])
+        ax.axhline(published, color=GREY, linestyle="--", label="published")
+        ax.set(xlabel="thousand steps", title=title, ylim=(0.0, None))
+        tidy(ax)
+    axes[0].legend(loc="lower right")
+    return figure

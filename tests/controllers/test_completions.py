@@ -43,7 +43,7 @@ RIVALS = [name for name in BASELINES if name not in ("mpc", "safety_filter")]
 def controller(name):
     if name == "mink":
         pytest.importorskip("mink")
-    return resolved(BASELINES[name].build)(MODEL)
+    return BASELINES[name].controller(MODEL)
 
 
 def hand_intent(twist, time=0.0, frames=None):

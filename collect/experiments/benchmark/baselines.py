@@ -1,17 +1,14 @@
 """Who takes part in the benchmark: each controller, what its operator sends, and how often it is asked."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
-from handrail.collect.experiments.benchmark.catalogue import FILTER_PERIOD
-from handrail.collect.experiments.mink.controller import MinkController
 from handrail.collect.tasks.goal_reaching import STEP
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.baselines.arm_completion import WeldedBaseCompletion
 from handrail.controllers.baselines.base_following import BaseFollowingCompletion
-from handrail.controllers.baselines.cbf_filter import CbfFilter
-from handrail.controllers.baselines.direct import DirectController
 from handrail.controllers.baselines.twist_completion import WholeBodyCompletion, twist_controller
 from handrail.controllers.baselines.twist_completion import blended as blend
 from handrail.controllers.interface.channels import Channels
@@ -19,12 +16,14 @@ from handrail.controllers.interface.controller import Controller, State
 from handrail.controllers.interface.intent import Intent
 from handrail.controllers.interface.prediction import Bounded, Prediction, Smoothed, after
 from handrail.controllers.mpc.masked_mpc import MaskedMpc
-from handrail.controllers.mpc.safety_filter import safety_filter
 from handrail.controllers.ocp.settings import MpcSettings
 from handrail.controllers.robot.model import RobotModel
 
 TAKE_UP, TAKE_UP_TURN = 1.0, 0.65  # time constants of the masked MPC's hand [s]
 _NOW = np.zeros(1)  # no time ahead [s]
+
+Asks = Callable[[FloatArray, State, float], Intent]
+"""Twist, world-aligned at the tool (6,), state, time at which it was sent [s] → intent."""
 
 
 def goal_reaching_settings() -> MpcSettings:
@@ -83,113 +82,79 @@ def goal_reaching_prediction(channels: Channels) -> Prediction:
     return Smoothed(Bounded(channels), time_constant)
 
 
-class HandIntent:
-    """The operator steers the hand: the twist goes on the tool's channels.
+def hand_intent(model: RobotModel) -> Asks:
+    """Return an operator who steers the hand: the twist goes on the tool's channels."""
+    channels = Channels.of(model.description)
+    mask = channels.mask("ee")
 
-    Args:
-        model: of the robot.
-    """
+    def ask(twist: FloatArray, state: State, time: float) -> Intent:
+        values = np.zeros(channels.size)
+        values[channels.tool_slice] = twist
+        return Intent(values, mask, mode="hand", time=time)
 
-    def __init__(self, model: RobotModel) -> None:
-        self._channels = Channels.of(model.description)
-        self._mask = self._channels.mask("ee")
-
-    def __call__(self, twist: FloatArray, state: State, time: float) -> Intent:
-        """Return the intent of a twist, world-aligned at the tool, that was sent at a time [s]."""
-        values = np.zeros(self._channels.size)
-        values[self._channels.tool_slice] = twist
-        return Intent(values, self._mask, mode="hand", time=time)
+    return ask
 
 
-class SmoothedHandIntent:
-    """The operator steers the hand through the masked MPC's own low-pass; for controllers that have none.
+def smoothed_hand_intent(model: RobotModel) -> Asks:
+    """Return one who steers the hand through the masked MPC's own low-pass; for controllers that have none.
 
     What arrives is what `goal_reaching_prediction` says of this moment. Remembers; one an episode.
-
-    Args:
-        model: of the robot.
     """
+    hand, predict = hand_intent(model), goal_reaching_prediction(Channels.of(model.description))
 
-    def __init__(self, model: RobotModel) -> None:
-        self._hand = HandIntent(model)
-        self._predict = goal_reaching_prediction(Channels.of(model.description))
+    def ask(twist: FloatArray, state: State, time: float) -> Intent:
+        nonlocal predict
+        intent = hand(twist, state, time)
+        predict = after(predict, intent)
+        return replace(intent, values=predict(intent, _NOW)[0])
 
-    def __call__(self, twist: FloatArray, state: State, time: float) -> Intent:
-        """Return the smoothed intent of a twist, world-aligned at the tool, that was sent at a time [s]."""
-        intent = self._hand(twist, state, time)
-        self._predict = after(self._predict, intent)
-        return replace(intent, values=self._predict(intent, _NOW)[0])
+    return ask
 
 
-class JointIntent:
-    """The operator steers every joint, and works out how alone: plain damped least squares.
+def joint_intent(model: RobotModel) -> Asks:
+    """Return one who steers every joint, and works out how alone: plain damped least squares.
 
     What reaches the controller is a complete command, as direct control and safety filters expect it; nobody
     could do that by hand so well.
-
-    Args:
-        model: of the robot.
     """
+    channels, resolve = Channels.of(model.description), WholeBodyCompletion(model)
+    mask = channels.mask("joint")
 
-    def __init__(self, model: RobotModel) -> None:
-        self._channels = Channels.of(model.description)
-        self._mask = self._channels.mask("joint")
-        self._resolve = WholeBodyCompletion(model)
+    def ask(twist: FloatArray, state: State, time: float) -> Intent:
+        values = np.zeros(channels.size)
+        values[channels.joint_slice] = resolve(state.q, state.v, twist, STEP)
+        return Intent(values, mask, mode="joints", time=time)
 
-    def __call__(self, twist: FloatArray, state: State, time: float) -> Intent:
-        """Return the intent of a twist, world-aligned at the tool, that was sent at a time [s]."""
-        values = np.zeros(self._channels.size)
-        values[self._channels.joint_slice] = self._resolve(state.q, state.v, twist, STEP)
-        return Intent(values, self._mask, mode="joints", time=time)
+    return ask
 
 
-def mpc(model: RobotModel) -> Controller:
+def mpc(model: RobotModel, period: float) -> Controller:
     """Return the masked MPC of the benchmark."""
     predict = goal_reaching_prediction(Channels.of(model.description))
     return MaskedMpc(model, goal_reaching_settings(), predict=predict)
 
 
-def mpc_paper(model: RobotModel) -> Controller:
+def mpc_paper(model: RobotModel, period: float) -> Controller:
     """Return the masked MPC with the paper's horizon."""
     return MaskedMpc(model, paper_settings())
 
 
-def mink(model: RobotModel) -> Controller:
-    """Return differential inverse kinematics with collision avoidance."""
-    return MinkController(model, STEP)
-
-
-def whole_body(model: RobotModel) -> Controller:
+def whole_body(model: RobotModel, period: float) -> Controller:
     """Return damped least squares on all joints."""
-    return twist_controller(model, WholeBodyCompletion(model), STEP)
+    return twist_controller(model, WholeBodyCompletion(model), period)
 
 
-def nominal_base(model: RobotModel) -> Controller:
+def nominal_base(model: RobotModel, period: float) -> Controller:
     """Return damped least squares on the arm, and a nominal base."""
-    return twist_controller(model, WeldedBaseCompletion(model), STEP)
+    return twist_controller(model, WeldedBaseCompletion(model), period)
 
 
-def base_following(model: RobotModel) -> Controller:
+def base_following(model: RobotModel, period: float) -> Controller:
     """Return base and arm that share nothing but the robot."""
-    return twist_controller(model, BaseFollowingCompletion(model), STEP)
+    return twist_controller(model, BaseFollowingCompletion(model), period)
 
 
-def blended(model: RobotModel) -> Controller:
+def blended(model: RobotModel, period: float) -> Controller:
     """Return the average of two completions."""
     both = blend(WholeBodyCompletion(model), WeldedBaseCompletion(model))
-    return twist_controller(model, both, STEP)
-
-
-def direct(model: RobotModel) -> Controller:
-    """Return direct joint control."""
-    return DirectController(model, STEP)
-
-
-def cbf(model: RobotModel) -> Controller:
-    """Return the CBF safety filter."""
-    return CbfFilter(model, STEP)
-
-
-def multi_step(model: RobotModel) -> Controller:
-    """Return the multi-step safety filter."""
-    return safety_filter(model, FILTER_PERIOD)
+    return twist_controller(model, both, period)

@@ -9,18 +9,15 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from handrail.collect.experiments.benchmark.catalogue import Baseline
 from handrail.collect.experiments.benchmark.config import BenchmarkConfig
-from handrail.collect.experiments.benchmark.episode import Conditions
 from handrail.collect.experiments.benchmark.figures import figures
-from handrail.collect.experiments.benchmark.metrics import Trace
-from handrail.collect.experiments.benchmark.page import write_page
-from handrail.collect.experiments.benchmark.report import write_report
-from handrail.collect.experiments.benchmark.results import save_json, summarise
+from handrail.collect.experiments.benchmark.report import write_page, write_report
+from handrail.collect.experiments.benchmark.results import summarise
 from handrail.collect.experiments.benchmark.run import Episode, available, goals, run, trace_of
-from handrail.collect.experiments.benchmark.video import film, strip
+from handrail.collect.experiments.benchmark.video import Example
 from handrail.collect.simulation.gl import graphics_trouble
-from handrail.controllers.errors import HandrailError
-from handrail.controllers.robot.model import load_model
 from handrail.datasets.presentation.drawing import png
+from handrail.datasets.storage.atomic import explained
+from handrail.datasets.storage.strict_json import write_json
 
 
 def benchmark(config: BenchmarkConfig, baselines: Mapping[str, Baseline], console: Console) -> dict[str, Any]:
@@ -35,22 +32,29 @@ def benchmark(config: BenchmarkConfig, baselines: Mapping[str, Baseline], consol
         HandrailError: a setting is wrong, a controller cannot take part, or a folder cannot be written.
     """
     config.check()
-    report = _folder(config)
+    report = Path(config.report).expanduser()
+    if config.report:
+        with explained(f"--report {config.report}: cannot be made"):
+            report.mkdir(parents=True, exist_ok=True)
     present, skipped = available(baselines, config)
     for name, reason in skipped.items():
         console.print(f"without {name}: {reason}", highlight=False)
     episodes = _run(config, present, console)
     results = summarise([episode.row for episode in episodes], config, present, skipped)
     if config.json:
-        save_json(results, Path(config.json).expanduser())
-    drawn = figures(results, episodes, goals(config)) if report or config.page else {}
-    example = _example(config, present, console)
-    if report:
-        save_json(results, report / "benchmark.json")
-        write_report(results, drawn, _video(example, report), report / "benchmark.html")
+        write_json(Path(config.json).expanduser(), results)
+    if not (config.report or config.page):
+        return results
+    drawn, example = figures(results, episodes, goals(config)), _example(config, present, console)
+    if config.report:
+        write_json(report / "benchmark.json", results)
+        video = report / "benchmark.mp4" if example else None
+        if example and video:
+            example.film(video)
+        write_report(results, drawn, video, report / "benchmark.html")
     if config.page:
         pictures = {name: png(figure) for name, figure in drawn.items()}
-        pictures |= {"example": strip(load_model(), *example)} if example else {}
+        pictures |= {"example": example.strip()} if example else {}
         write_page(results, pictures, Path(config.page).expanduser(), config)
     return results
 
@@ -67,34 +71,11 @@ def _run(config: BenchmarkConfig, present: tuple[Baseline, ...], console: Consol
     return sorted(episodes, key=lambda episode: episode.row["goal"])
 
 
-def _folder(config: BenchmarkConfig) -> Path | None:
-    if not config.report:
-        return None
-    folder = Path(config.report).expanduser()
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise HandrailError(f"--report {config.report}: cannot be made: {error.strerror}") from error
-    return folder
-
-
-def _example(
-    config: BenchmarkConfig, present: tuple[Baseline, ...], console: Console
-) -> tuple[Conditions, list[tuple[Baseline, Trace]]] | None:
+def _example(config: BenchmarkConfig, present: tuple[Baseline, ...], console: Console) -> Example | None:
     """Return what the first two controllers do on the first goal; None without OpenGL, which is said."""
-    if not (config.report or config.page):
-        return None
     trouble = graphics_trouble() if config.video else "not asked for"
     if trouble:
         console.print(f"without an example to look at: {trouble}", highlight=False)
         return None
-    runs = [(who, trace_of(config, who, 0)) for who in present[:2]]
-    return runs[0][1][0], [(who, trace) for who, (_, trace) in runs]
-
-
-def _video(example: tuple[Conditions, list[tuple[Baseline, Trace]]] | None, folder: Path) -> Path | None:
-    """Film the example, if there is one."""
-    if example is None:
-        return None
-    film(load_model(), *example, folder / "benchmark.mp4")
-    return folder / "benchmark.mp4"
+    runs = [(who, *trace_of(config, who, 0)) for who in present[:2]]
+    return Example(runs[0][1], [(who.help, trace) for who, _, trace in runs])

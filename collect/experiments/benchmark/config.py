@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Annotated
 
 from handrail.collect.experiments.benchmark.catalogue import BASELINES
-from handrail.collect.flags import check_names, check_page, names, one_of
+from handrail.collect.flags import check_json, check_names, check_page, check_whole, names, one_of
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.lists import Names
 
@@ -72,13 +72,10 @@ class BenchmarkConfig:
         """
         check_names("controller", "--controllers", self.controller_names, BASELINES)
         check_names("profile", "--profile", self.profile_names, PROFILES)
-        for name, least, most in (("goals", 1, 100_000), ("seed", 0, None), ("workers", 1, MOST_WORKERS)):
-            value = getattr(self, name)
-            if value < least or (most is not None and value > most):
-                limits = f"from {least} to {most}" if most is not None else f">= {least}"
-                raise HandrailError(f"--{name} {value}: expected a whole number {limits}")
-        if self.json and not Path(self.json).expanduser().absolute().parent.is_dir():
-            raise HandrailError(f"--json {self.json}: expected a file in an existing folder")
+        check_whole(self, goals=1, seed=0, workers=1)
+        if self.workers > MOST_WORKERS:
+            raise HandrailError(f"--workers {self.workers}: expected at most {MOST_WORKERS}")
+        check_json(self.json)
         check_page(self.page)
         if self.report and Path(self.report).expanduser().is_file():
             raise HandrailError(f"--report {self.report}: expected a folder, found a file")

@@ -2,23 +2,24 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from time import process_time
 
 import numpy as np
 
 from handrail.collect.envs.env import HandrailEnv
 from handrail.collect.experiments.benchmark.catalogue import Baseline
+from handrail.collect.experiments.benchmark.config import BenchmarkConfig
 from handrail.collect.experiments.benchmark.metrics import Trace
-from handrail.collect.experiments.benchmark.plants import plant
-from handrail.collect.experiments.benchmark.profiles import NOTHING_YET, SPEEDS, Commands, profile_commands
+from handrail.collect.experiments.benchmark.profiles import NOTHING_YET, SPEEDS, profile_commands
+from handrail.collect.experiments.benchmark.scenes import plant
 from handrail.collect.operators.operator import View
-from handrail.collect.session.outcome import Outcome
 from handrail.collect.session.session import Session
 from handrail.collect.simulation.scene import Scene
+from handrail.collect.tasks.fixed import FixedTask
 from handrail.collect.tasks.goal_reaching import STEP, T_MAX, Goal, StraightPlanner, pose_error, reached
 from handrail.collect.tasks.task import Episode, TaskState, Verdict
 from handrail.controllers.arrays import FloatArray
-from handrail.controllers.interface.command import Diagnostics
 from handrail.controllers.interface.controller import Controller, State
 from handrail.controllers.interface.intent import Intent
 from handrail.controllers.numerics.rotation import rotation_vector
@@ -37,20 +38,16 @@ class Conditions:
     Attributes:
         goal: to reach.
         scene: obstacles.
+        config: of the benchmark: physics, early stop, a planner that sees the hand.
         profile: how the planner's twist arrives.
         seed: of the profile's noise, delays and dropouts.
-        physics: MuJoCo, or an ideal robot.
-        early_stop: end at the first success.
-        closed_loop: the planner sees the hand.
     """
 
     goal: Goal
     scene: Scene
+    config: BenchmarkConfig
     profile: str = "nominal"
     seed: tuple[int, ...] = (0,)
-    physics: bool = True
-    early_stop: bool = True
-    closed_loop: bool = False
 
 
 def run_episode(
@@ -61,23 +58,18 @@ def run_episode(
     Args:
         model: of the robot.
         baseline: how the controller is asked.
-        controller: what its `build` returned; is reset.
+        controller: the baseline's; is reset.
         conditions: goal, scene, commands.
     """
     start = process_time()
-    operator = _Planner(
-        conditions, resolved(baseline.operator)(model), lambda: _aim(baseline, controller, conditions.goal)
-    )
-    task, build = _Task(conditions, operator), plant(conditions.physics)
-    env = HandrailEnv(task, model, fps=1.0 / STEP, plant=build, observes=False)
-    tracer = _Tracer(conditions.goal)
-    outcome = Session(env, controller, operator, [tracer], control_period=baseline.period).run(seed=0)
-    return tracer.trace(operator.end, outcome, process_time() - start)
-
-
-def _aim(baseline: Baseline, controller: Controller, goal: Goal) -> None:
-    if baseline.aim:
-        resolved(baseline.aim)(controller, goal)
+    operator = _Planner(conditions, resolved(baseline.operator)(model))
+    begin = Episode(conditions.scene, model.description.home)
+    judge = partial(_judged, given=conditions, planner=operator)
+    task = FixedTask("GoalReaching", begin, judge, horizon=(T_MAX - 0.5) * STEP)
+    env = HandrailEnv(task, model, fps=1.0 / STEP, plant=plant(conditions.config.physics), observes=False)
+    observer = _Observer(baseline, controller, conditions.goal)
+    outcome = Session(env, controller, operator, [observer], control_period=baseline.period).run(seed=0)
+    return observer.trace(operator.end, outcome.wall_time, process_time() - start)
 
 
 class _Planner:
@@ -85,23 +77,16 @@ class _Planner:
 
     name = "planner"
 
-    def __init__(
-        self,
-        conditions: Conditions,
-        intents: Callable[[FloatArray, State, float], Intent],
-        aim: Callable[[], None],
-    ) -> None:
-        self._conditions, self._intents, self._aim = conditions, intents, aim
+    def __init__(self, conditions: Conditions, ask: Callable[[FloatArray, State, float], Intent]) -> None:
+        self._conditions, self._ask = conditions, ask
 
     def reset(self, view: View, rng: np.random.Generator) -> None:
-        """Plan the way from here, and say where it leads to a controller that has to know."""
+        """Plan the way from here."""
         given, tool = self._conditions, view.tool
         speed = SPEEDS.get(given.profile, 1.0)
         self._planner = StraightPlanner.plan(tool.position, tool.rotation, given.goal, speed=speed)
-        noise = np.random.default_rng(given.seed)
-        self._commands: Commands = profile_commands(given.profile, self._planner, noise)
+        self._commands = profile_commands(given.profile, self._planner, np.random.default_rng(given.seed))
         self._sent: list[tuple[FloatArray, State]] = []
-        self._aim()
 
     @property
     def end(self) -> int:
@@ -114,80 +99,62 @@ class _Planner:
         self._sent.append((self._twist(step, view.tool), view.state))
         index = int(self._commands.delivered[step])
         if index == NOTHING_YET:
-            return self._intents(np.zeros(6), self._sent[0][1], step * STEP)
+            return self._ask(np.zeros(6), self._sent[0][1], step * STEP)
         twist, state = self._sent[index]
-        return self._intents(twist, state, index * STEP)
+        return self._ask(twist, state, index * STEP)
 
     def _twist(self, step: int, tool: Pose) -> FloatArray:
         """Return a step's twist; with closed loop, on top of it `k` times the pose error, (6,)."""
         twist = self._commands.twists[step]
-        if not self._conditions.closed_loop:
+        if not self._conditions.config.closed_loop:
             return twist
         position, rotation = self._planner.pose(self._commands.progress[step])
         turn = rotation_vector(rotation @ tool.rotation.T)
         return twist + _GAIN * np.concatenate([position - tool.position, turn])
 
 
-@dataclass(frozen=True)
-class _Task:
-    """Reaching the goal from home: over at the first success, or some time after the planner's end."""
-
-    conditions: Conditions
-    planner: _Planner
-    name: str = "GoalReaching"
-    description: str = "Reach the goal."
-    horizon: float = (T_MAX - 0.5) * STEP
-    state_names: tuple[str, ...] = ()
-
-    def sample(self, model: RobotModel, rng: np.random.Generator) -> Episode:
-        return Episode(self.conditions.scene, model.description.home)
-
-    def features(self, state: TaskState) -> FloatArray:
-        return np.zeros(0)
-
-    def outcome(self, state: TaskState) -> Verdict:
-        success = reached(*pose_error(state.tool.position, state.tool.rotation, self.conditions.goal))
-        if self.conditions.early_stop:
-            return Verdict(success)
-        over = state.time > (self.planner.end + _SETTLING - 0.5) * STEP
-        return Verdict(success and over, "missed" if over and not success else "")
+def _judged(state: TaskState, given: Conditions, planner: _Planner) -> Verdict:
+    """Say whether the goal is reached: at once, or some time after the planner's end."""
+    success = reached(*pose_error(state.tool.position, state.tool.rotation, given.goal))
+    if given.config.early_stop:
+        return Verdict(success)
+    over = state.time > (planner.end + _SETTLING - 0.5) * STEP
+    return Verdict(success and over, "missed" if over and not success else "")
 
 
-class _Tracer:
-    """Notes what happens, step by step; an observer."""
+class _Observer:
+    """Tells a controller that has to know it the goal; notes what happens, step by step."""
 
-    def __init__(self, goal: Goal) -> None:
-        self._goal = goal
+    def __init__(self, baseline: Baseline, controller: Controller, goal: Goal) -> None:
+        self._baseline, self._controller, self._goal = baseline, controller, goal
 
     def begin(self, env: HandrailEnv, seed: int) -> None:
+        if self._baseline.aims:
+            self._controller.aim(self._goal)  # pyright: ignore[reportAttributeAccessIssue]
         self._env = env
-        self._q, self._hand = [env.robot.state().q], [env.world.tool.position]
-        self._v: list[FloatArray] = []
-        self._errors: list[tuple[float, float]] = []
+        self._states, self._tools = [env.robot.state()], [env.world.tool]
         self._contacts: list[tuple[str, ...]] = []
-        self._updates: list[Diagnostics] = []
+        self._frames: list[Frame] = []
 
     def see(self, frame: Frame) -> None:
-        state, tool = self._env.robot.state(), self._env.world.tool
-        self._q.append(state.q)
-        self._v.append(state.v)
-        self._hand.append(tool.position)
-        self._errors.append(pose_error(tool.position, tool.rotation, self._goal))
+        self._states.append(self._env.robot.state())
+        self._tools.append(self._env.world.tool)
         self._contacts.append(self._env.world.contacts)
-        if not self._updates or frame.diagnostics is not self._updates[-1]:
-            self._updates.append(frame.diagnostics)
+        self._frames.append(frame)
 
-    def trace(self, end: int, outcome: Outcome, cpu_time: float) -> Trace:
-        """Return what was noted."""
+    def _error(self, tool: Pose) -> tuple[float, float]:
+        return pose_error(tool.position, tool.rotation, self._goal)
+
+    def trace(self, end: int, wall_time: float, cpu_time: float) -> Trace:
+        """Return what was noted; an update's diagnostics are in all frames until the next."""
         return Trace(
-            q=np.array(self._q),
-            v=np.array(self._v),
-            errors=np.array(self._errors),
-            hand=np.array(self._hand),
+            q=np.array([state.q for state in self._states]),
+            v=np.array([state.v for state in self._states[1:]]),
+            errors=np.array([self._error(tool) for tool in self._tools[1:]]),
+            hand=np.array([tool.position for tool in self._tools]),
             contacts=self._contacts,
-            statuses=[update.status for update in self._updates],
-            solve_times=[update.solve_time for update in self._updates],
+            updates=list({id(frame.diagnostics): frame.diagnostics for frame in self._frames}.values()),
             end=end,
-            wall_time=outcome.wall_time,
+            wall_time=wall_time,
             cpu_time=cpu_time,
         )

@@ -9,7 +9,7 @@ import numpy as np
 from handrail.collect.tasks.goal_reaching import STEP, reached
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.collision.model import CollisionModel
-from handrail.controllers.interface.command import Status
+from handrail.controllers.interface.command import Diagnostics
 from handrail.datasets.quality.metrics import path_length
 
 METRICS = (
@@ -43,8 +43,7 @@ class Trace:
         errors: (d_p [m], d_r) after every step, (T, 2).
         hand: the tool's positions before the first and after every step [m], (T + 1, 3).
         contacts: names of the forbidden contacts of every step, T tuples.
-        statuses: of the controller's updates.
-        solve_times: of the controller's updates [s].
+        updates: of the controller.
         end: first step from which on nothing but rest arrives from the planner.
         wall_time: of the episode, controller, physics and collision checking together [s].
         cpu_time: of the process in that time [s]; other programs do not lengthen it.
@@ -55,8 +54,7 @@ class Trace:
     errors: FloatArray
     hand: FloatArray
     contacts: Sequence[tuple[str, ...]]
-    statuses: Sequence[Status]
-    solve_times: Sequence[float]
+    updates: Sequence[Diagnostics]
     end: int
     wall_time: float
     cpu_time: float
@@ -72,7 +70,9 @@ def measure(trace: Trace, collision: CollisionModel, base: int) -> dict[str, Any
     """
     d_p, d_r = trace.errors[-1].tolist()
     names = sorted({name for step in trace.contacts for name in step})
-    row = {
+    came = 0 < trace.end <= len(trace.errors)
+    planned = trace.errors[trace.end - 1].tolist() if came else (None, None)
+    return {
         "success": reached(d_p, d_r),
         "final_position_error": d_p,
         "final_orientation_error": d_r,
@@ -85,13 +85,12 @@ def measure(trace: Trace, collision: CollisionModel, base: int) -> dict[str, Any
         "contacts": sum(map(bool, trace.contacts)),
         "contact_names": names,
         "smallest_distance": float(collision.values(trace.q).min(initial=np.inf)),
-        "brakes": sum(status.brakes for status in trace.statuses),
-        "updates": len(trace.statuses),
-        "update_ms_median": 1e3 * float(np.median(trace.solve_times)),
-        "updates_per_s": len(trace.statuses) / (len(trace.v) * STEP),
+        "brakes": sum(update.status.brakes for update in trace.updates),
+        "updates": len(trace.updates),
+        "update_ms_median": 1e3 * float(np.median([update.solve_time for update in trace.updates])),
+        "updates_per_s": len(trace.updates) / (len(trace.v) * STEP),
+        **dict(zip(SETTLED_METRICS, planned, strict=True)),
     }
-    row.update(dict(zip(SETTLED_METRICS, _planned(trace), strict=True)))
-    return row
 
 
 def arm_effort(velocities: FloatArray) -> float:
@@ -106,11 +105,3 @@ def jerkiness(velocities: FloatArray) -> float:
     """
     changes = np.linalg.norm(np.diff(velocities, axis=0), axis=1)
     return float(changes.mean() / STEP) if len(changes) else float("nan")
-
-
-def _planned(trace: Trace) -> tuple[float | None, float | None]:
-    """Return the errors after the planner's last step, None for an episode that ended before."""
-    if not 0 < trace.end <= len(trace.errors):
-        return None, None
-    d_p, d_r = trace.errors[trace.end - 1].tolist()
-    return d_p, d_r

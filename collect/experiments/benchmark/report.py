@@ -1,27 +1,24 @@
-"""The benchmark's report: one HTML file that carries its figures and its video."""
+"""What the benchmark writes for readers: an HTML file that carries everything, a part of a Markdown page."""
 
-from collections.abc import Iterator, Mapping
-from itertools import cycle
+from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from handrail.collect.experiments.benchmark.config import BenchmarkConfig
 from handrail.collect.experiments.benchmark.figures import CAPTIONS
-from handrail.collect.experiments.benchmark.tables import all_profiles_table, profile_tables
-from handrail.datasets.presentation.drawing import COLOURS, address, svg
-from handrail.datasets.presentation.markup import (
-    card,
-    cards,
-    film,
-    folded,
-    page,
-    panels,
-    paragraph,
-    section,
-)
-from handrail.datasets.presentation.wording import percent, percent_span
+from handrail.collect.experiments.benchmark.tables import benchmark_tables
+from handrail.collect.flags import command_line
+from handrail.datasets.presentation.drawing import address, svg
+from handrail.datasets.presentation.markdown import markdown_table, write_part
+from handrail.datasets.presentation.markup import film, folded, page, panels, paragraph, section
 from handrail.datasets.storage.atomic import write_whole
+from handrail.datasets.storage.strict_json import write_json
 
-_CONDITIONS = ("config", "mpc_settings", "mpc_paper_settings", "physics", "machine", "versions", "skipped")
+_CONDITIONS = (
+    *("titles", "config", "mpc_settings", "mpc_paper_settings"),
+    *("physics", "machine", "versions", "skipped"),
+)
 
 
 def write_report(
@@ -35,10 +32,7 @@ def write_report(
         video: a file to embed.
         path: of the HTML file.
     """
-    profiles = list(results["profiles"])
-    parts = [cards(_cards(results))]
-    parts += [section(f"Profile {profile}", *profile_tables(results, profile)) for profile in profiles]
-    parts += [section("All profiles", all_profiles_table(results))] if len(profiles) > 1 else []
+    parts = [section("Tables", *benchmark_tables(results))]
     parts.append(
         section("Figures", panels([(CAPTIONS[name], "", svg(each)) for name, each in drawn.items()], "wide"))
     )
@@ -50,16 +44,42 @@ def write_report(
     write_whole(path, page("Goal reaching", *parts, what=what).encode())
 
 
-def _cards(results: Mapping[str, Any]) -> Iterator[str]:
-    """Yield what can be seen at once, a card a controller."""
-    for colour, (name, summary) in zip(cycle(COLOURS), results["controllers"].items(), strict=False):
-        share = summary["success"]
-        lines = (
-            f"of {summary['episodes']} goals, {percent_span(share['interval'])} (95 %)",
-            f"in contact in {summary['episodes_with_contact']} episodes",
-        )
-        yield card(results["titles"][name], colour, percent(share["mean"]), lines)
-
-
 def _listed(settings: Mapping[str, Any]) -> str:
     return ", ".join(f"{name} {value}" for name, value in settings.items())
+
+
+def write_page(
+    results: Mapping[str, Any], pictures: Mapping[str, bytes], path: Path, config: BenchmarkConfig
+) -> None:
+    """Put tables and figures into a page, between the marks of this kind of run; other text stays.
+
+    Figures and the summaries as JSON go beside the page, named `<page>_<label>…`.
+
+    Args:
+        results: as summarised.
+        pictures: PNG by name.
+        path: of the Markdown file, made if it is not there.
+        config: what was run.
+    """
+    stem = f"{path.stem}_{config.label}"
+    for name, data in pictures.items():
+        write_whole(path.parent / f"{stem}_{name}.png", data)
+    write_json(path.parent / f"{stem}.json", {k: v for k, v in results.items() if k != "episodes"})
+    command = command_line("handrail-benchmark", replace(config, json="", report="", page=""))
+    parts = [f"`{command}` wrote this. {_how(results)}"]
+    for table in benchmark_tables(results):
+        parts += [markdown_table(table), table.caption]
+    parts += [f"![{CAPTIONS.get(name, name)}]({stem}_{name}.png)" for name in pictures]
+    parts += [f"Left out: {name} ({reason})." for name, reason in results["skipped"].items()]
+    once = dict.fromkeys(filter(None, parts))  # a caption
+    write_part(path, "Goal reaching", config.label, "\n\n".join(once))
+
+
+def _how(results: Mapping[str, Any]) -> str:
+    """Return how the numbers are to be read, those that depend on the machine above all."""
+    machine, workers = results["machine"], results["config"]["workers"]
+    return (
+        "Mean ± SD (min, max) over the episodes. Update ms: the median over an episode's updates, without the"
+        f" distances that baselines only report. {machine['cores']} cores; load at the end"
+        f" {machine['load']:.1f}, of which {workers} by this run: times are longer where others computed too."
+    )

@@ -1,11 +1,9 @@
 """What the benchmark measured, as one dictionary: summaries, paired comparisons, every episode's row."""
 
-import json
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from importlib import metadata
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -25,9 +23,9 @@ from handrail.collect.experiments.benchmark.metrics import (
     SAFETY_METRICS,
     SETTLED_METRICS,
 )
-from handrail.collect.experiments.benchmark.plants import PHYSICS
+from handrail.collect.experiments.benchmark.scenes import PHYSICS
+from handrail.controllers.arrays import FloatArray
 from handrail.datasets.statistics.paired import paired_difference, paired_success, wilson
-from handrail.datasets.storage.atomic import write_whole
 
 Row = Mapping[str, Any]
 _COMPARED = (*(name for name in METRICS if name != "success"), "update_ms_median")
@@ -50,13 +48,14 @@ def summarise(
         skipped: who did not, and why.
     """
     names, profiles = [baseline.name for baseline in baselines], config.profile_names
-    by_profile = {
-        profile: {name: _summary(_of(rows, profile, name)) for name in names} for profile in profiles
+    cells = {profile: {name: rows_of(rows, profile, name) for name in names} for profile in profiles}
+    summaries = {
+        profile: {name: _summary(own) for name, own in by_name.items()} for profile, by_name in cells.items()
     }
     return {
-        "controllers": by_profile[profiles[0]],
-        "profiles": by_profile,
-        "paired": {profile: _paired(rows, profile, names, config.seed) for profile in profiles},
+        "controllers": summaries[profiles[0]],
+        "profiles": summaries,
+        "paired": {profile: _paired(list(cells[profile].items()), config.seed) for profile in profiles},
         "titles": {baseline.name: baseline.help for baseline in baselines},
         "skipped": dict(skipped),
         "config": {name: value for name, value in asdict(config).items() if name not in _PLACES},
@@ -69,26 +68,22 @@ def summarise(
     }
 
 
-def save_json(results: Mapping[str, Any], path: Path) -> None:
-    """Write the results; what is no number becomes null."""
-    write_whole(path, (json.dumps(_finite(results), indent=1, allow_nan=False) + "\n").encode())
-
-
-def _of(rows: Sequence[Row], profile: str, name: str) -> list[Row]:
+def rows_of(rows: Sequence[Row], profile: str, name: str) -> list[Row]:
     """Return the rows of a controller under a profile, by goal."""
     own = [row for row in rows if row["profile"] == profile and row["controller"] == name]
     return sorted(own, key=lambda row: row["goal"])
 
 
-def _column(rows: Sequence[Row], metric: str) -> np.ndarray:
-    return np.array([np.nan if row[metric] is None else float(row[metric]) for row in rows])
+def column(rows: Sequence[Row], metric: str, known: bool = False) -> FloatArray:
+    """Return a measure of every row, NaN where it has none; or only those that are known."""
+    values = np.array([np.nan if row[metric] is None else float(row[metric]) for row in rows])
+    return values[np.isfinite(values)] if known else values
 
 
 def _summary(rows: Sequence[Row]) -> dict[str, Any]:
     summary: dict[str, Any] = {"episodes": len(rows)}
     for metric in (*METRICS, *COST_METRICS, *SAFETY_METRICS, *SETTLED_METRICS):
-        values = _column(rows, metric)
-        values = values[np.isfinite(values)]
+        values = column(rows, metric, known=True)
         if len(values):
             summary[metric] = {
                 "mean": float(values.mean()),
@@ -96,36 +91,24 @@ def _summary(rows: Sequence[Row]) -> dict[str, Any]:
                 "min": float(values.min()),
                 "max": float(values.max()),
             }
-    successes = int(sum(bool(row["success"]) for row in rows))
+    successes = sum(row["success"] for row in rows)
     summary["success"]["interval"] = list(wilson(successes, len(rows)))
-    summary["episodes_with_contact"] = int(sum(row["contacts"] > 0 for row in rows))
+    summary["episodes_with_contact"] = sum(row["contacts"] > 0 for row in rows)
     errors = "planned_position_error", "final_position_error"
-    summary["beyond_aim"] = {name: int(np.sum(_column(rows, name) > AIM)) for name in errors}
+    summary["beyond_aim"] = {name: int(np.sum(column(rows, name) > AIM)) for name in errors}
     return summary
 
 
-def _paired(rows: Sequence[Row], profile: str, names: Sequence[str], seed: int) -> dict[str, Any]:
+def _paired(cells: Sequence[tuple[str, Sequence[Row]]], seed: int) -> dict[str, Any]:
     """Return the first controller against every other, first minus other."""
     rng = np.random.default_rng([seed, 99])
-    first = _of(rows, profile, names[0])
-    if len(first) < 2:
-        return {}
-    return {name: _against(first, _of(rows, profile, name), rng) for name in names[1:]}
+    (_, first), *others = cells
+    return {name: _against(first, other, rng) for name, other in others} if len(first) > 1 else {}
 
 
 def _against(first: Sequence[Row], other: Sequence[Row], rng: np.random.Generator) -> dict[str, Any]:
-    success = paired_success(_column(first, "success"), _column(other, "success"))
+    success = paired_success(column(first, "success"), column(other, "success"))
     result: dict[str, Any] = {"success": asdict(success)}
     for metric in _COMPARED:
-        result[metric] = asdict(paired_difference(_column(first, metric), _column(other, metric), rng))
+        result[metric] = asdict(paired_difference(column(first, metric), column(other, metric), rng))
     return result
-
-
-def _finite(value: Any) -> Any:
-    if isinstance(value, Mapping):
-        return {key: _finite(entry) for key, entry in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(entry) for entry in value]
-    if isinstance(value, float) and not np.isfinite(value):
-        return None
-    return value

@@ -3,7 +3,7 @@
 import multiprocessing
 from collections.abc import Iterator, Mapping
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 
@@ -21,7 +21,6 @@ from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.controller import Controller
 from handrail.controllers.numerics.threads import single_threaded
-from handrail.controllers.registry import resolved
 from handrail.controllers.robot.model import load_model
 
 _PATHS = 12  # goals whose paths are kept, for drawing
@@ -29,22 +28,11 @@ _EVERY = 5  # steps between two points of a path
 
 
 @dataclass(frozen=True)
-class Job:
-    """One goal under one profile, for all controllers one after the other, so that noise hits all alike."""
-
-    index: int
-    profile: str
-    config: BenchmarkConfig
-    baselines: tuple[Baseline, ...]
-
-
-@dataclass(frozen=True)
 class Episode:
     """The row of an episode, and for some goals the paths of base and hand seen from above, (k, 2) each."""
 
     row: dict[str, Any]
-    base: FloatArray | None = None
-    hand: FloatArray | None = None
+    paths: tuple[FloatArray, ...] = ()
 
 
 def goals(config: BenchmarkConfig) -> list[Goal]:
@@ -59,15 +47,7 @@ def conditions(config: BenchmarkConfig, index: int, profile: str) -> Conditions:
     scene = empty_floor()
     if config.clutter:
         scene = cluttered_floor(load_model(), goal, np.random.default_rng([config.seed, index, 1]))
-    return Conditions(
-        goal=goal,
-        scene=scene,
-        profile=profile,
-        seed=(config.seed, index, 2),
-        physics=config.physics,
-        early_stop=config.early_stop,
-        closed_loop=config.closed_loop,
-    )
+    return Conditions(goal, scene, config, profile, seed=(config.seed, index, 2))
 
 
 def available(
@@ -104,63 +84,61 @@ def run(config: BenchmarkConfig, baselines: tuple[Baseline, ...]) -> Iterator[li
         baselines: who takes part.
     """
     jobs = [
-        Job(index, profile, config, baselines)
+        (config, baselines, index, profile)
         for index in range(config.goals)
         for profile in config.profile_names
     ]
     if config.workers == 1:
-        yield from map(run_job, jobs)
+        yield from (_run_goal(*job) for job in jobs)
         return
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(config.workers, context) as pool:
         try:
-            for done in as_completed([pool.submit(run_job, job) for job in jobs]):
+            for done in as_completed([pool.submit(_run_goal, *job) for job in jobs]):
                 yield done.result()
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
             raise
 
 
-def run_job(job: Job) -> list[Episode]:
-    """Run all controllers on one goal under one profile."""
-    model = load_model()
-    given = conditions(job.config, job.index, job.profile)
-    _warm_up(job.baselines, given.physics)
+def _run_goal(
+    config: BenchmarkConfig, baselines: tuple[Baseline, ...], index: int, profile: str
+) -> list[Episode]:
+    """Run all controllers on one goal, one after the other, so that noise hits all alike."""
+    model, given = load_model(), conditions(config, index, profile)
+    _warm_up(baselines, config)
     collision = CollisionModel(model, given.scene.obstacles())
     episodes = []
-    with single_threaded():
-        for baseline in job.baselines:
-            trace = run_episode(model, baseline, _controller(baseline), given)
-            row = {"goal": job.index, "profile": job.profile, "controller": baseline.name}
-            row |= measure(trace, collision, len(model.description.base_joints))
-            episodes.append(Episode(row, *_paths(trace, job.index)))
+    for baseline in baselines:
+        trace = _trace(baseline, given)
+        row = {"goal": index, "profile": profile, "controller": baseline.name}
+        row |= measure(trace, collision, len(model.description.base_joints))
+        paths = (trace.q[::_EVERY, :2], trace.hand[::_EVERY, :2]) if index < _PATHS else ()
+        episodes.append(Episode(row, paths))
     return episodes
 
 
 def trace_of(config: BenchmarkConfig, baseline: Baseline, index: int) -> tuple[Conditions, Trace]:
     """Return what a controller does on one goal under the first profile, for a closer look."""
     given = conditions(config, index, config.profile_names[0])
+    return given, _trace(baseline, given)
+
+
+def _trace(baseline: Baseline, given: Conditions) -> Trace:
     with single_threaded():
-        return given, run_episode(load_model(), baseline, _controller(baseline), given)
+        return run_episode(load_model(), baseline, _controller(baseline), given)
 
 
 @lru_cache(maxsize=32)
 def _controller(baseline: Baseline) -> Controller:
     """Return a baseline's controller, built once a process."""
-    return resolved(baseline.build)(load_model())
+    return baseline.controller(load_model())
 
 
 @lru_cache(maxsize=32)
-def _warm_up(baselines: tuple[Baseline, ...], physics: bool) -> None:
+def _warm_up(baselines: tuple[Baseline, ...], config: BenchmarkConfig) -> None:
     """Let everything that is built at its first use be built, outside of any measured time."""
     model = load_model()
-    here = model.pose(model.description.home)
-    at_home = Conditions(Goal(here.position, here.rotation), Scene(), physics=physics)
+    here, short = model.pose(model.description.home), replace(config, early_stop=True)
     for baseline in baselines:
-        run_episode(model, baseline, _controller(baseline), at_home)
-
-
-def _paths(trace: Trace, index: int) -> tuple[FloatArray | None, FloatArray | None]:
-    if index >= _PATHS:
-        return None, None
-    return trace.q[::_EVERY, :2], trace.hand[::_EVERY, :2]
+        _trace(baseline, Conditions(Goal(here.position, here.rotation), Scene(), short))

@@ -1,9 +1,8 @@
 """What `handrail-profile` measures, as typed settings; light to import."""
 
 from dataclasses import dataclass
-from pathlib import Path
 
-from handrail.controllers.errors import HandrailError
+from handrail.collect.flags import check_json, check_whole
 
 
 @dataclass(frozen=True)
@@ -31,9 +30,5 @@ class ProfileConfig:
         Raises:
             HandrailError: one is wrong.
         """
-        for name, least in (("updates", 10), ("solves", 1), ("seed", 0), ("qps", 0)):
-            value = getattr(self, name)
-            if value < least:
-                raise HandrailError(f"--{name} {value}: expected a whole number >= {least}")
-        if self.json and not Path(self.json).expanduser().absolute().parent.is_dir():
-            raise HandrailError(f"--json {self.json}: expected a file in an existing folder")
+        check_whole(self, updates=10, solves=1, seed=0, qps=0)
+        check_json(self.json)

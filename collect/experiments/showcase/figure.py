@@ -1,71 +1,45 @@
 """The figure of a case: paths from above, distances and tracking error over time."""
 
-import io
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from handrail.collect.experiments.showcase.metrics import held_error, tracking_error
-from handrail.collect.experiments.showcase.run import Trace
+from handrail.collect.experiments.showcase.trace import Trace
 from handrail.controllers.arrays import FloatArray
-from handrail.controllers.errors import not_installed
 from handrail.controllers.numerics.rotation import turned
 from handrail.controllers.robot.model import RobotModel
-from handrail.datasets.storage.atomic import write_whole
+from handrail.datasets.presentation.drawing import COLOURS, GREY, INK, new_figure, tidy
 
-_BASE, _HAND, _GREY, _OBSTACLE = "#2a6fbb", "#c8402f", "#666666", "#e0a050"
+_BASE, _HAND, _OBSTACLE, _OWN = COLOURS[0], COLOURS[1], COLOURS[4], COLOURS[5]
 _FARTHEST = 0.5  # distance that is shown [m]
 _GHOSTS = 6  # moments at which the robot is drawn
 
 
-def save_figure(trace: Trace, model: RobotModel, margin: float, path: Path) -> None:
-    """Write the figure as a picture file.
+def case_figure(trace: Trace, model: RobotModel, margin: float) -> Any:
+    """Return the figure.
 
     Args:
         trace: of the run.
         model: of the robot.
         margin: of the controller [m].
-        path: of the picture.
 
     Raises:
         HandrailError: matplotlib is not installed.
     """
-    try:
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-        from matplotlib.figure import Figure
-    except ImportError as error:
-        raise not_installed("the figure", "matplotlib") from error
-    figure = Figure(dpi=120, layout="constrained")
-    FigureCanvasAgg(figure)
-    above, upper, lower = _panels(figure, _extent(trace, model))
-    figure.suptitle(trace.case.title, fontsize=13)
-    _paths(above, trace, model)
-    _distances(upper, trace, margin)
-    _errors(lower, trace)
-    stream = io.BytesIO()
-    figure.savefig(stream, format="png")
-    write_whole(path, stream.getvalue())
-
-
-def _extent(trace: Trace, model: RobotModel) -> FloatArray:
-    """Return how far the robot gets along x and y, the chassis included, (2,) [m]."""
     places = np.vstack([trace.q[:, :2], trace.hand[:, :2]])
-    return np.ptp(places, axis=0) + model.description.base_size
-
-
-def _panels(figure: Any, extent: FloatArray) -> tuple[Any, Any, Any]:
-    """Return the axes of paths, distances and errors; wide paths on top of the others."""
-    if extent[0] > 2.0 * extent[1]:
-        figure.set_size_inches(11, 8.6)
-        grid = figure.add_gridspec(2, 2, height_ratios=(1.2, 1.0))
-        places = grid[0, :], grid[1, 0], grid[1, 1]
+    length, width = np.ptp(places, axis=0) + model.description.base_size
+    if length > 2.0 * width:  # paths on top of the others
+        figure, layout = new_figure(11, 8.6), [["paths", "paths"], ["distances", "errors"]]
     else:
-        figure.set_size_inches(13, 6.2)
-        grid = figure.add_gridspec(2, 2, width_ratios=(1.4, 1.0))
-        places = grid[:, 0], grid[0, 1], grid[1, 1]
-    above, upper, lower = (figure.add_subplot(place) for place in places)
-    return above, upper, lower
+        figure, layout = new_figure(13, 6.2), [["paths", "distances"], ["paths", "errors"]]
+    axes = figure.subplot_mosaic(layout)
+    figure.suptitle(trace.case.title, fontsize=13)
+    _paths(axes["paths"], trace, model)
+    _distances(axes["distances"], trace, margin)
+    _errors(axes["errors"], trace)
+    for each in axes.values():
+        tidy(each)
+    return figure
 
 
 def _paths(axes: Any, trace: Trace, model: RobotModel) -> None:
@@ -83,8 +57,7 @@ def _paths(axes: Any, trace: Trace, model: RobotModel) -> None:
     if trace.case.held:
         axes.plot(*trace.case.held[:2], "*", color=_HAND, ms=15, mec="white", label="held point", zorder=7)
     axes.set(xlabel="x [m]", ylabel="y [m]", title="from above", aspect="equal")
-    axes.legend(loc="upper left", framealpha=0.9)
-    _tidy(axes)
+    axes.legend(loc="upper left")
 
 
 def _robot(axes: Any, q: FloatArray, model: RobotModel, alpha: float) -> None:
@@ -94,54 +67,37 @@ def _robot(axes: Any, q: FloatArray, model: RobotModel, alpha: float) -> None:
     axes.plot(*(turned(corners.T, q[2]).T + q[:2]).T, color=_BASE, lw=1.0, alpha=alpha, zorder=2)
     frames = [shape.frame for shape in model.description.collision if shape.frame != "planar_base"]
     points = [model.pose(q, frame).position[:2] for frame in (*dict.fromkeys(frames), "tool")]
-    axes.plot(*np.array(points).T, color=_GREY, lw=2.2, alpha=alpha, zorder=3, solid_capstyle="round")
+    axes.plot(*np.array(points).T, color=GREY, lw=2.2, alpha=alpha, zorder=3, solid_capstyle="round")
 
 
 def _distances(axes: Any, trace: Trace, margin: float) -> None:
     obstacles = {item.name for item in trace.case.scene.obstacles()}
     scene = np.array([bool({*pair} & obstacles) for pair in trace.pairs])
     floor = np.array(["floor" in pair for pair in trace.pairs])
+    own = ["–".join(pair) for pair, smaller in zip(trace.pairs, trace.own_margin, strict=True) if smaller]
     groups = (
         ("to obstacles", scene, _HAND),
         ("to itself", ~scene & ~floor & ~trace.own_margin, _BASE),
-        ("to itself: " + _names(trace), trace.own_margin, "#7fb0e0"),
-        ("to the floor", floor, _GREY),
+        (f"to itself: {', '.join(own)}", trace.own_margin, _OWN),
+        ("to the floor", floor, GREY),
     )
     for label, which, colour in groups:
         smallest = trace.distances[:, which].min(axis=1, initial=np.inf)
         if smallest.min() < _FARTHEST:
             axes.plot(trace.times, smallest, color=colour, lw=1.6, label=label)
-    axes.axhline(margin, color="black", lw=1.0, ls="--", label=f"margin {margin:g} m")
+    axes.axhline(margin, color=INK, lw=1.0, ls="--", label=f"margin {margin:g} m")
     axes.set(ylabel="smallest signed distance [m]", xlabel="time [s]", ylim=(0.0, _FARTHEST))
-    axes.legend(fontsize=8, loc="upper right", framealpha=0.9)
-    _tidy(axes)
-
-
-def _names(trace: Trace) -> str:
-    return ", ".join("–".join(pair) for pair, own in zip(trace.pairs, trace.own_margin, strict=True) if own)
+    axes.legend(fontsize=8, loc="upper right")
 
 
 def _errors(axes: Any, trace: Trace) -> None:
-    error, cruise = tracking_error(trace), np.linalg.norm(trace.asked, axis=1).max()
-    mean = error.mean() / cruise if cruise else 0.0
+    error, cruise = 1e3 * trace.tracking_error, trace.cruise
     what = "hand" if trace.case.channels[0].startswith("ee") else "base"
-    label = f"{what} velocity error, mean {mean:.2%} of {cruise:.2f} m/s"
-    axes.plot(trace.times, 1e3 * error, color="black", lw=1.4, label=label)
-    axes.axhline(10.0 * cruise, color="black", lw=0.8, ls=":", label=f"1 % of {cruise:.2f} m/s")
-    axes.set(xlabel="time [s]", ylabel="tracking error [mm/s]", ylim=(0.0, 1.4e3 * error.max()))
-    handles, labels = axes.get_legend_handles_labels()
+    label = f"{what}: mean {error.mean():.1f} mm/s of {1e3 * cruise:.0f}"
+    axes.plot(trace.times, error, color=INK, lw=1.4, label=label)
+    axes.axhline(10.0 * cruise, color=INK, lw=0.8, ls=":", label=f"1 % of {cruise:.2f} m/s")
     if trace.case.held:
-        held = axes.twinx()
-        held.plot(trace.times, 1e3 * held_error(trace), color=_HAND, lw=1.4, label="hand")
-        held.set_ylabel("hand off the held point [mm]", color=_HAND)
-        held.set_ylim(0.0, 1.4e3 * held_error(trace).max())
-        more = held.get_legend_handles_labels()
-        handles, labels = handles + more[0], labels + more[1]
-    axes.legend(handles, labels, fontsize=8, loc="upper center", framealpha=0.9)
-    _tidy(axes)
-
-
-def _tidy(axes: Any) -> None:
-    axes.grid(color="#dddddd", lw=0.6)
-    axes.set_axisbelow(True)
-    axes.spines[["top", "right"]].set_visible(False)
+        held = 1e3 * trace.held_error
+        axes.plot(trace.times, held, color=_HAND, lw=1.4, label="hand off the held point [mm]")
+    axes.set(xlabel="time [s]", ylabel="tracking error [mm/s]", ylim=(0.0, None))
+    axes.legend(fontsize=8, loc="upper center")

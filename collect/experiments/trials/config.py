@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from handrail.collect.flags import check_names, check_page, names
+from handrail.collect.flags import check_names, check_page, check_whole, names
 from handrail.collect.operators.modes import MODES
 from handrail.collect.tasks.catalogue import TASKS
 from handrail.controllers.errors import HandrailError
@@ -53,10 +53,7 @@ class TrialsConfig:
         """
         check_names("task", "--tasks", self.task_names, TASKS)
         check_names("mode", "--modes", self.mode_names, MODES)
-        for name, least in (("episodes", 1), ("persons", 1), ("seed", 0)):
-            value = getattr(self, name)
-            if value < least:
-                raise HandrailError(f"--{name} {value}: expected a whole number >= {least}")
+        check_whole(self, episodes=1, persons=1, seed=0)
         if not 0.0 <= self.noise <= 5.0:
             raise HandrailError(f"--noise {self.noise}: expected a number from 0 (perfect) to 5")
         if not self.json.endswith(".json"):

@@ -65,18 +65,18 @@ class TrialsFile:
 
     def __init__(self, path: Path, config: TrialsConfig) -> None:
         self._path = path
-        self._settings = {name: getattr(config, name) for name in ("robot", "seed", "noise", "persons")}
-        self._trials: dict[tuple[str, str, int], Trial] = {}
-        try:
-            for row in self._read():
-                self._keep(Trial(**row))
-        except (TypeError, KeyError) as error:
-            raise HandrailError(f"--json {self._path}: expected a file of trials, got {error}") from error
+        settings = {name: getattr(config, name) for name in ("robot", "seed", "noise", "persons")}
+        self._head = {"format": FORMAT, **settings}
+        self._trials = {_key(trial): trial for trial in self._read()} if path.exists() else {}
 
     def add(self, trial: Trial) -> None:
         """Keep a trial, on the disk too."""
-        self._keep(trial)
-        self._write()
+        self._trials[_key(trial)] = trial
+        head = self._head | {"versions": software_versions()}
+        rows = ",\n".join(json.dumps(_rounded(each)) for _, each in sorted(self._trials.items()))
+        text = f'{json.dumps(head)[:-1]}, "trials": [\n{rows}\n]}}\n'
+        with explained(f"--json {self._path}"):
+            write_whole(self._path, text.encode())
 
     def missing(self, task: str, mode: str, episodes: int) -> list[int]:
         """Return the numbers of the episodes that have not been run."""
@@ -87,28 +87,19 @@ class TrialsFile:
         keys = [(task, mode, episode) for task in tasks for mode in modes for episode in range(episodes)]
         return [self._trials[key] for key in keys if key in self._trials]
 
-    def _keep(self, trial: Trial) -> None:
-        self._trials[trial.task, trial.mode, trial.episode] = trial
-
-    def _read(self) -> list[dict[str, Any]]:
-        if not self._path.exists():
-            return []
-        expected = {"format": FORMAT, **self._settings}
+    def _read(self) -> list[Trial]:
         try:
             content = read_json(self._path)
-            found = {name: content.get(name, _UNNAMED.get(name)) for name in expected}
-        except (OSError, ValueError, AttributeError) as error:
+            found = {name: content.get(name, _UNNAMED.get(name)) for name in self._head}
+            if found == self._head:
+                return [Trial(**row) for row in content["trials"]]
+        except (OSError, ValueError, AttributeError, KeyError, TypeError) as error:
             raise HandrailError(f"--json {self._path}: expected a file of trials, got {error}") from error
-        if found != expected:
-            raise HandrailError(f"--json {self._path}: expected {expected}, got {found}; choose another file")
-        return content["trials"]
+        raise HandrailError(f"--json {self._path}: expected {self._head}, got {found}; choose another file")
 
-    def _write(self) -> None:
-        head = {"format": FORMAT, **self._settings, "versions": software_versions()}
-        rows = ",\n".join(json.dumps(_rounded(trial)) for _, trial in sorted(self._trials.items()))
-        text = f'{json.dumps(head)[:-1]}, "trials": [\n{rows}\n]}}\n'
-        with explained(f"--json {self._path}"):
-            write_whole(self._path, text.encode())
+
+def _key(trial: Trial) -> tuple[str, str, int]:
+    return trial.task, trial.mode, trial.episode
 
 
 def _rounded(trial: Trial) -> dict[str, Any]:

@@ -8,6 +8,7 @@ import numpy as np
 
 from handrail.collect.experiments.trials.config import TrialsConfig
 from handrail.collect.experiments.trials.file import Trial
+from handrail.collect.flags import command_line
 from handrail.datasets.presentation.markdown import markdown_table, write_part
 from handrail.datasets.presentation.table import Table
 from handrail.datasets.statistics.paired import wilson
@@ -16,37 +17,29 @@ HEADINGS = (
     *("mode", "success", "95 %", "failures", "time of successes [s]", "episodes with contact"),
     *("smallest distance [m]", "braked updates", "switches", "time in switches"),
 )
-LABEL = "trials"
-
-
-def trials_table(trials: Sequence[Trial], modes: Sequence[str]) -> Table:
-    """Return a task's table: a line for each mode that has trials."""
-    groups = [[trial for trial in trials if trial.mode == mode] for mode in modes]
-    return Table(HEADINGS, [_line(group) for group in groups if group])
-
-
-def write_page(trials: Sequence[Trial], config: TrialsConfig) -> None:
-    """Put a table a task between the trials' marks of the page, made if need be; other text stays."""
-    page = Path(config.page).expanduser()
-    parts = [f"`{_command(config)}` wrote this. {_WORDS}"]
-    for task in config.task_names:
-        of_task = [trial for trial in trials if trial.task == task]
-        table = markdown_table(trials_table(of_task, config.mode_names))
-        parts.append(f"### `{task}`\n\n{table}")
-    write_part(page, "Scripted operators", LABEL, "\n\n".join(parts))
-
-
 _WORDS = (
     "Time: mean ± SD. 95 %: Wilson. Contacts are forbidden ones. Switches: mean an episode; time in "
     "switches: share of all time in which the hands are away from the input to change to other channels."
 )
 
 
+def trials_table(trials: Sequence[Trial], modes: Sequence[str], task: str) -> Table:
+    """Return a task's table: a line for each mode that has trials."""
+    groups = [[each for each in trials if (each.task, each.mode) == (task, mode)] for mode in modes]
+    return Table(HEADINGS, [_line(group) for group in groups if group], task)
+
+
+def write_page(trials: Sequence[Trial], config: TrialsConfig) -> None:
+    """Put a table a task between the trials' marks of the page, made if need be; other text stays."""
+    parts = [f"`{command_line('handrail-trials', config)}` wrote this. {_WORDS}"]
+    parts += [markdown_table(trials_table(trials, config.mode_names, task)) for task in config.task_names]
+    write_part(Path(config.page).expanduser(), "Scripted operators", "trials", "\n\n".join(parts))
+
+
 def _line(group: Sequence[Trial]) -> list[str]:
     successes = [trial.seconds for trial in group if trial.success]
     low, high = wilson(len(successes), len(group))
     failures = Counter(trial.failure_reason for trial in group if not trial.success)
-    touching = sum(trial.contacts > 0 for trial in group)
     brakes, frames = sum(trial.brakes for trial in group), sum(trial.frames for trial in group)
     seconds = sum(trial.seconds for trial in group)
     return [
@@ -55,16 +48,9 @@ def _line(group: Sequence[Trial]) -> list[str]:
         f"{100 * low:.0f} to {100 * high:.0f} %",
         ", ".join(f"{why} ({count})" for why, count in failures.most_common()) or "–",
         f"{np.mean(successes):.1f} ± {np.std(successes):.1f}" if successes else "–",
-        str(touching),
+        str(sum(trial.contacts > 0 for trial in group)),
         f"{min(trial.smallest_distance for trial in group):.3f}",
         f"{brakes} of {frames}",
         f"{np.mean([trial.switches for trial in group]):.1f}",
         f"{100 * sum(trial.switching for trial in group) / seconds:.1f} %",
     ]
-
-
-def _command(config: TrialsConfig) -> str:
-    default = TrialsConfig()
-    names = ("tasks", "modes", "episodes", "persons", "noise", "robot", "seed", "json", "page")
-    changed = [name for name in names if getattr(config, name) != getattr(default, name)]
-    return " ".join(["handrail-trials", *(f"--{name} {getattr(config, name)}" for name in changed)])

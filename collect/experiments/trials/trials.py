@@ -15,6 +15,9 @@ from handrail.collect.session.session import Session
 from handrail.datasets.recording.frames import Frame
 
 _FPS = 20  # [Hz]
+_OF_OUTCOME = (
+    *("success", "failure_reason", "seconds", "frames", "contacts", "smallest_distance", "brakes"),
+)
 
 
 def run_trials(config: TrialsConfig, told: Callable[[Trial], None]) -> list[Trial]:
@@ -55,21 +58,9 @@ def _run(config: TrialsConfig, task: str, mode: str, episodes: Sequence[int]) ->
         for episode in episodes:
             session, hands = watched[episode % config.persons]
             outcome = session.run(episode_seed(config.seed, episode))
-            yield Trial(
-                task=task,
-                mode=mode,
-                episode=episode,
-                person=episode % config.persons,
-                success=outcome.success,
-                failure_reason=outcome.failure_reason,
-                seconds=outcome.seconds,
-                frames=outcome.frames,
-                contacts=outcome.contacts,
-                smallest_distance=outcome.smallest_distance,
-                brakes=outcome.brakes,
-                switches=hands.switches,
-                switching=hands.away / _FPS,
-            )
+            went = {name: getattr(outcome, name) for name in _OF_OUTCOME}
+            own = {"switches": hands.switches, "switching": hands.away / _FPS}
+            yield Trial(task, mode, episode, episode % config.persons, **went, **own)
     finally:
         env.close()
 

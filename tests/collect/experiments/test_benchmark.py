@@ -15,7 +15,7 @@ from handrail.collect.experiments.benchmark.benchmark import benchmark
 from handrail.collect.experiments.benchmark.catalogue import BASELINES
 from handrail.collect.experiments.benchmark.config import BenchmarkConfig
 from handrail.collect.experiments.benchmark.metrics import METRICS
-from handrail.collect.experiments.benchmark.page import write_page
+from handrail.collect.experiments.benchmark.report import write_page
 from handrail.collect.experiments.benchmark.run import available, conditions, goals, run, trace_of
 from handrail.collect.experiments.benchmark.tables import benchmark_tables
 from handrail.controllers.collision.model import CollisionModel
@@ -175,7 +175,7 @@ def test_physics_and_ideal_robot_tell_the_same_story():
 def test_an_update_is_asked_for_at_its_period():
     """10 Hz against steps of 0.03 s: after 0, 4, 7, 10, 14, … steps."""
     _, trace = trace_of(replace(QUICK, goals=1), BASELINES["mpc"], 0)
-    assert len(trace.statuses) == int(np.ceil(len(trace.v) * 0.03 / 0.1))
+    assert len(trace.updates) == int(np.ceil(len(trace.v) * 0.03 / 0.1))
 
 
 def test_clutter_is_seen_by_the_mpc_and_not_by_plain_least_squares():
@@ -186,7 +186,7 @@ def test_clutter_is_seen_by_the_mpc_and_not_by_plain_least_squares():
     assert contacts["dls"] > 0
 
 
-def _fails(model):
+def _fails(model, period):
     raise HandrailError("robot missing")
 
 
@@ -205,9 +205,9 @@ WRONG = {
     "profile": (["--profile", "slow"], "unknown profile 'slow': expected one of all, delay"),
     "no controllers": (["--controllers", ","], "--controllers: expected all, or some of mpc, rl"),
     "twice": (["--controllers", "mpc,mpc"], "--controllers mpc,mpc: expected each controller once"),
-    "goals": (["--goals", "0"], "--goals 0: expected a whole number from 1"),
+    "goals": (["--goals", "0"], "--goals 0: expected a whole number >= 1"),
     "seed": (["--seed", "-1"], "--seed -1: expected a whole number >= 0"),
-    "workers": (["--workers", "1000"], "--workers 1000: expected a whole number from 1 to 64"),
+    "workers": (["--workers", "1000"], "--workers 1000: expected at most 64"),
     "json": (
         ["--json", "/nowhere/at/all.json"],
         "/nowhere/at/all.json: expected a file in an existing",

@@ -10,7 +10,7 @@ from handrail.collect.experiments.benchmark.results import summarise
 from handrail.collect.experiments.benchmark.tables import paired_table, profile_tables
 from handrail.collect.tasks.goal_reaching import STEP
 from handrail.controllers.collision.model import CollisionModel
-from handrail.controllers.interface.command import Status
+from handrail.controllers.interface.command import Diagnostics, Status
 from handrail.controllers.robot.model import load_model
 
 MODEL = load_model()
@@ -28,8 +28,11 @@ def trace(steps=4, end=4, errors=(0.05, 0.01), contacts=()):
         errors=np.tile(errors, (steps, 1)),
         hand=q[:, :3],
         contacts=[tuple(contacts)] + [()] * (steps - 1),
-        statuses=[Status.OK, Status.BACKUP, Status.CLIPPED],
-        solve_times=[1e-3, 2e-3, 3e-3],
+        updates=[
+            Diagnostics(Status.OK, 1e-3),
+            Diagnostics(Status.BACKUP, 2e-3),
+            Diagnostics(Status.CLIPPED, 3e-3),
+        ],
         end=end,
         wall_time=0.5,
         cpu_time=0.4,

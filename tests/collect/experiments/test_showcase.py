@@ -9,18 +9,15 @@ import numpy as np
 import pytest
 from command_helpers import command
 
-from handrail.collect.envs.env import HandrailEnv
 from handrail.collect.experiments.showcase.cases import cases
 from handrail.collect.experiments.showcase.config import CASES, ShowcaseConfig
-from handrail.collect.experiments.showcase.metrics import held_error, summary, tracking_error
-from handrail.collect.experiments.showcase.run import (
+from handrail.collect.experiments.showcase.showcase import (
     FPS,
-    ShowcaseTask,
     build_controller,
     parameters,
     run_case,
+    showcase,
 )
-from handrail.collect.experiments.showcase.showcase import showcase
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.robot.model import load_model
 
@@ -31,12 +28,7 @@ MPC = build_controller(MODEL)  # one object for all tests
 @cache
 def run(name, seconds=0.0):
     case = cases()[name]
-    case = replace(case, seconds=seconds or case.seconds)
-    env = HandrailEnv(ShowcaseTask(case), fps=FPS)
-    try:
-        return run_case(case, env, MPC)
-    finally:
-        env.close()
+    return run_case(replace(case, seconds=seconds or case.seconds), MPC)
 
 
 def test_cases_differ_only_in_what_is_asked_and_where():
@@ -55,7 +47,7 @@ def test_cases_differ_only_in_what_is_asked_and_where():
 @pytest.mark.parametrize("name", CASES)
 def test_a_case_is_tracked_and_safe(name):
     trace = run(name)
-    result = summary(trace)
+    result = trace.summary()
     assert trace.outcome.success
     assert (result["contacts"], result["brakes"]) == (0, 0)
     assert result["tracking"]["share"] < 0.01
@@ -81,7 +73,7 @@ def test_the_arm_gives_way_while_the_base_keeps_its_course():
 
 def test_the_hand_is_held_while_the_base_goes_round_in_a_circle():
     trace = run("c")
-    assert held_error(trace).max() < 0.02
+    assert trace.held_error.max() < 0.02
     assert np.linalg.norm(trace.q[-1, :2] - cases()["c"].q[:2]) < 0.3
     assert np.ptp(trace.q[:, 0]) > 0.45
     assert np.ptp(trace.q[:, 1]) > 0.45
@@ -89,9 +81,7 @@ def test_the_hand_is_held_while_the_base_goes_round_in_a_circle():
 
 def test_without_the_hold_the_hand_leaves():
     case = replace(cases()["c"], held=(), seconds=8.0)
-    env = HandrailEnv(ShowcaseTask(case), fps=FPS)
-    trace = run_case(case, env, MPC)
-    env.close()
+    trace = run_case(case, MPC)
     assert np.max(np.linalg.norm(trace.hand - cases()["c"].held, axis=1)) > 0.2
 
 
@@ -109,7 +99,7 @@ def test_the_trace_compares_with_what_is_asked_at_that_moment():
     trace = run("a", 1.0)
     expected = [trace.case.command(time, 1.0) for time in trace.times]
     np.testing.assert_allclose(trace.asked, expected)
-    assert tracking_error(trace).shape == trace.times.shape
+    assert trace.tracking_error.shape == trace.times.shape
 
 
 def test_without_opengl_there_is_everything_but_the_video(tmp_path, monkeypatch):

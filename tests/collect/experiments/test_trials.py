@@ -90,7 +90,7 @@ def test_wrong_settings_name_the_flag(config, wrong):
 def test_a_table_counts_every_episode():
     failed = replace(DONE, success=False, failure_reason="timeout", seconds=16.0, switches=3, switching=2.0)
     line = trials_table(
-        [DONE, DONE, replace(failed, contacts=7, smallest_distance=-0.01)], ["base", "ee"]
+        [DONE, DONE, replace(failed, contacts=7, smallest_distance=-0.01)], ["base", "ee"], "reach"
     ).rows
     cells = dict(zip(HEADINGS, line[0], strict=True))
     assert len(line) == 1

@@ -30,7 +30,7 @@ def intent(twist, time: float = 0.0) -> Intent:
 
 @pytest.fixture
 def controller():
-    return RlController(MODEL, random_actor())
+    return RlController(MODEL, actor=random_actor())
 
 
 def test_the_controller_moves_like_the_environment(controller):

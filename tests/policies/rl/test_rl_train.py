@@ -94,7 +94,7 @@ def test_the_record_says_how_the_actor_was_made(run):
     score = means(evaluate(last, evaluation_goals(config.goals)))  # the mean of one actor is that actor
     assert {name: record["curve"][-1][name] for name in score} == score
     final = evaluate(last, evaluation_goals(2, FINAL_SEED))
-    assert record["final"]["length"]["max"] == max(score.length for score in final)
+    assert record["final"]["length"]["max"] == max(score["length"] for score in final)
     assert record["final"]["length"]["mean"] == means(final)["length"]
 
 

@@ -1,19 +1,14 @@
 """Differential inverse kinematics with collision avoidance (mink) as a controller."""
 
-from dataclasses import dataclass
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from handrail.collect.experiments.mink.scene import (
-    avoidance,
-    import_mink,
-    qp_solvers,
-    shape_model,
-    standing_pairs,
-)
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.baselines.twist_completion import twist_controller
+from handrail.controllers.collision.model import CollisionModel
+from handrail.controllers.errors import not_installed
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.command import Command
 from handrail.controllers.interface.controller import State
@@ -21,24 +16,11 @@ from handrail.controllers.interface.intent import Intent
 from handrail.controllers.robot.model import RobotModel
 from handrail.controllers.robot.shape import Obstacle
 
-
-@dataclass(frozen=True)
-class MinkSettings:
-    """Settings of mink's tasks and limits; costs are those of the masked MPC's objectives, square-rooted.
-
-    Attributes:
-        base_cost: of base velocities, relative to the tool's.
-        arm_cost: of arm velocities.
-        margin: signed distance kept between shapes [m].
-        activation_distance: distance beyond the margin at which a pair enters the problem [m].
-        approach: how fast a distance may shrink, relative to what is left above the margin [1/s].
-    """
-
-    base_cost: float = 0.0055
-    arm_cost: float = 0.01
-    margin: float = 0.10
-    activation_distance: float = 0.15
-    approach: float = 2.0
+ACTIVATION_DISTANCE = 0.15  # beyond the margin, at which a pair enters the problem [m]
+_BASE_COST, _ARM_COST = 0.0055, 0.01  # of velocities: the masked MPC's, square-rooted, relative to the tool's
+_MARGIN = 0.10  # signed distance kept between shapes [m]
+_APPROACH = 2.0  # how fast a distance may shrink, relative to what is left above the margin [1/s]
+_SOLVERS = ("daqp", "proxqp", "quadprog")  # the fastest first; PIQP is slower than these and prints
 
 
 class MinkController:
@@ -51,25 +33,24 @@ class MinkController:
     Args:
         model: of the robot.
         period: of the control loop [s].
-        settings: costs, margins.
-        intent_timeout: age from which an intent is stale [s].
+        activation_distance: beyond the margin, at which a pair enters the problem [m].
 
     Raises:
         HandrailError: mink is not installed.
     """
 
     def __init__(
-        self,
-        model: RobotModel,
-        period: float = 0.05,
-        settings: MinkSettings | None = None,
-        intent_timeout: float = 0.25,
+        self, model: RobotModel, period: float = 0.05, activation_distance: float = ACTIVATION_DISTANCE
     ) -> None:
-        self._mink = import_mink()
-        self._solver = qp_solvers()[0]
-        self._model, self._period = model, period
-        self._settings = settings or MinkSettings()
-        self._reactive = twist_controller(model, self._velocity, period, intent_timeout)
+        try:
+            import mink
+            import qpsolvers
+        except ImportError as error:
+            raise not_installed("differential IK", "mink", "profile") from error
+        self._mink: Any = mink
+        self._solver = next(name for name in _SOLVERS if name in qpsolvers.available_solvers)
+        self._model, self._period, self._activation_distance = model, period, activation_distance
+        self._reactive = twist_controller(model, self._velocity, period)
         self.reset()
 
     @property
@@ -79,15 +60,15 @@ class MinkController:
 
     def reset(self, obstacles: tuple[Obstacle, ...] = ()) -> None:
         """Forget the last command; build mink's tasks and limits for the scene of a new episode."""
-        mink, settings = self._mink, self._settings
+        mink, model = self._mink, self._model
         around = tuple(obstacle for obstacle in obstacles if not obstacle.held)
-        self._shapes = shape_model(self._model, around)
+        self._shapes = _shape_model(model, around)
         self._configuration = mink.Configuration(self._shapes)
         self._task = mink.FrameTask("tool", "site", position_cost=1.0, orientation_cost=1.0)
-        base = len(self._model.description.base_joints)
-        costs = np.where(np.arange(self._model.size) < base, settings.base_cost, settings.arm_cost)
+        costs = np.full(model.size, _ARM_COST)
+        costs[: len(model.description.base_joints)] = _BASE_COST
         self._tasks = [self._task, mink.DampingTask(self._shapes, costs)]
-        speeds = dict(zip(self._model.joints, self._model.description.limits.velocity.tolist(), strict=True))
+        speeds = dict(zip(model.joints, model.description.limits.velocity.tolist(), strict=True))
         limits = [mink.ConfigurationLimit(self._shapes), mink.VelocityLimit(self._shapes, speeds)]
         self._limits = [*limits, *self._avoidance(around)]
         self._reactive.reset(obstacles)
@@ -104,19 +85,24 @@ class MinkController:
         return self._reactive.update(state, intent)
 
     def _avoidance(self, obstacles: tuple[Obstacle, ...]) -> list[Any]:
-        """Return a limit for every margin that pairs keep: a few of the robot's own keep less."""
-        description, settings = self._model.description, self._settings
-        pairs = standing_pairs(self._model, obstacles)
-        others = np.full(len(pairs) - len(description.self_margins), np.inf)
-        margins = np.minimum(settings.margin, np.concatenate([description.self_margins, others]))
-        gain = min(settings.approach * self._period, 1.0)
+        """Return a limit for every margin that pairs keep: a few of the robot's own keep less.
+
+        Mink's own filter would drop neighbours: base against obstacle, for one.
+        """
+
+        class EveryPair(self._mink.CollisionAvoidanceLimit):
+            def _construct_geom_id_pairs(self, geom_pairs: Any) -> list[tuple[int, int]]:
+                return [(self.model.geom(a).id, self.model.geom(b).id) for (a,), (b,) in geom_pairs]
+
+        collision = CollisionModel(self._model, obstacles)
+        margins = np.minimum(_MARGIN, collision.largest_margin)
         return [
-            avoidance(
+            EveryPair(
                 self._shapes,
-                tuple(pair for pair, own in zip(pairs, margins, strict=True) if own == margin),
-                margin,
-                margin + settings.activation_distance,
-                gain,
+                [([a], [b]) for (a, b), kept in zip(collision.pairs, margins, strict=True) if kept == margin],
+                gain=min(_APPROACH * self._period, 1.0),
+                minimum_distance_from_collisions=margin,
+                collision_detection_distance=margin + self._activation_distance,
             )
             for margin in np.unique(margins).tolist()
         ]
@@ -137,3 +123,21 @@ class MinkController:
             )
         except (mink.MinkError, ValueError, RuntimeError):
             return np.full(len(q), np.nan)
+
+
+def _shape_model(model: RobotModel, obstacles: tuple[Obstacle, ...]) -> Any:
+    """Return the controller's own shapes in MuJoCo, each a geom of its name."""
+    from handrail.collect.simulation import geometry
+    from handrail.collect.simulation.gl import mujoco
+    from handrail.collect.simulation.robot import build_robot
+
+    bare = RobotModel(replace(model.description, gripper=None))
+    spec = build_robot(bare, meshes=False).spec
+    spec.worldbody.add_geom(name="floor", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[8.0, 8.0, 0.1])
+    for obstacle in obstacles:
+        spec.worldbody.add_geom(
+            name=obstacle.name,
+            **geometry.geom_shape(obstacle.shape),
+            **geometry.pose(obstacle.position, obstacle.rotation),
+        )
+    return spec.compile()

@@ -1,4 +1,4 @@
-"""Who else takes part: the paper's own horizon, and rivals behind the masked MPC's low-pass."""
+"""Who else takes part: the paper's own horizon, and baselines behind the masked MPC's low-pass."""
 
 from dataclasses import replace
 
@@ -8,9 +8,9 @@ import pytest
 from handrail.collect.experiments.benchmark.baselines import (
     TAKE_UP,
     TAKE_UP_TURN,
-    HandIntent,
-    SmoothedHandIntent,
     goal_reaching_prediction,
+    hand_intent,
+    smoothed_hand_intent,
 )
 from handrail.collect.experiments.benchmark.catalogue import BASELINES
 from handrail.collect.experiments.benchmark.config import BenchmarkConfig
@@ -30,12 +30,13 @@ IDEAL = BenchmarkConfig(goals=1, seed=103, physics=False)
 KEYS = replace(IDEAL, profile="quantised")
 
 
-def test_a_rival_s_low_pass_is_the_mpc_s():
+def test_a_baseline_s_low_pass_is_the_mpc_s():
     """At every moment it sends what the MPC's prediction says of that moment, rests and gaps included."""
     twists = np.random.default_rng(0).normal(size=(40, 6))
     twists[10:20] = 0.0
     times = np.cumsum(np.random.default_rng(1).choice([STEP, 0.0, 0.5], 40, p=[0.8, 0.1, 0.1]))
-    hand, smooth, predict = HandIntent(MODEL), SmoothedHandIntent(MODEL), goal_reaching_prediction(CHANNELS)
+    hand, smooth = hand_intent(MODEL), smoothed_hand_intent(MODEL)
+    predict = goal_reaching_prediction(CHANNELS)
     for twist, time in zip(twists, times, strict=True):
         asked = hand(twist, STATE, time)
         predict = after(predict, asked)
@@ -47,7 +48,7 @@ def test_a_rival_s_low_pass_is_the_mpc_s():
 
 def test_the_low_pass_takes_a_step_up_in_its_time_and_keeps_the_way():
     steps, held = 600, 200
-    smooth = SmoothedHandIntent(MODEL)
+    smooth = smoothed_hand_intent(MODEL)
     sent = np.array([smooth(np.ones(6) * (k < held), STATE, k * STEP).values for k in range(steps)])
     hand = sent[:, CHANNELS.tool_slice]
     constants = np.array([TAKE_UP] * 3 + [TAKE_UP_TURN] * 3)
@@ -59,21 +60,21 @@ def test_the_low_pass_takes_a_step_up_in_its_time_and_keeps_the_way():
 def test_who_has_the_low_pass_differs_from_their_twin_in_nothing_else():
     for name in ("mink", "rl"):
         bare, smooth = BASELINES[name], BASELINES[f"{name}_low_pass"]
-        assert resolved(smooth.operator) is SmoothedHandIntent
-        assert resolved(bare.operator) is HandIntent
+        assert resolved(smooth.operator) is smoothed_hand_intent
+        assert resolved(bare.operator) is hand_intent
         assert replace(smooth, name=bare.name, help=bare.help, operator=bare.operator) == bare
 
 
 def test_behind_the_low_pass_keys_jerk_less():
     bare = BASELINES["dls"]
-    smooth = replace(bare, operator=SmoothedHandIntent)
+    smooth = replace(bare, operator=smoothed_hand_intent)
     rough, smoothed = (trace_of(KEYS, who, 0)[1] for who in (bare, smooth))
     jerks = [np.linalg.norm(np.diff(trace.v, axis=0), axis=1).mean() for trace in (rough, smoothed)]
     assert jerks[1] < 0.5 * jerks[0]
 
 
 def test_the_low_pass_begins_at_rest_in_every_episode():
-    who = replace(BASELINES["dls"], operator=SmoothedHandIntent)
+    who = replace(BASELINES["dls"], operator=smoothed_hand_intent)
     first, second = (trace_of(KEYS, who, 0)[1] for _ in range(2))
     np.testing.assert_array_equal(first.v, second.v)
 
@@ -81,10 +82,10 @@ def test_the_low_pass_begins_at_rest_in_every_episode():
 def test_the_paper_s_horizon_is_the_paper_s():
     """N = 10, dt = 0.1 s, γ = 1, the command held constant, no posture and no terminal cost."""
     baseline = BASELINES["mpc_paper"]
-    mpc = resolved(baseline.build)(MODEL)
+    mpc = baseline.controller(MODEL)
     assert isinstance(mpc, MaskedMpc)
     assert (mpc.settings.horizon, mpc.settings.dt, baseline.period) == (10, 0.1, 0.1)
-    intent = HandIntent(MODEL)(np.full(6, 0.1), STATE, 0.0)
+    intent = hand_intent(MODEL)(np.full(6, 0.1), STATE, 0.0)
     problem = mpc.build_problem(STATE, intent)
     tool = CHANNELS.tool_slice
     np.testing.assert_allclose(problem.reference[:, tool], 0.1)
