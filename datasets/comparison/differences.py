@@ -9,8 +9,9 @@ from scipy import stats
 from handrail.controllers.arrays import FloatArray
 from handrail.datasets.comparison.collection import shared_seeds
 from handrail.datasets.comparison.groups import Group
-from handrail.datasets.quality.catalogue import METRICS, Metric
+from handrail.datasets.quality.catalogue import METRICS
 from handrail.datasets.quality.measure import Measured, Measurements
+from handrail.datasets.quality.metric import Metric
 from handrail.datasets.statistics.proportions import LEVEL, holm
 from handrail.datasets.statistics.resampling import (
     FEWEST,

@@ -67,6 +67,8 @@ def load_groups(
     groups: list[Group] = []
     for root, name in zip(roots, names, strict=True):
         info, episodes = read_info(root), read_demonstrations(root, columns)
+        if not episodes:
+            raise HandrailError(f"dataset {str(info.root)!r}: expected one episode or more, got none")
         if not by:
             groups.append(Group(name, info, tuple(episodes)))
             continue
@@ -122,7 +124,7 @@ def _value(episode: Demonstration, by: str, root: str) -> str:
     """Return the value of a metadata column; a mode that the metadata lacks is read from the frames."""
     meta: dict[str, Any] = {key: value for key, value in episode.meta.items() if "/" not in key}
     if by not in meta and by == "mode" and episode.has("mode"):
-        return " → ".join(dict.fromkeys(str(mode) for mode in episode.column("mode") if mode)) or "none"
+        return episode.modes or "none"
     if by not in meta:
         raise HandrailError(
             f"dataset {root!r}: unknown column {by!r} of episodes, expected one of {', '.join(meta)}"

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray
-from handrail.datasets.quality.catalogue import METRICS, Metric
-from handrail.datasets.quality.demonstration import Demonstration
-from handrail.datasets.quality.missing import DoesNotApply
+from handrail.datasets.quality.catalogue import METRICS
+from handrail.datasets.quality.demonstration import Demonstration, DoesNotApply
+from handrail.datasets.quality.metric import Metric
 from handrail.datasets.quality.pool import Pool
 from handrail.datasets.quality.units import why_not
 

@@ -8,12 +8,12 @@ from datasets_helpers import FPS, REPO, ROBOT, record
 
 from handrail.datasets.format.schema import Feature
 from handrail.datasets.quality.metrics import high_frequency_content, rate_of_change, sparc
-from handrail.datasets.quality.summary import HEADINGS, QUALITY_HEADINGS, TOOL, summarize
+from handrail.datasets.quality.summary import HEADINGS, QUALITY_HEADINGS, summarize
 from handrail.datasets.reading.reader import read_episodes, read_frames, read_info
 from handrail.datasets.recording.writer import EpisodeWriter
 
 FEATURES = {
-    "observation.state": Feature("float32", (4,), ("x", *TOOL)),
+    "observation.state": Feature("float32", (4,), ("x", "tool.x", "tool.y", "tool.z")),
     "action": Feature("float32", (2,), ("v_x", "gripper")),
     "teleop.mode": Feature("string"),
     "controller.smallest_distance": Feature("float32"),
@@ -83,11 +83,11 @@ def test_chattering_of_what_was_commanded(tmp_path):
     assert base.quality_cells()[-1] == "–"
 
 
-def test_without_a_tool_the_commanded_velocity_is_judged(tmp_path):
+def test_without_a_tool_the_configuration_is_judged(tmp_path):
     root = record(tmp_path / "set", 2)
-    frames = read_frames(root, 1)
-    expected = sparc(np.abs(frames["action"][:, 0].astype(float)), FPS)
-    assert summarize(root)[1].smoothness == pytest.approx(expected)
+    state = read_frames(root, 1)["observation.state"][:, :2].astype(float)  # x, y
+    expected = sparc(np.linalg.norm(np.diff(state, axis=0), axis=1) * FPS, FPS)
+    assert summarize(root)[1].smoothness == pytest.approx(expected, nan_ok=True)
 
 
 def test_a_dataset_of_lerobot_s_own(tmp_path):
@@ -126,5 +126,5 @@ def test_a_dataset_of_lerobot_s_own(tmp_path):
     assert frames["action"].shape == (5,)
     summary = summarize(tmp_path / "set")[2]
     cells = summary.cells()
-    assert summary.quality_cells() == ("2", "–", "0.2", "–", "–", "–", "–")
-    assert cells == ("2", "push", "–", "–", "–", "0.2", "–", "–", "–")
+    assert summary.quality_cells() == ("2", "–", "0.2", "-1.69", "–", "–", "–")
+    assert cells == ("2", "push", "–", "–", "–", "0.2", "–", "-1.69", "–")

@@ -11,7 +11,7 @@ from handrail.datasets.comparison.differences import Difference
 from handrail.datasets.comparison.means import Mean
 from handrail.datasets.comparison.report.figures import Colours, colours
 from handrail.datasets.presentation.drawing import GREY, INK, Panel, new_figure, short, tidy
-from handrail.datasets.quality.catalogue import Metric
+from handrail.datasets.quality.metric import Metric
 
 TURNED = "↓"  # marks a metric of which less is better, drawn the other way round
 _WIDEST = 4.0  # standard deviations that are shown

@@ -23,7 +23,8 @@ from handrail.datasets.presentation.wording import (
     signed,
     span,
 )
-from handrail.datasets.quality.catalogue import METRICS, Metric
+from handrail.datasets.quality.catalogue import METRICS
+from handrail.datasets.quality.metric import Metric
 
 _UNTESTED = "described, not tested: episodes share neighbours"
 

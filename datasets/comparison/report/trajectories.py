@@ -9,8 +9,7 @@ from handrail.datasets.comparison.compare import Comparison
 from handrail.datasets.comparison.groups import Group
 from handrail.datasets.comparison.report.figures import colours
 from handrail.datasets.presentation.drawing import FAINT, GREY, Panel, new_figure, short, tidy
-from handrail.datasets.quality.demonstration import Demonstration
-from handrail.datasets.quality.missing import DoesNotApply
+from handrail.datasets.quality.demonstration import Demonstration, DoesNotApply
 from handrail.datasets.quality.naming import position_entries
 
 _SHOWN = 50  # paths a group
@@ -84,7 +83,7 @@ def _first_names(episode: Demonstration) -> tuple[str, str]:
 def _speed(group: Group, colour: str) -> Panel:
     figure, episode = new_figure(*_SIZE), example(group)
     axes = figure.subplots()
-    speed = np.linalg.norm(np.diff(episode.motion, axis=0), axis=1) * episode.fps
+    speed = episode.speed
     times = np.arange(len(speed)) / episode.fps
     axes.fill_between(times, speed, color=FAINT)
     axes.plot(times, speed, color=colour, lw=1.5)
