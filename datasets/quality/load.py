@@ -4,8 +4,7 @@ from pathlib import Path
 
 from handrail.datasets.quality.columns import ColumnNames
 from handrail.datasets.quality.demonstration import Demonstration
-from handrail.datasets.reading.labels import with_success
-from handrail.datasets.reading.reader import DatasetInfo, read_episodes, read_info, read_rows_of
+from handrail.datasets.reading.reader import DatasetInfo, read_episodes, read_info, read_rows_of, with_success
 
 
 def read_demonstrations(root: str | Path, columns: ColumnNames | None = None) -> list[Demonstration]:
