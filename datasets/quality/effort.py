@@ -16,15 +16,13 @@ from handrail.datasets.quality.pool import Pool
 DEAD_BAND = 0.05  # of full deflection: below it an axis is not in use
 
 
-@metric(
-    "input_effort", "input effort", "s", "lower", "seconds of full deflection, input axes added up", "pool"
-)
+@metric("input_effort", "s", "lower", "seconds of full deflection, input axes added up", "pool")
 def input_effort(episode: Demonstration, pool: Pool) -> float:
     """Return Σ_i ∫ |u_i| / scale_i dt [s]."""
     return float(np.abs(_deflection(episode, pool)).sum()) / episode.fps
 
 
-@metric("input_reversals", "input reversals", "", "lower", "how often an input axis changed its sign", "pool")
+@metric("input_reversals", "", "lower", "how often an input axis changed its sign", "pool")
 def input_reversals(episode: Demonstration, pool: Pool) -> float:
     """Return how often an axis changed its sign, axes added up; what is below 5 % of full is passed over."""
     deflection = _deflection(episode, pool)
@@ -33,11 +31,7 @@ def input_reversals(episode: Demonstration, pool: Pool) -> float:
 
 
 @metric(
-    "mode_switches",
-    "mode switches",
-    "",
-    "lower",
-    "how often the mode, or the set of axes that the operator owned, changed",
+    "mode_switches", "", "lower", "how often the mode, or the set of axes that the operator owned, changed"
 )
 def mode_switches(episode: Demonstration, pool: Pool) -> float:
     """Return how often either changed; one of them is enough."""
@@ -47,7 +41,14 @@ def mode_switches(episode: Demonstration, pool: Pool) -> float:
     return float(np.count_nonzero(np.any(changed, axis=0)))
 
 
-@metric("active_axes", "active input axes", "", "lower", "mean number of input axes in use at a time", "pool")
+@metric(
+    "active_axes",
+    "",
+    "lower",
+    "mean number of input axes in use at a time",
+    "pool",
+    title="active input axes",
+)
 def active_axes(episode: Demonstration, pool: Pool) -> float:
     """Return the mean number of axes that are above 5 % of full deflection at a time."""
     return float((np.abs(_deflection(episode, pool)) >= DEAD_BAND).sum(axis=1).mean())

@@ -46,7 +46,8 @@ class Metric:
 
 
 def metric(
-    name: str, title: str, unit: str, good: str, meaning: str, needs: Needs = ""
+    name: str, unit: str, good: str, meaning: str, needs: Needs = "", title: str = ""
 ) -> Callable[[OfEpisode], Metric]:
-    """Return what makes a metric of the function that measures it."""
-    return lambda measure: Metric(name, title, unit, good, meaning, needs, measure)
+    """Return what makes a metric of the function that measures it; its title is its name if not given."""
+    called = title or name.replace("_", " ")
+    return lambda measure: Metric(name, called, unit, good, meaning, needs, measure)

@@ -15,7 +15,9 @@ _LOW, _HIGH = 0.25, 0.75  # of the gripper's range: where it counts as closed an
 _STILL = 1e-9  # a path shorter than this is no path, in the unit of the motion
 
 
-@metric("length", "episode length", "s", "lower", "how long an episode took, which is the operator's time")
+@metric(
+    "length", "s", "lower", "how long an episode took, which is the operator's time", title="episode length"
+)
 def length(episode: Demonstration, pool: Pool) -> float:
     """Return frames over frames a second [s]."""
     return episode.seconds
@@ -23,11 +25,11 @@ def length(episode: Demonstration, pool: Pool) -> float:
 
 @metric(
     "sparc",
-    "smoothness (SPARC)",
     "",
     "higher",
     "spectral arc length of the speed: minimum jerk −1.4, more negative is less smooth",
     "motion",
+    title="smoothness (SPARC)",
 )
 def smoothness(episode: Demonstration, pool: Pool) -> float:
     """Return the measure of `metrics.sparc`."""
@@ -36,11 +38,11 @@ def smoothness(episode: Demonstration, pool: Pool) -> float:
 
 @metric(
     "ldlj",
-    "smoothness (LDLJ)",
     "",
     "higher",
     "log dimensionless jerk of the speed: minimum jerk −5.2; very sensitive to noise",
     "motion",
+    title="smoothness (LDLJ)",
 )
 def jerkiness(episode: Demonstration, pool: Pool) -> float:
     """Return the measure of `metrics.ldlj`."""
@@ -48,12 +50,7 @@ def jerkiness(episode: Demonstration, pool: Pool) -> float:
 
 
 @metric(
-    "path_efficiency",
-    "path efficiency",
-    "",
-    "higher",
-    "straight-line over travelled distance, each phase on its own",
-    "motion",
+    "path_efficiency", "", "higher", "straight-line over travelled distance, each phase on its own", "motion"
 )
 def directness(episode: Demonstration, pool: Pool) -> float:
     """Return the measure of `path_efficiency` of what moves."""
@@ -62,11 +59,11 @@ def directness(episode: Demonstration, pool: Pool) -> float:
 
 @metric(
     "idle_raw",
-    "idle, whole episode",
     "",
     "lower",
     "share of time with hardly any net motion within 0.5 s",
     "position",
+    title="idle, whole episode",
 )
 def idle_raw(episode: Demonstration, pool: Pool) -> float:
     """Return the share of windows that are idle, see `idle_windows`."""
@@ -75,11 +72,11 @@ def idle_raw(episode: Demonstration, pool: Pool) -> float:
 
 @metric(
     "idle_pruned",
-    "idle, before the final hold",
     "",
     "lower",
     "the same up to the last motion",
     "position",
+    title="idle, before the final hold",
 )
 def idle_pruned(episode: Demonstration, pool: Pool) -> float:
     """Return the share without the idle time at the very end.

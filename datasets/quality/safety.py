@@ -20,19 +20,19 @@ def contacts_begun(contacts: ArrayLike) -> float:
     return float(np.maximum(np.diff(np.asarray(contacts, np.float64), prepend=0.0), 0.0).sum())
 
 
-@metric("smallest_distance", "smallest distance", "m", "higher", "smallest signed distance to a collision")
+@metric("smallest_distance", "m", "higher", "smallest signed distance to a collision")
 def smallest_distance(episode: Demonstration, pool: Pool) -> float:
     """Return min_t d(t), signed: negative is penetration [m]."""
     return float(_finite(episode, "distance").min())
 
 
-@metric("contacts", "contacts", "", "lower", "unwanted contacts that began")
+@metric("contacts", "", "lower", "unwanted contacts that began")
 def contacts(episode: Demonstration, pool: Pool) -> float:
     """Return how many there were, see `contacts_begun`."""
     return contacts_begun(episode.numbers("contacts")[:, 0])
 
 
-@metric("impulse", "contact impulse", "N s", "lower", "impulse of all unwanted contacts")
+@metric("impulse", "N s", "lower", "impulse of all unwanted contacts", title="contact impulse")
 def impulse(episode: Demonstration, pool: Pool) -> float:
     """Return Σ_t ∫ ‖F‖ dt [N s]."""
     return float(_finite(episode, "impulse").sum())
@@ -40,24 +40,17 @@ def impulse(episode: Demonstration, pool: Pool) -> float:
 
 @metric(
     "time_within_margin",
-    "time within the margin",
     "s",
     "lower",
     "for how long something was nearer than the margin",
+    title="time within the margin",
 )
 def time_within_margin(episode: Demonstration, pool: Pool) -> float:
     """Return ∫ 1[d(t) < margin] dt [s]."""
     return float(np.count_nonzero(_finite(episode, "distance") < pool.margin)) / episode.fps
 
 
-@metric(
-    "slack_used",
-    "slack used",
-    "unit of the limit",
-    "lower",
-    "how far a soft limit was given up at most",
-    "controller",
-)
+@metric("slack_used", "unit of the limit", "lower", "how far a soft limit was given up at most", "controller")
 def slack_used(episode: Demonstration, pool: Pool) -> float:
     """Return max_t of the largest violation in the plan, in the limit's unit."""
     most = float(_finite(episode, "slack").max())

@@ -17,26 +17,11 @@ from handrail.datasets.quality.metrics import corrections, high_frequency_conten
 from handrail.datasets.quality.pool import Pool
 
 UNKNOWN = "–"
-HEADINGS = (
-    "episode",
-    "task",
-    "mode",
-    "success",
-    "why not",
-    "length [s]",
-    "smallest distance [m]",
-    "smoothness",
-    "contacts begun",
-)
-QUALITY_HEADINGS = (
-    "episode",
-    "mode",
-    "length [s]",
-    "smoothness",
+CHATTERING = (
     "rate of change",
     "high-frequency content",
     "corrections",
-)
+)  # a table of its own
 ASKED, OWNED = "teleop.values", "teleop.mask"
 
 
@@ -73,32 +58,23 @@ class EpisodeSummary:
     high_frequency_content: float | None
     corrections: int | None
 
-    def cells(self) -> tuple[str, ...]:
-        """Return the line as text, one cell for each of `HEADINGS`."""
+    def cells(self) -> dict[str, str]:
+        """Return the line as text, by heading."""
         success = None if self.success is None else ("yes" if self.success else "no")
-        return (
-            str(self.episode),
-            self.task or UNKNOWN,
-            self.mode or UNKNOWN,
-            success or UNKNOWN,
-            self.failure_reason or UNKNOWN,
-            f"{self.length:.1f}",
-            _number(self.smallest_distance, "{:.3f}"),
-            _number(self.smoothness, "{:.2f}"),
-            _number(self.contacts, "{:d}"),
-        )
-
-    def quality_cells(self) -> tuple[str, ...]:
-        """Return the measures of quality as text, one cell for each of `QUALITY_HEADINGS`."""
-        return (
-            str(self.episode),
-            self.mode or UNKNOWN,
-            f"{self.length:.1f}",
-            _number(self.smoothness, "{:.2f}"),
-            _number(self.rate_of_change, "{:.2f}"),
-            _number(self.high_frequency_content, "{:.2f}"),
-            _number(self.corrections, "{:d}"),
-        )
+        return {
+            "episode": str(self.episode),
+            "task": self.task or UNKNOWN,
+            "mode": self.mode or UNKNOWN,
+            "success": success or UNKNOWN,
+            "why not": self.failure_reason or UNKNOWN,
+            "length [s]": f"{self.length:.1f}",
+            "smallest distance [m]": _number(self.smallest_distance, "{:.3f}"),
+            "smoothness": _number(self.smoothness, "{:.2f}"),
+            "contacts begun": _number(self.contacts, "{:d}"),
+            "rate of change": _number(self.rate_of_change, "{:.2f}"),
+            "high-frequency content": _number(self.high_frequency_content, "{:.2f}"),
+            "corrections": _number(self.corrections, "{:d}"),
+        }
 
 
 def summarize(root: str | Path) -> list[EpisodeSummary]:

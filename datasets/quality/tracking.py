@@ -11,7 +11,6 @@ TOLERANCE = 0.005  # of an entry's range: this close to its end is at the end
 
 @metric(
     "tracking_error",
-    "tracking error",
     "unit of the action",
     "lower",
     "distance of the next state from what was commanded",
@@ -28,7 +27,6 @@ def tracking_error(episode: Demonstration, pool: Pool) -> float:
 
 
 @metric(
-    "saturation",
     "saturation",
     "",
     "lower",
@@ -56,11 +54,11 @@ def saturation(episode: Demonstration, pool: Pool) -> float:
 
 @metric(
     "variation_ratio",
-    "action total-variation ratio",
     "",
     "",
     "total variation of the commands over that of the motion; above 1 the robot smoothed them",
     "action",
+    title="action total-variation ratio",
 )
 def variation_ratio(episode: Demonstration, pool: Pool) -> float:
     """Return Σ_t ‖a_{t+1} − a_t‖₁ / Σ_t ‖s_{t+1} − s_t‖₁: 1 is a robot that does it all."""

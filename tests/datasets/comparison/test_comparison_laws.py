@@ -67,8 +67,7 @@ def compared(groups, generator):
 @pytest.fixture
 def quick(monkeypatch):
     """Few resamples: what is tested here does not hang on the third digit of p."""
-    for module in ("statistics.resampling", "comparison.differences"):
-        monkeypatch.setattr(f"handrail.datasets.{module}.RESAMPLES", 400)
+    monkeypatch.setattr("handrail.datasets.statistics.resampling.RESAMPLES", 400)
     assert resampling.RESAMPLES == 400
 
 
