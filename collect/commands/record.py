@@ -31,6 +31,7 @@ from handrail.collect.session.recorded_settings import settings_json
 from handrail.collect.session.recorder import Recorder
 from handrail.collect.session.session import Session
 from handrail.controllers.errors import HandrailError
+from handrail.datasets.format.manifest import Manifest
 from handrail.datasets.recording.writer import EpisodeWriter
 
 INTERRUPTED = 130
@@ -124,16 +125,12 @@ def _session_columns(config: RecordConfig) -> dict[str, str | float]:
 
 def _open_writer(config: RecordConfig, env: HandrailEnv) -> EpisodeWriter:
     dataset = config.dataset
-    arguments = (
-        dataset.folder,
-        dataset.name,
-        dataset.fps,
-        session_features(env),
-        env.model.description.name,
+    manifest = Manifest(
+        dataset.name, dataset.fps, env.model.description.name, session_features(env), software_versions()
     )
     if config.resume:
-        return EpisodeWriter.resume(*arguments, versions=software_versions(), verify=config.verify)
-    return EpisodeWriter.create(*arguments, versions=software_versions(), overwrite=config.overwrite)
+        return EpisodeWriter.resume(dataset.folder, manifest, config.verify)
+    return EpisodeWriter.create(dataset.folder, manifest, config.overwrite)
 
 
 def _record_all(

@@ -3,9 +3,9 @@
 from pathlib import Path
 
 from handrail.datasets.presentation.table import Table
-from handrail.datasets.quality.summary import HEADINGS, QUALITY_HEADINGS, summarize
+from handrail.datasets.quality.summary import CHATTERING, summarize
 
-_TASK = HEADINGS.index("task")
+_QUALITY = ("episode", "mode", "length [s]", "smoothness", *CHATTERING)
 
 
 def summary_table(root: Path) -> Table:
@@ -18,10 +18,11 @@ def summary_table(root: Path) -> Table:
     known = [row.success for row in rows if row.success is not None]
     caption = f"{len(rows)} episodes" + (f", {sum(known)} succeeded" if known else "")
     tasks = {row.task for row in rows}
-    shown = [index for index in range(len(HEADINGS)) if index != _TASK or len(tasks) > 1]
+    left_out = (*CHATTERING, *(("task",) if len(tasks) == 1 else ()))
     title = f"{root}\n{tasks.pop()}" if len(tasks) == 1 else str(root)
-    lines = [[row.cells()[index] for index in shown] for row in rows]
-    return Table([HEADINGS[index] for index in shown], lines, title, caption)
+    lines = [{name: cell for name, cell in row.cells().items() if name not in left_out} for row in rows]
+    headings = list(lines[0]) if lines else ["episode"]
+    return Table(headings, [list(line.values()) for line in lines], title, caption)
 
 
 def quality_table(root: Path) -> Table:
@@ -34,4 +35,5 @@ def quality_table(root: Path) -> Table:
         "rate of change and high-frequency content of the commanded velocities;\n"
         "corrections of joints that were commanded one by one, switched on or off"
     )
-    return Table(QUALITY_HEADINGS, [row.quality_cells() for row in summarize(root)], caption=caption)
+    lines = [[row.cells()[name] for name in _QUALITY] for row in summarize(root)]
+    return Table(_QUALITY, lines, caption=caption)

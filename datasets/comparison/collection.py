@@ -1,13 +1,16 @@
-"""What was collected: how many episodes, in how much of an operator's time, and how many failed."""
+"""What was collected: how many episodes, in how much of an operator's time, and what that time yields."""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
+from handrail.controllers.arrays import FloatArray, IntArray
 from handrail.datasets.comparison.groups import Group
 from handrail.datasets.statistics.paired import wilson
 from handrail.datasets.statistics.proportions import ShareDifference, paired_shares, unpaired_shares
-from handrail.datasets.statistics.resampling import Interval
+from handrail.datasets.statistics.resampling import FEWEST, Interval, bootstrap, permutation_p
 
 
 @dataclass(frozen=True)
@@ -37,11 +40,6 @@ class Collected:
     def success(self) -> float | None:
         """Share of the episodes that succeeded."""
         return None if self.successes is None else self.successes / self.episodes
-
-    @property
-    def failure_share(self) -> float | None:
-        """Share of the episodes that failed."""
-        return None if self.success is None else 1.0 - self.success
 
     @property
     def successes_an_hour(self) -> float | None:
@@ -112,3 +110,82 @@ def matched_time(groups: Sequence[Group]) -> list[Group]:
     """Return the first episodes of each group that fit into the shortest group's operator time."""
     seconds = min(sum(episode.seconds for episode in group.episodes) for group in groups)
     return [group.within(seconds) for group in groups]
+
+
+@dataclass(frozen=True)
+class RateRatio:
+    """Successes an hour of a group over those of the baseline.
+
+    Attributes:
+        estimate: The ratio.
+        interval: 95 %, bootstrap over episodes.
+        p: Permutation test, two-sided.
+    """
+
+    estimate: float
+    interval: Interval
+    p: float
+
+    @property
+    def inverse(self) -> "RateRatio":
+        """Those of the baseline over those of the group."""
+        low, high = self.interval
+        return RateRatio(_over(self.estimate), (_over(high), _over(low)), self.p)
+
+
+def rate_interval(group: Group, rng: np.random.Generator) -> Interval | None:
+    """Return the 95 % bootstrap interval of successes an hour; None where it cannot be told."""
+    successes, seconds = _numbers(group)
+    if len(successes) < FEWEST or not np.isfinite(successes).all():
+        return None
+    return bootstrap((successes, seconds), _rate, True, rng)
+
+
+def rate_ratio(group: Group, baseline: Group, rng: np.random.Generator) -> RateRatio | None:
+    """Return how many times as many successes an hour there are; None where it cannot be told.
+
+    Σ success / Σ time of one over that of the other, episodes resampled, as pairs where all began alike.
+
+    Args:
+        group: One group.
+        baseline: The other.
+        rng: Of the resampling.
+    """
+    pairs, counts = shared_seeds(group, baseline), (len(group.episodes), len(baseline.episodes))
+    numbers = [_numbers(group), _numbers(baseline)]
+    if min(counts) < FEWEST or not all(np.isfinite(s).all() and s.any() for s, _ in numbers):
+        return None
+    successes, seconds = (np.concatenate(each) for each in zip(*numbers, strict=True))
+    places = np.arange(counts[0]), counts[0] + np.arange(counts[1])
+    if pairs:
+        places = np.array([i for i, _ in pairs]), counts[0] + np.array([j for _, j in pairs])
+
+    def rates(chosen: Sequence[IntArray], axis: int) -> list[FloatArray]:
+        return [_rate(successes[each], seconds[each], axis) for each in chosen]
+
+    def share(*chosen: IntArray, axis: int = -1) -> FloatArray:
+        one, other = rates(chosen, axis)
+        return np.divide(one, one + other, out=np.full_like(one, 0.5), where=one + other > 0)
+
+    def difference(*chosen: IntArray, axis: int = -1) -> FloatArray:
+        one, other = rates(chosen, axis)
+        return one - other
+
+    low, high = bootstrap(places, share, bool(pairs), rng)  # of both, which is finite even without successes
+    one, other = rates(places, -1)
+    interval = low * _over(1.0 - low), high * _over(1.0 - high)
+    return RateRatio(float(one / other), interval, permutation_p(places, difference, bool(pairs), rng))
+
+
+def _numbers(group: Group) -> tuple[FloatArray, FloatArray]:
+    """Return success, NaN where unknown, and duration [s] of every episode."""
+    successes = [np.nan if e.success is None else float(e.success) for e in group.episodes]
+    return np.array(successes), np.array([e.seconds for e in group.episodes])
+
+
+def _over(ratio: float) -> float:
+    return 1.0 / ratio if ratio else float("inf")
+
+
+def _rate(successes: FloatArray, seconds: FloatArray, axis: int = -1) -> FloatArray:
+    return 3600.0 * successes.sum(axis=axis) / seconds.sum(axis=axis)

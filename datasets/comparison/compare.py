@@ -8,19 +8,19 @@ import numpy as np
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.comparison.collection import (
     Collected,
+    RateRatio,
     collected,
     matched_number,
     matched_time,
+    rate_interval,
+    rate_ratio,
     success_difference,
 )
 from handrail.datasets.comparison.config import CompareConfig
 from handrail.datasets.comparison.differences import Difference, differences
 from handrail.datasets.comparison.evaluations import Condition, read_evaluations
-from handrail.datasets.comparison.groups import Group, baseline_of, group_of, load_groups
-from handrail.datasets.comparison.likeness import unlike
-from handrail.datasets.comparison.means import Means, means
+from handrail.datasets.comparison.groups import Group, baseline_of, group_of, load_groups, unlike
 from handrail.datasets.comparison.outcomes import LIKE_FOR_LIKE, Outcomes, Pair, judge_pairs
-from handrail.datasets.comparison.productivity import RateRatio, rate_interval, rate_ratio
 from handrail.datasets.quality.measure import Measurements, measure
 from handrail.datasets.reading.check import check_whole
 from handrail.datasets.statistics.proportions import ShareDifference
@@ -39,7 +39,6 @@ class View:
         groups: The episodes chosen.
         collected: What they consist of; failures are counted even where quality is measured without.
         measurements: Of their quality.
-        means: Of these.
         differences: Of every metric, each group against the baseline.
     """
 
@@ -47,7 +46,6 @@ class View:
     groups: Sequence[Group]
     collected: Sequence[Collected]
     measurements: Measurements
-    means: Means
     differences: Sequence[Difference]
 
 
@@ -135,7 +133,7 @@ def _view(
     measurements = measure({group.label: group.episodes for group in measured}, rng, config.margin)
     found = differences(measured, measurements, baseline, rng)
     counted = [collected(group) for group in groups]
-    return View(title, measured, counted, measurements, means(measurements, rng), found)
+    return View(title, measured, counted, measurements, found)
 
 
 def _conditions(config: CompareConfig, groups: Sequence[Group]) -> dict[str, Condition]:

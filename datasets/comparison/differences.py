@@ -6,18 +6,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import stats
 
-from handrail.controllers.arrays import FloatArray
+from handrail.controllers.arrays import FloatArray, IntArray
 from handrail.datasets.comparison.collection import shared_seeds
 from handrail.datasets.comparison.groups import Group
-from handrail.datasets.quality.catalogue import METRICS, Metric
+from handrail.datasets.quality.catalogue import METRICS
 from handrail.datasets.quality.measure import Measured, Measurements
+from handrail.datasets.quality.metric import Metric
 from handrail.datasets.statistics.proportions import LEVEL, holm
 from handrail.datasets.statistics.resampling import (
     FEWEST,
-    RESAMPLES,
     Interval,
-    p_of_difference,
-    percentiles,
+    bootstrap,
+    difference_of_means,
+    permutation_p,
 )
 
 FOLLOWS = 0.5  # |Spearman's ρ| with length from which a metric counts as following it
@@ -77,12 +78,8 @@ class Difference:
     @property
     def effect(self) -> tuple[float, float, float]:
         """Estimate and interval in standard deviations; infinite for a difference where nothing varies."""
-        low, high = self.interval
-        return (
-            _in_spreads(self.estimate, self.spread),
-            _in_spreads(low, self.spread),
-            _in_spreads(high, self.spread),
-        )
+        low, high = (_in_spreads(end, self.spread) for end in self.interval)
+        return _in_spreads(self.estimate, self.spread), low, high
 
     @property
     def at_equal_length(self) -> bool:
@@ -128,8 +125,9 @@ def _difference(
         return Difference(**names, reason=f"not comparable: {apart}", incomparable=apart)
     if metric.of_group:
         return _described(Difference(**names, tested=False), measured[0], measured[1])
-    pairs = _finite_pairs(shared_seeds(group, base), measured[0].values, measured[1].values)
-    chosen = _chosen(pairs, measured[0].values, measured[1].values)
+    one, other = (np.isfinite(each.values) for each in measured)
+    pairs = [(i, j) for i, j in shared_seeds(group, base) if one[i] and other[j]]
+    chosen = np.array(pairs).T if pairs else (np.flatnonzero(one), np.flatnonzero(other))
     if min(map(len, chosen)) < FEWEST:
         return Difference(**names, reason=_TOO_FEW)
     values = [each.values[places] for each, places in zip(measured, chosen, strict=True)]
@@ -151,39 +149,27 @@ def _described(difference: Difference, one: Measured, other: Measured) -> Differ
     return replace(difference, counts=counts, estimate=estimate)
 
 
-def _finite_pairs(
-    pairs: Sequence[tuple[int, int]], one: FloatArray, other: FloatArray
-) -> list[tuple[int, int]]:
-    return [(i, j) for i, j in pairs if np.isfinite(one[i]) and np.isfinite(other[j])]
-
-
-def _chosen(pairs: Sequence[tuple[int, int]], one: FloatArray, other: FloatArray) -> list[np.ndarray]:
-    if pairs:
-        return [np.array([pair[side] for pair in pairs]) for side in (0, 1)]
-    return [np.flatnonzero(np.isfinite(values)) for values in (one, other)]
-
-
 def _compared(
     values: Sequence[FloatArray], lengths: Sequence[FloatArray], paired: bool, rng: np.random.Generator
 ) -> dict[str, object]:
-    draws = [rng.integers(len(each), size=(RESAMPLES, len(each))) for each in values]
-    if paired:
-        draws[1] = draws[0]
-    resampled = [each[draw] for each, draw in zip(values, draws, strict=True)]
-    durations = [each[draw] for each, draw in zip(lengths, draws, strict=True)]
-    estimate = float(values[0].mean() - values[1].mean())
-    low, high = percentiles(resampled[0].mean(axis=1) - resampled[1].mean(axis=1))
-    spread = float(np.sqrt(np.mean([each.var(ddof=1) for each in values])))
-    whole = [each[None] for each in values], [each[None] for each in lengths]
+    def at_length(first: IntArray, second: IntArray, axis: int = -1) -> FloatArray:
+        chosen = (first, second)
+        return at_equal_length(
+            [each[places] for each, places in zip(values, chosen, strict=True)],
+            [each[places] for each, places in zip(lengths, chosen, strict=True)],
+        )
+
+    one, other = values
+    places = np.arange(len(one)), np.arange(len(other))
     return {
         "paired": paired,
-        "counts": (len(values[0]), len(values[1])),
-        "estimate": estimate,
-        "interval": (low, high),
-        "spread": spread,
-        "p": p_of_difference(values[0], values[1], paired, rng),
-        "at_length": float(at_equal_length(*whole)[0]),
-        "at_length_interval": percentiles(at_equal_length(resampled, durations)),
+        "counts": (len(one), len(other)),
+        "estimate": float(one.mean() - other.mean()),
+        "interval": bootstrap((one, other), difference_of_means, paired, rng),
+        "spread": float(np.sqrt(np.mean([each.var(ddof=1) for each in values]))),
+        "p": permutation_p((one, other), difference_of_means, paired, rng),
+        "at_length": float(at_length(*places)),
+        "at_length_interval": bootstrap(places, at_length, paired, rng),
         "follows_length": _follows(values, lengths),
     }
 
@@ -194,21 +180,21 @@ def at_equal_length(values: Sequence[FloatArray], lengths: Sequence[FloatArray])
     β = Σ_g Σ (L − L̄_g)(y − ȳ_g) / Σ_g Σ (L − L̄_g)²: the analysis of covariance.
 
     Args:
-        values: Of two groups, `(B, N)` and `(B, M)`.
+        values: Of two groups, `(…, N)` and `(…, M)`.
         lengths: Of the same episodes.
 
     Returns:
-        `(B,)`.
+        `(…)`.
     """
-    means = [(y.mean(axis=1), length.mean(axis=1)) for y, length in zip(values, lengths, strict=True)]
-    product = np.zeros(len(values[0]))
-    square = np.zeros(len(values[0]))
-    for y, length, (mean, middle) in zip(values, lengths, means, strict=True):
-        away = length - middle[:, None]
-        product += (away * (y - mean[:, None])).sum(axis=1)
-        square += (away**2).sum(axis=1)
+    (one, one_length), (other, other_length) = [
+        (y.mean(axis=-1), length.mean(axis=-1)) for y, length in zip(values, lengths, strict=True)
+    ]
+    product, square = np.zeros_like(one), np.zeros_like(one)
+    for y, length in zip(values, lengths, strict=True):
+        away = length - length.mean(axis=-1, keepdims=True)
+        product += (away * (y - y.mean(axis=-1, keepdims=True))).sum(axis=-1)
+        square += (away**2).sum(axis=-1)
     slope = np.divide(product, square, out=np.zeros_like(product), where=square > 1e-12)
-    (one, one_length), (other, other_length) = means
     return one - other - slope * (one_length - other_length)
 
 

@@ -55,12 +55,6 @@ class Policy:
         """Draw of the dataset and training seed."""
         return self.draw, self.training_seed
 
-    def run(self, outcome: str) -> Run:
-        """Return one outcome of all rollouts."""
-        seeds = tuple(sorted(self.rollouts))
-        values = np.array([self.rollouts[seed][outcome] for seed in seeds], float)
-        return Run(self.draw, self.training_seed, seeds, values)
-
 
 @dataclass(frozen=True)
 class Condition:
@@ -101,7 +95,12 @@ class Condition:
 
     def runs(self, outcome: str = SUCCESS) -> list[Run]:
         """Return one outcome of all policies."""
-        return [policy.run(outcome) for policy in self.policies]
+        found = []
+        for policy in self.policies:
+            seeds = tuple(sorted(policy.rollouts))
+            values = np.array([policy.rollouts[seed][outcome] for seed in seeds], float)
+            found.append(Run(*policy.key, seeds, values))
+        return found
 
 
 def read_evaluations(paths: Iterable[str | Path]) -> dict[str, Condition]:
@@ -113,24 +112,45 @@ def read_evaluations(paths: Iterable[str | Path]) -> dict[str, Condition]:
     policies: dict[str, dict[tuple[int, int], Policy]] = {}
     for path in map(Path, paths):
         for label, entries in _content(path)["arms"].items():
-            known = policies.setdefault(label, {})
-            for policy in _policies(path, label, entries):
-                _add(known, policy, f"{str(path)!r}: condition {label!r}")
+            where = f"evaluations {str(path)!r}: condition {label!r}"
+            _add_all(policies.setdefault(label, {}), entries, where)
     return {label: Condition(label, tuple(known.values())) for label, known in policies.items()}
 
 
-def _add(known: dict[tuple[int, int], Policy], policy: Policy, where: str) -> None:
-    key = policy.key
-    before = known.get(key)
-    if before is None:
-        known[key] = policy
-        return
-    twice = set(before.rollouts) & set(policy.rollouts)
-    if twice:
+def _add_all(known: dict[tuple[int, int], Policy], entries: Any, where: str) -> None:
+    if not isinstance(entries, list) or not entries:
+        raise HandrailError(f"{where}: expected a list of trained policies, got {type(entries).__name__}")
+    try:
+        for entry in entries:
+            _add(known, entry, where)
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise HandrailError(
-            f"{where}, training seed {key[1]}: the rollout with seed {min(twice)} comes twice"
-        )
-    known[key] = Policy(*key, before.trained_on, {**before.rollouts, **policy.rollouts})
+            f"{where}: expected 'training_seed' and 'rollouts' with 'seed' and 'success', got {error!r}"
+        ) from error
+
+
+def _add(known: dict[tuple[int, int], Policy], entry: dict[str, Any], where: str) -> None:
+    """Add a policy's rollouts to those known of it."""
+    trained_on = {name: float(value) for name, value in (entry.get("trained_on") or {}).items()}
+    policy = Policy(int(entry.get("dataset_draw", 0)), int(entry["training_seed"]), trained_on, {})
+    rollouts = dict(known.get(policy.key, policy).rollouts)
+    for rollout in entry["rollouts"]:
+        seed = int(rollout["seed"])
+        if seed in rollouts:
+            raise HandrailError(
+                f"{where}, training seed {policy.training_seed}: the rollout with seed {seed} comes twice"
+            )
+        rollouts[seed] = _outcomes(rollout, where)
+    if not entry["rollouts"]:
+        raise HandrailError(f"{where}: expected one rollout or more, got none")
+    known[policy.key] = replace(known.get(policy.key, policy), rollouts=rollouts)
+
+
+def _outcomes(rollout: Mapping[str, Any], where: str) -> dict[str, float]:
+    if not isinstance(rollout[SUCCESS], bool):
+        raise HandrailError(f"{where}: expected 'success' true or false, got {rollout[SUCCESS]!r}")
+    numbers = {name: value for name, value in rollout.items() if isinstance(value, bool | int | float)}
+    return {name: float(value) for name, value in numbers.items() if name != "seed"}
 
 
 def _content(path: Path) -> dict[str, Any]:
@@ -146,34 +166,3 @@ def _content(path: Path) -> dict[str, Any]:
     if not isinstance(content.get("arms"), dict) or not content["arms"]:
         raise HandrailError(f"evaluations {str(path)!r}: expected 'arms' with one label or more")
     return content
-
-
-def _policies(path: Path, label: str, entries: Any) -> list[Policy]:
-    where = f"evaluations {str(path)!r}: condition {label!r}"
-    if not isinstance(entries, list) or not entries:
-        raise HandrailError(f"{where}: expected a list of trained policies, got {type(entries).__name__}")
-    try:
-        return [_policy(entry, where) for entry in entries]
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise HandrailError(
-            f"{where}: expected 'training_seed' and 'rollouts' with 'seed' and 'success', got {error!r}"
-        ) from error
-
-
-def _policy(entry: dict[str, Any], where: str) -> Policy:
-    rollouts: dict[int, dict[str, float]] = {}
-    for rollout in entry["rollouts"]:
-        seed = int(rollout["seed"])
-        if seed in rollouts:
-            raise HandrailError(f"{where}: the rollout with seed {seed} comes twice")
-        if not isinstance(rollout[SUCCESS], bool):
-            raise HandrailError(f"{where}: expected 'success' true or false, got {rollout[SUCCESS]!r}")
-        rollouts[seed] = {
-            name: float(value)
-            for name, value in rollout.items()
-            if name != "seed" and isinstance(value, bool | int | float)
-        }
-    if not rollouts:
-        raise HandrailError(f"{where}: expected one rollout or more, got none")
-    trained_on = {name: float(value) for name, value in (entry.get("trained_on") or {}).items()}
-    return Policy(int(entry.get("dataset_draw", 0)), int(entry["training_seed"]), trained_on, rollouts)

@@ -11,7 +11,7 @@ class Finding:
         kind: `outcome`, `collection`, `quality` or `caution`.
         text: What to read.
         detected: Whether it is a difference that was detected.
-        short: The same in fewer words, for a headline.
+        short: The beginning of the text, for a headline.
     """
 
     kind: str

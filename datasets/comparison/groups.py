@@ -1,7 +1,7 @@
 """What is compared: whole datasets, or the episodes of datasets by a column of their metadata."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,6 +13,7 @@ from handrail.datasets.quality.load import read_demonstrations
 from handrail.datasets.reading.reader import DatasetInfo, read_info
 
 FEWEST, MOST = 2, 8
+_SHOWN = 2  # task sentences of a group
 
 
 @dataclass(frozen=True)
@@ -67,12 +68,16 @@ def load_groups(
     groups: list[Group] = []
     for root, name in zip(roots, names, strict=True):
         info, episodes = read_info(root), read_demonstrations(root, columns)
+        if not episodes:
+            raise HandrailError(f"dataset {str(info.root)!r}: expected one episode or more, got none")
         if not by:
             groups.append(Group(name, info, tuple(episodes)))
             continue
         prefix = f"{name} · " if len(roots) > 1 else ""
-        for value, members in _split(episodes, by, str(root)).items():
-            groups.append(Group(prefix + value, info, tuple(members)))
+        values = [_value(episode, by, str(root)) for episode in episodes]
+        for each in dict.fromkeys(values):
+            members = (episode for episode, value in zip(episodes, values, strict=True) if value == each)
+            groups.append(Group(prefix + each, info, tuple(members)))
     if not FEWEST <= len(groups) <= MOST:
         found = ", ".join(group.label for group in groups) or "none"
         advice = "" if by else "; name another dataset, or say --by mode"
@@ -111,21 +116,40 @@ def _names(roots: Sequence[str | Path], labels: Sequence[str]) -> list[str]:
     return names
 
 
-def _split(episodes: Sequence[Demonstration], by: str, root: str) -> dict[str, list[Demonstration]]:
-    groups: dict[str, list[Demonstration]] = {}
-    for episode in episodes:
-        groups.setdefault(_value(episode, by, root), []).append(episode)
-    return groups
-
-
 def _value(episode: Demonstration, by: str, root: str) -> str:
     """Return the value of a metadata column; a mode that the metadata lacks is read from the frames."""
     meta: dict[str, Any] = {key: value for key, value in episode.meta.items() if "/" not in key}
     if by not in meta and by == "mode" and episode.has("mode"):
-        return " → ".join(dict.fromkeys(str(mode) for mode in episode.column("mode") if mode)) or "none"
+        return episode.modes or "none"
     if by not in meta:
         raise HandrailError(
             f"dataset {root!r}: unknown column {by!r} of episodes, expected one of {', '.join(meta)}"
         )
     value = meta[by]
     return "; ".join(map(str, value)) if isinstance(value, list) else str(value)
+
+
+def unlike(groups: Sequence[Group]) -> tuple[str, ...]:
+    """Return what differs between groups so that no difference can be laid to how they were recorded."""
+    return tuple(filter(None, (_differs("tasks", _tasks, groups), _differs("robots", _robot, groups))))
+
+
+def _differs(what: str, read: Callable[[Group], tuple[str, ...]], groups: Sequence[Group]) -> str:
+    found = {group.label: read(group) for group in groups}
+    if len(set(found.values())) == 1:
+        return ""
+    told = "; ".join(f"{label}: {_told(names)}" for label, names in found.items())
+    return f"The {what} differ ({told})"
+
+
+def _told(names: Sequence[str]) -> str:
+    more = f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else ""
+    return ", ".join(f"“{name}”" for name in names[:_SHOWN]) + more or "not recorded"
+
+
+def _tasks(group: Group) -> tuple[str, ...]:
+    return tuple(sorted({task for episode in group.episodes for task in episode.meta["tasks"]}))
+
+
+def _robot(group: Group) -> tuple[str, ...]:
+    return (group.info.robot_type,) if group.info.robot_type else ()

@@ -5,7 +5,6 @@ from collections.abc import Iterator
 from handrail.datasets.comparison.finding import Finding
 from handrail.datasets.comparison.outcomes import ConditionOutcome, OutcomeDifference, Outcomes
 from handrail.datasets.presentation.wording import counted, p_value, percent, percent_span, points_span
-from handrail.datasets.statistics.resampling import Interval
 
 
 def outcome_findings(outcomes: Outcomes) -> Iterator[Finding]:
@@ -14,17 +13,10 @@ def outcome_findings(outcomes: Outcomes) -> Iterator[Finding]:
     for difference in outcomes.differences:
         one, other = conditions[difference.label], conditions[difference.baseline]
         more, less = (one, other) if one.share >= other.share else (other, one)
-        interval = _toward(more, difference)
-        text, short = _text(difference, more, less, interval), _short(difference, more, less, interval)
-        yield Finding("outcome", text, difference.detected, short)
+        short = _short(difference, more, less)
+        yield Finding("outcome", f"{short}; {_rest(difference)}", difference.detected, short)
     compared = {label for each in outcomes.differences for label in (each.label, each.baseline)}
     yield from (_alone(condition) for condition in outcomes.conditions if condition.label not in compared)
-
-
-def _toward(more: ConditionOutcome, difference: OutcomeDifference) -> Interval:
-    """Return the interval of the larger share minus the smaller."""
-    low, high = difference.nested or difference.rollouts.interval
-    return (low, high) if difference.label == more.label else (-high, -low)
 
 
 def _alone(condition: ConditionOutcome) -> Finding:
@@ -36,9 +28,9 @@ def _alone(condition: ConditionOutcome) -> Finding:
     return Finding("outcome", f"{short}; compared with no other.", short=short)
 
 
-def _short(
-    difference: OutcomeDifference, more: ConditionOutcome, less: ConditionOutcome, interval: Interval
-) -> str:
+def _short(difference: OutcomeDifference, more: ConditionOutcome, less: ConditionOutcome) -> str:
+    low, high = difference.nested or difference.rollouts.interval
+    interval = (low, high) if difference.label == more.label else (-high, -low)
     shares = f"{more.label} {percent(more.share)}, {less.label} {percent(less.share)}"
     shares += f", difference {points_span(interval)} points"
     if not difference.detected:
@@ -48,28 +40,13 @@ def _short(
     return f"{whose} {more.label} succeeded {word} ({shares})"
 
 
-def _text(
-    difference: OutcomeDifference, more: ConditionOutcome, less: ConditionOutcome, interval: Interval
-) -> str:
-    shares = f"{percent(more.share)} against {percent(less.share)}"
-    told = f"difference {points_span(interval)} points (95 %; {_chance(difference)})"
-    if not difference.detected:
-        return (
-            f"No difference in policy success was detected between {more.label} and {less.label}: {shares},"
-            f" {told}. This does not show that they are equal: a difference below about"
-            f" {100 * difference.detectable:.0f} points would often go unseen here."
-        )
-    if difference.nested:
-        return (
-            f"Policies trained on {more.label} succeeded more often than those trained on {less.label}:"
-            f" {shares}, {told}."
-        )
-    return (
-        f"The policy trained on {more.label} succeeded more often in one training run than that trained on"
-        f" {less.label}: {shares}, {told}."
-    )
-
-
-def _chance(difference: OutcomeDifference) -> str:
+def _rest(difference: OutcomeDifference) -> str:
     """Say how probable such a difference is by chance; an interval alone knows nothing of the others."""
-    return f"{p_value(difference.p_adjusted)} after Holm over {counted(difference.tests, difference.family)}"
+    tests = counted(difference.tests, difference.family)
+    chance = f"95 %, {p_value(difference.p_adjusted)} after Holm over {tests}"
+    if difference.detected:
+        return f"{chance}."
+    return (
+        f"{chance}. This does not show that they are equal: a difference below about"
+        f" {100 * difference.detectable:.0f} points would often go unseen here."
+    )

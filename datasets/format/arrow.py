@@ -18,8 +18,7 @@ def numbers(values: np.ndarray, kind: pa.DataType) -> pa.Array:
         kind: A number type or bool.
     """
     if kind == pa.bool_():
-        packed = np.packbits(np.asarray(values, bool), bitorder="little")
-        return pa.Array.from_buffers(kind, len(values), [None, pa.py_buffer(packed)])
+        return numbers(values, pa.uint8()).cast(kind)
     plain = np.ascontiguousarray(values, dtype=kind.to_pandas_dtype())
     return pa.Array.from_buffers(kind, len(plain), [None, pa.py_buffer(plain)])
 
@@ -62,12 +61,9 @@ def to_numpy(values: pa.Array) -> np.ndarray:
     """Return an Arrow array of numbers or truth values as a numpy array, `(N,)`; nulls become NaN."""
     if values.null_count:
         return values.to_numpy(zero_copy_only=False)
-    if values.type == pa.bool_():
-        packed = np.frombuffer(values.buffers()[1], np.uint8)
-        return (
-            np.unpackbits(packed, count=values.offset + len(values), bitorder="little")[values.offset :] != 0
-        )
-    return np.from_dlpack(values)  # type: ignore[arg-type]
+    truth = values.type == pa.bool_()
+    found = np.from_dlpack(values.cast(pa.uint8()) if truth else values)  # type: ignore[arg-type]
+    return found != 0 if truth else found
 
 
 def flat_numbers(column: pa.ChunkedArray) -> np.ndarray:

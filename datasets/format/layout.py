@@ -13,10 +13,6 @@ FILES_IN_A_CHUNK = 1000
 DATA_PATH = "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
 VIDEO_PATH = "videos/{video_key}/chunk-{chunk_index:03d}/file-{file_index:03d}.mp4"
 EPISODES_PATH = "meta/episodes/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
-INFO_PATH = "meta/info.json"
-STATS_PATH = "meta/stats.json"
-TASKS_PATH = "meta/tasks.parquet"
-MANIFEST_PATH = "meta/handrail.json"
 STAGING = ".handrail"
 DAMAGED = ".damaged"
 
@@ -61,22 +57,22 @@ class Layout:
     @property
     def info(self) -> Path:
         """The file that LeRobot opens first."""
-        return self.root / INFO_PATH
+        return self.root / "meta" / "info.json"
 
     @property
     def stats(self) -> Path:
         """The statistics over all episodes."""
-        return self.root / STATS_PATH
+        return self.root / "meta" / "stats.json"
 
     @property
     def tasks(self) -> Path:
         """The task sentences."""
-        return self.root / TASKS_PATH
+        return self.root / "meta" / "tasks.parquet"
 
     @property
     def manifest(self) -> Path:
         """What Handrail keeps of the schema: written once, first of all."""
-        return self.root / MANIFEST_PATH
+        return self.root / "meta" / "handrail.json"
 
     @property
     def staging(self) -> Path:

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from handrail.controllers.errors import HandrailError
+from handrail.datasets.format.info_fields import features
 from handrail.datasets.format.layout import Layout
 from handrail.datasets.format.schema import OUTCOME_PREFIX, Feature, check_features
 from handrail.datasets.storage.strict_json import read_json
@@ -71,7 +72,7 @@ class Manifest:
 
     def to_bytes(self) -> bytes:
         """Return the manifest as JSON."""
-        features = {key: _feature_to_json(feature) for key, feature in self.features.items()}
+        features = {key: feature.described for key, feature in self.features.items()}
         content = {"format": FORMAT, "repo_id": self.repo_id, "fps": self.fps, "robot_type": self.robot_type}
         return json_bytes(content | {"versions": dict(self.versions), "features": features})
 
@@ -84,9 +85,8 @@ def read_manifest(layout: Layout) -> Manifest:
     """
     try:
         content = _content(layout)
-        features = {key: _feature_from_json(value) for key, value in content["features"].items()}
         fixed = {name: content[name] for name in ("repo_id", "fps", "robot_type")}
-        manifest = Manifest(features=features, versions=dict(content["versions"]), **fixed)
+        manifest = Manifest(features=features(content), versions=dict(content["versions"]), **fixed)
     except (FileNotFoundError, NotADirectoryError) as error:
         raise HandrailError(_why_no_manifest(layout)) from error
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
@@ -98,16 +98,6 @@ def read_manifest(layout: Layout) -> Manifest:
     except HandrailError as error:
         raise HandrailError(f"{str(layout.manifest)!r}: {error}") from error
     return manifest
-
-
-def check_format(layout: Layout) -> None:
-    """Check that a dataset, if Handrail wrote it, is of a format that this version understands.
-
-    Raises:
-        HandrailError: A newer Handrail wrote it, or its manifest cannot be read.
-    """
-    if layout.manifest.exists():
-        read_manifest(layout)
 
 
 def json_bytes(content: Any) -> bytes:
@@ -133,16 +123,6 @@ def _why_no_manifest(layout: Layout) -> str:
     if layout.info.exists():
         return f"dataset {root!r} was not written by Handrail (no meta/handrail.json): choose another folder"
     return f"{root!r} is not a LeRobot dataset (no meta/info.json): choose another folder"
-
-
-def _feature_to_json(feature: Feature) -> dict[str, Any]:
-    names = None if feature.names is None else list(feature.names)
-    return {"dtype": feature.dtype, "shape": list(feature.shape), "names": names}
-
-
-def _feature_from_json(value: Mapping[str, Any]) -> Feature:
-    names = value["names"]
-    return Feature(value["dtype"], tuple(value["shape"]), None if names is None else tuple(names))
 
 
 def _describe(feature: Feature | None) -> str:

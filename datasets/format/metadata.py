@@ -268,6 +268,4 @@ def _stats_of(row: Mapping[str, Any]) -> Stats:
 
 
 def _info_feature(feature: Feature, fps: int) -> dict[str, Any]:
-    names = None if feature.names is None else list(feature.names)
-    content: dict[str, Any] = {"dtype": feature.dtype, "shape": list(feature.shape), "names": names}
-    return content | {"info": video_info(feature, fps)} if feature.is_video else content
+    return feature.described | ({"info": video_info(feature, fps)} if feature.is_video else {})

@@ -42,6 +42,12 @@ class Feature:
             object.__setattr__(self, "names", ("height", "width", "channels"))
 
     @property
+    def described(self) -> dict[str, Any]:
+        """The feature as LeRobot writes it into JSON."""
+        names = None if self.names is None else list(self.names)
+        return {"dtype": self.dtype, "shape": list(self.shape), "names": names}
+
+    @property
     def is_video(self) -> bool:
         """Whether the feature is a camera."""
         return self.dtype == "video"
@@ -139,7 +145,9 @@ def _check_camera(key: str, feature: Feature) -> None:
 
 def _check_value(key: str, feature: Feature, value: Any) -> Any:
     if feature.dtype == "string":
-        return _check_string(key, value)
+        if not isinstance(value, str):
+            raise HandrailError(f"frame: {key!r} expected a str, got {type(value).__name__}")
+        return str(value)
     array = np.asarray(value)
     expected = np.dtype("uint8" if feature.is_video else feature.dtype)
     shape = (1,) if array.shape == () and feature.is_scalar else array.shape
@@ -151,12 +159,6 @@ def _check_value(key: str, feature: Feature, value: Any) -> Any:
     if feature.is_video:
         return array
     return _check_finite(key, feature, array.reshape(shape), expected)
-
-
-def _check_string(key: str, value: Any) -> str:
-    if not isinstance(value, str):
-        raise HandrailError(f"frame: {key!r} expected a str, got {type(value).__name__}")
-    return str(value)
 
 
 def _check_finite(key: str, feature: Feature, array: np.ndarray, dtype: np.dtype) -> np.ndarray:

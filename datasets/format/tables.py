@@ -40,20 +40,6 @@ def stored_features(features: Mapping[str, Feature]) -> dict[str, Feature]:
     return {key: feature for key, feature in features.items() if not feature.is_video} | AUTOMATIC
 
 
-def arrow_type(feature: Feature) -> pa.DataType:
-    """Return the Arrow type of a feature's column."""
-    value_type = pa.string() if feature.dtype == "string" else pa.from_numpy_dtype(np.dtype(feature.dtype))
-    return value_type if feature.is_scalar else pa.list_(value_type, feature.shape[0])
-
-
-def data_schema(features: Mapping[str, Feature]) -> pa.Schema:
-    """Return the Arrow schema of the data files, with the description that Hugging Face reads."""
-    stored = stored_features(features)
-    description = {"info": {"features": {key: _hf_feature(feature) for key, feature in stored.items()}}}
-    fields = [pa.field(key, arrow_type(feature)) for key, feature in stored.items()]
-    return pa.schema(fields, metadata={"huggingface": json.dumps(description)})
-
-
 def data_bytes(features: Mapping[str, Feature], columns: Mapping[str, Any]) -> bytes:
     """Return the data file of one episode.
 
@@ -61,7 +47,10 @@ def data_bytes(features: Mapping[str, Feature], columns: Mapping[str, Any]) -> b
         features: The schema.
         columns: For each stored feature `(N,)` or `(N, d)` values, or a list of N strings.
     """
-    schema = data_schema(features)
+    stored = stored_features(features)
+    description = {"info": {"features": {key: _hf_feature(feature) for key, feature in stored.items()}}}
+    fields = [pa.field(key, _arrow_type(feature)) for key, feature in stored.items()]
+    schema = pa.schema(fields, metadata={"huggingface": json.dumps(description)})  # what Hugging Face reads
     arrays = [_arrow_array(columns[field.name], field.type) for field in schema]
     return parquet_bytes(pa.Table.from_arrays(arrays, schema=schema))
 
@@ -78,6 +67,11 @@ def parquet_bytes(table: pa.Table, statistics: bool = True) -> bytes:
     sink = pa.BufferOutputStream()
     pq.write_table(table, sink, compression="snappy", use_dictionary=statistics, write_statistics=statistics)
     return sink.getvalue().to_pybytes()
+
+
+def _arrow_type(feature: Feature) -> pa.DataType:
+    value_type = pa.string() if feature.dtype == "string" else pa.from_numpy_dtype(np.dtype(feature.dtype))
+    return value_type if feature.is_scalar else pa.list_(value_type, feature.shape[0])
 
 
 def _hf_feature(feature: Feature) -> dict[str, Any]:

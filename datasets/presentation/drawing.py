@@ -2,6 +2,7 @@
 
 import base64
 import io
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -76,6 +77,13 @@ def png(figure: Any) -> bytes:
 def address(data: bytes, kind: str) -> str:
     """Return an address that holds all of a file, whose MIME type is `kind`."""
     return f"data:{kind};base64,{base64.b64encode(data).decode()}"
+
+
+def rows(axes: Any, labels: Sequence[str], most: int = 60) -> None:
+    """Give axes a row for each label, from above, each with so many letters at most."""
+    names = [short(label, most) for label in labels]
+    axes.set(ylim=(len(names) - 0.4, -0.6), yticks=range(len(names)), yticklabels=names)
+    tidy(axes, "x")
 
 
 def tidy(axes: Any, grid: str = "both") -> None:

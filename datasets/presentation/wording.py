@@ -4,7 +4,7 @@ import math
 from collections import Counter
 from collections.abc import Iterable
 
-from handrail.datasets.quality.catalogue import Metric
+from handrail.datasets.quality.metric import Metric
 
 DASH = "–"
 THESE_POLICIES = "these policies 95 %"  # in other scenes

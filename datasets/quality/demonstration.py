@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from handrail.controllers.arrays import BoolArray, FloatArray
+from handrail.controllers.arrays import FloatArray
+from handrail.controllers.errors import HandrailError
 from handrail.datasets.quality.columns import ColumnNames
-from handrail.datasets.quality.missing import DoesNotApply
 from handrail.datasets.quality.naming import (
     gripper_entry,
     is_velocity,
@@ -18,23 +18,14 @@ from handrail.datasets.quality.naming import (
     position_entries,
     same_thing,
 )
+from handrail.datasets.reading.reader import DatasetInfo
 
-Names = Mapping[str, tuple[str, ...] | None]
 
+class DoesNotApply(HandrailError):  # noqa: N818, it says what the report says
+    """A metric has no value for an episode or a dataset; the message says why, for the report.
 
-@dataclass(frozen=True)
-class Source:
-    """Where an episode is from, as far as that tells the units of its numbers.
-
-    Attributes:
-        root: Folder of the dataset.
-        robot: Its type, or "".
-        from_handrail: Whether Handrail recorded it: in metres, radians and seconds.
+    Raised instead of a NaN or a zero: "no contact was recorded" is not "no contact".
     """
-
-    root: str = ""
-    robot: str = ""
-    from_handrail: bool = False
 
 
 @dataclass(frozen=True)
@@ -43,21 +34,22 @@ class Demonstration:
 
     Attributes:
         number: of the episode in its dataset.
-        fps: Frames a second [Hz].
+        info: What the dataset is; it also tells the units of the numbers, as far as anything does.
         frames: Columns, `(N,)` or `(N, d)`; no pictures.
-        names: Names of the columns' entries.
         meta: The episode's line of metadata.
         columns: Which column plays which part.
-        source: Where it is from.
     """
 
     number: int
-    fps: float
+    info: DatasetInfo
     frames: Mapping[str, np.ndarray]
-    names: Names
     meta: Mapping[str, Any]
     columns: ColumnNames = field(default_factory=ColumnNames)
-    source: Source = field(default_factory=Source)
+
+    @property
+    def fps(self) -> float:
+        """Frames a second [Hz]."""
+        return self.info.fps
 
     @property
     def count(self) -> int:
@@ -82,6 +74,11 @@ class Demonstration:
         return state[:, point_entries(names)] if point_entries(names) else self.configuration
 
     @property
+    def speed(self) -> FloatArray:
+        """How fast `motion` changes, `(N − 1,)` [1/s]."""
+        return np.linalg.norm(np.diff(self.motion, axis=0), axis=1) * self.fps
+
+    @property
     def motion_is_tool(self) -> bool:
         """Whether `motion` is the tool's position [m]."""
         return bool(point_entries(self.entries("state")))
@@ -95,16 +92,11 @@ class Demonstration:
     @cached_property
     def observation(self) -> FloatArray:
         """What a policy reads, pictures aside: all numbers under `observation.`, `(N, s)`."""
-        return np.hstack([_rows(self.frames[name]) for name in self.observed])
-
-    @property
-    def observed(self) -> tuple[str, ...]:
-        """The columns that `observation` is made of."""
-        known = (name for name in self.frames if name.startswith("observation"))
-        found = tuple(name for name in known if self.frames[name].dtype.kind in "fiub")
+        known = [values for name, values in self.frames.items() if name.startswith("observation")]
+        found = [_rows(values) for values in known if values.dtype.kind in "fiub"]
         if not found:
             raise DoesNotApply("no column 'observation.…' with numbers")
-        return found
+        return np.hstack(found)
 
     @cached_property
     def pairs(self) -> tuple[tuple[int, int], ...]:
@@ -142,28 +134,22 @@ class Demonstration:
                 return self.matrix(part)[:, place]
         raise DoesNotApply("no entry of action or state is called gripper")
 
-    @cached_property
-    def phase(self) -> np.ndarray:
-        """The recorded phase, `(N,)`."""
-        return self.column("phase").reshape(self.count, -1)[:, 0]
+    @property
+    def modes(self) -> str:
+        """The teleop modes that the frames name, in the order in which they first occur; "" for none."""
+        found = self.column("mode") if self.has("mode") else np.empty(0, str)
+        known = dict.fromkeys(found.tolist() if found.dtype.kind == "U" else ())
+        return " → ".join(mode for mode in known if mode)
 
     @cached_property
     def inputs(self) -> FloatArray:
         """What the operator put in, zero on axes not owned and without the gripper, `(N, u)`."""
         values = self.matrix("asked")
-        if self.has("owned") and self.owned.shape == values.shape:
-            values = np.where(self.owned, values, 0.0)
-        return values[:, [place for place, name in enumerate(self.axes) if "gripper" not in name]]
-
-    @property
-    def axes(self) -> tuple[str, ...]:
-        """Names of the input's entries, the gripper's included."""
-        return self.entries("asked") or tuple(map(str, range(self.matrix("asked").shape[1])))
-
-    @cached_property
-    def owned(self) -> BoolArray:
-        """Which of its inputs the operator owned, `(N, u)`."""
-        return self.matrix("owned").astype(bool)
+        owned = self.matrix("owned") if self.has("owned") else np.empty(0)
+        if owned.shape == values.shape:
+            values = np.where(owned.astype(bool), values, 0.0)
+        axes = self.entries("asked") or map(str, range(values.shape[1]))
+        return values[:, [place for place, name in enumerate(axes) if "gripper" not in name]]
 
     def has(self, part: str) -> bool:
         """Return whether a part is there."""
@@ -207,7 +193,7 @@ class Demonstration:
         """Return the names of a part's entries; none where the dataset names none."""
         for name in self.columns.choices(part):
             if name in self.frames:
-                return self.names.get(name) or ()
+                return self.info.features[name].names or ()
         return ()
 
 

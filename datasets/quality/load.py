@@ -2,11 +2,9 @@
 
 from pathlib import Path
 
-from handrail.controllers.errors import HandrailError
 from handrail.datasets.quality.columns import ColumnNames
-from handrail.datasets.quality.demonstration import Demonstration, Source
-from handrail.datasets.reading.labels import with_success
-from handrail.datasets.reading.reader import DatasetInfo, read_episodes, read_info, read_rows_of
+from handrail.datasets.quality.demonstration import Demonstration
+from handrail.datasets.reading.reader import DatasetInfo, read_episodes, read_info, read_rows_of, with_success
 
 
 def read_demonstrations(root: str | Path, columns: ColumnNames | None = None) -> list[Demonstration]:
@@ -17,25 +15,12 @@ def read_demonstrations(root: str | Path, columns: ColumnNames | None = None) ->
         columns: Which column plays which part.
 
     Raises:
-        HandrailError: There is no dataset, it has no episodes, or a file of it cannot be read.
+        HandrailError: There is no dataset, or a file of it cannot be read.
     """
-    columns = columns or ColumnNames()
-    info = read_info(root)
-    if not info.episodes:
-        raise HandrailError(f"dataset {str(info.root)!r}: expected one episode or more, got none")
+    columns, info = columns or ColumnNames(), read_info(root)
     wanted = _wanted(info, columns)
-    names = {name: info.features[name].names for name in wanted}
-    source = Source(str(info.root.resolve()), info.robot_type, info.from_handrail)
     return [
-        Demonstration(
-            number=row["episode_index"],
-            fps=info.fps,
-            frames=read_rows_of(info, row, wanted),
-            names=names,
-            meta=row,
-            columns=columns,
-            source=source,
-        )
+        Demonstration(row["episode_index"], info, read_rows_of(info, row, wanted), row, columns)
         for row in with_success(info, read_episodes(root))
     ]
 

@@ -7,11 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray
-from handrail.datasets.quality.catalogue import METRICS, Metric
-from handrail.datasets.quality.demonstration import Demonstration
-from handrail.datasets.quality.missing import DoesNotApply
+from handrail.datasets.quality.catalogue import METRICS
+from handrail.datasets.quality.demonstration import Demonstration, DoesNotApply
+from handrail.datasets.quality.metric import Metric
 from handrail.datasets.quality.pool import Pool
 from handrail.datasets.quality.units import why_not
+from handrail.datasets.statistics.resampling import FEWEST, Interval, bootstrap_mean
 
 _FRAMES = 2048  # of a group at most, for what compares every frame with every other
 
@@ -22,16 +23,29 @@ class Measured:
 
     Attributes:
         values: `(E,)`; NaN where it does not apply.
+        interval: 95 % of the mean, bootstrap; None for fewer than five episodes, and for a metric of a group,
+            whose values share neighbours.
         reason: Why it applies to none, or not to all: the commonest reason; "" where it applies to all.
     """
 
     values: FloatArray
+    interval: Interval | None = None
     reason: str = ""
+
+    @property
+    def known(self) -> FloatArray:
+        """The values of the episodes to which it applies."""
+        return self.values[np.isfinite(self.values)]
 
     @property
     def applies(self) -> bool:
         """Whether there is any value."""
-        return bool(np.isfinite(self.values).any())
+        return bool(self.known.size)
+
+    @property
+    def mean(self) -> float | None:
+        """Over the episodes to which it applies; None without any."""
+        return float(self.known.mean()) if self.applies else None
 
 
 Groups = Mapping[str, Sequence[Demonstration]]
@@ -109,11 +123,13 @@ def _measured(
         try:
             return Measured(metric.measure_group(episodes, pool, rng))
         except DoesNotApply as error:
-            return Measured(np.full(len(episodes), np.nan), str(error))
+            return Measured(np.full(len(episodes), np.nan), None, str(error))
     values, reasons = np.full(len(episodes), np.nan), Counter[str]()
     for place, episode in enumerate(episodes):
         try:
             values[place] = metric.measure(episode, pool) if metric.measure else np.nan
         except DoesNotApply as error:
             reasons[str(error)] += 1
-    return Measured(values, reasons.most_common(1)[0][0] if reasons else "")
+    known, reason = values[np.isfinite(values)], reasons.most_common(1)[0][0] if reasons else ""
+    interval = bootstrap_mean(known, rng) if len(known) >= FEWEST else None
+    return Measured(values, interval, reason)

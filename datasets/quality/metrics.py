@@ -30,7 +30,7 @@ def sparc(speed: np.ndarray, fs: float) -> float:
     Raises:
         HandrailError: `speed` is no vector, or `fs` is not positive.
     """
-    speed = _checked(speed, fs)
+    speed = _checked("speed", speed, 1, fs)
     if not _moves(speed):
         return float("nan")
     size = 2 ** (int(np.ceil(np.log2(len(speed)))) + ZERO_PADDING)
@@ -61,7 +61,7 @@ def ldlj(speed: np.ndarray, fs: float) -> float:
     Raises:
         HandrailError: `speed` is no vector, or `fs` is not positive.
     """
-    speed = _checked(speed, fs)
+    speed = _checked("speed", speed, 1, fs)
     jerk = np.diff(speed, 2) * fs**2
     if not _moves(speed) or not jerk.any():
         return float("nan")
@@ -97,7 +97,7 @@ def rate_of_change(command: np.ndarray, fs: float) -> float:
     Raises:
         HandrailError: `command` has another shape, or `fs` is not positive.
     """
-    command = _checked_rows(command, fs)
+    command = _checked("command", command, 2, fs)
     if len(command) < 2 or not np.isfinite(command).all():
         return float("nan")
     changes = np.diff(command, axis=0) * fs
@@ -121,7 +121,7 @@ def high_frequency_content(command: np.ndarray, fs: float) -> float:
     Raises:
         HandrailError: `command` has another shape, or `fs` is not positive.
     """
-    command = _checked_rows(command, fs)
+    command = _checked("command", command, 2, fs)
     size = len(command)
     if size < 2 or not np.isfinite(command).all():
         return float("nan")
@@ -155,22 +155,14 @@ def corrections(
     return int(np.count_nonzero(np.diff(on, prepend=False)))
 
 
-def _checked_rows(command: np.ndarray, fs: float) -> np.ndarray:
-    command = np.asarray(command, float)
-    if command.ndim != 2:
-        raise HandrailError(f"command: expected the shape (N, d), got {command.shape}")
+def _checked(name: str, values: np.ndarray, ndim: int, fs: float) -> np.ndarray:
+    values = np.asarray(values, float)
+    if values.ndim != ndim:
+        expected = "(N,)" if ndim == 1 else "(N, d)"
+        raise HandrailError(f"{name}: expected the shape {expected}, got {values.shape}")
     if not fs > 0:
         raise HandrailError(f"fs: expected a positive rate [Hz], got {fs}")
-    return command
-
-
-def _checked(speed: np.ndarray, fs: float) -> np.ndarray:
-    speed = np.asarray(speed, float)
-    if speed.ndim != 1:
-        raise HandrailError(f"speed: expected the shape (N,), got {speed.shape}")
-    if not fs > 0:
-        raise HandrailError(f"fs: expected a positive rate [Hz], got {fs}")
-    return speed
+    return values
 
 
 def _moves(speed: np.ndarray) -> bool:

@@ -1,42 +1,26 @@
 """What the datasets that are compared have in common: one scale for all, so that numbers can be compared."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray
-from handrail.datasets.quality.demonstration import Demonstration
-from handrail.datasets.quality.missing import DoesNotApply
+from handrail.datasets.quality.demonstration import Demonstration, DoesNotApply
 
 _FEW = 2  # values that an entry takes if it is a switch
 _STILL = 1e-9  # a standard deviation below this is that of a constant
 
 
-@dataclass(frozen=True)
-class Embedding:
-    """A linear map onto few numbers of about unit size: standardised, then principal components.
-
-    y = (x − mean) / std · directions; entries that never change are left out.
-
-    Attributes:
-        mean: `(d,)`.
-        scale: Standard deviation, ∞ where the entry is constant, `(d,)`.
-        directions: Orthonormal columns, most variance first, `(d, m)`.
-    """
-
-    mean: FloatArray
-    scale: FloatArray
-    directions: FloatArray
-
-    def __call__(self, values: FloatArray) -> FloatArray:
-        """Return the image of rows, `(N, d)` → `(N, m)`."""
-        return (values - self.mean) / self.scale @ self.directions
+Embedding = Callable[[FloatArray], FloatArray]
 
 
 def embed(rows: FloatArray, most: int | None = None) -> Embedding:
-    """Return the embedding that fits the rows.
+    """Return the linear map of rows onto few numbers of about unit size, `(N, d)` → `(N, m)`.
+
+    y = (x − mean) / std · directions: standardised, then principal components, most variance first; entries
+    that never change are left out.
 
     Args:
         rows: `(N, d)`.
@@ -50,11 +34,12 @@ def embed(rows: FloatArray, most: int | None = None) -> Embedding:
     if not varies.any():
         raise DoesNotApply("nothing in the columns ever changes")
     scale = np.where(varies, scale, np.inf)
-    if most is None:
-        return Embedding(mean, scale, np.eye(len(scale))[:, varies])
-    standard = (rows - mean) / scale
-    _, vectors = np.linalg.eigh(standard.T @ standard)
-    return Embedding(mean, scale, vectors[:, ::-1][:, : min(most, int(varies.sum()))])
+    directions = np.eye(len(scale))[:, varies]
+    if most is not None:
+        standard = (rows - mean) / scale
+        _, vectors = np.linalg.eigh(standard.T @ standard)
+        directions = vectors[:, ::-1][:, : min(most, int(varies.sum()))]
+    return lambda values: (values - mean) / scale @ directions
 
 
 @dataclass(frozen=True)

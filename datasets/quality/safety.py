@@ -4,29 +4,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from handrail.controllers.arrays import FloatArray
-from handrail.datasets.quality.missing import DoesNotApply
+from handrail.datasets.quality.demonstration import Demonstration, DoesNotApply
+from handrail.datasets.quality.metric import metric
+from handrail.datasets.quality.pool import Pool
 
-_ROUNDING = 1e-6
-
-
-def smallest_distance(distance: FloatArray) -> float:
-    """Return min_t d(t), signed: negative is penetration [m].
-
-    Args:
-        distance: `(N,)` [m]; what is not finite is no measurement.
-    """
-    return float(_finite(distance).min())
-
-
-def time_within(distance: FloatArray, margin: float, fps: float) -> float:
-    """Return ∫ 1[d(t) < margin] dt: for how long something was nearer than the margin [s].
-
-    Args:
-        distance: `(N,)` [m].
-        margin: [m].
-        fps: Frames a second [Hz].
-    """
-    return float(np.count_nonzero(_finite(distance) < margin)) / fps
+_ROUNDING = 1e-6  # of the solver: below it, slack is zero
 
 
 def contacts_begun(contacts: ArrayLike) -> float:
@@ -38,28 +20,46 @@ def contacts_begun(contacts: ArrayLike) -> float:
     return float(np.maximum(np.diff(np.asarray(contacts, np.float64), prepend=0.0), 0.0).sum())
 
 
-def impulse(impulses: FloatArray) -> float:
-    """Return the impulse of all contacts, Σ_t ∫ ‖F‖ dt [N s].
-
-    Args:
-        impulses: Of each period, `(N,)` [N s].
-    """
-    return float(_finite(impulses).sum())
+@metric("smallest_distance", "m", "higher", "smallest signed distance to a collision")
+def smallest_distance(episode: Demonstration, pool: Pool) -> float:
+    """Return min_t d(t), signed: negative is penetration [m]."""
+    return float(_finite(episode, "distance").min())
 
 
-def slack_used(slack: FloatArray) -> float:
-    """Return max_t of the slack: how far a soft limit was given up at most, in the limit's unit.
+@metric("contacts", "", "lower", "unwanted contacts that began")
+def contacts(episode: Demonstration, pool: Pool) -> float:
+    """Return how many there were, see `contacts_begun`."""
+    return contacts_begun(episode.numbers("contacts")[:, 0])
 
-    Below 1e-6 it is the solver's rounding, and zero.
 
-    Args:
-        slack: Largest violation in the plan of each period, `(N,)`.
-    """
-    most = float(_finite(slack).max())
+@metric("impulse", "N s", "lower", "impulse of all unwanted contacts", title="contact impulse")
+def impulse(episode: Demonstration, pool: Pool) -> float:
+    """Return Σ_t ∫ ‖F‖ dt [N s]."""
+    return float(_finite(episode, "impulse").sum())
+
+
+@metric(
+    "time_within_margin",
+    "s",
+    "lower",
+    "for how long something was nearer than the margin",
+    title="time within the margin",
+)
+def time_within_margin(episode: Demonstration, pool: Pool) -> float:
+    """Return ∫ 1[d(t) < margin] dt [s]."""
+    return float(np.count_nonzero(_finite(episode, "distance") < pool.margin)) / episode.fps
+
+
+@metric("slack_used", "unit of the limit", "lower", "how far a soft limit was given up at most", "controller")
+def slack_used(episode: Demonstration, pool: Pool) -> float:
+    """Return max_t of the largest violation in the plan, in the limit's unit."""
+    most = float(_finite(episode, "slack").max())
     return most if most > _ROUNDING else 0.0
 
 
-def _finite(values: FloatArray) -> FloatArray:
+def _finite(episode: Demonstration, part: str) -> FloatArray:
+    """Return the measurements in a column; what is not finite is none."""
+    values = episode.numbers(part)[:, 0]
     known = values[np.isfinite(values)]
     if not known.size:
         raise DoesNotApply("no number in the column is finite")

@@ -3,44 +3,26 @@
 What a dataset does not hold stays None and is shown as "–", so that any LeRobot dataset can be looked at.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from handrail.datasets.format.schema import NUMBERS
-from handrail.datasets.quality.metrics import corrections, high_frequency_content, rate_of_change, sparc
-from handrail.datasets.quality.safety import contacts_begun
-from handrail.datasets.reading.labels import with_success
-from handrail.datasets.reading.reader import DatasetInfo, read_episodes, read_info, read_rows_of
+from handrail.controllers.arrays import FloatArray
+from handrail.datasets.quality import motion, safety
+from handrail.datasets.quality.demonstration import Demonstration, DoesNotApply
+from handrail.datasets.quality.load import read_demonstrations
+from handrail.datasets.quality.metric import Metric
+from handrail.datasets.quality.metrics import corrections, high_frequency_content, rate_of_change
+from handrail.datasets.quality.pool import Pool
 
 UNKNOWN = "–"
-HEADINGS = (
-    "episode",
-    "task",
-    "mode",
-    "success",
-    "why not",
-    "length [s]",
-    "smallest distance [m]",
-    "smoothness",
-    "contacts begun",
-)
-QUALITY_HEADINGS = (
-    "episode",
-    "mode",
-    "length [s]",
-    "smoothness",
+CHATTERING = (
     "rate of change",
     "high-frequency content",
     "corrections",
-)
-TOOL = ("tool.x", "tool.y", "tool.z")
-STATE, ACTION = "observation.state", "action"
+)  # a table of its own
 ASKED, OWNED = "teleop.values", "teleop.mask"
-MODE, DISTANCE, CONTACTS = "teleop.mode", "controller.smallest_distance", "safety.contacts"
 
 
 @dataclass(frozen=True)
@@ -55,7 +37,7 @@ class EpisodeSummary:
         failure_reason: Why it failed.
         length: Duration [s].
         smallest_distance: Smallest distance to a collision [m].
-        smoothness: SPARC of the tool's speed, or else of the norm of the commanded velocity.
+        smoothness: SPARC of the tool's speed, or else of the configuration's.
         contacts: How many unwanted contacts began.
         rate_of_change: Of the commanded velocities, see `metrics.rate_of_change`.
         high_frequency_content: Of the commanded velocities, see `metrics.high_frequency_content`.
@@ -76,32 +58,23 @@ class EpisodeSummary:
     high_frequency_content: float | None
     corrections: int | None
 
-    def cells(self) -> tuple[str, ...]:
-        """Return the line as text, one cell for each of `HEADINGS`."""
+    def cells(self) -> dict[str, str]:
+        """Return the line as text, by heading."""
         success = None if self.success is None else ("yes" if self.success else "no")
-        return (
-            str(self.episode),
-            self.task or UNKNOWN,
-            self.mode or UNKNOWN,
-            success or UNKNOWN,
-            self.failure_reason or UNKNOWN,
-            f"{self.length:.1f}",
-            _number(self.smallest_distance, "{:.3f}"),
-            _number(self.smoothness, "{:.2f}"),
-            _number(self.contacts, "{:d}"),
-        )
-
-    def quality_cells(self) -> tuple[str, ...]:
-        """Return the measures of quality as text, one cell for each of `QUALITY_HEADINGS`."""
-        return (
-            str(self.episode),
-            self.mode or UNKNOWN,
-            f"{self.length:.1f}",
-            _number(self.smoothness, "{:.2f}"),
-            _number(self.rate_of_change, "{:.2f}"),
-            _number(self.high_frequency_content, "{:.2f}"),
-            _number(self.corrections, "{:d}"),
-        )
+        return {
+            "episode": str(self.episode),
+            "task": self.task or UNKNOWN,
+            "mode": self.mode or UNKNOWN,
+            "success": success or UNKNOWN,
+            "why not": self.failure_reason or UNKNOWN,
+            "length [s]": f"{self.length:.1f}",
+            "smallest distance [m]": _number(self.smallest_distance, "{:.3f}"),
+            "smoothness": _number(self.smoothness, "{:.2f}"),
+            "contacts begun": _number(self.contacts, "{:d}"),
+            "rate of change": _number(self.rate_of_change, "{:.2f}"),
+            "high-frequency content": _number(self.high_frequency_content, "{:.2f}"),
+            "corrections": _number(self.corrections, "{:d}"),
+        }
 
 
 def summarize(root: str | Path) -> list[EpisodeSummary]:
@@ -113,92 +86,55 @@ def summarize(root: str | Path) -> list[EpisodeSummary]:
     Raises:
         HandrailError: There is no dataset, or a file of it cannot be read.
     """
-    info = read_info(root)
-    known = dict.fromkeys((STATE, ACTION, ASKED, OWNED, DISTANCE, CONTACTS), NUMBERS) | {MODE: ("string",)}
-    wanted = [name for name, dtypes in known.items() if _is_column(info, name, dtypes)]
-    rows = with_success(info, read_episodes(root))
-    return [_summary(info, row, read_rows_of(info, row, wanted)) for row in rows]
+    return [_summary(episode) for episode in read_demonstrations(root)]
 
 
-def _summary(info: DatasetInfo, row: dict[str, Any], frames: dict[str, np.ndarray]) -> EpisodeSummary:
-    distance = _finite(frames.get(DISTANCE))
-    contacts = frames.get(CONTACTS)
-    commands = _commands(info, frames)
+def _summary(episode: Demonstration) -> EpisodeSummary:
+    contacts, commands = _measured(safety.contacts, episode), _commands(episode)
     return EpisodeSummary(
-        episode=row["episode_index"],
-        task="; ".join(row["tasks"]),
-        mode=_mode(row, frames),
-        success=_as_bool(row.get("success")),
-        failure_reason=row.get("failure_reason") or None,
-        length=row["length"] / info.fps,
-        smallest_distance=None if distance is None else float(distance.min()),
-        smoothness=_smoothness(info, frames),
-        contacts=None if contacts is None or contacts.ndim != 1 else int(contacts_begun(contacts)),
-        rate_of_change=None if commands is None else _known(rate_of_change(commands, info.fps)),
-        high_frequency_content=None
-        if commands is None
-        else _known(high_frequency_content(commands, info.fps)),
-        corrections=_corrections(info, frames),
+        episode=episode.number,
+        task="; ".join(episode.meta["tasks"]),
+        mode=episode.modes or episode.meta.get("mode") or None,
+        success=episode.success,
+        failure_reason=episode.meta.get("failure_reason") or None,
+        length=episode.seconds,
+        smallest_distance=_measured(safety.smallest_distance, episode),
+        smoothness=_measured(motion.smoothness, episode),
+        contacts=None if contacts is None else int(contacts),
+        rate_of_change=_known(rate_of_change(commands, episode.fps)),
+        high_frequency_content=_known(high_frequency_content(commands, episode.fps)),
+        corrections=_corrections(episode),
     )
 
 
-def _mode(row: dict[str, Any], frames: dict[str, np.ndarray]) -> str | None:
-    modes = [str(mode) for mode in dict.fromkeys(frames.get(MODE, ())) if mode]
-    return " → ".join(modes) or row.get("mode") or None
-
-
-def _smoothness(info: DatasetInfo, frames: dict[str, np.ndarray]) -> float | None:
-    speed = _tool_speed(info, frames)
-    if speed is None:
-        commands = _commands(info, frames)
-        speed = None if commands is None else np.linalg.norm(commands, axis=1)
-    return None if speed is None else _known(sparc(speed, info.fps))
-
-
-def _tool_speed(info: DatasetInfo, frames: dict[str, np.ndarray]) -> np.ndarray | None:
-    """Return the tool's speed [m/s], `(N − 1,)`, if the state names its position."""
-    names = info.features[STATE].names if STATE in frames else None
-    if not names or any(name not in names for name in TOOL):
+def _measured(metric: Metric, episode: Demonstration) -> float | None:
+    try:
+        return metric.measure(episode, Pool([episode])) if metric.measure else None
+    except DoesNotApply:
         return None
-    positions = frames[STATE][:, [names.index(name) for name in TOOL]].astype(float)
-    return np.linalg.norm(np.diff(positions, axis=0), axis=1) * info.fps
 
 
-def _commands(info: DatasetInfo, frames: dict[str, np.ndarray]) -> np.ndarray | None:
-    """Return the commanded velocities, `(N, n)`; another tool's action may be a position."""
-    names = info.features[ACTION].names if ACTION in frames and info.from_handrail else None
-    if not names or frames[ACTION].ndim != 2:
-        return None
+def _commands(episode: Demonstration) -> FloatArray:
+    """Return the commanded velocities, `(N, n)`; none for another tool's action, which may be a position."""
+    names = episode.entries("action") if episode.info.from_handrail else ()
     moving = [index for index, name in enumerate(names) if "gripper" not in name]
-    return frames[ACTION][:, moving].astype(float)
+    return episode.numbers("action")[:, moving] if moving else np.empty((0, 0))
 
 
-def _corrections(info: DatasetInfo, frames: dict[str, np.ndarray]) -> int | None:
+def _corrections(episode: Demonstration) -> int | None:
     """Return how often the correction of a joint's command switched, if the operator commanded any joint."""
-    if not {ACTION, ASKED, OWNED} <= set(frames):
+    given = [episode.frames.get(name, np.empty(0)) for name in (ASKED, OWNED)]
+    if not episode.has("action") or any(each.dtype.kind not in "fiub" or not each.size for each in given):
         return None
-    channels = {name: index for index, name in enumerate(info.features[ASKED].names or ())}
+    channels = {name: index for index, name in enumerate(episode.info.features[ASKED].names or ())}
     joints = [
         (index, channels[f"joint.{name.removeprefix('v_')}"])
-        for index, name in enumerate(info.features[ACTION].names or ())
+        for index, name in enumerate(episode.entries("action"))
         if f"joint.{name.removeprefix('v_')}" in channels
     ]
-    sent, asked = np.array(joints, dtype=int).reshape(-1, 2).T
-    owned = frames[OWNED][:, asked]
-    return corrections(frames[ASKED][:, asked], frames[ACTION][:, sent], owned) if owned.any() else None
-
-
-def _finite(values: np.ndarray | None) -> np.ndarray | None:
-    finite = None if values is None else values[np.isfinite(values)]
-    return finite if finite is not None and finite.size else None
-
-
-def _is_column(info: DatasetInfo, name: str, dtypes: Sequence[str]) -> bool:
-    return name in info.features and info.features[name].dtype in dtypes
-
-
-def _as_bool(value: Any) -> bool | None:
-    return bool(value) if isinstance(value, bool | int | float) else None
+    sent, places = np.array(joints, dtype=int).reshape(-1, 2).T
+    asked, owned = (each[:, places] for each in given)
+    return corrections(asked, episode.numbers("action")[:, sent], owned) if owned.any() else None
 
 
 def _known(value: float) -> float | None:

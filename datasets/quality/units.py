@@ -5,14 +5,13 @@ radians, seconds); else the same robot, the same names that say what they measur
 of the same size, all of these.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from typing import Literal
 
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray
-from handrail.datasets.quality.demonstration import Demonstration
-from handrail.datasets.quality.missing import DoesNotApply
+from handrail.datasets.quality.demonstration import Demonstration, DoesNotApply
 from handrail.datasets.quality.naming import quantity
 
 Group = Sequence[Demonstration]
@@ -36,26 +35,19 @@ def why_not(needs: Needs, one: Group, other: Group) -> str:
     """
     if needs == "controller":
         return _modes(one, other)
-    if not needs or one[0].source.root == other[0].source.root:
+    if not needs or one[0].info.root == other[0].info.root:
         return ""
     try:
-        return _CHECKS[needs](one, other)
+        if needs == "pool":
+            return _on_one_scale(one, other)
+        if needs == "action":
+            return _numbers("action", one, other) or _followed(one, other)
+        tools = one[0].motion_is_tool and other[0].motion_is_tool
+        if tools and (needs == "motion" or _by_handrail(one[0], other[0])):
+            return ""  # the same thing moves; a measure without a unit needs no more
+        return _numbers("state", one, other)
     except DoesNotApply as error:
         return str(error)
-
-
-def _motion(one: Group, other: Group) -> str:
-    """Return why not the same thing moves; a measure without a unit needs no more."""
-    return "" if one[0].motion_is_tool and other[0].motion_is_tool else _numbers("state", one, other)
-
-
-def _position(one: Group, other: Group) -> str:
-    known = _by_handrail(one[0], other[0])
-    return _motion(one, other) if known else _numbers("state", one, other)
-
-
-def _action(one: Group, other: Group) -> str:
-    return _numbers("action", one, other) or _followed(one, other)
 
 
 def _on_one_scale(one: Group, other: Group) -> str:
@@ -69,7 +61,7 @@ def _columns(episode: Demonstration) -> tuple[object, ...]:
     """Return sizes and entries of what is measured."""
     choices = (*episode.columns.choices("action"), *episode.columns.choices("asked"))
     names = sorted(name for name in episode.frames if name.startswith("observation") or name in choices)
-    return tuple((name, episode.frames[name].shape[1:], episode.names.get(name)) for name in names)
+    return tuple((name, episode.frames[name].shape[1:], episode.info.features[name].names) for name in names)
 
 
 def _numbers(part: str, one: Group, other: Group) -> str:
@@ -82,7 +74,7 @@ def _numbers(part: str, one: Group, other: Group) -> str:
         return f"they have other entries in the {part} ({_few(names[0])}; {_few(names[1])})"
     if _by_handrail(first, second):
         return ""
-    robots = first.source.robot, second.source.robot
+    robots = first.info.robot_type, second.info.robot_type
     if not robots[0] or robots[0] != robots[1]:
         told = " and ".join(robot or "not recorded" for robot in robots)
         return f"the robots are not known to be the same ({told}), so the units of the {part} are not either"
@@ -105,7 +97,7 @@ def _followed(one: Group, other: Group) -> str:
         return "the state measures other entries of the action"
     for group in (one, other):
         factor = _times(np.vstack([e.commanded for e in group]), np.vstack([e.reached for e in group]))
-        if factor > _FACTOR and not group[0].source.from_handrail:
+        if factor > _FACTOR and not group[0].info.from_handrail:
             return f"commands and state differ {factor:.0f} times in size, so their units may differ"
     return ""
 
@@ -120,7 +112,7 @@ def _modes(one: Group, other: Group) -> str:
 
 
 def _by_handrail(*episodes: Demonstration) -> bool:
-    return all(episode.source.from_handrail for episode in episodes)
+    return all(episode.info.from_handrail for episode in episodes)
 
 
 def _pairs(episode: Demonstration) -> list[tuple[str, str]]:
@@ -143,11 +135,3 @@ def _rows(part: str, group: Group) -> FloatArray:
 
 def _few(names: Sequence[str]) -> str:
     return ", ".join(names[:_NAMED]) + (", …" if len(names) > _NAMED else "")
-
-
-_CHECKS: Mapping[str, Callable[[Group, Group], str]] = {
-    "motion": _motion,
-    "position": _position,
-    "action": _action,
-    "pool": _on_one_scale,
-}

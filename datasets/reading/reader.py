@@ -16,11 +16,12 @@ from handrail.controllers.errors import HandrailError, unknown_name
 from handrail.datasets.format.arrow import flat_numbers, numbers, to_numpy
 from handrail.datasets.format.info_fields import MOST_EPISODES, MOST_FRAMES, features, rate, whole_number
 from handrail.datasets.format.layout import VIDEO_PATH, Layout
-from handrail.datasets.format.manifest import check_format
+from handrail.datasets.format.manifest import read_manifest
 from handrail.datasets.format.path_pattern import check_pattern, fill
 from handrail.datasets.format.schema import NUMBERS, Feature
 from handrail.datasets.storage.strict_json import read_json
 
+_SUCCESS = "next.success"
 _DAMAGED = " the dataset is damaged"
 _READABLE = (*NUMBERS, "float16", "string")
 _PLACE = ("episode_index", "length", "data/chunk_index", "data/file_index")
@@ -68,7 +69,8 @@ def read_info(root: str | Path) -> DatasetInfo:
             f"dataset {str(layout.root)!r}: expected version v3.0, got {version[:60]};"
             " lerobot.scripts.convert_dataset_v21_to_v30 converts older ones"
         )
-    check_format(layout)
+    if layout.manifest.exists():
+        read_manifest(layout)  # of a format that this version understands
     try:
         robot = content.get("robot_type") or ""
         if not isinstance(robot, str):
@@ -165,6 +167,29 @@ def read_rows_of(
             + _advice(info)
         )
     return frames
+
+
+def with_success(info: DatasetInfo, rows: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Return lines of metadata with `success`, as they say it or else as their frames do: any of them.
+
+    LeRobot's own `next.success` survives its `delete_episodes` and `split`, which drop every column of an
+    episode that is not LeRobot's.
+
+    Args:
+        info: What the dataset is.
+        rows: As `read_episodes` returns them.
+
+    Raises:
+        HandrailError: A file of the dataset cannot be read.
+    """
+    feature = info.features.get(_SUCCESS)
+    if feature is None or feature.dtype not in NUMBERS:
+        return list(rows)
+    found = [dict(row) for row in rows]
+    for row in found:
+        if row.get("success") is None:
+            row["success"] = bool(np.any(read_rows_of(info, row, [_SUCCESS])[_SUCCESS] > 0))
+    return found
 
 
 def _chosen(info: DatasetInfo, columns: Sequence[str] | None) -> tuple[str, ...]:

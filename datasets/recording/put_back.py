@@ -32,7 +32,7 @@ from handrail.datasets.format.metadata import (
 from handrail.datasets.format.schema import video_keys
 from handrail.datasets.format.stats import column_stats
 from handrail.datasets.format.tables import parquet_bytes
-from handrail.datasets.recording.wholeness import UNREADABLE, EpisodeState, examine
+from handrail.datasets.recording.survey import UNREADABLE, EpisodeState, examine
 from handrail.datasets.storage.atomic import move, remove, sync_file, sync_folder, write_synced
 
 
@@ -86,7 +86,7 @@ def put_back(layout: Layout, manifest: Manifest, totals: Totals) -> tuple[Totals
     known = {read_origin(layout.row(number)) for number in range(totals.episodes)}
     for folder in folders(layout):
         for row in sorted(folder.root.glob("meta/episodes/*/*.parquet")):
-            state = _candidate(layout, folder, manifest, row)
+            state = _candidate(folder, manifest, row)
             if state is None:
                 continue
             origin = hashlib.sha256(row.read_bytes()).hexdigest()
@@ -96,37 +96,27 @@ def put_back(layout: Layout, manifest: Manifest, totals: Totals) -> tuple[Totals
                 except (HandrailError, ValueError):
                     continue  # columns that this dataset does not have, or tasks that do not add up
                 known.add(origin)
-            _forget(layout, folder, row, state)
+            _forget(folder, row, state)
     _remove_empty(layout.damaged)
     return totals, totals.episodes - before
 
 
-def _candidate(layout: Layout, folder: Layout, manifest: Manifest, row: Path) -> EpisodeState | None:
+def _candidate(folder: Layout, manifest: Manifest, row: Path) -> EpisodeState | None:
     """Return an episode that was set aside, if it is whole."""
     number = episode_of(row)
     if number is None:
         return None
     try:
-        state = examine(
-            folder, manifest, number, None, FileSeal.of, lambda name: _place(layout, folder, row, name)
-        )
+        state = examine(folder, manifest, number, None, FileSeal.of)
     except HandrailError:
         return None
     return None if state.fault else state
 
 
-def _place(layout: Layout, folder: Layout, row: Path, name: str) -> Path:
-    """Return where a file of an episode that was set aside lies: beside its line, or in another folder."""
-    own = folder.root / name
-    if own.is_file():
-        return own
-    return _set_aside(layout, name, read_record(row, with_stats=False).files[name]) or own
-
-
 def _set_aside(layout: Layout, name: str, seal: FileSeal) -> Path | None:
     """Return the file of `.damaged/` with a path and a seal."""
     places = (folder.root / name for folder in folders(layout))
-    return next((path for path in places if path.is_file() and FileSeal.of(path) == seal), None)
+    return next((path for path in places if _has(path, seal)), None)
 
 
 def _line_set_aside(layout: Layout, number: int, start: int) -> Path | None:
@@ -157,21 +147,18 @@ def _append(
     """Save a copy of an episode under the next number, in the order in which the writer saves one."""
     old = state.record
     assert old is not None
-    row = folder.row(state.number)
-    types = read_column_types(layout.row(totals.episodes - 1) if totals.episodes else row)
+    types = read_column_types(
+        layout.row(totals.episodes - 1) if totals.episodes else folder.row(state.number)
+    )
     columns: dict[str, Scalar] = {name: value for name, value in old.columns.items() if value is not None}
     extras = fit_columns(columns, types)
     number, staging = totals.episodes, layout.staging
-    sources = {
-        layout.video(key, number): folder.video(key, state.number) for key in video_keys(manifest.features)
-    }
-    streams = {path: staging / f"{place}.mp4" for place, path in enumerate(sources)}
-    for path, source in sources.items():
-        _copy(_place(layout, folder, row, folder.relative(source)), streams[path])
-    data = _place(layout, folder, row, folder.relative(folder.data(state.number)))
-    table, stats = _renumbered(data, old, totals)
-    streams[layout.data(number)] = staging / "data.parquet"
+    streams = {layout.data(number): staging / "data.parquet"}
+    table, stats = _renumbered(folder.data(state.number), old, totals)
     write_synced(staging / "data.parquet", parquet_bytes(table))
+    for key in video_keys(manifest.features):
+        streams[layout.video(key, number)] = staging / f"{key}.mp4"
+        _copy(folder.video(key, state.number), staging / f"{key}.mp4")
     seals = {layout.relative(path): FileSeal.of(staged) for path, staged in streams.items()}
     record = changed(
         old,
@@ -216,10 +203,10 @@ def _copy(source: Path, target: Path) -> None:
     sync_file(target)
 
 
-def _forget(layout: Layout, folder: Layout, row: Path, state: EpisodeState) -> None:
+def _forget(folder: Layout, row: Path, state: EpisodeState) -> None:
     """Remove an episode from `.damaged/` that is in the dataset again; its line goes last."""
     assert state.record is not None
-    for path in (*(_place(layout, folder, row, name) for name in state.record.files), row):
+    for path in (*(folder.root / name for name in state.record.files), row):
         remove(path)
         sync_folder(path.parent) if path.parent.is_dir() else None
 

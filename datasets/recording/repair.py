@@ -11,6 +11,7 @@ if they are not, to the byte, what the episodes say.
 from dataclasses import dataclass
 from dataclasses import replace as replaced
 from pathlib import Path
+from typing import Any
 
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.format.layout import Layout
@@ -35,12 +36,10 @@ class RepairReport:
     Attributes:
         root: The dataset.
         episodes: Number of episodes in it now.
-        frames: Number of their frames.
         damage: What is wrong with each episode that is not whole and still in its place.
         lost: What was wrong with each episode that was set aside.
         put_back: How many episodes of `.damaged/` are in the dataset again.
-        resealed: Files that another tool wrote anew and that are whole; their checksums were renewed.
-        differing: Such files where they were only noticed, as `resume` does.
+        rewritten: Files that another tool wrote anew and that are whole; a repair renews their checksums.
         removed: Leftovers of an interrupted recording, deleted; paths in the dataset.
         moved: Files set aside in `.damaged/`; the paths that they had.
         restored: Files moved back from there to where they were.
@@ -49,12 +48,10 @@ class RepairReport:
 
     root: Path
     episodes: int
-    frames: int
     damage: tuple[str, ...] = ()
     lost: tuple[str, ...] = ()
     put_back: int = 0
-    resealed: tuple[str, ...] = ()
-    differing: tuple[str, ...] = ()
+    rewritten: tuple[str, ...] = ()
     removed: tuple[str, ...] = ()
     moved: tuple[str, ...] = ()
     restored: tuple[str, ...] = ()
@@ -80,8 +77,7 @@ class RepairReport:
 
     def _files(self) -> dict[str, tuple[str, ...]]:
         return {
-            "taken as another tool wrote them": self.resealed,
-            "whole, but not as they were saved": self.differing,
+            "whole, but as another tool wrote them": self.rewritten,
             "leftovers removed": self.removed,
             "files of no episode moved to .damaged": self.moved,
             "files moved back": self.restored,
@@ -131,18 +127,14 @@ def tidy_locked(layout: Layout, manifest: Manifest, sums: Checksums) -> tuple[Re
     found = survey(layout, manifest, sums.of)
     sums.remember()
     require_whole(layout, found)
-    removed, moved = _clear(layout, found)
+    done = _clear(layout, found)
     rebuilt = _rebuild(layout, manifest, found.totals)
-    report = RepairReport(
-        root=layout.root,
-        episodes=found.totals.episodes,
-        frames=found.totals.frames,
-        differing=tuple(name for state in found.rewritten for name in state.rewritten),
-        removed=removed,
-        moved=moved,
-        rebuilt=rebuilt,
-    )
-    return report, found.totals
+    return _report(layout, found, found.totals, rebuilt=rebuilt, **done), found.totals
+
+
+def _report(layout: Layout, found: Survey, totals: Totals, **done: Any) -> RepairReport:
+    count = max(totals.episodes, len(found.states) + found.absent)
+    return RepairReport(layout.root, count, tuple(found.faults()), **done)
 
 
 def require_whole(layout: Layout, found: Survey) -> None:
@@ -168,8 +160,8 @@ def _repair_locked(layout: Layout, manifest: Manifest, set_aside_damaged: bool) 
     sums = Checksums(layout.root, anew=True)
     restored = restore(layout, said_to_be_saved(layout))
     found = survey(layout, manifest, sums.of)
-    removed, moved = _clear(layout, found)
-    resealed = _reseal(layout, found)
+    done = _clear(layout, found)
+    _reseal(layout, found)
     rebuilt = _rebuild(layout, manifest, found.totals) if found.counted else ()
     lost: list[str] = []
     if set_aside_damaged and not found.whole:
@@ -177,18 +169,15 @@ def _repair_locked(layout: Layout, manifest: Manifest, set_aside_damaged: bool) 
     totals, back = put_back(layout, manifest, found.totals) if found.whole else (found.totals, 0)
     rebuilt += _rebuild(layout, manifest, totals) if found.counted else ()
     sums.remember()
-    return RepairReport(
-        root=layout.root,
-        episodes=max(totals.episodes, len(found.states) + found.absent),
-        frames=totals.frames,
-        damage=tuple(found.faults()),
+    return _report(
+        layout,
+        found,
+        totals,
         lost=tuple(lost),
         put_back=back,
-        resealed=resealed,
-        removed=removed,
-        moved=moved,
         restored=tuple(restored),
         rebuilt=tuple(dict.fromkeys(rebuilt)),
+        **done,
     )
 
 
@@ -210,25 +199,26 @@ def _without_damaged(layout: Layout, manifest: Manifest, found: Survey, sums: Ch
     return replaced(left, absent=0)
 
 
-def _clear(layout: Layout, found: Survey) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Remove what a crash left and set aside what nobody can explain; return both."""
+def _clear(layout: Layout, found: Survey) -> dict[str, tuple[str, ...]]:
+    """Remove what a crash left and set aside what nobody can explain; return all of these."""
     for path in found.leftovers:
         remove(path)
     for folder in {path.parent for path in found.leftovers}:
         sync_folder(folder)
     removed = [*clear_staging(layout), *map(layout.relative, found.leftovers)]
-    return tuple(removed), tuple(set_aside(layout, list(found.strays)))
+    return {
+        "rewritten": tuple(name for state in found.rewritten for name in state.rewritten),
+        "removed": tuple(removed),
+        "moved": tuple(set_aside(layout, list(found.strays))),
+    }
 
 
-def _reseal(layout: Layout, found: Survey) -> tuple[str, ...]:
+def _reseal(layout: Layout, found: Survey) -> None:
     """Renew the checksums of files that another tool wrote anew and that are whole."""
-    names: list[str] = []
     for state in found.rewritten:
         assert state.record is not None
         row, files = layout.row(state.number), {**state.record.files, **state.rewritten}
         replace(row, resealed_bytes(row, files), layout.staging)
-        names += state.rewritten
-    return tuple(names)
 
 
 def _rebuild(layout: Layout, manifest: Manifest, totals: Totals) -> tuple[str, ...]:

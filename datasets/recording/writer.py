@@ -4,7 +4,7 @@ Every file of an episode is written in `.handrail/` inside the dataset and synce
 are they renamed into place: videos, data, tasks, then **the episode's line of metadata, which is the
 commit**, then `info.json` and `stats.json`. A disk that fills up is noticed before the first rename.
 
-    with EpisodeWriter.create(root, "me/cups", 50, features, "handrail") as writer:
+    with EpisodeWriter.create(root, Manifest("me/cups", 50, "ridgeback_ur10", features)) as writer:
         writer.add_frame({"observation.state": state, "action": action}, task="lift the cup")
         writer.save_episode({"success": True, "operator": "ada"})
 """
@@ -71,32 +71,18 @@ class EpisodeWriter:
         self._episode, self._encodings = OpenEpisode(layout, manifest), read_encodings(layout.info, manifest)
 
     @classmethod
-    def create(
-        cls,
-        root: str | Path,
-        repo_id: str,
-        fps: int,
-        features: Mapping[str, Feature],
-        robot_type: str,
-        versions: Mapping[str, str] | None = None,
-        overwrite: bool = False,
-    ) -> Self:
+    def create(cls, root: str | Path, manifest: Manifest, overwrite: bool = False) -> Self:
         """Start a new dataset.
 
         Args:
             root: Its folder; must be missing or empty.
-            repo_id: Its name, `owner/name`.
-            fps: Frames a second [Hz].
-            features: The columns; LeRobot's own (timestamp, indices) are added.
-            robot_type: The robot.
-            versions: Software versions, kept with the dataset and with each episode.
+            manifest: Its schema; LeRobot's own columns (timestamp, indices) are added.
             overwrite: Remove the dataset that Handrail recorded there. Anything else is never removed.
 
         Raises:
             HandrailError: A wrong argument, or a folder taken or not to be written; unchanged then.
         """
         layout = Layout(Path(root).expanduser().absolute())
-        manifest = Manifest(repo_id, fps, robot_type, dict(features), dict(versions or {}))
         manifest.check()
         check_target(layout, overwrite)
         with explained(f"cannot create dataset {str(layout.root)!r}"):
@@ -109,25 +95,13 @@ class EpisodeWriter:
         return cls(layout, manifest, Totals(), lock, None)
 
     @classmethod
-    def resume(
-        cls,
-        root: str | Path,
-        repo_id: str,
-        fps: int,
-        features: Mapping[str, Feature],
-        robot_type: str,
-        versions: Mapping[str, str] | None = None,
-        verify: bool = False,
-    ) -> Self:
+    def resume(cls, root: str | Path, manifest: Manifest, verify: bool = False) -> Self:
         """Go on with a dataset that Handrail wrote; what a crash left is cleared first, see `repaired`.
 
         Args:
             root: Its folder.
-            repo_id: Its name; a dataset may have been renamed since.
-            fps: Frames a second [Hz]; like features and robot_type, must be the dataset's.
-            features: The columns.
-            robot_type: The robot.
-            versions: Software versions of this session, kept with each of its episodes.
+            manifest: The schema, which must be the dataset's but for its name; the versions are of this
+                session and are kept with each of its episodes.
             verify: Read every file anew, also those that have not changed since they were last checked.
 
         Raises:
@@ -135,7 +109,6 @@ class EpisodeWriter:
         """
         layout = Layout(Path(root).expanduser().absolute())
         existing = read_manifest(layout)
-        manifest = Manifest(repo_id, fps, robot_type, dict(features), dict(versions or {}))
         manifest.check()
         manifest.check_continues(existing, layout.root)
         check_folders(layout)

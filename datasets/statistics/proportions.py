@@ -94,20 +94,18 @@ def paired_shares(
     Raises:
         HandrailError: The sizes differ, or there are none.
     """
-    found = paired_success(np.asarray(first), np.asarray(second))
     one, other = np.asarray(first, bool), np.asarray(second, bool)
+    found, differences = paired_success(one, other), one.astype(int) - other
+    scenes = range(found.pairs) if scenes is None else scenes
+    worth = independent_trials(differences, scenes) / found.pairs
     both, neither = int(np.sum(one & other)), int(np.sum(~one & ~other))
-    worth, p = 1.0, found.p_mcnemar
-    if scenes is not None:
-        worth = independent_trials(one.astype(float) - other, scenes) / found.pairs
-        p = mcnemar_by_scene(one.astype(int) - other, scenes)
     cells = [worth * count for count in (both, found.only_first, found.only_second, neither)]
     pairs = sum(cells)
     discordant = (cells[1] + cells[2] + 2.0) / (pairs + 4.0)
     return ShareDifference(
         estimate=(found.only_first - found.only_second) / found.pairs,
         interval=newcombe_paired(*cells),
-        p=p,
+        p=mcnemar_by_scene(differences, scenes),
         paired=True,
         trials=(found.pairs,),
         error=float(np.sqrt(discordant / pairs)),
@@ -151,10 +149,9 @@ def unpaired_shares(
         HandrailError: There are none.
     """
     one, other = (int(np.sum(first)), len(first)), (int(np.sum(second)), len(second))
-    sides = (first, second) if scenes else ()
-    worth = [float(one[1]), float(other[1])]
-    for place, (values, each) in enumerate(zip(sides, scenes or (), strict=True)):
-        worth[place] = independent_trials(np.asarray(values, float), each)
+    owners = scenes or (range(one[1]), range(other[1]))
+    values = [np.asarray(each, float) for each in (first, second)]
+    worth = [independent_trials(each, owner) for each, owner in zip(values, owners, strict=True)]
     shares = one[0] / one[1], other[0] / other[1]
     trials = [round(each) for each in worth]
     hits = [round(share * count) for share, count in zip(shares, trials, strict=True)]
@@ -163,7 +160,7 @@ def unpaired_shares(
     spread = np.sqrt(share * (1 - share) * (1 / worth[0] + 1 / worth[1]))
     return ShareDifference(
         estimate=shares[0] - shares[1],
-        interval=newcombe_unpaired(shares[0] * worth[0], worth[0], shares[1] * worth[1], worth[1]),
+        interval=newcombe((shares[0] * worth[0], worth[0]), (shares[1] * worth[1], worth[1])),
         p=float(stats.boschloo_exact(table).pvalue),
         paired=False,
         trials=(one[1], other[1]),
@@ -187,28 +184,27 @@ def newcombe_paired(both: float, only_first: float, only_second: float, neither:
         HandrailError: There are no pairs.
     """
     count = both + only_first + only_second + neither
-    low_1, high_1 = wilson(both + only_first, count)
-    low_2, high_2 = wilson(both + only_second, count)
-    share_1, share_2 = (both + only_first) / count, (both + only_second) / count
     phi = _correlation(both, only_first, only_second, neither)
-    below, above = (share_1 - low_1, high_2 - share_2), (high_1 - share_1, share_2 - low_2)
-    difference = share_1 - share_2
-    return difference - _combined(*below, phi), difference + _combined(*above, phi)
+    return newcombe((both + only_first, count), (both + only_second, count), phi)
 
 
-def newcombe_unpaired(successes_1: float, trials_1: float, successes_2: float, trials_2: float) -> Interval:
-    """Return the 95 % interval of the difference of two independent shares (method 10).
+def newcombe(first: tuple[float, float], second: tuple[float, float], phi: float = 0.0) -> Interval:
+    """Return the 95 % interval of the difference of two shares (method 10).
+
+    Args:
+        first: Successes and trials of the first.
+        second: Of the second.
+        phi: Correlation of the two; 0 where they are independent.
 
     Raises:
         HandrailError: No trials, or more successes than trials.
     """
-    low_1, high_1 = wilson(successes_1, trials_1)
-    low_2, high_2 = wilson(successes_2, trials_2)
-    share_1, share_2 = successes_1 / trials_1, successes_2 / trials_2
+    (low_1, high_1), (low_2, high_2) = wilson(*first), wilson(*second)
+    share_1, share_2 = first[0] / first[1], second[0] / second[1]
     difference = share_1 - share_2
     return (
-        difference - _combined(share_1 - low_1, high_2 - share_2, 0.0),
-        difference + _combined(high_1 - share_1, share_2 - low_2, 0.0),
+        difference - _combined(share_1 - low_1, high_2 - share_2, phi),
+        difference + _combined(high_1 - share_1, share_2 - low_2, phi),
     )
 
 

@@ -1,6 +1,6 @@
 """Intervals by resampling: of means, of differences, and of what is nested."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,44 +20,50 @@ def percentiles(resampled: FloatArray) -> Interval:
     return low, high
 
 
-def mean_interval(values: FloatArray, rng: np.random.Generator) -> Interval | None:
-    """Return the 95 % bootstrap interval of a mean (percentiles), or None for fewer than five values.
-
-    Args:
-        values: `(N,)`, finite.
-        rng: Of the resampling.
-    """
-    if len(values) < FEWEST:
-        return None
-    return bootstrap_mean(values, rng, RESAMPLES)
-
-
-def bootstrap_mean(values: FloatArray, rng: np.random.Generator, resamples: int) -> Interval:
+def bootstrap_mean(values: FloatArray, rng: np.random.Generator, resamples: int = 0) -> Interval:
     """Return the 95 % bootstrap interval of a mean (percentiles), however few values there are."""
-    found = stats.bootstrap((values,), np.mean, n_resamples=resamples, method="percentile", rng=rng)
+    return bootstrap((values,), np.mean, False, rng, resamples)
+
+
+def bootstrap(
+    samples: tuple[np.ndarray, ...],
+    statistic: Callable[..., FloatArray],
+    paired: bool,
+    rng: np.random.Generator,
+    resamples: int = 0,
+) -> Interval:
+    """Return the 95 % bootstrap interval (percentiles) of a statistic, which takes samples and an axis."""
+    count = resamples or RESAMPLES
+    found = stats.bootstrap(
+        samples, statistic, n_resamples=count, paired=paired, method="percentile", rng=rng
+    )
     return float(found.confidence_interval.low), float(found.confidence_interval.high)
 
 
-def p_of_difference(first: FloatArray, second: FloatArray, paired: bool, rng: np.random.Generator) -> float:
-    """Return the two-sided p of a difference of means by permutation; of paired ones by turning signs.
+def permutation_p(
+    samples: tuple[np.ndarray, np.ndarray],
+    statistic: Callable[..., FloatArray],
+    paired: bool,
+    rng: np.random.Generator,
+) -> float:
+    """Return the two-sided p of a statistic of two samples by permutation.
 
     Exact where there are no more than B permutations; else the smaller of #{d* ≤ d} and #{d* ≥ d}, each
     plus one, doubled, over B + 1 (Phipson & Smyth 2010).
 
     Args:
-        first: `(N,)`.
-        second: `(M,)`; the same trials where paired.
-        paired: Whether they are.
+        samples: `(N,)` and `(M,)`; of the same trials where paired.
+        statistic: Takes both samples and an axis.
+        paired: Whether pairs are swapped; else values change samples.
         rng: Of the permutations.
     """
     kind = "samples" if paired else "independent"
-    found = stats.permutation_test(
-        (first, second), _difference, permutation_type=kind, n_resamples=RESAMPLES, rng=rng
-    )
+    found = stats.permutation_test(samples, statistic, permutation_type=kind, n_resamples=RESAMPLES, rng=rng)
     return float(found.pvalue)
 
 
-def _difference(first: FloatArray, second: FloatArray, axis: int) -> FloatArray:
+def difference_of_means(first: FloatArray, second: FloatArray, axis: int) -> FloatArray:
+    """Return the mean of one sample minus that of the other."""
     return first.mean(axis=axis) - second.mean(axis=axis)
 
 

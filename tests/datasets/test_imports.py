@@ -15,7 +15,7 @@ def _run(code: str) -> str:
 
 
 @pytest.mark.parametrize(
-    "module", ["recording.writer", "recording.repair", "reading.reader", "quality.summary", "recording.pack"]
+    "module", ["recording.writer", "recording.repair", "reading.reader", "quality.summary"]
 )
 def test_nothing_heavy_is_imported(module):
     assert _run(f"import sys, handrail.datasets.{module}; print({HEAVY} & set(sys.modules))") == "set()"

@@ -1,14 +1,19 @@
 """Every quality metric has a golden value, closed-form or published, and laws that it keeps."""
 
+from pathlib import Path
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from handrail.datasets.quality import effort, idle, path, safety, tracking
-from handrail.datasets.quality.consistency import action_variance, state_coverage
-from handrail.datasets.quality.information import information
-from handrail.datasets.quality.missing import DoesNotApply
+from handrail.datasets.format.schema import Feature
+from handrail.datasets.quality import effort, motion, safety, tracking
+from handrail.datasets.quality.columns import ColumnNames
+from handrail.datasets.quality.consistency import action_variance, information, state_coverage
+from handrail.datasets.quality.demonstration import Demonstration, DoesNotApply
+from handrail.datasets.reading.reader import DatasetInfo
 
 NONE = np.empty(0, int)
 
@@ -17,45 +22,57 @@ def rng(seed=0):
     return np.random.default_rng(seed)
 
 
+def value(metric, pool=None, fps=10, **parts):
+    """Return a metric of an episode with these columns; entries of the same place have the same name."""
+    frames = {ColumnNames().choices(part)[0]: column for part, column in parts.items()}
+    features = {
+        name: Feature(str(column.dtype), column.shape[1:] or (1,), tuple("abc"[: column[0].size]))
+        for name, column in frames.items()
+    }
+    info = DatasetInfo(Path("one"), fps, "arm", features, 1, 1, "", "", from_handrail=True)
+    episode = Demonstration(0, info, frames, {"length": len(next(iter(frames.values())))})
+    return metric.measure(episode, SimpleNamespace(**(pool or {})))
+
+
 def test_half_a_circle_is_two_over_pi_efficient():
     angle = np.linspace(0.0, np.pi, 2001)
     half = np.column_stack([np.cos(angle), np.sin(angle)])
-    assert path.path_efficiency(half, NONE) == pytest.approx(2 / np.pi, rel=1e-6)
+    assert motion.path_efficiency(half, NONE) == pytest.approx(2 / np.pi, rel=1e-6)
 
 
 def test_phases_are_judged_one_by_one():
     corner = np.array([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [2.0, 1.0], [2.0, 2.0]])
-    assert path.path_efficiency(corner, NONE) == pytest.approx(np.sqrt(8) / 4)
-    assert path.path_efficiency(corner, np.array([2])) == pytest.approx(1.0)
+    assert motion.path_efficiency(corner, NONE) == pytest.approx(np.sqrt(8) / 4)
+    assert motion.path_efficiency(corner, np.array([2])) == pytest.approx(1.0)
 
 
 def test_out_and_back_is_not_zero():
     there = np.linspace([0.0, 0.0, 0.0], [1.0, 2.0, 3.0], 30)
     back = np.vstack([there, there[::-1]])
-    assert path.path_efficiency(back, NONE) == pytest.approx(0.0, abs=1e-12)
-    assert path.path_efficiency(back, path.farthest(back)) == pytest.approx(1.0)
+    assert motion.path_efficiency(back, NONE) == pytest.approx(0.0, abs=1e-12)
+    assert motion.path_efficiency(back, motion.farthest(back)) == pytest.approx(1.0)
 
 
 @given(st.integers(0, 10_000), st.integers(0, 5))
 def test_efficiency_is_a_share_and_more_phases_never_lower_it(seed, count):
     walk = np.cumsum(rng(seed).normal(size=(40, 3)), axis=0)
     boundaries = np.sort(rng(seed).choice(40, count, replace=False))
-    whole, parts = path.path_efficiency(walk, NONE), path.path_efficiency(walk, boundaries)
+    whole, parts = motion.path_efficiency(walk, NONE), motion.path_efficiency(walk, boundaries)
     assert 0.0 <= whole <= parts + 1e-12
     assert parts <= 1.0 + 1e-12
 
 
 def test_the_gripper_changes_where_it_is_sure():
     opening = np.array([0.5, 1.0, 0.7, 0.8, 0.4, 0.2, 0.6, 0.0, 0.9])
-    assert path.gripper_state(opening).tolist() == [1, 1, 1, 1, 1, 0, 0, 0, 1]
-    assert path.gripper_state(np.full(4, 0.3)).tolist() == [0, 0, 0, 0]
+    assert motion.gripper_state(opening).tolist() == [1, 1, 1, 1, 1, 0, 0, 0, 1]
+    assert motion.gripper_state(np.full(4, 0.3)).tolist() == [0, 0, 0, 0]
 
 
 def test_nothing_moves():
     with pytest.raises(DoesNotApply, match="nothing moves"):
-        path.path_efficiency(np.zeros((9, 3)), NONE)
+        motion.path_efficiency(np.zeros((9, 3)), NONE)
     with pytest.raises(DoesNotApply, match="nothing moves"):
-        idle.idle_share(np.zeros((99, 3)), 20.0, pruned=True)
+        value(motion.idle_pruned, fps=20, state=np.zeros((99, 3)))
 
 
 def test_idle_time_with_and_without_the_final_hold():
@@ -66,16 +83,16 @@ def test_idle_time_with_and_without_the_final_hold():
     """
     speed = np.repeat([1.0, 0.0, 1.0, 0.0], 44) / 22.0
     positions = np.concatenate([[0.0], np.cumsum(speed)])[:, None]
-    assert idle.idle_windows(positions, 22.0).sum() == 38 + 36
-    assert idle.idle_share(positions, 22.0, pruned=False) == pytest.approx(74 / 166)
-    assert idle.idle_share(positions, 22.0, pruned=True) == pytest.approx(38 / 130)
+    assert motion.idle_windows(positions, 22.0).sum() == 38 + 36
+    assert value(motion.idle_raw, fps=22, state=positions) == pytest.approx(74 / 166)
+    assert value(motion.idle_pruned, fps=22, state=positions) == pytest.approx(38 / 130)
 
 
 def test_small_tremor_is_idle_by_the_floor():
     tremor = 0.001 * rng().normal(size=(100, 3))
-    assert idle.idle_share(tremor, 20.0, pruned=False) == 1.0
+    assert value(motion.idle_raw, fps=20, state=tremor) == 1.0
     with pytest.raises(DoesNotApply, match="not longer than"):
-        idle.idle_share(tremor[:10], 20.0, pruned=False)
+        value(motion.idle_raw, fps=20, state=tremor[:10])
 
 
 def test_actions_that_do_not_depend_on_the_state_vary_by_their_dimension():
@@ -147,9 +164,9 @@ def test_more_noise_is_less_information():
 def test_tracking_error_is_against_the_next_state():
     states = np.cumsum(rng().normal(size=(50, 3)), axis=0)
     actions = np.vstack([states[1:], states[-1:]]) + [3.0, 4.0, 0.0]
-    assert tracking.tracking_error(actions, states) == pytest.approx(5.0)
+    assert value(tracking.tracking_error, action=actions, state=states) == pytest.approx(5.0)
     with pytest.raises(DoesNotApply):
-        tracking.tracking_error(actions[:1], states[:1])
+        value(tracking.tracking_error, action=actions[:1], state=states[:1])
 
 
 def test_a_clipped_sine_is_saturated_for_two_thirds():
@@ -160,60 +177,68 @@ def test_a_clipped_sine_is_saturated_for_two_thirds():
     low, high = np.array([-0.5, 0.0]), np.array([0.5, 0.0])
     share = 1.0 - 2.0 / np.pi * np.arcsin(0.5 - 0.005)
     assert share == pytest.approx(2 / 3, abs=5e-3)
-    assert tracking.saturation(action, low, high) == pytest.approx(share, abs=2e-3)
-    assert tracking.saturation(action[:, :1], low[:1], 2.0 * high[:1]) == pytest.approx(0.5 * share, abs=2e-3)
+    assert saturation(action, low, high) == pytest.approx(share, abs=2e-3)
+    assert saturation(action[:, :1], low[:1], 2.0 * high[:1]) == pytest.approx(0.5 * share, abs=2e-3)
     with pytest.raises(DoesNotApply, match="two values"):
-        tracking.saturation(action[:, 1:], low[1:], high[1:])
+        saturation(action[:, 1:], low[1:], high[1:])
 
 
 def test_touching_an_end_once_is_no_saturation():
     triangle = np.abs(np.linspace(-1.0, 1.0, 41))[:, None]
-    assert tracking.saturation(triangle, np.zeros(1), np.ones(1)) == 0.0
+    assert saturation(triangle, np.zeros(1), np.ones(1)) == 0.0
+
+
+def saturation(action, low, high):
+    return value(tracking.saturation, {"action_range": (low, high)}, action=action)
 
 
 def test_variation_ratio():
     states = rng().normal(size=(50, 2))
-    assert tracking.variation_ratio(states, states) == pytest.approx(1.0)
-    assert tracking.variation_ratio(-2.0 * states + 7.0, states) == pytest.approx(2.0)
+    assert value(tracking.variation_ratio, action=states, state=states) == pytest.approx(1.0)
+    assert value(tracking.variation_ratio, action=7.0 - 2.0 * states, state=states) == pytest.approx(2.0)
     with pytest.raises(DoesNotApply, match="never changes"):
-        tracking.variation_ratio(states, np.ones((50, 2)))
+        value(tracking.variation_ratio, action=states, state=np.ones((50, 2)))
 
 
 def test_safety():
     distance = np.array([0.5, 0.05, -0.02, np.nan, np.inf, 0.09, 0.11])
-    assert safety.smallest_distance(distance) == pytest.approx(-0.02)
-    assert safety.time_within(distance, 0.1, 10.0) == pytest.approx(0.3)
-    assert safety.contacts_begun(np.array([1, 1, 0, 2, 1, 3])) == 1 + 2 + 2
-    assert safety.contacts_begun(np.zeros(5)) == 0.0
-    assert safety.impulse(np.array([0.5, 0.0, 1.25])) == pytest.approx(1.75)
-    assert safety.slack_used(np.array([0.0, 0.2, 0.1])) == pytest.approx(0.2)
-    assert safety.slack_used(np.full(4, 1e-12)) == 0.0
+    assert value(safety.smallest_distance, distance=distance) == pytest.approx(-0.02)
+    assert value(safety.time_within_margin, {"margin": 0.1}, distance=distance) == pytest.approx(0.3)
+    assert value(safety.contacts, contacts=np.array([1, 1, 0, 2, 1, 3])) == 1 + 2 + 2
+    assert value(safety.contacts, contacts=np.zeros(5)) == 0.0
+    assert value(safety.impulse, impulse=np.array([0.5, 0.0, 1.25])) == pytest.approx(1.75)
+    assert value(safety.slack_used, slack=np.array([0.0, 0.2, 0.1])) == pytest.approx(0.2)
+    assert value(safety.slack_used, slack=np.full(4, 1e-12)) == 0.0
     with pytest.raises(DoesNotApply, match="finite"):
-        safety.smallest_distance(np.full(3, np.nan))
+        value(safety.smallest_distance, distance=np.full(3, np.nan))
+
+
+def steered(metric, inputs, scale):
+    return value(metric, {"input_scale": scale}, asked=inputs)
 
 
 def test_effort():
     """Golden at 10 Hz over 2 s: one axis at full deflection, one at a quarter, one never used."""
     inputs = np.column_stack([np.full(20, -1.0), np.full(20, 0.5), np.zeros(20)])
     scale = np.array([1.0, 2.0, 0.0])
-    assert effort.input_effort(inputs, scale, 10.0) == pytest.approx(2.0 + 0.5)
-    assert effort.active_axes(inputs, scale) == pytest.approx(2.0)
-    assert effort.input_reversals(inputs, scale) == 0.0
+    assert steered(effort.input_effort, inputs, scale) == pytest.approx(2.0 + 0.5)
+    assert steered(effort.active_axes, inputs, scale) == pytest.approx(2.0)
+    assert steered(effort.input_reversals, inputs, scale) == 0.0
     with pytest.raises(DoesNotApply, match="ever used"):
-        effort.input_effort(inputs, np.zeros(3), 10.0)
+        steered(effort.input_effort, inputs, np.zeros(3))
 
 
 def test_reversals_pass_over_the_dead_band():
     axis = np.array([1.0, 0.0, 1.0, -1.0, 0.01, -1.0, -0.01, 1.0])[:, None]
-    assert effort.input_reversals(axis, np.ones(1)) == 2.0
-    assert effort.active_axes(axis, np.ones(1)) == pytest.approx(5 / 8)
+    assert steered(effort.input_reversals, axis, np.ones(1)) == 2.0
+    assert steered(effort.active_axes, axis, np.ones(1)) == pytest.approx(5 / 8)
 
 
 def test_mode_switches():
     mode = np.array(["base", "base", "ee", "ee", "base", "base"])
     owned = np.array([[1, 0], [1, 0], [0, 1], [1, 1], [1, 0], [1, 0]], bool)
-    assert effort.mode_switches(mode, None) == 2.0
-    assert effort.mode_switches(None, owned) == 3.0
-    assert effort.mode_switches(mode, owned) == 3.0
+    assert value(effort.mode_switches, mode=mode) == 2.0
+    assert value(effort.mode_switches, owned=owned) == 3.0
+    assert value(effort.mode_switches, mode=mode, owned=owned) == 3.0
     with pytest.raises(DoesNotApply):
-        effort.mode_switches(None, None)
+        value(effort.mode_switches, state=np.zeros((6, 1)))

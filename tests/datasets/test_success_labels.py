@@ -10,6 +10,7 @@ from training_helpers import features, frame, tiny
 
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.comparison.groups import load_groups
+from handrail.datasets.format.manifest import Manifest
 from handrail.datasets.format.schema import Feature
 from handrail.datasets.quality.summary import summarize
 from handrail.datasets.reading.reader import read_episodes, read_info
@@ -23,7 +24,9 @@ OUTCOME = {"next.success": Feature("bool"), "next.done": Feature("bool")}
 def write(root, columns=True, outcome=OUTCOME):
     """Write episodes whose frames say how they ended, and whose lines of metadata may say so too."""
     rng = np.random.default_rng(0)
-    with EpisodeWriter.create(root, "handrail/test", 20, features() | outcome, "ridgeback_ur10") as writer:
+    with EpisodeWriter.create(
+        root, Manifest("handrail/test", 20, "ridgeback_ur10", features() | outcome)
+    ) as writer:
         for number, success in enumerate(SUCCESSES):
             for index in range(8):
                 last = index == 7

@@ -12,7 +12,7 @@ from handrail.controllers.errors import HandrailError
 from handrail.datasets.presentation.markdown import markdown_table, with_part
 from handrail.datasets.presentation.markup import page, section
 from handrail.datasets.presentation.table import Cell, Table
-from handrail.datasets.statistics.resampling import p_of_difference
+from handrail.datasets.statistics.resampling import difference_of_means, permutation_p
 
 TABLE = Table(
     ("who", "how much [m]"),
@@ -60,5 +60,7 @@ def test_the_p_of_a_few_values_counts_every_permutation():
     low, high = np.arange(4.0), np.arange(4.0) + 10.0
     for seed in range(3):
         rng = np.random.default_rng(seed)
-        assert p_of_difference(low, high, False, rng) == pytest.approx(2 / 70)  # of 8 over 4
-        assert p_of_difference(low, high, True, rng) == pytest.approx(2 / 16)
+        assert permutation_p((low, high), difference_of_means, False, rng) == pytest.approx(
+            2 / 70
+        )  # of 8 over 4
+        assert permutation_p((low, high), difference_of_means, True, rng) == pytest.approx(2 / 16)

@@ -13,6 +13,7 @@ os.environ["HF_HUB_OFFLINE"] = "1"
 os.environ.setdefault("HF_DATASETS_CACHE", str(Path(tempfile.gettempdir()) / "handrail-test-datasets"))
 
 from handrail.datasets.format.layout import Layout
+from handrail.datasets.format.manifest import Manifest
 from handrail.datasets.format.schema import Feature
 from handrail.datasets.recording.writer import EpisodeWriter
 
@@ -72,14 +73,18 @@ def record_one(writer: EpisodeWriter, cameras: bool) -> int:
     return writer.save_episode({"success": episode % 2 == 0, "failure_reason": None, "seed": episode})
 
 
+def _manifest(features) -> Manifest:
+    return Manifest(REPO, FPS, ROBOT, features, {"handrail": "0"})
+
+
 def create(root: Path, cameras: bool = False, features=None, **options) -> EpisodeWriter:
     features = features or (CAMERA_FEATURES if cameras else STATE_FEATURES)
-    return EpisodeWriter.create(root, REPO, FPS, features, ROBOT, {"handrail": "0"}, **options)
+    return EpisodeWriter.create(root, _manifest(features), **options)
 
 
 def resume(root: Path, cameras: bool = False, features=None) -> EpisodeWriter:
     features = features or (CAMERA_FEATURES if cameras else STATE_FEATURES)
-    return EpisodeWriter.resume(root, REPO, FPS, features, ROBOT, {"handrail": "0"})
+    return EpisodeWriter.resume(root, _manifest(features))
 
 
 def record(root: Path, episodes: int, cameras: bool = False, features=None) -> Path:

@@ -8,6 +8,7 @@ import numpy as np
 from handrail.collect.config import StoredConfig
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.robot.description import load_description
+from handrail.datasets.format.manifest import Manifest
 from handrail.datasets.format.schema import Feature
 from handrail.datasets.recording.frames import frame_features
 from handrail.datasets.recording.writer import EpisodeWriter
@@ -62,7 +63,9 @@ def write_dataset(
 ) -> Path:
     """Write episodes of random numbers; modes and successes as given, else `ee` and success."""
     rng = np.random.default_rng(0)
-    with EpisodeWriter.create(root, "handrail/test", FPS, features(cameras), "ridgeback_ur10") as writer:
+    with EpisodeWriter.create(
+        root, Manifest("handrail/test", FPS, "ridgeback_ur10", features(cameras))
+    ) as writer:
         for number, length in enumerate(lengths):
             for _ in range(length):
                 writer.add_frame(frame(rng, cameras), "reach")

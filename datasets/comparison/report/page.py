@@ -9,10 +9,15 @@ from handrail.datasets.comparison.findings import headline
 from handrail.datasets.comparison.groups import group_of
 from handrail.datasets.comparison.outcomes import Outcomes
 from handrail.datasets.comparison.report import tables
-from handrail.datasets.comparison.report.figures import answer_panels, colours
-from handrail.datasets.comparison.report.metric_figures import TURNED, effects_panels, metrics_panels
+from handrail.datasets.comparison.report.figures import (
+    TURNED,
+    answer_panels,
+    colours,
+    effects_panels,
+    metrics_panels,
+    trajectory_panels,
+)
 from handrail.datasets.comparison.report.pictures import first_pictures
-from handrail.datasets.comparison.report.trajectories import trajectory_panels
 from handrail.datasets.presentation.drawing import Panel, svg
 from handrail.datasets.presentation.markup import (
     card,
@@ -64,24 +69,24 @@ _TURNED = f" {TURNED}: less is better, so the metric is drawn the other way roun
 
 def report_page(comparison: Comparison, found: list[Finding]) -> str:
     """Return the page."""
-    parts = [*_first_screen(comparison, found), section("Findings", _findings(found))]
+    looks = ("caution" if f.kind == "caution" else "detected" if f.detected else "quiet" for f in found)
+    said = items(zip(looks, (f.text for f in found), strict=True))
+    parts = [*_first_screen(comparison, found), section("Findings", said)]
     if comparison.outcomes:
-        shown = (
-            tables.conditions_table(comparison.outcomes),
-            tables.outcome_differences_table(comparison.outcomes),
-        )
-        parts.append(section("Policies", *shown))
+        differences = tables.outcome_differences_table(comparison.outcomes)
+        parts.append(section("Policies", tables.conditions_table(comparison.outcomes), differences))
     parts += [
         section("What was collected", tables.collection_table(comparison.everything.collected)),
         section("Quality", *_quality(comparison)),
-        section("The same number, the same time", _matched_note(), tables.matched_table(comparison.views)),
         section("Trajectories", _drawn(trajectory_panels(comparison)), _pictures(comparison)),
     ]
     missing = tables.not_applicable_table(comparison)
     parts += [section("What does not apply, or is not comparable", missing)] if missing else []
+    meanings = items(("quiet", f"{metric.title}: {metric.meaning}.") for metric in METRICS)
     how = paragraph(_HOW), paragraph(_families(comparison))
-    parts.append(section("How to read this", *how, folded("What every metric means", _meanings())))
-    return page(_title(comparison), *parts, what=_what(comparison))
+    parts.append(section("How to read this", *how, folded("What every metric means", meanings)))
+    *first, last = comparison.labels
+    return page(f"{', '.join(first)} and {last}, compared", *parts, what=_what(comparison))
 
 
 def _drawn(shown: Iterable[Panel], look: str = "") -> str:
@@ -124,11 +129,6 @@ def _first_screen(comparison: Comparison, found: list[Finding]) -> list[str]:
     return [answer, cards(shown), figure]
 
 
-def _title(comparison: Comparison) -> str:
-    *first, last = comparison.labels
-    return f"{', '.join(first)} and {last}, compared"
-
-
 def _card(comparison: Comparison, each: Collected) -> str:
     rates, colour = comparison.rates[each.label], colours(comparison)[each.label]
     rate = number(each.successes_an_hour) + (f" ({span(rates)})" if rates else "")
@@ -153,16 +153,8 @@ def _policies(outcomes: Outcomes, label: str, labels: Sequence[str]) -> tuple[st
         return DASH, "no policy was evaluated"
     condition = min(mine, key=lambda condition: condition.label != label)
     whose = "" if condition.label == label else f" of {condition.label}"
-    return percent(
-        condition.share
-    ), f"policy success{whose}, {percent_span(condition.nested or condition.wilson)} (95 %)"
-
-
-def _findings(found: list[Finding]) -> str:
-    looks = [
-        ("caution" if f.kind == "caution" else "detected" if f.detected else "quiet", f.text) for f in found
-    ]
-    return items(looks)
+    interval = percent_span(condition.nested or condition.wilson)
+    return percent(condition.share), f"policy success{whose}, {interval} (95 %)"
 
 
 def _quality(comparison: Comparison) -> list[str | Table]:
@@ -173,16 +165,22 @@ def _quality(comparison: Comparison) -> list[str | Table]:
         paragraph(_EFFECTS + turned, "quiet"),
     ]
     parts += [tables.metrics_table(comparison, label) for label in comparison.success]
-    parts.append(paragraph(_QUALITY, "quiet"))
+    parts += [paragraph(_QUALITY, "quiet"), _matched(comparison)]
     return [*parts, _drawn(metrics_panels(comparison), "small")]
 
 
-def _matched_note() -> str:
-    text = (
-        "The first episodes of each, as many as the smallest has, or as fit into the shortest operator time:"
-        " where persons took turns, the last of them may be missing."
+def _matched(comparison: Comparison) -> str:
+    """Return how much of each group the views take."""
+    told = [
+        f"{view.title}: " + ", ".join(f"{each.label} {each.episodes}" for each in view.collected)
+        for view in comparison.views[1:]
+    ]
+    return paragraph(
+        "“Same number” and “same time” are of the first episodes of each, as many as the smallest has, or as"
+        " fit into the shortest operator time: where persons took turns, the last of them may be missing."
+        f" Episodes of {'; of '.join(told)}.",
+        "quiet",
     )
-    return paragraph(f"{text} The columns “same number” and “same time” above are of these.", "quiet")
 
 
 def _pictures(comparison: Comparison) -> str:
@@ -190,7 +188,3 @@ def _pictures(comparison: Comparison) -> str:
         return ""
     shown = [(group.label, gallery(first_pictures(group))) for group in comparison.everything.groups]
     return "".join(paragraph(label, "quiet") + pictures for label, pictures in shown if pictures)
-
-
-def _meanings() -> str:
-    return items(("quiet", f"{metric.title}: {metric.meaning}.") for metric in METRICS)

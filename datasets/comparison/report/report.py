@@ -14,6 +14,7 @@ from handrail.datasets.comparison.finding import Finding
 from handrail.datasets.comparison.findings import findings
 from handrail.datasets.comparison.report.page import report_page
 from handrail.datasets.quality.catalogue import METRICS
+from handrail.datasets.quality.measure import Measured
 from handrail.datasets.storage.atomic import write_whole
 from handrail.datasets.storage.csv_file import csv_text
 
@@ -84,16 +85,20 @@ def as_json(comparison: Comparison, found: list[Finding]) -> dict[str, Any]:
 def _view(view: View) -> dict[str, Any]:
     return {
         "collected": {
-            each.label: asdict(each)
-            | {"failure_share": each.failure_share, "successes_an_hour": each.successes_an_hour}
+            each.label: asdict(each) | {"successes_an_hour": each.successes_an_hour}
             for each in view.collected
         },
         "metrics": {
-            name: {label: asdict(mean) for label, mean in groups.items()}
-            for name, groups in view.means.items()
+            name: {label: _measured(each) for label, each in groups.items()}
+            for name, groups in view.measurements.values.items()
         },
         "differences": [_difference(each) for each in view.differences],
     }
+
+
+def _measured(each: Measured) -> dict[str, Any]:
+    numbers = {"count": len(each.known), "mean": each.mean, "interval": each.interval}
+    return numbers | {"reason": each.reason}
 
 
 def _difference(each: Difference) -> dict[str, Any]:
@@ -108,17 +113,14 @@ def _difference(each: Difference) -> dict[str, Any]:
 def _episode_rows(comparison: Comparison) -> list[dict[str, Any]]:
     """Return a row an episode: which, how it ended, every metric; empty where one does not apply."""
     view = comparison.everything
-    return [
-        {
-            "group": group.label,
-            "dataset": group.info.root.name,
-            "episode": episode.number,
-            "success": episode.success,
-        }
-        | {m.name: view.measurements.values[m.name][group.label].values[place] for m in METRICS}
-        for group in view.groups
-        for place, episode in enumerate(group.episodes)
-    ]
+    rows = []
+    for group in view.groups:
+        for place, episode in enumerate(group.episodes):
+            row = {"group": group.label, "dataset": group.info.root.name, "episode": episode.number}
+            row |= {"success": episode.success}
+            values = view.measurements.values
+            rows.append(row | {m.name: values[m.name][group.label].values[place] for m in METRICS})
+    return rows
 
 
 def _difference_rows(comparison: Comparison) -> list[dict[str, Any]]:

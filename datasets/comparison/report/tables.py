@@ -5,7 +5,6 @@ from collections.abc import Sequence
 from handrail.datasets.comparison.collection import Collected
 from handrail.datasets.comparison.compare import Comparison, View
 from handrail.datasets.comparison.differences import FOLLOWS, Difference
-from handrail.datasets.comparison.means import Mean
 from handrail.datasets.comparison.outcomes import ConditionOutcome, Outcomes
 from handrail.datasets.presentation.table import Cell, Table
 from handrail.datasets.presentation.wording import (
@@ -23,23 +22,16 @@ from handrail.datasets.presentation.wording import (
     signed,
     span,
 )
-from handrail.datasets.quality.catalogue import METRICS, Metric
+from handrail.datasets.quality.catalogue import METRICS
+from handrail.datasets.quality.measure import Measured
+from handrail.datasets.quality.metric import Metric
 
 _UNTESTED = "described, not tested: episodes share neighbours"
 
 
 def collection_table(collected: Sequence[Collected]) -> Table:
     """Return what each group consists of."""
-    headings = (
-        "",
-        "episodes",
-        "success",
-        "95 %",
-        "failures",
-        "operator time",
-        "successes / h",
-        "why not",
-    )
+    headings = ("", "episodes", "success", "95 %", "operator time", "successes / h", "why not")
     return Table(headings, [_collected(each) for each in collected])
 
 
@@ -50,29 +42,10 @@ def _collected(each: Collected) -> list[str]:
         str(each.episodes),
         percent(each.success),
         percent_span(each.success_interval),
-        percent(each.failure_share),
         duration(each.operator_time),
         number(each.successes_an_hour),
         reasons or DASH,
     ]
-
-
-def matched_table(views: Sequence[View]) -> Table:
-    """Return how much of each group the views take."""
-    headings = ("view", "", "episodes", "operator time", "successes", "frames")
-    rows = [
-        [
-            view.title if place == 0 else "",
-            each.label,
-            str(each.episodes),
-            duration(each.operator_time),
-            DASH if each.successes is None else str(each.successes),
-            str(each.frames),
-        ]
-        for view in views
-        for place, each in enumerate(view.collected)
-    ]
-    return Table(headings, rows)
 
 
 def conditions_table(outcomes: Outcomes) -> Table:
@@ -142,7 +115,7 @@ def metrics_table(comparison: Comparison, label: str) -> Table:
 
 
 def _metric(comparison: Comparison, metric: Metric, label: str) -> list[Cell | str]:
-    means = comparison.everything.means[metric.name]
+    means = comparison.everything.measurements.values[metric.name]
     one, other = means[label], means[comparison.baseline]
     if one.mean is None and other.mean is None:
         return []
@@ -176,7 +149,7 @@ def _of(view: View, metric: Metric, label: str) -> Difference:
     return found
 
 
-def _mean(mean: Mean) -> Cell:
+def _mean(mean: Measured) -> Cell:
     if mean.mean is None:
         return Cell("does not apply", "quiet", mean.reason)
     return Cell(number(mean.mean), below=span(mean.interval) if mean.interval else "")
@@ -196,7 +169,7 @@ def not_applicable_table(comparison: Comparison) -> Table | None:
     rows = []
     for metric in METRICS:
         reasons: dict[str, list[str]] = {}
-        for label, mean in comparison.everything.means[metric.name].items():
+        for label, mean in comparison.everything.measurements.values[metric.name].items():
             if mean.reason:
                 who = label if mean.mean is None else f"{label} (some episodes)"
                 reasons.setdefault(mean.reason, []).append(who)

@@ -14,8 +14,7 @@ from handrail.controllers.errors import HandrailError
 from handrail.datasets.format.schema import Feature
 from handrail.datasets.format.stats import column_stats
 from handrail.datasets.reading.check import check_whole
-from handrail.datasets.reading.labels import with_success
-from handrail.datasets.reading.reader import DatasetInfo, read_episodes, read_info, read_rows_of
+from handrail.datasets.reading.reader import DatasetInfo, read_episodes, read_info, read_rows_of, with_success
 from handrail.policies.imitation.config import TrainConfig
 from handrail.policies.imitation.interface.checkpoint import PolicyMeta
 from handrail.policies.imitation.interface.interface import COLUMNS, PolicyInterface

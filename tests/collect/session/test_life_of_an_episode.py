@@ -17,6 +17,7 @@ from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.command import Status
 from handrail.controllers.interface.intent import Intent
 from handrail.controllers.mpc.masked_mpc import MaskedMpc
+from handrail.datasets.format.manifest import Manifest
 from handrail.datasets.reading.reader import read_episodes, read_frames
 from handrail.datasets.recording.writer import EpisodeWriter
 
@@ -119,7 +120,7 @@ def test_a_late_operator_is_braked(env):
 
 @pytest.mark.parametrize("event", [DISCARD, RESTART])
 def test_what_is_not_kept_is_over_at_once(env, event, tmp_path):
-    with EpisodeWriter.create(tmp_path / "d", "x/d", 20, session_features(env), "robot") as writer:
+    with EpisodeWriter.create(tmp_path / "d", Manifest("x/d", 20, "robot", session_features(env))) as writer:
         recorder, person = Recorder(writer, "reach", {}), Person(env.model, {9: event}, {5: SUCCESS})
         session = Session(env, DirectController(env.model, env.period), person, [recorder])
         outcome = session.run(3)

@@ -1,5 +1,7 @@
 """What a comparison claims follows the data: not how many episodes, scenes or comparisons there were."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from compare_helpers import quick_and_slow
@@ -13,10 +15,11 @@ from handrail.datasets.comparison.evaluations import Condition, Policy
 from handrail.datasets.comparison.findings import findings
 from handrail.datasets.comparison.groups import Group
 from handrail.datasets.comparison.outcomes import LIKE_FOR_LIKE, Pair, in_families, judge, judge_pairs
+from handrail.datasets.format.schema import Feature
 from handrail.datasets.quality.catalogue import METRICS
+from handrail.datasets.quality.consistency import frames_of
 from handrail.datasets.quality.demonstration import Demonstration
 from handrail.datasets.quality.measure import measure
-from handrail.datasets.quality.neighbours import frames_of
 from handrail.datasets.reading.reader import DatasetInfo
 from handrail.datasets.statistics import resampling
 from handrail.datasets.statistics.paired import wilson
@@ -28,7 +31,11 @@ from handrail.datasets.statistics.proportions import (
 )
 
 OF_GROUP = [metric for metric in METRICS if metric.of_group]
-NAMES = {"observation.state": ("x", "y", "goal"), "action": ("v_x", "v_y")}
+FEATURES = {
+    "observation.state": Feature("float64", (3,), ("x", "y", "goal")),
+    "action": Feature("float64", (2,), ("v_x", "v_y")),
+}
+INFO = DatasetInfo(Path("one"), 20, "arm", FEATURES, 9, 450, "", "", from_handrail=False)
 
 
 def rng(*seed):
@@ -45,11 +52,11 @@ def episode(number, generator, **meta):
         "observation.state": np.hstack([state, np.full((count, 1), goal.sum())]),
         "action": np.gradient(state, axis=0),
     }
-    return Demonstration(number, 20.0, frames, NAMES, {"length": count, "tasks": ["go"], **meta})
+    return Demonstration(number, INFO, frames, {"length": count, "tasks": ["go"], **meta})
 
 
 def group(label, count, generator, **meta):
-    return Group(label, DatasetInfo, tuple(episode(k, generator, **meta) for k in range(count)))  # type: ignore[arg-type]
+    return Group(label, INFO, tuple(episode(k, generator, **meta) for k in range(count)))
 
 
 def compared(groups, generator):
@@ -60,8 +67,7 @@ def compared(groups, generator):
 @pytest.fixture
 def quick(monkeypatch):
     """Few resamples: what is tested here does not hang on the third digit of p."""
-    for module in ("statistics.resampling", "comparison.differences"):
-        monkeypatch.setattr(f"handrail.datasets.{module}.RESAMPLES", 400)
+    monkeypatch.setattr("handrail.datasets.statistics.resampling.RESAMPLES", 400)
     assert resampling.RESAMPLES == 400
 
 
@@ -93,7 +99,7 @@ def test_as_many_frames_stand_for_every_group(monkeypatch):
     generator = rng(4)
     groups = [group("few", 9, generator), group("many", 30, generator)]
     monkeypatch.setattr(
-        "handrail.datasets.quality.catalogue.consistency.state_coverage",
+        "handrail.datasets.quality.consistency.state_coverage",
         lambda points: seen.append(len(points)) or np.zeros(len(points)),
     )
     measure({each.label: each.episodes for each in groups}, generator, metrics=[metric])

@@ -14,15 +14,15 @@ from handrail.datasets.comparison.config import CompareConfig
 from handrail.datasets.comparison.differences import Difference
 from handrail.datasets.comparison.evaluations import FORMAT
 from handrail.datasets.comparison.findings import findings, headline
-from handrail.datasets.comparison.report.figures import answer_panels
-from handrail.datasets.comparison.report.metric_figures import (
+from handrail.datasets.comparison.report.figures import (
+    answer_panels,
     draw_effect,
     effects_panels,
     metrics_panels,
+    trajectory_panels,
     turned,
 )
 from handrail.datasets.comparison.report.page import report_page
-from handrail.datasets.comparison.report.trajectories import trajectory_panels
 from handrail.datasets.presentation.drawing import new_figure, short
 from handrail.datasets.quality.catalogue import METRICS
 
@@ -35,8 +35,7 @@ JUDGED = re.compile(r"\b(better|worse|best|worst)\b")
 def quick():
     """Few resamples: what is tested here does not hang on the third digit of p."""
     with pytest.MonkeyPatch.context() as patch:
-        for module in ("statistics.resampling", "comparison.differences", "comparison.productivity"):
-            patch.setattr(f"handrail.datasets.{module}.RESAMPLES", 500)
+        patch.setattr("handrail.datasets.statistics.resampling.RESAMPLES", 500)
         yield
 
 
@@ -106,7 +105,9 @@ def test_metrics_are_turned_so_that_right_is_better(alike):
         (axes,) = panel.figure.axes
         assert axes.xaxis_inverted() == ("↓" in panel.title)
     turned_round = {panel.title.split(" ↓")[0] for panel in metrics_panels(alike) if "↓" in panel.title}
-    applied = {m.title for m in METRICS if alike.everything.means[m.name][LONG[0]].mean is not None}
+    applied = {
+        m.title for m in METRICS if alike.everything.measurements.values[m.name][LONG[0]].mean is not None
+    }
     assert turned_round == applied & {metric.title for metric in METRICS if metric.good == "lower"}
 
 

@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,18 +12,20 @@ from handrail.datasets.comparison.compare import compare
 from handrail.datasets.comparison.config import CompareConfig
 from handrail.datasets.comparison.findings import findings
 from handrail.datasets.comparison.report.page import report_page
+from handrail.datasets.format.schema import Feature
 from handrail.datasets.quality.catalogue import METRICS
-from handrail.datasets.quality.demonstration import Demonstration, Source
+from handrail.datasets.quality.demonstration import Demonstration
 from handrail.datasets.quality.measure import measure
 from handrail.datasets.quality.units import why_not
+from handrail.datasets.reading.reader import DatasetInfo
 
 NAMES = ("a.pos", "b.pos", "c.pos")
-ARM = Source("one", "arm")
-OURS = Source("one", "ridgeback", from_handrail=True)
+ARM = DatasetInfo(Path("one"), 20, "arm", {}, 6, 240, "", "", from_handrail=False)
+OURS = replace(ARM, robot_type="ridgeback", from_handrail=True)
 ABSOLUTE = {"length", "smallest_distance", "contacts", "impulse", "time_within_margin", "mode_switches"}
 
 
-def group(source=ARM, names=NAMES, scale=1.0, fps=20.0, action=1.0, mode="", seed=0):
+def group(source=ARM, names=NAMES, scale=1.0, fps=20, action=1.0, mode="", seed=0):
     """Six episodes of an arm that follows its commands; `action` scales these against the state."""
     generator, found = np.random.default_rng(seed), []
     for number in range(6):
@@ -30,14 +33,13 @@ def group(source=ARM, names=NAMES, scale=1.0, fps=20.0, action=1.0, mode="", see
         frames = {"observation.state": state, "action": action * np.roll(state, -1, axis=0)}
         if mode:
             frames["teleop.mode"] = np.full(40, mode)
-        entries = {"observation.state": names, "action": names}
-        found.append(
-            Demonstration(number, fps, frames, entries, {"length": 40, "tasks": ["go"]}, source=source)
-        )
+        entry = Feature("float64", state.shape[1:], names)
+        info = replace(source, fps=fps, features={"observation.state": entry, "action": entry})
+        found.append(Demonstration(number, info, frames, {"length": 40, "tasks": ["go"]}))
     return found
 
 
-OTHER = replace(ARM, root="other")
+OTHER = replace(ARM, root=Path("other"))
 UNKNOWN = {
     "no names": (group(names=None), group(OTHER, names=None), "have no names"),
     "other names": (group(), group(OTHER, names=("x.pos", "y.pos", "z.pos")), "other entries in the"),
@@ -46,16 +48,23 @@ UNKNOWN = {
         group(OTHER, names=("pan", "lift", "elbow")),
         r"names in the .*pan, lift, elbow.* do not say whether it is positions or velocities",
     ),
-    "other robot": (group(), group(replace(OTHER, robot="leg")), r"robots are not known .*arm and leg"),
-    "no robot": (group(replace(ARM, robot="")), group(replace(OTHER, robot="")), "not recorded and not"),
+    "other robot": (group(), group(replace(OTHER, robot_type="leg")), r"robots are not known .*arm and leg"),
+    "no robot": (
+        group(replace(ARM, robot_type="")),
+        group(replace(OTHER, robot_type="")),
+        "not recorded and not",
+    ),
     "one of ours": (group(OURS), group(OTHER), "robots are not known"),
-    "other rate": (group(), group(OTHER, fps=50.0), "frame rates differ"),
+    "other rate": (group(), group(OTHER, fps=50), "frame rates differ"),
     "degrees": (group(), group(OTHER, scale=57.3), r"are 5\d times as large"),
 }
 KNOWN = {
     "one dataset": (group(names=None), group(names=None, scale=20.0, seed=1)),
     "the same robot": (group(), group(OTHER, scale=2.0, seed=1)),
-    "ours": (group(OURS, names=("pan",)), group(replace(OURS, root="other"), names=("pan",), scale=99.0)),
+    "ours": (
+        group(OURS, names=("pan",)),
+        group(replace(OURS, root=Path("other")), names=("pan",), scale=99.0),
+    ),
 }
 
 
@@ -63,7 +72,7 @@ KNOWN = {
 @pytest.mark.parametrize(("one", "other", "reason"), UNKNOWN.values(), ids=UNKNOWN)
 def test_what_is_not_known_to_be_the_same_is_not_compared(one, other, reason, needs):
     found = why_not(needs, one, other)
-    if needs == "pool" and one[0].names != other[0].names:
+    if needs == "pool" and one[0].entries("state") != other[0].entries("state"):
         reason = "different columns"
     assert re.search(reason, found), found
     assert why_not("", one, other) == ""
@@ -77,11 +86,12 @@ def test_what_is_known_to_be_the_same_is_compared(one, other, needs):
 
 def test_smoothness_needs_no_unit_where_both_are_a_tool_s():
     tool = ("tool.x", "tool.y", "tool.z")
-    one, other = group(names=tool), group(replace(OTHER, robot="leg"), names=(*tool, "elbow.pos"))
+    one, other = group(names=tool), group(replace(OTHER, robot_type="leg"), names=(*tool, "elbow.pos"))
     assert why_not("motion", one, other) == ""
     assert "other entries" in why_not("position", one, other)
     ours = [
-        group(replace(OURS, root=root), names=names) for root, names in (("a", tool), ("b", (*tool, "q")))
+        group(replace(OURS, root=Path(root)), names=names)
+        for root, names in (("a", tool), ("b", (*tool, "q")))
     ]
     assert why_not("position", *ours) == ""
 
@@ -89,7 +99,7 @@ def test_smoothness_needs_no_unit_where_both_are_a_tool_s():
 def test_commands_that_the_state_does_not_measure_alike():
     fast = group(action=20.0), group(OTHER, action=20.0)
     assert "commands and state differ 20 times" in why_not("action", *fast)
-    slow = group(replace(OURS, root="other"), fps=50.0)
+    slow = group(replace(OURS, root=Path("other")), fps=50)
     assert "a frame later" in why_not("action", group(OURS), slow)
     assert why_not("pool", group(OURS), slow) == ""
 
@@ -104,7 +114,11 @@ def test_every_metric_with_a_unit_of_its_dataset_says_what_that_hangs_on():
 
 
 def test_only_what_is_on_one_scale_is_pooled():
-    groups = {"a": group(), "b": group(OTHER, seed=1), "degrees": group(replace(ARM, root="c"), scale=57.3)}
+    groups = {
+        "a": group(),
+        "b": group(OTHER, seed=1),
+        "degrees": group(replace(ARM, root=Path("c")), scale=57.3),
+    }
     found = measure(groups, np.random.default_rng(0))
     assert found.pools == {"a": 0, "b": 0, "degrees": 1}
 

@@ -22,6 +22,7 @@ from datasets_helpers import (
 
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.format import video
+from handrail.datasets.format.manifest import Manifest
 from handrail.datasets.format.schema import Feature
 from handrail.datasets.recording.repair import repair
 from handrail.datasets.recording.writer import EpisodeWriter
@@ -121,7 +122,7 @@ def test_a_really_full_disk(tmp_path):
     noise = np.random.default_rng(0).integers(0, 255, (96, 96, 3), dtype=np.uint8)
     try:
         saved, failed = [], 0
-        with EpisodeWriter.create(disk / "set", REPO, 30, features, ROBOT) as writer:
+        with EpisodeWriter.create(disk / "set", Manifest(REPO, 30, ROBOT, features)) as writer:
             while failed < 3:
                 for _ in range(6):
                     writer.add_frame({"observation.state": np.zeros(2), CAMERAS[0]: noise}, "fill the disk")

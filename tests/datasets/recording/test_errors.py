@@ -66,7 +66,7 @@ def test_an_empty_folder_is_fine(tmp_path):
 )
 def test_nothing_is_created_for_a_wrong_argument(tmp_path, change, words):
     arguments = {"repo_id": REPO, "fps": FPS, "features": STATE_FEATURES, "robot_type": ROBOT} | change
-    _fails(lambda: EpisodeWriter.create(tmp_path / "set", **arguments), *words)
+    _fails(lambda: EpisodeWriter.create(tmp_path / "set", Manifest(**arguments)), *words)
     assert not list(tmp_path.iterdir())
 
 
@@ -114,7 +114,7 @@ def test_resume_refuses_another_schema(tmp_path, change, words):
     Layout(root).info.write_bytes(b"{torn")  # refused before anything is repaired
     before = tree(root)
     arguments = {"repo_id": REPO, "fps": FPS, "features": STATE_FEATURES, "robot_type": ROBOT} | change
-    _fails(lambda: EpisodeWriter.resume(root, **arguments), "--resume: cannot add to", *words)
+    _fails(lambda: EpisodeWriter.resume(root, Manifest(**arguments)), "--resume: cannot add to", *words)
     assert tree(root) == before
 
 

@@ -44,7 +44,7 @@ def test_what_lerobot_encoded_anew_is_whole(root):
     info = json.loads(Layout(root).info.read_bytes())["features"][CAMERAS[0]]["info"]
     assert info["video.crf"] == 35
     with resume(root, cameras=True) as writer:
-        assert "whole, but not as they were saved: videos/" in str(writer.repaired)
+        assert "whole, but as another tool wrote them: videos/" in str(writer.repaired)
         assert record_one(writer, cameras=True) == 4
     assert json.loads(Layout(root).info.read_bytes())["features"][CAMERAS[0]]["info"] == info
     checked = command("--dataset.root", root, "--check", name="inspect")

@@ -15,6 +15,7 @@ from handrail.collect.session.recorded_settings import recorded_settings, settin
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.command import Diagnostics, Status
 from handrail.controllers.interface.intent import Intent, RawInput
+from handrail.datasets.format.manifest import Manifest
 from handrail.datasets.format.schema import check_frame
 from handrail.datasets.quality.summary import summarize
 from handrail.datasets.reading.reader import read_episodes, read_frames, read_info
@@ -165,7 +166,7 @@ def older(masked, tmp_path_factory):
     names = ("timestamp", "frame_index", "episode_index", "index", "task_index", *NEW)
     features = {key: feature for key, feature in info.features.items() if key not in names}
     kept = ("environment", "robot", "operator", "noise", "person", "success", "failure_reason", "seed")
-    with EpisodeWriter.create(root, "handrail/demo", info.fps, features, info.robot_type) as writer:
+    with EpisodeWriter.create(root, Manifest("handrail/demo", info.fps, info.robot_type, features)) as writer:
         for row in read_episodes(masked):
             columns = read_frames(masked, row["episode_index"], list(features))
             columns["controller.work_distance"][:] = np.inf

@@ -24,7 +24,6 @@ from datasets_helpers import (
 )
 
 from handrail.datasets.reading.reader import read_episodes, read_frames
-from handrail.datasets.recording.pack import pack
 
 EPISODES = 5
 
@@ -180,18 +179,3 @@ def test_resuming_goes_on_where_it_stopped(tmp_path):
     for path in sorted(whole.rglob("*.*")):
         if path.is_file():
             assert path.read_bytes() == (parts / path.relative_to(whole)).read_bytes(), path
-
-
-def test_a_packed_copy_reads_the_same(root, dataset, tmp_path):
-    pack(root, tmp_path / "packed")
-    packed: Any = open_with_lerobot(tmp_path / "packed")
-    assert len(list((tmp_path / "packed").glob("data/*/*.parquet"))) == 1
-    assert len(packed) == len(dataset)
-    check_pictures(packed, range(0, len(packed), 5))
-    for episode in range(EPISODES):
-        ours, theirs = dataset.meta.episodes[episode], packed.meta.episodes[episode]
-        assert {k for k in ours if ours[k] != theirs[k]} <= {"data/file_index", "meta/episodes/file_index"}
-    assert (
-        packed.hf_dataset[7]["observation.state"].tolist()
-        == dataset.hf_dataset[7]["observation.state"].tolist()
-    )

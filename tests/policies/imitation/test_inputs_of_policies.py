@@ -7,6 +7,7 @@ import pytest
 from training_helpers import tiny
 
 from handrail.controllers.errors import HandrailError
+from handrail.datasets.format.manifest import Manifest
 from handrail.datasets.format.schema import Feature
 from handrail.datasets.recording.writer import EpisodeWriter
 from handrail.policies.imitation.training.training import train
@@ -41,7 +42,7 @@ def write(root, keys):
     """Write a dataset with these columns and nothing else, as any recorder might."""
     vector, camera = Feature("float32", (2,), ("a.pos", "b.pos")), Feature("video", (32, 48, 3))
     features = {key: camera if key == PICTURES else vector for key in keys}
-    with EpisodeWriter.create(root, "any/body", 20, features, "so101") as writer:
+    with EpisodeWriter.create(root, Manifest("any/body", 20, "so101", features)) as writer:
         for index in range(12):
             frame = {key: np.full(2, index / 12) for key in keys}
             frame |= {key: np.full((32, 48, 3), 20 * index, np.uint8) for key in keys if key == PICTURES}

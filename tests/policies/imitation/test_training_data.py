@@ -20,10 +20,11 @@ def another_tool_s(root, keys, cameras=False):
     """Write a dataset that is not Handrail's; return its root."""
     from datasets_helpers import CAMERA_FEATURES, frame_of
 
+    from handrail.datasets.format.manifest import Manifest
     from handrail.datasets.recording.writer import EpisodeWriter
 
     features = {key: feature for key, feature in CAMERA_FEATURES.items() if key.startswith(keys)}
-    with EpisodeWriter.create(root, "a/b", 30, features, "testbot") as writer:
+    with EpisodeWriter.create(root, Manifest("a/b", 30, "testbot", features)) as writer:
         for index in range(8):
             writer.add_frame({key: frame_of(0, index, cameras)[key] for key in features}, "lift")
         writer.save_episode({})

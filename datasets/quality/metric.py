@@ -1,0 +1,53 @@
+"""A quality metric: what it is called, its unit, what it means, and how it is measured."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from handrail.controllers.arrays import FloatArray
+from handrail.datasets.quality.demonstration import Demonstration
+from handrail.datasets.quality.pool import Pool
+from handrail.datasets.quality.units import Needs
+
+OfEpisode = Callable[[Demonstration, Pool], float]
+OfGroup = Callable[[Sequence[Demonstration], Pool, np.random.Generator], FloatArray]
+
+
+@dataclass(frozen=True)
+class Metric:
+    """A measure of quality.
+
+    Attributes:
+        name: Its name in JSON and CSV.
+        title: What people call it.
+        unit: Of its values; "" for a pure number.
+        good: "higher" or "lower" where everything else being equal that is better; "" where it is not so.
+        meaning: One sentence.
+        needs: What its unit hangs on, see `units.why_not`; "" where it has a unit of its own.
+        measure: Its value for one episode, or None.
+        measure_group: Its values for all episodes of a group, for what needs the others; or None. Such values
+            depend on how many episodes there are and, through the neighbours they share, on each other.
+    """
+
+    name: str
+    title: str
+    unit: str
+    good: str
+    meaning: str
+    needs: Needs = ""
+    measure: OfEpisode | None = None
+    measure_group: OfGroup | None = None
+
+    @property
+    def of_group(self) -> bool:
+        """Whether an episode's value depends on the other episodes of its group."""
+        return self.measure_group is not None
+
+
+def metric(
+    name: str, unit: str, good: str, meaning: str, needs: Needs = "", title: str = ""
+) -> Callable[[OfEpisode], Metric]:
+    """Return what makes a metric of the function that measures it; its title is its name if not given."""
+    called = title or name.replace("_", " ")
+    return lambda measure: Metric(name, called, unit, good, meaning, needs, measure)
