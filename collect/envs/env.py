@@ -142,13 +142,15 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             HandrailError: `reset` was not called, or there are no physics.
         """
         if not isinstance(self._present, Simulation):
-            raise HandrailError(f"environment {self.task.name}: expected physics, got an ideal robot")
+            raise HandrailError(
+                f"environment {type(self.task).__name__}: expected physics, got an ideal robot"
+            )
         return self._present
 
     @property
     def _present(self) -> Plant:
         if self._plant is None:
-            raise HandrailError(f"environment {self.task.name}: call reset() before anything else")
+            raise HandrailError(f"environment {type(self.task).__name__}: call reset() before anything else")
         return self._plant
 
     @property
@@ -159,7 +161,7 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             HandrailError: `reset` was not called.
         """
         if self._episode is None:
-            raise HandrailError(f"environment {self.task.name}: call reset() before anything else")
+            raise HandrailError(f"environment {type(self.task).__name__}: call reset() before anything else")
         return self._episode
 
     def state(self) -> State:
@@ -198,6 +200,7 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         super().reset(seed=seed)
         episode: Episode = (options or {}).get("episode") or self.task.sample(self.model, self.np_random)
         meshes = bool(self.cameras or self.render_mode)
+        self.close()
         self._plant = self._build(
             self.model, episode.scene, episode.q, self.period, meshes=meshes, grip=episode.grip
         )
@@ -250,7 +253,7 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         if use not in self._painters:
             size, quality = (self.image_size, FAST) if use == "pixels" else (self.render_size, PRETTY)
             self._painters[use] = Painter(now.mujoco_model, size, quality)
-        return self._painters[use].paint(now.mujoco_model, now.data, camera)
+        return self._painters[use].paint(now.data, camera)
 
     def close(self) -> None:
         """Give the OpenGL contexts back."""

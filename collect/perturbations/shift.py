@@ -32,11 +32,6 @@ class ShiftedTask:
     size: float
 
     @property
-    def name(self) -> str:
-        """Of the task."""
-        return self.task.name
-
-    @property
     def description(self) -> str:
         """What the operator is asked to do."""
         return self.task.description

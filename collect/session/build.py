@@ -8,7 +8,6 @@ import numpy as np
 from handrail.collect.config import SessionConfig, check_fps
 from handrail.collect.envs.env import RENDER_SIZE, HandrailEnv
 from handrail.collect.operators.catalogue import OPERATORS
-from handrail.collect.operators.leaving import leaving
 from handrail.collect.operators.modes import MODES, TeleopMode, always
 from handrail.collect.operators.operator import Operator
 from handrail.collect.session.session import Observer, Session
@@ -121,7 +120,7 @@ def build_mode(config: SessionConfig, model: RobotModel) -> TeleopMode:
         mode = TeleopMode(config.mode_name, always(*names), mode.controller, "a mask of one's own")
     if not CONTROLLERS.find(mode.controller).objectives:
         return mode
-    return leaving(mode, task.left, task.minded)
+    return mode.leaving(task.left, task.minded)
 
 
 def _masked(mask: str, channels: Channels) -> tuple[str, ...]:

@@ -15,9 +15,8 @@ import numpy as np
 
 from handrail.collect.envs.env import HandrailEnv
 from handrail.collect.operators.operator import EpisodeEvent, Operator, View
-from handrail.collect.session.driver import Driver
+from handrail.collect.session.driver import Driver, Rate
 from handrail.collect.session.outcome import Outcome, Tally
-from handrail.collect.session.rates import Rate
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import Controller
 from handrail.controllers.interface.intent import Intent
@@ -198,8 +197,7 @@ class Session:
         return commanded is not None and not commanded.any()
 
     def _view(self) -> View:
-        task = self.env.task_state()
-        return View(self.env.robot.state(), task.tool, task.opening, task, self._observation)
+        return View(self.env.robot.state(), self.env.task_state(), self._observation)
 
 
 def _lasting(first: Frame, last: Frame) -> Frame:

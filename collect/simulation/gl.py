@@ -79,13 +79,11 @@ type MjsBody = Any
 type MjsGeom = Any
 type MjModel = Any
 type MjData = Any
-type MjrContext = Any
 
 __all__ = [
     "MjData",
     "MjModel",
     "MjSpec",
-    "MjrContext",
     "MjsBody",
     "MjsGeom",
     "choose_backend",

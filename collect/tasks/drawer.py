@@ -21,14 +21,12 @@ class Drawer:
     There is no failure but running out of time.
 
     Attributes:
-        name: of the task.
         description: what the operator is asked to do.
         horizon: time limit [s].
         opening: how far the drawer has to be open [m]; it opens 0.35 m.
         retreat: least distance of the tool point from the handle at the end [m].
     """
 
-    name: str = "Drawer"
     description: str = "Pull the drawer open by its handle."
     horizon: float = 60.0
     opening: float = 0.20

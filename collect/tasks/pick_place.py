@@ -26,14 +26,12 @@ class PickPlace:
     Failure: the cube on the floor.
 
     Attributes:
-        name: of the task.
         description: what the operator is asked to do.
         horizon: time limit [s].
         clearance: between the robot's start and anything on the floor, and between obstacles [m].
         retreat: least distance of the tool point from the cube at the end [m].
     """
 
-    name: str = "PickPlace"
     description: str = "Pick up the cube and put it into the bin on the other table."
     horizon: float = 90.0
     clearance: float = 0.15

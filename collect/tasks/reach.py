@@ -24,7 +24,6 @@ class Reach:
     Success at the first moment with `d_p ≤ 0.1 m` and `d_r = 1 − ⟨q, g⟩² ≤ 0.05`.
 
     Attributes:
-        name: of the task.
         description: what the operator is asked to do.
         horizon: time limit [s].
         position_tolerance: largest d_p [m].
@@ -32,7 +31,6 @@ class Reach:
         moving_obstacles: how many cylinders cross the robot's way; goals are the same with and without.
     """
 
-    name: str = "Reach"
     description: str = "Move the gripper to the goal frame."
     horizon: float = 30.0
     position_tolerance: float = POSITION_TOLERANCE

@@ -103,11 +103,6 @@ class Task(Protocol):
     """A task; a frozen dataclass in its own file, with one entry in `handrail.collect.tasks.catalogue`."""
 
     @property
-    def name(self) -> str:
-        """A short name, as in `Reach`."""
-        ...
-
-    @property
     def description(self) -> str:
         """One sentence: what to do; LeRobot's `task` string."""
         ...

@@ -36,14 +36,12 @@ class Tray:
     Failure: the can fell off or over; the tray dropped.
 
     Attributes:
-        name: of the task.
         description: what the operator is asked to do.
         horizon: time limit [s].
         clearance: between the robot's start and anything on the floor, and between obstacles [m].
         retreat: least distance of the tool point from the handle at the end [m].
     """
 
-    name: str = "Tray"
     description: str = "Carry the tray to the table and put it down without spilling the can."
     horizon: float = 90.0
     clearance: float = 0.15

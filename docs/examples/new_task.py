@@ -20,7 +20,6 @@ from handrail.controllers.arrays import FloatArray
 class TouchBall:
     """Bring the tip of the hand within 3 cm of a ball that hangs in front of the robot."""
 
-    name: str = "TouchBall"
     description: str = "Touch the ball."
     horizon: float = 20.0  # [s]
     state_names: tuple[str, ...] = ("ball.x", "ball.y", "ball.z")

@@ -24,7 +24,6 @@ from handrail.controllers.robot.model import Pose
 class Press:
     """Bring the tool within 4 cm of a button near it."""
 
-    name: str = "Press"
     description: str = "Press the button."
     horizon: float = 20.0
     state_names: tuple[str, ...] = ("button.x", "button.y", "button.z")

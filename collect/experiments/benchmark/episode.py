@@ -83,8 +83,6 @@ def _aim(baseline: Baseline, controller: Controller, goal: Goal) -> None:
 class _Planner:
     """The planner behind a command profile: sends a message a step, of which the profile delivers some."""
 
-    name = "planner"
-
     def __init__(
         self,
         conditions: Conditions,
@@ -134,7 +132,6 @@ class _Task:
 
     conditions: Conditions
     planner: _Planner
-    name: str = "GoalReaching"
     description: str = "Reach the goal."
     horizon: float = (T_MAX - 0.5) * STEP
     state_names: tuple[str, ...] = ()

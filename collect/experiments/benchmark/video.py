@@ -98,7 +98,7 @@ def _panel(
     """Return the picture of a run at a step, over a bar that says who it is and how far from the goal."""
     index = min(step, len(trace.q) - 1)
     simulation.show(trace.q[index])
-    picture = painter.paint(simulation.mujoco_model, simulation.data, "scene")
+    picture = painter.paint(simulation.data, "scene")
     d_p, d_r = trace.errors[max(index - 1, 0)]
     height, width, _ = picture.shape
     image = Image.new("RGB", (width, height + _BAR), (24, 26, 30))

@@ -88,7 +88,6 @@ class ShowcaseTask:
     """A task without a goal: the case's beginning, over after its time."""
 
     case: Case
-    name: str = "Showcase"
     state_names: tuple[str, ...] = ()
 
     @property
@@ -122,11 +121,6 @@ class CaseOperator:
         channels = Channels.of(model.description)
         self._mask = channels.mask(*case.channels)
         self._index = [channels.names.index(name) for name in case.channels]
-
-    @property
-    def name(self) -> str:
-        """Who steers."""
-        return "showcase"
 
     def reset(self, view: View, rng: np.random.Generator) -> None:
         """Begin."""

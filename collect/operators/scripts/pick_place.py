@@ -4,10 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from handrail.collect.operators.human.motion_goal import MotionGoal
-from handrail.collect.operators.human.steering import Gains, pose_errors
+from handrail.collect.operators.human.steering import pose_errors
 from handrail.collect.operators.operator import View
-from handrail.collect.operators.scripts.phases import Phase, PhaseRunner
+from handrail.collect.operators.scripts.phases import Phase, PhasedScript, from_phase
 from handrail.collect.operators.scripts.route import Route, front_edge
 from handrail.collect.simulation.scene import SceneObject
 from handrail.controllers.arrays import FloatArray
@@ -28,40 +27,18 @@ class _Place:
     thing: FloatArray
 
 
-class PickPlaceScript:
-    """Approach, grasp, lift, carry, place for `handrail/PickPlace-v0`; a script.
+class PickPlaceScript(PhasedScript):
+    """Approach, grasp, lift, carry, place for `handrail/PickPlace-v0`; a script."""
 
-    Args:
-        model: of the robot.
-        gains: of the operator.
-        drives: whether the operator drives the base by itself between the places (switching).
-    """
-
-    def __init__(self, model: RobotModel, gains: Gains, drives: bool) -> None:
-        self._model = model
-        self._gains = gains
-        self._drives = drives
-        self._runner = PhaseRunner(gains, self._redo)
-
-    def reset(self, view: View) -> None:
-        """Look at the scene and plan."""
-        self._runner.start(self._phases(view), view.state.time)
-
-    def motion_goal(self, view: View) -> MotionGoal:
-        """Return what is wanted now."""
-        return self._runner.motion_goal(view)
-
-    def _redo(self, view: View, name: str) -> int | None:
+    def replan(self, view: View, name: str) -> list[Phase] | None:
         """Grasp again when the cube stayed behind."""
         cube = view.task.pose("cube").position
         if name != "lift" or np.linalg.norm(cube - view.tool.position) < _HELD:
             return None
-        phases = self._phases(view)
-        index = next(i for i, phase in enumerate(phases) if phase.name == "above")
-        self._runner.start(phases, view.state.time, index)
-        return index
+        return from_phase(self.plan(view), "above")
 
-    def _phases(self, view: View) -> list[Phase]:
+    def plan(self, view: View) -> list[Phase]:
+        """Return the way to the cube, over to the bin, and what is done at both."""
         task = view.task
         self._route = Route(self._model, task)
         cube = task.pose("cube")
@@ -102,15 +79,11 @@ class PickPlaceScript:
         width = float(cube.shape.size[0]) * (np.cos(_ALIGNED) + np.sin(_ALIGNED))
         return _NEAR if gripper is None else max(_NEAR, (gripper.stroke - width) / 2)
 
-    def _height(self) -> float:
-        """Return how high the tool point is above the middle of a cube that the fingers close around [m]."""
-        return round(tips_beyond_tool(self._model) - _BELOW, 6)
-
     def _pick(self, pick: _Place, down: FloatArray, room: float) -> list[Phase]:
         """Go above the cube, down until it is between the fingers, close them, lift."""
         cube, base = pick.thing, self._stand(pick)
         stage = np.array([pick.edge - 0.15, cube[1], cube[2] + 0.30])
-        grasp = _above(cube, self._height())
+        grasp = _above(cube, round(tips_beyond_tool(self._model) - _BELOW, 6))
 
         def phase(name: str, position: FloatArray, **options: float) -> Phase:
             return Phase(name, Pose(position, down), base, **options)  # type: ignore[arg-type]

@@ -107,8 +107,6 @@ class Meeting(Reach):
 class Idle:
     """Touches nothing."""
 
-    name = "idle"
-
     def reset(self, view, rng):
         self._channels = Channels.of(MODEL.description)
 
