@@ -11,7 +11,7 @@ from gymnasium import spaces
 from gymnasium.envs.registration import load_env_creator
 from numpy.typing import ArrayLike, NDArray
 
-from handrail.collect.envs.observation import AgentObservation, bounded, box_space, image_space
+from handrail.collect.envs.observation import AgentObservation, bounded, box_space
 from handrail.collect.simulation.protocols import Plant, Robot, World
 from handrail.collect.simulation.rendering import CAMERAS, FAST, PRETTY, Painter
 from handrail.collect.simulation.simulation import Simulation
@@ -42,6 +42,7 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         image_size: height and width of `pixels` [px].
         render_mode: `rgb_array` or None.
         render_size: height and width of what `render` returns [px].
+        sample: draws how an episode begins, `(model, rng)`, instead of the task.
         observes: whether there is anything in observations; without, steps are quicker.
 
     Attributes:
@@ -68,6 +69,7 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         image_size: tuple[int, int] = (128, 128),
         render_mode: str | None = None,
         render_size: tuple[int, int] = RENDER_SIZE,
+        sample: Callable[[RobotModel, np.random.Generator], Episode] | None = None,
         observes: bool = True,
     ) -> None:
         _check(fps, cameras, render_mode)
@@ -81,14 +83,14 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self.metadata = {**type(self).metadata, "render_fps": fps}
         self._max_episode_steps = math.ceil(self.task.horizon * fps)
         self._build, self._observes = plant, observes
+        self._sample = sample or self.task.sample
         self._agent = AgentObservation(self.model)
         self.agent_names = self._agent.names
         self.state_names = self.task.state_names
         self.action_space = self._action_space()
         self.observation_space = self._observation_space()
         self._painters: dict[str, Painter] = {}
-        self._episode: Episode | None = None
-        self._plant: Plant | None = None
+        self._begun: tuple[Episode, Plant] | None = None
         self._steps = 0
 
     def _action_space(self) -> spaces.Space[Any]:
@@ -103,7 +105,8 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             "environment_state": box_space(len(self.state_names)),
         }
         if self.cameras:
-            parts["pixels"] = spaces.Dict({camera: image_space(*self.image_size) for camera in self.cameras})
+            picture = spaces.Box(0, 255, (*self.image_size, 3), np.uint8)
+            parts["pixels"] = spaces.Dict(dict.fromkeys(self.cameras, picture))
         return spaces.Dict(parts)
 
     @property
@@ -149,9 +152,13 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
 
     @property
     def _present(self) -> Plant:
-        if self._plant is None:
+        return self._now[1]
+
+    @property
+    def _now(self) -> tuple[Episode, Plant]:
+        if self._begun is None:
             raise HandrailError(f"environment {type(self.task).__name__}: call reset() before anything else")
-        return self._plant
+        return self._begun
 
     @property
     def episode(self) -> Episode:
@@ -160,9 +167,7 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         Raises:
             HandrailError: `reset` was not called.
         """
-        if self._episode is None:
-            raise HandrailError(f"environment {type(self.task).__name__}: call reset() before anything else")
-        return self._episode
+        return self._now[0]
 
     def state(self) -> State:
         """Return the measured positions, velocities and time, and the velocity sent last."""
@@ -184,7 +189,7 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             opening=now.opening,
             episode=self.episode,
             poses=now.poses(),
-            twists=now.twists(),
+            still=now.still(),
             stable=now.is_stable,
         )
 
@@ -198,13 +203,13 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             options: `episode`: an `Episode` to begin with instead of a sampled one.
         """
         super().reset(seed=seed)
-        episode: Episode = (options or {}).get("episode") or self.task.sample(self.model, self.np_random)
+        episode: Episode = (options or {}).get("episode") or self._sample(self.model, self.np_random)
         meshes = bool(self.cameras or self.render_mode)
         self.close()
-        self._plant = self._build(
+        plant = self._build(
             self.model, episode.scene, episode.q, self.period, meshes=meshes, grip=episode.grip
         )
-        self._episode = episode
+        self._begun = episode, plant
         self._steps = 0
         state = self.task_state()
         rest = np.append(np.zeros(self.model.size), float(episode.grip is not None)).astype(np.float32)

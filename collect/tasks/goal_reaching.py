@@ -10,6 +10,7 @@ from handrail.controllers.arrays import FloatArray, frozen
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.numerics.jit import exact_jit
 from handrail.controllers.numerics.rotation import rotation_vector
+from handrail.controllers.robot.model import Pose
 
 STEP = 0.03  # of the simulation [s]
 T_MAX = 1000  # longest episode [steps]
@@ -21,28 +22,15 @@ _SPEED = 0.08  # of the planner over long distances [m/s]
 _LOWER, _UPPER = (-1.0, -1.0, 0.7), (1.0, 1.0, 1.0)  # of goals [m]
 
 
-@dataclass(frozen=True)
-class Goal:
-    """A pose of the tool to reach: position (3,) [m], rotation world from tool (3, 3)."""
-
-    position: FloatArray
-    rotation: FloatArray
-
-    def __post_init__(self) -> None:
-        """Copy the arrays and make them read-only."""
-        object.__setattr__(self, "position", frozen(self.position))
-        object.__setattr__(self, "rotation", frozen(self.rotation))
-
-
-def sample_goal(rng: np.random.Generator) -> Goal:
+def sample_goal(rng: np.random.Generator) -> Pose:
     """Draw a goal: x, y ∈ [−1, 1] m, z ∈ [0.7, 1.0] m, a normalised uniform-cube axis, an angle in [0, π]."""
     position = rng.uniform(_LOWER, _UPPER)
     axis = rng.uniform(-1.0, 1.0, 3)
     axis /= np.linalg.norm(axis)
-    return Goal(position, pin.exp3(axis * rng.uniform(0.0, np.pi)))
+    return Pose(position, pin.exp3(axis * rng.uniform(0.0, np.pi)))
 
 
-def pose_error(position: FloatArray, rotation: FloatArray, goal: Goal) -> tuple[float, float]:
+def pose_error(position: FloatArray, rotation: FloatArray, goal: Pose) -> tuple[float, float]:
     """Return d_p = ‖p − p_g‖ [m] and d_r = 1 − ⟨q, q_g⟩² = (3 − tr RᵀR_g) / 4, the paper's equations 7 and 8.
 
     Args:
@@ -85,7 +73,7 @@ class StraightPlanner:
 
     start_position: FloatArray
     start_rotation: FloatArray
-    goal: Goal
+    goal: Pose
     velocity: FloatArray
     steps: int
     step: float = STEP
@@ -95,7 +83,7 @@ class StraightPlanner:
         cls,
         start_position: FloatArray,
         start_rotation: FloatArray,
-        goal: Goal,
+        goal: Pose,
         step: float = STEP,
         speed: float = 1.0,
     ) -> "StraightPlanner":

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from handrail.collect.simulation.scene import Part, Scene, SceneObject, View
-from handrail.collect.tasks.goal_reaching import ORIENTATION_TOLERANCE, POSITION_TOLERANCE, sample_goal
+from handrail.collect.tasks.goal_reaching import pose_error, reached, sample_goal
 from handrail.collect.tasks.moving import mover_features, mover_names, sample_movers
 from handrail.collect.tasks.task import Episode, TaskState, Verdict
 from handrail.controllers.arrays import FloatArray
-from handrail.controllers.numerics.rotation import matrix_to_axis, orientation_error, quaternion_from_matrix
+from handrail.controllers.numerics.rotation import matrix_to_axis, quaternion_from_matrix
 from handrail.controllers.robot.model import Pose, RobotModel
 from handrail.controllers.robot.shape import Shape
 
@@ -26,15 +26,11 @@ class Reach:
     Attributes:
         description: what the operator is asked to do.
         horizon: time limit [s].
-        position_tolerance: largest d_p [m].
-        orientation_tolerance: largest d_r.
         moving_obstacles: how many cylinders cross the robot's way; goals are the same with and without.
     """
 
     description: str = "Move the gripper to the goal frame."
     horizon: float = 30.0
-    position_tolerance: float = POSITION_TOLERANCE
-    orientation_tolerance: float = ORIENTATION_TOLERANCE
     moving_obstacles: int = 0
 
     @property
@@ -45,8 +41,7 @@ class Reach:
 
     def sample(self, model: RobotModel, rng: np.random.Generator) -> Episode:
         """Draw a goal, then the moving obstacles."""
-        drawn = sample_goal(rng)
-        goal = Pose(drawn.position, drawn.rotation)
+        goal = sample_goal(rng)
         movers = sample_movers(self.moving_obstacles, model, model.description.home, rng)
         return Episode(Scene((goal_marker(goal), *movers), _VIEW), model.description.home, goal)
 
@@ -58,12 +53,7 @@ class Reach:
 
     def outcome(self, state: TaskState) -> Verdict:
         """Judge by the distance and the orientation error."""
-        goal = _goal(state)
-        distance = float(np.linalg.norm(state.tool.position - goal.position))
-        turn = orientation_error(
-            quaternion_from_matrix(state.tool.rotation), quaternion_from_matrix(goal.rotation)
-        )
-        return Verdict(distance <= self.position_tolerance and turn <= self.orientation_tolerance)
+        return Verdict(reached(*pose_error(state.tool.position, state.tool.rotation, _goal(state))))
 
 
 _VIEW = View(position=(-2.6, -3.0, 2.2), target=(-0.35, 0.0, 0.65))

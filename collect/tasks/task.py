@@ -1,17 +1,18 @@
 """What a task is: it samples an episode, names its state, and judges the outcome."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
 from handrail.collect.simulation.scene import Scene, SceneObject
-from handrail.collect.simulation.twist import Twist
 from handrail.controllers.arrays import FloatArray, frozen
 from handrail.controllers.errors import unknown_name
 from handrail.controllers.robot.model import Pose, RobotModel
 from handrail.controllers.robot.shape import Obstacle
+
+_AWAY = 0.08  # [m]
 
 
 @dataclass(frozen=True)
@@ -45,7 +46,7 @@ class TaskState:
         opening: of the gripper, 0 closed to 1 open.
         episode: how it began: scene with the objects' shapes, goal.
         poses: of every object of the scene, by name.
-        twists: of every movable object, by name.
+        still: names of the movable objects that are at rest.
         stable: whether the physics went well so far.
     """
 
@@ -54,7 +55,7 @@ class TaskState:
     opening: float
     episode: Episode
     poses: Mapping[str, Pose]
-    twists: Mapping[str, Twist] = field(default_factory=dict)
+    still: frozenset[str] = frozenset()
     stable: bool = True
 
     @property
@@ -66,6 +67,10 @@ class TaskState:
     def obstacles(self) -> tuple[Obstacle, ...]:
         """What the robot must not touch, where it is now."""
         return self.episode.scene.obstacles(self.time)
+
+    def let_go(self, place: FloatArray) -> bool:
+        """Return whether the gripper is open, and the tool point 8 cm or more from a place, (3,) [m]."""
+        return float(np.linalg.norm(self.tool.position - place)) >= _AWAY and self.opening > 0.8
 
     def pose(self, name: str) -> Pose:
         """Return where an object is.

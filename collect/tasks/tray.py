@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from handrail.collect.simulation.scene import Scene, SceneObject, View
-from handrail.collect.tasks.arm_reach import reach_share
 from handrail.collect.tasks.clutter import obstacle_features, obstacle_names, sample_obstacles
 from handrail.collect.tasks.furniture import TRAY_BAR, can, table, tray
+from handrail.collect.tasks.starts import reach_share
 from handrail.collect.tasks.task import Episode, TaskState, Verdict
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import HandrailError
@@ -39,13 +39,11 @@ class Tray:
         description: what the operator is asked to do.
         horizon: time limit [s].
         clearance: between the robot's start and anything on the floor, and between obstacles [m].
-        retreat: least distance of the tool point from the handle at the end [m].
     """
 
     description: str = "Carry the tray to the table and put it down without spilling the can."
     horizon: float = 90.0
     clearance: float = 0.15
-    retreat: float = 0.08
 
     @property
     def state_names(self) -> tuple[str, ...]:
@@ -82,10 +80,9 @@ class Tray:
         if not _stands_on(held, state.pose("can")):
             return Verdict(failure="can_fell")
         inside = np.abs(held.position[:2] - goal.position[:2]) < goal.shape.size[:2] / 2
-        down = held.position[2] < goal.top + 0.02 and state.twists["tray"].is_still and inside.all()
+        down = held.position[2] < goal.top + 0.02 and "tray" in state.still and inside.all()
         handle = held.position + held.rotation @ HANDLE
-        away = float(np.linalg.norm(state.tool.position - handle)) >= self.retreat
-        return Verdict(success=bool(down) and away and state.opening > 0.8)
+        return Verdict(success=bool(down) and state.let_go(handle))
 
 
 def _stands_on(held: Pose, thing: Pose) -> bool:

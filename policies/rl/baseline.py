@@ -2,9 +2,8 @@
 
 from typing import cast
 
-from handrail.collect.tasks.goal_reaching import Goal
 from handrail.controllers.interface.controller import Controller
-from handrail.controllers.robot.model import RobotModel
+from handrail.controllers.robot.model import Pose, RobotModel
 from handrail.policies.rl.controller import RlController
 
 
@@ -13,6 +12,6 @@ def build(model: RobotModel) -> Controller:
     return RlController(model)
 
 
-def aim(controller: Controller, goal: Goal) -> None:
+def aim(controller: Controller, goal: Pose) -> None:
     """Tell it the goal: the baseline's observation has it."""
     cast(RlController, controller).aim(goal)

@@ -5,8 +5,9 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from handrail.collect.tasks.goal_reaching import STEP, Goal, sample_goal
+from handrail.collect.tasks.goal_reaching import STEP, sample_goal
 from handrail.controllers.arrays import FloatArray
+from handrail.controllers.robot.model import Pose
 from handrail.policies.rl.env import GoalReachingEnv
 
 EVALUATION_SEED = 20_000  # of the goals watched in training, which are others
@@ -40,13 +41,13 @@ class EpisodeScore:
     contacts: int
 
 
-def evaluation_goals(count: int, seed: int = EVALUATION_SEED) -> tuple[Goal, ...]:
+def evaluation_goals(count: int, seed: int = EVALUATION_SEED) -> tuple[Pose, ...]:
     """Return the goals of a seed."""
     rng = np.random.default_rng(seed)
     return tuple(sample_goal(rng) for _ in range(count))
 
 
-def run_episode(env: GoalReachingEnv, policy: Policy, goal: Goal) -> EpisodeScore:
+def run_episode(env: GoalReachingEnv, policy: Policy, goal: Pose) -> EpisodeScore:
     """Run a policy until the episode ends."""
     observation, _ = env.reset(options={"goal": goal})
     velocities, contacts, done, info = [], 0, False, {}
@@ -68,7 +69,7 @@ def run_episode(env: GoalReachingEnv, policy: Policy, goal: Goal) -> EpisodeScor
     )
 
 
-def evaluate(policy: Policy, goals: Sequence[Goal], physics: bool = True) -> list[EpisodeScore]:
+def evaluate(policy: Policy, goals: Sequence[Pose], physics: bool = True) -> list[EpisodeScore]:
     """Return the score of every goal, early failure off."""
     env = GoalReachingEnv(early_failure=False, physics=physics)
     return [run_episode(env, policy, goal) for goal in goals]

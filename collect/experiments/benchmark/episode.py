@@ -15,7 +15,7 @@ from handrail.collect.operators.operator import View
 from handrail.collect.session.outcome import Outcome
 from handrail.collect.session.session import Session
 from handrail.collect.simulation.scene import Scene
-from handrail.collect.tasks.goal_reaching import STEP, T_MAX, Goal, StraightPlanner, pose_error, reached
+from handrail.collect.tasks.goal_reaching import STEP, T_MAX, StraightPlanner, pose_error, reached
 from handrail.collect.tasks.task import Episode, TaskState, Verdict
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.interface.command import Diagnostics
@@ -44,7 +44,7 @@ class Conditions:
         closed_loop: the planner sees the hand.
     """
 
-    goal: Goal
+    goal: Pose
     scene: Scene
     profile: str = "nominal"
     seed: tuple[int, ...] = (0,)
@@ -75,7 +75,7 @@ def run_episode(
     return tracer.trace(operator.end, outcome, process_time() - start)
 
 
-def _aim(baseline: Baseline, controller: Controller, goal: Goal) -> None:
+def _aim(baseline: Baseline, controller: Controller, goal: Pose) -> None:
     if baseline.aim:
         resolved(baseline.aim)(controller, goal)
 
@@ -153,7 +153,7 @@ class _Task:
 class _Tracer:
     """Notes what happens, step by step; an observer."""
 
-    def __init__(self, goal: Goal) -> None:
+    def __init__(self, goal: Pose) -> None:
         self._goal = goal
 
     def begin(self, env: HandrailEnv, seed: int) -> None:

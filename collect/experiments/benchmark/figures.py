@@ -8,7 +8,7 @@ import numpy as np
 from handrail.collect.experiments.benchmark.format import HEADINGS
 from handrail.collect.experiments.benchmark.published import PUBLISHED
 from handrail.collect.experiments.benchmark.run import Episode
-from handrail.collect.tasks.goal_reaching import Goal
+from handrail.controllers.robot.model import Pose
 from handrail.datasets.presentation.drawing import COLOURS, GREY, INK, new_figure, tidy
 
 CAPTIONS = {
@@ -31,7 +31,7 @@ _SHOWN = (
 _COLUMNS = 4  # panels side by side
 
 
-def figures(results: Mapping[str, Any], episodes: Sequence[Episode], goals: Sequence[Goal]) -> dict[str, Any]:
+def figures(results: Mapping[str, Any], episodes: Sequence[Episode], goals: Sequence[Pose]) -> dict[str, Any]:
     """Return matplotlib figures by name.
 
     Args:
@@ -77,7 +77,7 @@ def _distributions(results: Mapping[str, Any], profile: str) -> Any:
     return figure
 
 
-def _paths(episodes: Sequence[Episode], names: Sequence[str], goals: Sequence[Goal]) -> Any:
+def _paths(episodes: Sequence[Episode], names: Sequence[str], goals: Sequence[Pose]) -> Any:
     """Draw base and hand of some goals from above, one panel a controller."""
     rows = -(-len(names) // _COLUMNS)
     figure = new_figure(_WIDTH, 2.9 * rows)

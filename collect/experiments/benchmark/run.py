@@ -15,14 +15,14 @@ from handrail.collect.experiments.benchmark.episode import Conditions, run_episo
 from handrail.collect.experiments.benchmark.metrics import Trace, measure
 from handrail.collect.experiments.benchmark.scenes import cluttered_floor, empty_floor
 from handrail.collect.simulation.scene import Scene
-from handrail.collect.tasks.goal_reaching import Goal, sample_goal
+from handrail.collect.tasks.goal_reaching import sample_goal
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.controller import Controller
 from handrail.controllers.numerics.threads import single_threaded
 from handrail.controllers.registry import resolved
-from handrail.controllers.robot.model import load_model
+from handrail.controllers.robot.model import Pose, load_model
 
 _PATHS = 12  # goals whose paths are kept, for drawing
 _EVERY = 5  # steps between two points of a path
@@ -47,7 +47,7 @@ class Episode:
     hand: FloatArray | None = None
 
 
-def goals(config: BenchmarkConfig) -> list[Goal]:
+def goals(config: BenchmarkConfig) -> list[Pose]:
     """Return the goals of a seed; the first ones do not depend on how many there are."""
     rng = np.random.default_rng(config.seed)
     return [sample_goal(rng) for _ in range(config.goals)]
@@ -155,7 +155,7 @@ def _warm_up(baselines: tuple[Baseline, ...], physics: bool) -> None:
     """Let everything that is built at its first use be built, outside of any measured time."""
     model = load_model()
     here = model.pose(model.description.home)
-    at_home = Conditions(Goal(here.position, here.rotation), Scene(), physics=physics)
+    at_home = Conditions(here, Scene(), physics=physics)
     for baseline in baselines:
         run_episode(model, baseline, _controller(baseline), at_home)
 

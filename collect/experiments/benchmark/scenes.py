@@ -4,11 +4,10 @@ import numpy as np
 
 from handrail.collect.simulation.scene import Scene, SceneObject, View
 from handrail.collect.tasks.furniture import footprint, pillar
-from handrail.collect.tasks.goal_reaching import Goal
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.errors import HandrailError
-from handrail.controllers.robot.model import RobotModel
+from handrail.controllers.robot.model import Pose, RobotModel
 
 VIEW = View(position=(-2.9, -3.4, 3.0), target=(-0.3, 0.0, 0.4), fovy=36.0)
 _LOW, _TALL = (0.3, 0.3), (0.25, 1.5)  # radius and height of the showcase's cylinders [m]
@@ -25,7 +24,7 @@ def empty_floor() -> Scene:
     return Scene(view=VIEW)
 
 
-def cluttered_floor(model: RobotModel, goal: Goal, rng: np.random.Generator) -> Scene:
+def cluttered_floor(model: RobotModel, goal: Pose, rng: np.random.Generator) -> Scene:
     """Draw two low cylinders and a tall one, clear of the robot's start, of the hand's way and of each other.
 
     Low ones stand in the way of the base, tall ones in the way of the arm; the straight way of the hand from

@@ -20,7 +20,7 @@ from handrail.collect.simulation.scene import Scene
 from handrail.collect.simulation.simulation import Simulation
 from handrail.collect.tasks.goal_reaching import STEP
 from handrail.collect.tasks.reach import goal_marker
-from handrail.controllers.robot.model import Pose, RobotModel
+from handrail.controllers.robot.model import RobotModel
 
 _SIZE = (360, 480)  # of one picture of the video [px]
 _SMALL = (252, 336)  # of one in a strip [px]
@@ -82,8 +82,7 @@ def _stage(
     model: RobotModel, conditions: Conditions, size: tuple[int, int]
 ) -> Iterator[tuple[Simulation, Painter]]:
     """Give the robot among the obstacles, with the goal marked, and who paints it at a size."""
-    goal = Pose(conditions.goal.position, conditions.goal.rotation)
-    scene = Scene((*conditions.scene.objects, goal_marker(goal)), conditions.scene.view)
+    scene = Scene((*conditions.scene.objects, goal_marker(conditions.goal)), conditions.scene.view)
     simulation = Simulation(model, scene, model.description.home, STEP, meshes=True)
     painter = Painter(simulation.mujoco_model, size, PRETTY)
     try:

@@ -122,10 +122,10 @@ class SingleAxisMap(InputMap):
         done = np.all(self._goal_error(target, state.q) < 1.0) and state.time >= self._thinks_at
         if target.identity == self._thought and not done:
             return
-        plan = plan_joints(self._model, self._collision, state.q, target.hand, _CLEAR)
-        way = plan.goal - state.q
+        there, order = plan_joints(self._model, self._collision, state.q, target.hand, _CLEAR)
+        way = there - state.q
         self._goal = state.q + way * (1.0 + self._error * self._rng.standard_normal(len(way)))
-        self._order = [self.channels.joint_slice.start + joint for joint in plan.order]
+        self._order = [self.channels.joint_slice.start + joint for joint in order]
         self._care = 1.0 if target.identity != self._thought else max(0.5 * self._care, _MOST_CARE)
         self._thought, self._axis_holds = target.identity, False
         self._thinks_at = state.time + _PREPARATION

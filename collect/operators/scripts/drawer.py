@@ -37,7 +37,7 @@ class DrawerScript(PhasedScript):
         into = inward(view.task.object("cabinet").rotation)
         back = Pose(handle(view.task) - _BACK * into, handle_rotation(view.tool.rotation, into))
         base = view.state.q[:3] if self._model.description.base_joints else np.zeros(3)
-        return Phase("leave", back, base, distance=0.03, angle=3.2, pace=0.5, patience=5.0)
+        return Phase(back, base, name="leave", distance=0.03, angle=3.2, pace=0.5, patience=5.0)
 
     def plan(self, view: View) -> list[Phase]:
         """Return the way to the handle, how to pull it, and how to let go."""
@@ -49,7 +49,7 @@ class DrawerScript(PhasedScript):
 
         def phase(name: str, back: float, **options: float) -> Phase:
             stand = base - np.array([pull * into[0], pull * into[1], 0.0]) * (name in ("pull", "release"))
-            return Phase(name, Pose(bar - back * into, grasp), stand, **options)  # type: ignore[arg-type]
+            return Phase(Pose(bar - back * into, grasp), stand, name=name, **options)  # type: ignore[arg-type]
 
         phases = [
             phase("stage", _BACK, distance=0.02, angle=0.10),
@@ -60,8 +60,12 @@ class DrawerScript(PhasedScript):
         ]
         if self._drives:
             hand, now = phases[0].hand, view.state.q[:3]
-            ready = Phase("ready", before_driving(hand, base, now), now, distance=0.05, angle=0.15)
-            phases = [ready, Phase("drive", hand, base, focus="base", distance=0.08, angle=0.08), *phases]
+            ready = Phase(before_driving(hand, base, now), now, name="ready", distance=0.05, angle=0.15)
+            phases = [
+                ready,
+                Phase(hand, base, name="drive", focus="base", distance=0.08, angle=0.08),
+                *phases,
+            ]
         return phases
 
 

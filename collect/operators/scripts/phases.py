@@ -9,39 +9,26 @@ from handrail.collect.operators.human.motion_goal import MotionGoal, Target
 from handrail.collect.operators.human.steering import Gains, base_twist, hand_twist, pose_errors
 from handrail.collect.operators.modes import Focus
 from handrail.collect.operators.operator import View
-from handrail.controllers.arrays import FloatArray
-from handrail.controllers.robot.model import Pose, RobotModel
+from handrail.controllers.robot.model import RobotModel
 
 
 @dataclass(frozen=True)
-class Phase:
-    """One thing to do.
+class Phase(Target):
+    """One thing to do: get the hand, or the base, to a target.
 
     Attributes:
-        name: for logs and metrics.
-        hand: goal of the tool.
-        base: where the base would stand, (x, y, θ).
+        name: what it is, for whoever plans anew after it.
         focus: which of the two ends the phase, and is steered in switching mode.
         gripper: 0 open, 1 closed.
-        distance: from the goal at which the phase ends [m].
-        beside: the same across the tool's axis, where more is good enough there [m].
-        angle: the same for orientation [rad].
-        pace: share of the full stick.
-        tilt: how far the hand may lean on the way [rad].
+        beside: `distance` across the tool's axis, where more is good enough there [m].
         dwell: time to wait, hands still, before the next phase [s].
         patience: time after which the operator goes on anyway [s].
     """
 
-    name: str
-    hand: Pose
-    base: FloatArray
+    name: str = ""
     focus: Focus = "hand"
     gripper: float = 0.0
-    distance: float = 0.05
     beside: float = 0.0
-    angle: float = 0.2
-    pace: float = 1.0
-    tilt: float = np.inf
     dwell: float = 0.0
     patience: float = np.inf
 
@@ -82,8 +69,7 @@ class PhasedScript(ABC):
             return MotionGoal.rest(phase.focus, phase.gripper)
         hand = hand_twist(view.tool, phase.hand, self._gains, phase.pace)
         base = base_twist(view.state.q, phase.base, self._gains)
-        target = Target(phase.hand, phase.base, phase.distance, phase.angle, phase.pace, phase.tilt)
-        return MotionGoal(hand, base, phase.focus, phase.gripper, target)
+        return MotionGoal(hand, base, phase.focus, phase.gripper, phase)
 
     def _enter(self, index: int, time: float) -> None:
         self._index = index

@@ -7,7 +7,7 @@ import numpy as np
 from handrail.collect.operators.human.steering import pose_errors
 from handrail.collect.operators.operator import View
 from handrail.collect.operators.scripts.phases import Phase, PhasedScript, from_phase
-from handrail.collect.operators.scripts.route import Route, front_edge
+from handrail.collect.operators.scripts.route import Route
 from handrail.collect.simulation.scene import SceneObject
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.robot.model import Pose, RobotModel
@@ -42,8 +42,8 @@ class PickPlaceScript(PhasedScript):
         task = view.task
         self._route = Route(self._model, task)
         cube = task.pose("cube")
-        pick = _Place(front_edge(task, "cube_table"), cube.position)
-        place = _Place(front_edge(task, "bin_table"), task.pose("bin").position)
+        pick = _Place(task.object("cube_table").front, cube.position)
+        place = _Place(task.object("bin_table").front, task.pose("bin").position)
         down = grasp_rotation(view.tool.rotation, cube.rotation)
         rim = task.object("bin").top - place.thing[2]
         phases = self._pick(pick, down, self._room(task.object("cube")))
@@ -62,13 +62,13 @@ class PickPlaceScript(PhasedScript):
             height = cube.position[2] + 0.30
             around = Pose(np.array([lane + _AHEAD, cube.position[1], height]), down)
             base = np.array([lane, cube.position[1], 0.0])
-            phases.insert(0, Phase("approach", around, base, distance=0.15, angle=0.5))
+            phases.insert(0, Phase(around, base, name="approach", distance=0.15, angle=0.5))
         return phases
 
     def _ready(self, base: FloatArray, pick: _Place, down: FloatArray) -> Phase:
         """Return the phase that folds the arm before it is driven up to the table, from where the base is."""
         hand = np.array([base[0] + _AHEAD, base[1], pick.thing[2] + 0.30])
-        return Phase("ready", Pose(hand, down), base, distance=0.15, angle=0.5)
+        return Phase(Pose(hand, down), base, name="ready", distance=0.15, angle=0.5)
 
     def _room(self, cube: SceneObject) -> float:
         """Return how far beside the cube the hand may be for the open fingers to close around it [m].
@@ -86,7 +86,7 @@ class PickPlaceScript(PhasedScript):
         grasp = _above(cube, round(tips_beyond_tool(self._model) - _BELOW, 6))
 
         def phase(name: str, position: FloatArray, **options: float) -> Phase:
-            return Phase(name, Pose(position, down), base, **options)  # type: ignore[arg-type]
+            return Phase(Pose(position, down), base, name=name, **options)  # type: ignore[arg-type]
 
         return [
             phase("stage", stage, distance=0.10, angle=0.30),
@@ -104,7 +104,7 @@ class PickPlaceScript(PhasedScript):
 
         def phase(name: str, x: float, at: _Place, base: FloatArray) -> Phase:
             hand = Pose(np.array([x, at.thing[1], height]), down)
-            return Phase(name, hand, base, gripper=1.0, distance=0.12, angle=0.4)
+            return Phase(hand, base, name=name, gripper=1.0, distance=0.12, angle=0.4)
 
         if self._drives:
             retreat = phase("retreat", self._stand(pick)[0] + _AHEAD, pick, self._stand(pick))
@@ -121,7 +121,7 @@ class PickPlaceScript(PhasedScript):
         base = self._stand(place)
 
         def phase(name: str, rise: float, **options: float) -> Phase:
-            return Phase(name, Pose(_above(rim, rise), down), base, **options)  # type: ignore[arg-type]
+            return Phase(Pose(_above(rim, rise), down), base, name=name, **options)  # type: ignore[arg-type]
 
         return [
             phase("over", 0.18, gripper=1.0, distance=0.03, angle=0.3),

@@ -4,8 +4,8 @@ import numpy as np
 
 from handrail.collect.operators.operator import View
 from handrail.collect.operators.scripts.phases import Phase, PhasedScript
-from handrail.collect.operators.scripts.route import Route, front_edge
-from handrail.collect.tasks.arm_reach import reach_share
+from handrail.collect.operators.scripts.route import Route
+from handrail.collect.tasks.starts import reach_share
 from handrail.collect.tasks.tray import HANDLE
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.robot.model import Pose
@@ -24,13 +24,13 @@ class TrayScript(PhasedScript):
     def plan(self, view: View) -> list[Phase]:
         """Return the way to the table, and what is done there."""
         task, route = view.task, Route(self._model, view.task)
-        table, edge = task.object("table"), front_edge(task, "table")
-        place = np.array([edge + _INSIDE, table.position[1], table.top + HANDLE[2] + _ABOVE])
-        stand = route.stand(place, edge)
+        table = task.object("table")
+        place = np.array([table.front + _INSIDE, table.position[1], table.top + HANDLE[2] + _ABOVE])
+        stand = route.stand(place, table.front)
         height = max(view.tool.position[2], place[2] + _OVER)
 
         def phase(name: str, hand: FloatArray, base: FloatArray, **options: float) -> Phase:
-            return Phase(name, Pose(hand, _DOWN), base, **({"gripper": 1.0} | options))  # type: ignore[arg-type]
+            return Phase(Pose(hand, _DOWN), base, name=name, **({"gripper": 1.0} | options))  # type: ignore[arg-type]
 
         over, up = (place + np.array([0.0, 0.0, rise]) for rise in (_OVER, _OVER + 0.08))
         phases = [

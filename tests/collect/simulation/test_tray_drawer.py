@@ -176,7 +176,7 @@ def test_a_drawer_stays_shut_opens_along_its_rail_and_stops_at_its_end():
         state = env.task_state()
         assert opened(state) == pytest.approx(TRAVEL, abs=0.01)
         np.testing.assert_allclose(handle(state) - shut, -opened(state) * into, atol=1e-6)
-        assert env.task_state().twists["drawer"].is_still
+        assert "drawer" in env.task_state().still
 
 
 def test_the_drawer_counts_only_when_the_hand_has_let_go():
@@ -199,8 +199,8 @@ def test_a_light_friction_is_felt():
 
 def test_a_thing_weighs_what_the_task_says():
     """Mass is spread over parts by volume; either way the body weighs what the task says."""
-    for task, names in ((Tray(), ("tray", "can")), (Drawer(), ("drawer",))):
-        with environment("Tray" if task.name == "Tray" else "Drawer") as env:
+    for task, names in (("Tray", ("tray", "can")), ("Drawer", ("drawer",))):
+        with environment(task) as env:
             env.reset(seed=0)
             for name in names:
                 body = env.simulation.mujoco_model.body(name)
