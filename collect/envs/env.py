@@ -15,7 +15,7 @@ from handrail.collect.envs.observation import AgentObservation, bounded, box_spa
 from handrail.collect.simulation.protocols import Plant, Robot, World
 from handrail.collect.simulation.rendering import CAMERAS, FAST, PRETTY, Painter
 from handrail.collect.simulation.simulation import Simulation
-from handrail.collect.tasks.task import Episode, Task, TaskState, Verdict
+from handrail.collect.tasks.task import Start, Task, TaskState, Verdict
 from handrail.controllers.errors import HandrailError, unknown_name
 from handrail.controllers.interface.controller import State
 from handrail.controllers.robot.model import RobotModel, load_model
@@ -69,7 +69,7 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         image_size: tuple[int, int] = (128, 128),
         render_mode: str | None = None,
         render_size: tuple[int, int] = RENDER_SIZE,
-        sample: Callable[[RobotModel, np.random.Generator], Episode] | None = None,
+        sample: Callable[[RobotModel, np.random.Generator], Start] | None = None,
         observes: bool = True,
     ) -> None:
         _check(fps, cameras, render_mode)
@@ -90,7 +90,7 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self.action_space = self._action_space()
         self.observation_space = self._observation_space()
         self._painters: dict[str, Painter] = {}
-        self._begun: tuple[Episode, Plant] | None = None
+        self._begun: tuple[Start, Plant] | None = None
         self._steps = 0
 
     def _action_space(self) -> spaces.Space[Any]:
@@ -155,13 +155,13 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         return self._now[1]
 
     @property
-    def _now(self) -> tuple[Episode, Plant]:
+    def _now(self) -> tuple[Start, Plant]:
         if self._begun is None:
             raise HandrailError(f"environment {type(self.task).__name__}: call reset() before anything else")
         return self._begun
 
     @property
-    def episode(self) -> Episode:
+    def start(self) -> Start:
         """How this episode began.
 
         Raises:
@@ -187,7 +187,7 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             time=now.time,
             tool=now.tool,
             opening=now.opening,
-            episode=self.episode,
+            start=self.start,
             poses=now.poses(),
             still=now.still(),
             stable=now.is_stable,
@@ -200,19 +200,17 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
 
         Args:
             seed: of everything random.
-            options: `episode`: an `Episode` to begin with instead of a sampled one.
+            options: `start`: a `Start` to begin with instead of a sampled one.
         """
         super().reset(seed=seed)
-        episode: Episode = (options or {}).get("episode") or self._sample(self.model, self.np_random)
+        start: Start = (options or {}).get("start") or self._sample(self.model, self.np_random)
         meshes = bool(self.cameras or self.render_mode)
         self.close()
-        plant = self._build(
-            self.model, episode.scene, episode.q, self.period, meshes=meshes, grip=episode.grip
-        )
-        self._begun = episode, plant
+        plant = self._build(self.model, start.scene, start.q, self.period, meshes=meshes, grip=start.grip)
+        self._begun = start, plant
         self._steps = 0
         state = self.task_state()
-        rest = np.append(np.zeros(self.model.size), float(episode.grip is not None)).astype(np.float32)
+        rest = np.append(np.zeros(self.model.size), float(start.grip is not None)).astype(np.float32)
         return self._observe(state), self._info(state, Verdict(), rest)
 
     def step(self, action: ArrayLike) -> tuple[Observation, float, bool, bool, dict[str, Any]]:

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from handrail.collect.simulation.scene import Scene, SceneObject
-from handrail.collect.tasks.task import Episode, Task
+from handrail.collect.tasks.task import Start, Task
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.robot.model import RobotModel
@@ -14,7 +14,7 @@ _CLEARANCE = 0.08  # of the start from everything, unless it was nearer before [
 _ATTEMPTS = 100
 
 
-def sample_shifted(task: Task, size: float, model: RobotModel, rng: np.random.Generator) -> Episode:
+def sample_shifted(task: Task, size: float, model: RobotModel, rng: np.random.Generator) -> Start:
     """Draw a task's beginning, then where the robot is instead; scene and goal of a seed stay what they are.
 
     With size s the base begins `s/2` to s metres away in any direction and turned by up to s rad, each joint
@@ -49,7 +49,7 @@ def _draw(base: int, joints: int, size: float, rng: np.random.Generator) -> Floa
     return step
 
 
-def _moved(model: RobotModel, episode: Episode, step: FloatArray) -> Episode:
+def _moved(model: RobotModel, episode: Start, step: FloatArray) -> Start:
     """Return the episode with the robot displaced; what it holds moves with the hand."""
     if episode.grip is None:
         return replace(episode, q=episode.q + step)
@@ -71,7 +71,7 @@ def _inside(model: RobotModel, q: FloatArray) -> bool:
     return bool(np.all((limits.position_lower < q) & (q < limits.position_upper)))
 
 
-def _distances(model: RobotModel, episode: Episode) -> FloatArray:
+def _distances(model: RobotModel, episode: Start) -> FloatArray:
     """Return the signed distance of every pair, things that can be moved included [m], (P,)."""
     solid = tuple(item.obstacle() for item in episode.scene.objects if not item.ghost)
     return CollisionModel(model, solid).values(episode.q[None, :])[0]

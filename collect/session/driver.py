@@ -48,7 +48,7 @@ class Driver:
 
     def __init__(self, controller: Controller, env: HandrailEnv, period: float) -> None:
         self._controller, self._env, self._rate = controller, env, Rate(period)
-        self._moving, self._holding = bool(env.episode.scene.movers), bool(env.world.held())
+        self._moving, self._holding = bool(env.start.scene.movers), bool(env.world.held())
         self._asked = 0
         controller.reset(env.world.obstacles())
 

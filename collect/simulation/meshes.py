@@ -1,9 +1,9 @@
-"""The arm's meshes as a camera sees them: split into their pieces, coloured."""
+"""The arm's meshes as a camera sees them: STL files, split into their pieces, coloured."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
 
-import coal
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
@@ -11,9 +11,11 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from handrail.controllers.arrays import FloatArray
+from handrail.controllers.errors import HandrailError
 from handrail.controllers.robot.model import RobotModel
 
 _TUBE, _JOINT, _CAP = (0.80, 0.81, 0.83, 1.0), (0.42, 0.44, 0.47, 1.0), (0.32, 0.56, 0.76, 1.0)
+_TRIANGLE = np.dtype([("normal", "<3f4"), ("vertices", "<9f4"), ("attribute", "<u2")])
 
 
 @dataclass(frozen=True)
@@ -43,27 +45,37 @@ def placed_meshes(model: RobotModel) -> Iterator[PlacedMesh]:
         arm, str(description.urdf), pin.COLLISION, package_dirs=[str(description.mesh_root)]
     )
     for item in geometry.geometryObjects:
-        if not isinstance(item.geometry, coal.BVHModelBase):
+        path = Path(item.meshPath)
+        if not path.is_file():
             continue  # a primitive, such as the marker box on the UR's ee_link
         link = arm.frames[item.parentFrame]
         frame = model.pinocchio.frames[model.pinocchio.getFrameId(link.name, pin.FrameType.BODY)]
         placement = frame.placement * (link.placement.inverse() * item.placement)
-        yield PlacedMesh(item.name, frame.parentJoint, placement, _pieces(item.geometry))
+        yield PlacedMesh(item.name, frame.parentJoint, placement, _pieces(path, item.meshScale))
 
 
-def _pieces(mesh: coal.BVHModelBase) -> tuple[Piece, ...]:
-    """Return the connected pieces, without those that are flat."""
-    triangles = map(mesh.tri_indices, range(mesh.num_tris))
-    corners = [triangle[corner] for triangle in triangles for corner in range(3)]
-    every = mesh.vertices()[corners].round(7)  # a vertex of several triangles may be there as often
-    vertices, faces = np.unique(every, axis=0, return_inverse=True)
-    faces = faces.reshape(-1, 3)
+def _pieces(path: Path, scale: FloatArray) -> tuple[Piece, ...]:
+    """Return the connected pieces of a binary STL file, without those that are flat."""
+    vertices, faces = _read_stl(path)
     edges = np.vstack([faces[:, [0, 1]], faces[:, [1, 2]]])
     graph = coo_matrix((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), shape=(len(vertices),) * 2)
     count, labels = connected_components(graph, directed=False)
     parts = [_part(vertices, faces, labels == label) for label in range(count)]
     solid = [part for part in parts if np.ptp(part[0], axis=0).min() > 1e-3]
-    return tuple(Piece(*part, _colour(part[0]) if len(solid) > 1 else _JOINT) for part in solid)
+    colours = [_colour(vertices) if len(solid) > 1 else _JOINT for vertices, _ in solid]
+    return tuple(
+        Piece(vertices * scale, faces, rgba) for (vertices, faces), rgba in zip(solid, colours, strict=True)
+    )
+
+
+def _read_stl(path: Path) -> tuple[FloatArray, NDArray[np.int64]]:
+    data = path.read_bytes()
+    count = int.from_bytes(data[80:84], "little")
+    if len(data) < 84 + count * _TRIANGLE.itemsize:
+        raise HandrailError(f"mesh {path}: expected a binary STL file")
+    corners = np.frombuffer(data, _TRIANGLE, count, 84)["vertices"].reshape(-1, 3).astype(float)
+    vertices, index = np.unique(corners.round(7), axis=0, return_inverse=True)
+    return vertices, index.reshape(-1, 3)
 
 
 def _part(

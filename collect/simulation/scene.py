@@ -137,7 +137,7 @@ class SceneObject:
 
 
 @dataclass(frozen=True)
-class View:
+class Viewpoint:
     """A camera in the world: where it stands, what it looks at [m], vertical field of view [deg]."""
 
     position: tuple[float, float, float] = (-2.9, -2.6, 2.3)
@@ -150,7 +150,7 @@ class Scene:
     """Everything around the robot but the floor, and the camera that overlooks it."""
 
     objects: tuple[SceneObject, ...] = ()
-    view: View = field(default_factory=View)
+    view: Viewpoint = field(default_factory=Viewpoint)
 
     def __post_init__(self) -> None:
         """Check the names.
@@ -249,7 +249,7 @@ def _contact(item: SceneObject) -> dict[str, Any]:
     }
 
 
-def _view_pose(view: View) -> dict[str, FloatArray]:
+def _view_pose(view: Viewpoint) -> dict[str, FloatArray]:
     """Return the pose of a camera that looks along −z with y up."""
     position = np.array(view.position)
     forward = np.array(view.target) - position

@@ -4,14 +4,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from handrail.collect.simulation.scene import Scene, View
+from handrail.collect.simulation.scene import Scene, Viewpoint
 from handrail.collect.tasks.cabinet import HANDLE, cabinet, drawer, inward
 from handrail.collect.tasks.starts import near_home
-from handrail.collect.tasks.task import Episode, TaskState, Verdict
+from handrail.collect.tasks.task import Start, TaskState, Verdict
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.robot.model import RobotModel
 
-_VIEW = View(position=(-0.9, -2.7, 1.9), target=(-0.1, 0.1, 0.6), fovy=52.0)
+_VIEW = Viewpoint(position=(-0.9, -2.7, 1.9), target=(-0.1, 0.1, 0.6), fovy=52.0)
 _OPENING = 0.20  # [m]
 
 
@@ -36,11 +36,11 @@ class Drawer:
         names = [f"handle.{axis}" for axis in "xyz"]
         return (*names, "inward.nx", "inward.ny", "drawer.opening", *(f"cabinet.{axis}" for axis in "xyz"))
 
-    def sample(self, model: RobotModel, rng: np.random.Generator) -> Episode:
+    def sample(self, model: RobotModel, rng: np.random.Generator) -> Start:
         """Draw the cabinet, then the robot's start."""
         x, y = 0.95 + rng.uniform(-0.1, 0.1), rng.uniform(-0.6, 0.6)
         body = cabinet("cabinet", x, y, rng.uniform(-0.3, 0.3), rng.uniform(0.76, 0.95))
-        return Episode(Scene((body, drawer("drawer", body)), _VIEW), near_home(model, rng))
+        return Start(Scene((body, drawer("drawer", body)), _VIEW), near_home(model, rng))
 
     def features(self, state: TaskState) -> FloatArray:
         """Return the numbers that `state_names` names, (9,)."""

@@ -4,11 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from handrail.collect.simulation.scene import Scene, SceneObject, View
+from handrail.collect.simulation.scene import Scene, SceneObject, Viewpoint
 from handrail.collect.tasks.clutter import obstacle_features, obstacle_names, sample_obstacles
 from handrail.collect.tasks.furniture import cube, open_bin, table
 from handrail.collect.tasks.starts import near_home
-from handrail.collect.tasks.task import Episode, TaskState, Verdict
+from handrail.collect.tasks.task import Start, TaskState, Verdict
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.numerics.rotation import quaternion_from_matrix
 from handrail.controllers.robot.model import RobotModel
@@ -16,7 +16,7 @@ from handrail.controllers.robot.model import RobotModel
 _EDGE, _MASS = 0.05, 0.1  # of the cube [m], [kg]
 _BIN_HEIGHT = 0.10
 _POSE = ("x", "y", "z", "qw", "qx", "qy", "qz")
-_VIEW = View(position=(3.0, 0.0, 3.5), target=(0.05, 0.0, 0.2), fovy=56.0)
+_VIEW = Viewpoint(position=(3.0, 0.0, 3.5), target=(0.05, 0.0, 0.2), fovy=56.0)
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class PickPlace:
         names += [f"{item}.{axis}" for item in ("bin", "cube_table", "bin_table") for axis in "xyz"]
         return (*names, *obstacle_names())
 
-    def sample(self, model: RobotModel, rng: np.random.Generator) -> Episode:
+    def sample(self, model: RobotModel, rng: np.random.Generator) -> Start:
         """Draw tables, cube, bin, obstacles and the robot's start."""
         side = rng.choice([-1.0, 1.0])
         cube_table = _sample_table("cube_table", side, rng)
@@ -56,7 +56,7 @@ class PickPlace:
             _sample_bin(bin_table, rng),
             *sample_obstacles(model, q, rng, self.clearance),
         )
-        return Episode(Scene(objects, _VIEW), q)
+        return Start(Scene(objects, _VIEW), q)
 
     def features(self, state: TaskState) -> FloatArray:
         """Return the numbers that `state_names` names, (28,)."""
@@ -65,7 +65,7 @@ class PickPlace:
         for name in ("cube_table", "bin_table"):
             item = state.object(name)
             numbers += [item.position[0], item.position[1], item.top]
-        return np.concatenate([numbers, obstacle_features(state.episode.scene)])
+        return np.concatenate([numbers, obstacle_features(state.start.scene)])
 
     def outcome(self, state: TaskState) -> Verdict:
         """Judge where the cube is, whether it rests, and where the gripper is."""

@@ -4,10 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from handrail.collect.simulation.scene import Part, Scene, SceneObject, View
+from handrail.collect.simulation.scene import Part, Scene, SceneObject, Viewpoint
 from handrail.collect.tasks.goal_reaching import pose_error, reached, sample_goal
 from handrail.collect.tasks.moving import mover_features, mover_names, sample_movers
-from handrail.collect.tasks.task import Episode, TaskState, Verdict
+from handrail.collect.tasks.task import Start, TaskState, Verdict
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.numerics.rotation import matrix_to_axis, quaternion_from_matrix
 from handrail.controllers.robot.model import Pose, RobotModel
@@ -39,16 +39,16 @@ class Reach:
         goal = tuple(f"goal.{axis}" for axis in ("x", "y", "z", "qw", "qx", "qy", "qz"))
         return (*goal, *mover_names(self.moving_obstacles))
 
-    def sample(self, model: RobotModel, rng: np.random.Generator) -> Episode:
+    def sample(self, model: RobotModel, rng: np.random.Generator) -> Start:
         """Draw a goal, then the moving obstacles."""
         goal = sample_goal(rng)
         movers = sample_movers(self.moving_obstacles, model, model.description.home, rng)
-        return Episode(Scene((goal_marker(goal), *movers), _VIEW), model.description.home, goal)
+        return Start(Scene((goal_marker(goal), *movers), _VIEW), model.description.home, goal)
 
     def features(self, state: TaskState) -> FloatArray:
         """Return the goal pose, (7,), and place, velocity and size of what moves, (6,) each."""
         goal = _goal(state)
-        movers = mover_features(state.episode.scene, state.time, self.moving_obstacles)
+        movers = mover_features(state.start.scene, state.time, self.moving_obstacles)
         return np.concatenate([goal.position, quaternion_from_matrix(goal.rotation), movers])
 
     def outcome(self, state: TaskState) -> Verdict:
@@ -56,7 +56,7 @@ class Reach:
         return Verdict(reached(*pose_error(state.tool.position, state.tool.rotation, _goal(state))))
 
 
-_VIEW = View(position=(-2.6, -3.0, 2.2), target=(-0.35, 0.0, 0.65))
+_VIEW = Viewpoint(position=(-2.6, -3.0, 2.2), target=(-0.35, 0.0, 0.65))
 
 
 def _goal(state: TaskState) -> Pose:

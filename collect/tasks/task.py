@@ -16,7 +16,7 @@ _AWAY = 0.08  # [m]
 
 
 @dataclass(frozen=True)
-class Episode:
+class Start:
     """A sampled beginning.
 
     Attributes:
@@ -44,7 +44,7 @@ class TaskState:
         time: since the episode began [s].
         tool: pose of the tool point.
         opening: of the gripper, 0 closed to 1 open.
-        episode: how it began: scene with the objects' shapes, goal.
+        start: how the episode began: scene with the objects' shapes, goal.
         poses: of every object of the scene, by name.
         still: names of the movable objects that are at rest.
         stable: whether the physics went well so far.
@@ -53,7 +53,7 @@ class TaskState:
     time: float
     tool: Pose
     opening: float
-    episode: Episode
+    start: Start
     poses: Mapping[str, Pose]
     still: frozenset[str] = frozenset()
     stable: bool = True
@@ -61,12 +61,12 @@ class TaskState:
     @property
     def goal(self) -> Pose | None:
         """Where the tool has to go, if the task says so."""
-        return self.episode.goal
+        return self.start.goal
 
     @property
     def obstacles(self) -> tuple[Obstacle, ...]:
         """What the robot must not touch, where it is now."""
-        return self.episode.scene.obstacles(self.time)
+        return self.start.scene.obstacles(self.time)
 
     def let_go(self, place: FloatArray) -> bool:
         """Return whether the gripper is open, and the tool point 8 cm or more from a place, (3,) [m]."""
@@ -88,7 +88,7 @@ class TaskState:
         Raises:
             HandrailError: the scene has no such object.
         """
-        return self.episode.scene.find(name)
+        return self.start.scene.find(name)
 
 
 @dataclass(frozen=True)
@@ -122,7 +122,7 @@ class Task(Protocol):
         """Names of the numbers in `environment_state`, (k,)."""
         ...
 
-    def sample(self, model: RobotModel, rng: np.random.Generator) -> Episode:
+    def sample(self, model: RobotModel, rng: np.random.Generator) -> Start:
         """Return the beginning of an episode."""
         ...
 

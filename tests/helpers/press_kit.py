@@ -12,7 +12,7 @@ from handrail.collect.operators.modes import TeleopMode, always
 from handrail.collect.operators.scripts.scripted import scripted_operator
 from handrail.collect.simulation.scene import Scene
 from handrail.collect.tasks.catalogue import TaskSpec
-from handrail.collect.tasks.task import Episode, Verdict
+from handrail.collect.tasks.task import Start, Verdict
 from handrail.controllers.baselines.catalogue import ControllerSpec
 from handrail.controllers.baselines.twist_completion import twist_controller
 from handrail.controllers.baselines.whole_body_completion import WholeBodyCompletion
@@ -31,7 +31,7 @@ class Press:
     def sample(self, model, rng):
         hand = model.pose(model.description.home)
         button = Pose(hand.position + rng.uniform(0.05, 0.15, 3), hand.rotation)
-        return Episode(Scene(()), model.description.home, button)
+        return Start(Scene(()), model.description.home, button)
 
     def features(self, state):
         return state.goal.position

@@ -16,7 +16,7 @@ from handrail.collect.session.outcome import Outcome
 from handrail.collect.session.session import Session
 from handrail.collect.simulation.scene import Scene
 from handrail.collect.tasks.goal_reaching import STEP, T_MAX, StraightPlanner, pose_error, reached
-from handrail.collect.tasks.task import Episode, TaskState, Verdict
+from handrail.collect.tasks.task import Start, TaskState, Verdict
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.interface.command import Diagnostics
 from handrail.controllers.interface.controller import Controller, State
@@ -136,8 +136,8 @@ class _Task:
     horizon: float = (T_MAX - 0.5) * STEP
     state_names: tuple[str, ...] = ()
 
-    def sample(self, model: RobotModel, rng: np.random.Generator) -> Episode:
-        return Episode(self.conditions.scene, model.description.home)
+    def sample(self, model: RobotModel, rng: np.random.Generator) -> Start:
+        return Start(self.conditions.scene, model.description.home)
 
     def features(self, state: TaskState) -> FloatArray:
         return np.zeros(0)

@@ -2,14 +2,14 @@
 
 import numpy as np
 
-from handrail.collect.simulation.scene import Scene, SceneObject, View
+from handrail.collect.simulation.scene import Scene, SceneObject, Viewpoint
 from handrail.collect.tasks.furniture import footprint, pillar
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.robot.model import Pose, RobotModel
 
-VIEW = View(position=(-2.9, -3.4, 3.0), target=(-0.3, 0.0, 0.4), fovy=36.0)
+VIEW = Viewpoint(position=(-2.9, -3.4, 3.0), target=(-0.3, 0.0, 0.4), fovy=36.0)
 _LOW, _TALL = (0.3, 0.3), (0.25, 1.5)  # radius and height of the showcase's cylinders [m]
 _COUNTS = ((2, _LOW), (1, _TALL))
 _AREA = (-1.2, -1.2), (1.2, 1.2)  # of their centres [m]

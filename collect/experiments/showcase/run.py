@@ -10,7 +10,7 @@ from handrail.collect.experiments.showcase.cases import Case
 from handrail.collect.operators.operator import View
 from handrail.collect.session.outcome import Outcome
 from handrail.collect.session.session import Observer, Session
-from handrail.collect.tasks.task import Episode, TaskState, Verdict
+from handrail.collect.tasks.task import Start, TaskState, Verdict
 from handrail.controllers.arrays import BoolArray, FloatArray
 from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.interface.channel_matrix import channel_matrix
@@ -100,9 +100,9 @@ class ShowcaseTask:
         """Time limit, never reached [s]."""
         return self.case.seconds + 1.0
 
-    def sample(self, model: RobotModel, rng: np.random.Generator) -> Episode:
+    def sample(self, model: RobotModel, rng: np.random.Generator) -> Start:
         """Return the beginning, always the same."""
-        return Episode(self.case.scene, self.case.q)
+        return Start(self.case.scene, self.case.q)
 
     def features(self, state: TaskState) -> FloatArray:
         """Return no features, (0,)."""
@@ -178,7 +178,7 @@ class _Tracer:
         states, solve_times = zip(*self._rows, strict=True)
         model, case = self._env.model, self._case
         q = np.array([state.q for state in states])
-        collision = CollisionModel(model, self._env.episode.scene.obstacles())
+        collision = CollisionModel(model, self._env.start.scene.obstacles())
         return Trace(
             case=case,
             times=np.array([state.time for state in states]),

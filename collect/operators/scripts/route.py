@@ -26,7 +26,7 @@ class Route:
 
     def __init__(self, model: RobotModel, task: TaskState) -> None:
         self._model = model
-        self._obstacles = floor_obstacles(task.episode.scene)
+        self._obstacles = floor_obstacles(task.start.scene)
         behind = [item.position[0] - np.hypot(*item.shape.size[:2]) / 2 for item in self._obstacles]
         self.lane = float(min(behind, default=0.0)) - model.description.base_size[0] / 2 - _CLEARANCE
 
