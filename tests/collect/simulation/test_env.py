@@ -12,6 +12,7 @@ from collect_helpers import action, environment, moved, write_small_robot
 from gymnasium.utils.env_checker import check_env
 
 from handrail.collect.simulation.gl import mujoco
+from handrail.collect.tasks.reach import Reach
 from handrail.controllers.errors import HandrailError
 
 CAMERAS = ("wrist", "scene")

@@ -6,7 +6,13 @@ from collect_helpers import action, environment, over_cube
 
 from handrail.collect.config import SessionConfig
 from handrail.collect.operators.scripts.pick_place import tips_beyond_tool
-from handrail.collect.session.build import build_controller, build_env, build_mode, build_operator
+from handrail.collect.session.build import (
+    build_controller,
+    build_env,
+    build_mode,
+    build_operator,
+    build_session,
+)
 from handrail.collect.session.session import Session
 from handrail.collect.simulation.geometry import box_around
 from handrail.collect.tasks.task import Start
