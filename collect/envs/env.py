@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from handrail.collect.envs.observation import AgentObservation, bounded, box_space
 from handrail.collect.simulation.protocols import Plant, Robot, World
-from handrail.collect.simulation.rendering import CAMERAS, FAST, PRETTY, Painter
+from handrail.collect.simulation.rendering import CAMERAS, Painter
 from handrail.collect.simulation.simulation import Simulation
 from handrail.collect.tasks.task import Start, Task, TaskState, Verdict
 from handrail.controllers.errors import HandrailError, unknown_name
@@ -254,8 +254,9 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     def _paint(self, use: str, camera: str) -> NDArray[np.uint8]:
         now = self.simulation
         if use not in self._painters:
-            size, quality = (self.image_size, FAST) if use == "pixels" else (self.render_size, PRETTY)
-            self._painters[use] = Painter(now.mujoco_model, size, quality)
+            pretty = use == "render"
+            size = self.render_size if pretty else self.image_size
+            self._painters[use] = Painter(now.mujoco_model, size, pretty)
         return self._painters[use].paint(now.data, camera)
 
     def close(self) -> None:

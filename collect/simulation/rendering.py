@@ -1,7 +1,5 @@
 """Pictures of a simulation: a fast setting for observations, a pretty one for people."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,39 +10,27 @@ from handrail.controllers.errors import unknown_name
 CAMERAS = ("wrist", "scene")
 
 
-@dataclass(frozen=True)
-class Quality:
-    """How a picture is drawn: shadow map size (0: none) and samples a pixel (0: jagged edges)."""
-
-    shadows: int = 0
-    samples: int = 0
-
-
-FAST = Quality()
-PRETTY = Quality(shadows=4096, samples=8)
-
-
 class Painter:
     """Draws one simulation, offscreen.
 
     Args:
         model: of the simulation; its visual settings become those of the pictures.
         size: height and width of the pictures [px].
-        quality: how they are drawn.
+        pretty: with shadows and smooth edges, which takes longer.
 
     Raises:
         HandrailError: there is no OpenGL on this machine.
     """
 
-    def __init__(self, model: MjModel, size: tuple[int, int], quality: Quality = FAST) -> None:
+    def __init__(self, model: MjModel, size: tuple[int, int], pretty: bool = False) -> None:
         self._cameras = [model.camera(index).name for index in range(model.ncam)]
-        self._shadows = bool(quality.shadows)
+        self._pretty = pretty
         self._option = mujoco.MjvOption()
         self._option.geomgroup[:] = 0
         self._option.geomgroup[VISIBLE_GROUP] = 1
         visual = model.vis
         visual.global_.offheight, visual.global_.offwidth = size
-        visual.quality.shadowsize, visual.quality.offsamples = quality.shadows, quality.samples
+        visual.quality.shadowsize, visual.quality.offsamples = (4096, 8) if pretty else (0, 0)
         try:
             self._renderer = mujoco.Renderer(model, *size, max_geom=300)
         except Exception as error:  # each backend has its own kind
@@ -60,7 +46,7 @@ class Painter:
             raise unknown_name("camera", camera, self._cameras)
         self._renderer.update_scene(data, camera, self._option)
         for flag in (mujoco.mjtRndFlag.mjRND_SHADOW, mujoco.mjtRndFlag.mjRND_REFLECTION):
-            self._renderer.scene.flags[flag] = self._shadows
+            self._renderer.scene.flags[flag] = self._pretty
         return self._renderer.render()
 
     def close(self) -> None:

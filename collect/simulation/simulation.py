@@ -44,7 +44,6 @@ class Simulation:
     Attributes:
         mujoco_model: the compiled model.
         data: its state.
-        substeps: integration steps in one control step.
     """
 
     def __init__(
@@ -65,10 +64,10 @@ class Simulation:
         self._gripper = model.description.gripper if grips else None
         self._scene = scene
         self._step = step
-        self.substeps = math.ceil(step / timestep - 1e-9)
-        self._shares = np.arange(1, self.substeps + 1) / self.substeps
+        substeps = math.ceil(step / timestep - 1e-9)
+        self._shares = np.arange(1, substeps + 1) / substeps
         with _understood(model):
-            robot = _robot(model, meshes, grips, step / self.substeps)
+            robot = _robot(model, meshes, grips, step / substeps)
             spec = robot.spec.copy()
             add_scene(spec, scene)
             self.mujoco_model = spec.compile()

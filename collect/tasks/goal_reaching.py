@@ -60,7 +60,7 @@ def reached(d_p: float, d_r: float) -> bool:
 class StraightPlanner:
     """Moves the tool on a straight line with spherical interpolation, open loop, at a constant twist.
 
-    `p(t) = p_0 + v t h`, `R(t) = exp(ω t h) R_0` for `steps` steps of h seconds; at rest from then on.
+    `p(t) = p_0 + v t h`, `R(t) = exp(ω t h) R_0` for `steps` steps of h = 0.03 s; at rest from then on.
 
     Attributes:
         start_position: where it begins [m], (3,).
@@ -68,7 +68,6 @@ class StraightPlanner:
         goal: where it ends.
         velocity: (v, ω), world-aligned at the tool [m/s, rad/s], (6,).
         steps: how many it takes.
-        step: length h of one [s].
     """
 
     start_position: FloatArray
@@ -76,16 +75,10 @@ class StraightPlanner:
     goal: Pose
     velocity: FloatArray
     steps: int
-    step: float = STEP
 
     @classmethod
     def plan(
-        cls,
-        start_position: FloatArray,
-        start_rotation: FloatArray,
-        goal: Pose,
-        step: float = STEP,
-        speed: float = 1.0,
+        cls, start_position: FloatArray, start_rotation: FloatArray, goal: Pose, speed: float = 1.0
     ) -> "StraightPlanner":
         """Plan a motion of `max(300, ⌈distance / (0.08 · 0.03)⌉) / speed` steps.
 
@@ -93,20 +86,18 @@ class StraightPlanner:
             start_position: of the tool [m], (3,).
             start_rotation: world from tool, (3, 3).
             goal: where to go.
-            step: length of a step [s].
             speed: how many times faster than the paper's.
 
         Raises:
-            HandrailError: step or speed is not a positive number.
+            HandrailError: the speed is not a positive number.
         """
-        for name, value in (("step", step), ("speed", speed)):
-            if not 0.0 < value < np.inf:
-                raise HandrailError(f"{name} of a planner: expected a positive number, got {value}")
+        if not 0.0 < speed < np.inf:
+            raise HandrailError(f"speed of a planner: expected a positive number, got {speed}")
         line = goal.position - start_position
         steps = ceil(max(_SHORTEST, ceil(float(np.linalg.norm(line)) / (_SPEED * STEP))) / speed)
         turn = rotation_vector(goal.rotation @ np.asarray(start_rotation).T)
-        velocity = np.concatenate([line, turn]) / (steps * step)
-        return cls(frozen(start_position), frozen(start_rotation), goal, frozen(velocity), steps, step)
+        velocity = np.concatenate([line, turn]) / (steps * STEP)
+        return cls(frozen(start_position), frozen(start_rotation), goal, frozen(velocity), steps)
 
     def twist(self, t: int) -> FloatArray:
         """Return (v, ω) from step t to the next, world-aligned at the tool [m/s, rad/s], (6,)."""
@@ -116,6 +107,6 @@ class StraightPlanner:
         """Return the pose after t steps: position [m], (3,), and rotation world from tool, (3, 3)."""
         if t >= self.steps:
             return self.goal.position, self.goal.rotation
-        time = max(t, 0) * self.step
+        time = max(t, 0) * STEP
         rotation = pin.exp3(self.velocity[3:] * time) @ self.start_rotation
         return self.start_position + self.velocity[:3] * time, rotation

@@ -15,7 +15,7 @@ from handrail.collect.experiments.benchmark.episode import Conditions
 from handrail.collect.experiments.benchmark.metrics import Trace
 from handrail.collect.session.contact_sheet import contact_sheet
 from handrail.collect.session.video_file import VideoFile
-from handrail.collect.simulation.rendering import PRETTY, Painter
+from handrail.collect.simulation.rendering import Painter
 from handrail.collect.simulation.scene import Scene
 from handrail.collect.simulation.simulation import Simulation
 from handrail.collect.tasks.goal_reaching import STEP
@@ -84,7 +84,7 @@ def _stage(
     """Give the robot among the obstacles, with the goal marked, and who paints it at a size."""
     scene = Scene((*conditions.scene.objects, goal_marker(conditions.goal)), conditions.scene.view)
     simulation = Simulation(model, scene, model.description.home, STEP, meshes=True)
-    painter = Painter(simulation.mujoco_model, size, PRETTY)
+    painter = Painter(simulation.mujoco_model, size, pretty=True)
     try:
         yield simulation, painter
     finally:

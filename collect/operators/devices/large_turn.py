@@ -45,10 +45,8 @@ class LargeTurn:
         self._goal = view.state.q.copy()
         self._thought = b""
 
-    def is_ahead(self, target: Target | None, q: FloatArray) -> bool:
+    def is_ahead(self, target: Target, q: FloatArray) -> bool:
         """Return whether the hand has to turn far to where a goal leads."""
-        if target is None:
-            return False
         turn = target.hand.rotation @ self._model.pose(q).rotation.T
         return float(np.linalg.norm(rotation_vector(turn))) > self._large
 

@@ -79,7 +79,7 @@ def test_the_planner_is_as_fast_as_the_paper_s(distance, steps):
     assert StraightPlanner.plan(np.zeros(3), np.eye(3), goal, speed=2.0).steps == -(-steps // 2)
 
 
-@pytest.mark.parametrize("options", [{"speed": 0.0}, {"speed": np.nan}, {"step": -0.1}])
+@pytest.mark.parametrize("options", [{"speed": 0.0}, {"speed": np.nan}, {"speed": -0.1}])
 def test_a_planner_without_speed_is_refused(options):
     with pytest.raises(HandrailError, match="expected a positive number"):
         StraightPlanner.plan(np.zeros(3), np.eye(3), Pose(np.ones(3), np.eye(3)), **options)
