@@ -28,14 +28,14 @@ def sample_shifted(task: Task, size: float, model: RobotModel, rng: np.random.Ge
         model: of the robot.
         rng: drawn from.
     """
-    episode = task.sample(model, rng)
-    least = np.minimum(_distances(model, episode), _CLEARANCE)
+    start = task.sample(model, rng)
+    least = np.minimum(_distances(model, start), _CLEARANCE)
     for attempt in range(_ATTEMPTS):
         step = _draw(len(model.description.base_joints), model.size, size * (1.0 - attempt / _ATTEMPTS), rng)
-        moved = _moved(model, episode, step)
+        moved = _moved(model, start, step)
         if _inside(model, moved.q) and np.all(_distances(model, moved) >= least):
             return moved
-    return episode
+    return start
 
 
 def _draw(base: int, joints: int, size: float, rng: np.random.Generator) -> FloatArray:
@@ -49,12 +49,12 @@ def _draw(base: int, joints: int, size: float, rng: np.random.Generator) -> Floa
     return step
 
 
-def _moved(model: RobotModel, episode: Start, step: FloatArray) -> Start:
-    """Return the episode with the robot displaced; what it holds moves with the hand."""
-    if episode.grip is None:
-        return replace(episode, q=episode.q + step)
-    q = episode.q + np.where(np.arange(model.size) < len(model.description.base_joints), step, 0.0)
-    before, after = model.pose(episode.q), model.pose(q)
+def _moved(model: RobotModel, start: Start, step: FloatArray) -> Start:
+    """Return the start with the robot displaced; what it holds moves with the hand."""
+    if start.grip is None:
+        return replace(start, q=start.q + step)
+    q = start.q + np.where(np.arange(model.size) < len(model.description.base_joints), step, 0.0)
+    before, after = model.pose(start.q), model.pose(q)
     turn = after.rotation @ before.rotation.T
 
     def carried(item: SceneObject) -> SceneObject:
@@ -63,7 +63,7 @@ def _moved(model: RobotModel, episode: Start, step: FloatArray) -> Start:
         position = after.position + turn @ (item.position - before.position)
         return replace(item, position=position, rotation=turn @ item.rotation)
 
-    return replace(episode, q=q, scene=Scene(tuple(map(carried, episode.scene.objects)), episode.scene.view))
+    return replace(start, q=q, scene=Scene(tuple(map(carried, start.scene.objects)), start.scene.view))
 
 
 def _inside(model: RobotModel, q: FloatArray) -> bool:
@@ -71,7 +71,7 @@ def _inside(model: RobotModel, q: FloatArray) -> bool:
     return bool(np.all((limits.position_lower < q) & (q < limits.position_upper)))
 
 
-def _distances(model: RobotModel, episode: Start) -> FloatArray:
+def _distances(model: RobotModel, start: Start) -> FloatArray:
     """Return the signed distance of every pair, things that can be moved included [m], (P,)."""
-    solid = tuple(item.obstacle() for item in episode.scene.objects if not item.ghost)
-    return CollisionModel(model, solid).values(episode.q[None, :])[0]
+    solid = tuple(item.obstacle() for item in start.scene.objects if not item.ghost)
+    return CollisionModel(model, solid).values(start.q[None, :])[0]
