@@ -1,5 +1,6 @@
 """What a recording session is made of, as typed settings; light to import."""
 
+import math
 import os
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -21,6 +22,15 @@ CAMERAS = ("wrist", "scene")
 FPS_RANGE = (10, 100)
 MOST_MOVING = 4
 MOST_TIME = 3600.0  # [s]
+_SIZES = "an even number from 16 to 1024"
+_RANGES = {
+    "noise": (0.0, 5.0, "a number from 0 (perfect) to 5"),
+    "moving_obstacles": (0, MOST_MOVING, f"a whole number from 0 to {MOST_MOVING}"),
+    "time_limit": (0.0, MOST_TIME, f"0 (the task's own) to {MOST_TIME} s"),
+    "person": (0, math.inf, "a whole number >= 0"),
+    "seed": (0, math.inf, "a whole number >= 0"),
+    "image_size": (16, 1024, _SIZES),
+}
 
 
 @dataclass(frozen=True)
@@ -85,29 +95,18 @@ class SessionConfig:
                 raise unknown_name("camera", camera, CAMERAS)
         if len(set(self.camera_names)) != len(self.camera_names):
             raise HandrailError(f"--cameras {self.cameras}: expected each camera once")
-        if not 0.0 <= self.noise <= 5.0:
-            raise HandrailError(f"--noise {self.noise}: expected a number from 0 (perfect) to 5")
-        if not 0 <= self.moving_obstacles <= MOST_MOVING:
-            raise HandrailError(
-                f"--moving_obstacles {self.moving_obstacles}: expected a whole number from 0 to {MOST_MOVING}"
-            )
+        for name, (low, high, words) in _RANGES.items():
+            if not low <= getattr(self, name) <= high:
+                raise HandrailError(f"--{name} {getattr(self, name)}: expected {words}")
         if self.moving_obstacles and not TASKS.find(self.task).movers:
             fit = " or ".join(spec.name for spec in TASKS.built_in if spec.movers)
             raise HandrailError(f"--moving_obstacles: expected --task {fit}, got --task {self.task}")
-        if not 0.0 <= self.time_limit <= MOST_TIME:
-            raise HandrailError(
-                f"--time_limit {self.time_limit}: expected 0 (the task's own) to {MOST_TIME} s"
-            )
         if not self.physics and (self.task != "reach" or self.camera_names):
             raise HandrailError(
                 "--no_physics: expected --task reach without cameras: nothing can be moved or seen"
             )
-        if self.person < 0:
-            raise HandrailError(f"--person {self.person}: expected a whole number >= 0")
-        if self.seed < 0:
-            raise HandrailError(f"--seed {self.seed}: expected a whole number >= 0")
-        if not 16 <= self.image_size <= 1024 or self.image_size % 2:
-            raise HandrailError(f"--image_size {self.image_size}: expected an even number from 16 to 1024")
+        if self.image_size % 2:
+            raise HandrailError(f"--image_size {self.image_size}: expected {_SIZES}")
 
 
 @dataclass(frozen=True)
@@ -200,6 +199,8 @@ class RecordConfig(SessionConfig):
             raise HandrailError("--display_data and --display_web: expected one of them, got both")
         if self.display_save and not self.display_save.endswith(".rrd"):
             raise HandrailError(f"--display_save {self.display_save}: expected a file that ends in .rrd")
+        if self.display_save and not Path(self.display_save).parent.is_dir():
+            raise HandrailError(f"--display_save {self.display_save}: expected a file in an existing folder")
 
     def _check_rates(self) -> None:
         fps = self.dataset.fps

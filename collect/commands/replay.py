@@ -154,8 +154,6 @@ class _Recorded:
 class _Nobody:
     """Asks for nothing; an operator."""
 
-    name = "nobody"
-
     def reset(self, view: View, rng: np.random.Generator) -> None:
         """Begin an episode."""
 

@@ -11,11 +11,11 @@ from gymnasium import spaces
 from gymnasium.envs.registration import load_env_creator
 from numpy.typing import ArrayLike, NDArray
 
-from handrail.collect.envs.observation import AgentObservation, bounded, box_space, image_space
+from handrail.collect.envs.observation import AgentObservation, bounded, box_space
 from handrail.collect.simulation.protocols import Plant, Robot, World
-from handrail.collect.simulation.rendering import CAMERAS, FAST, PRETTY, Painter
+from handrail.collect.simulation.rendering import CAMERAS, Painter
 from handrail.collect.simulation.simulation import Simulation
-from handrail.collect.tasks.task import Episode, Task, TaskState, Verdict
+from handrail.collect.tasks.task import Start, Task, TaskState, Verdict
 from handrail.controllers.errors import HandrailError, unknown_name
 from handrail.controllers.interface.controller import State
 from handrail.controllers.robot.model import RobotModel, load_model
@@ -42,6 +42,7 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         image_size: height and width of `pixels` [px].
         render_mode: `rgb_array` or None.
         render_size: height and width of what `render` returns [px].
+        sample: draws how an episode begins, `(model, rng)`, instead of the task.
         observes: whether there is anything in observations; without, steps are quicker.
 
     Attributes:
@@ -68,6 +69,7 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         image_size: tuple[int, int] = (128, 128),
         render_mode: str | None = None,
         render_size: tuple[int, int] = RENDER_SIZE,
+        sample: Callable[[RobotModel, np.random.Generator], Start] | None = None,
         observes: bool = True,
     ) -> None:
         _check(fps, cameras, render_mode)
@@ -81,14 +83,14 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self.metadata = {**type(self).metadata, "render_fps": fps}
         self._max_episode_steps = math.ceil(self.task.horizon * fps)
         self._build, self._observes = plant, observes
+        self._sample = sample or self.task.sample
         self._agent = AgentObservation(self.model)
         self.agent_names = self._agent.names
         self.state_names = self.task.state_names
         self.action_space = self._action_space()
         self.observation_space = self._observation_space()
         self._painters: dict[str, Painter] = {}
-        self._episode: Episode | None = None
-        self._plant: Plant | None = None
+        self._begun: tuple[Start, Plant] | None = None
         self._steps = 0
 
     def _action_space(self) -> spaces.Space[Any]:
@@ -103,7 +105,8 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             "environment_state": box_space(len(self.state_names)),
         }
         if self.cameras:
-            parts["pixels"] = spaces.Dict({camera: image_space(*self.image_size) for camera in self.cameras})
+            picture = spaces.Box(0, 255, (*self.image_size, 3), np.uint8)
+            parts["pixels"] = spaces.Dict(dict.fromkeys(self.cameras, picture))
         return spaces.Dict(parts)
 
     @property
@@ -142,25 +145,29 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             HandrailError: `reset` was not called, or there are no physics.
         """
         if not isinstance(self._present, Simulation):
-            raise HandrailError(f"environment {self.task.name}: expected physics, got an ideal robot")
+            raise HandrailError(
+                f"environment {type(self.task).__name__}: expected physics, got an ideal robot"
+            )
         return self._present
 
     @property
     def _present(self) -> Plant:
-        if self._plant is None:
-            raise HandrailError(f"environment {self.task.name}: call reset() before anything else")
-        return self._plant
+        return self._now[1]
 
     @property
-    def episode(self) -> Episode:
+    def _now(self) -> tuple[Start, Plant]:
+        if self._begun is None:
+            raise HandrailError(f"environment {type(self.task).__name__}: call reset() before anything else")
+        return self._begun
+
+    @property
+    def start(self) -> Start:
         """How this episode began.
 
         Raises:
             HandrailError: `reset` was not called.
         """
-        if self._episode is None:
-            raise HandrailError(f"environment {self.task.name}: call reset() before anything else")
-        return self._episode
+        return self._now[0]
 
     def state(self) -> State:
         """Return the measured positions, velocities and time, and the velocity sent last."""
@@ -180,9 +187,9 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             time=now.time,
             tool=now.tool,
             opening=now.opening,
-            episode=self.episode,
+            start=self.start,
             poses=now.poses(),
-            twists=now.twists(),
+            still=now.still(),
             stable=now.is_stable,
         )
 
@@ -193,18 +200,17 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
 
         Args:
             seed: of everything random.
-            options: `episode`: an `Episode` to begin with instead of a sampled one.
+            options: `start`: a `Start` to begin with instead of a sampled one.
         """
         super().reset(seed=seed)
-        episode: Episode = (options or {}).get("episode") or self.task.sample(self.model, self.np_random)
+        start: Start = (options or {}).get("start") or self._sample(self.model, self.np_random)
         meshes = bool(self.cameras or self.render_mode)
-        self._plant = self._build(
-            self.model, episode.scene, episode.q, self.period, meshes=meshes, grip=episode.grip
-        )
-        self._episode = episode
+        self.close()
+        plant = self._build(self.model, start.scene, start.q, self.period, meshes=meshes, grip=start.grip)
+        self._begun = start, plant
         self._steps = 0
         state = self.task_state()
-        rest = np.append(np.zeros(self.model.size), float(episode.grip is not None)).astype(np.float32)
+        rest = np.append(np.zeros(self.model.size), float(start.grip is not None)).astype(np.float32)
         return self._observe(state), self._info(state, Verdict(), rest)
 
     def step(self, action: ArrayLike) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
@@ -248,9 +254,10 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     def _paint(self, use: str, camera: str) -> NDArray[np.uint8]:
         now = self.simulation
         if use not in self._painters:
-            size, quality = (self.image_size, FAST) if use == "pixels" else (self.render_size, PRETTY)
-            self._painters[use] = Painter(now.mujoco_model, size, quality)
-        return self._painters[use].paint(now.mujoco_model, now.data, camera)
+            pretty = use == "render"
+            size = self.render_size if pretty else self.image_size
+            self._painters[use] = Painter(now.mujoco_model, size, pretty)
+        return self._painters[use].paint(now.data, camera)
 
     def close(self) -> None:
         """Give the OpenGL contexts back."""

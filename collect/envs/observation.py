@@ -49,8 +49,3 @@ def bounded(numbers: FloatArray) -> NDArray[np.float32]:
 def box_space(size: int) -> spaces.Space[Any]:
     """Return the space of `size` bounded numbers."""
     return spaces.Box(-_BOUND, _BOUND, (size,), np.float32)
-
-
-def image_space(height: int, width: int) -> spaces.Space[Any]:
-    """Return the space of a colour picture, height by width by 3."""
-    return spaces.Box(0, 255, (height, width, 3), np.uint8)

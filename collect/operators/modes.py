@@ -1,9 +1,10 @@
 """Teleop modes by name: which channels an operator owns, with which device, before which controller."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
+from handrail.controllers.interface.channels import TOOL
 from handrail.controllers.registry import Registry
 
 Focus = Literal["hand", "base"]
@@ -31,6 +32,21 @@ class TeleopMode:
     def by_focus(self) -> bool:
         """Whether the operator owns other channels while they drive the base."""
         return self.groups("base") != self.groups("hand")
+
+    def leaving(self, left: tuple[str, ...], minded: tuple[str, ...]) -> "TeleopMode":
+        """Return the mode of an operator who leaves some tool channels alone, and minds some while driving.
+
+        Args:
+            left: channels of the tool that the group `ee` loses; a mode that names channels keeps them.
+            minded: channels that are owned too while the operator, who steers by focus, drives the base.
+        """
+        kept = tuple(name for name in TOOL if name not in left)
+
+        def groups(focus: Focus) -> tuple[str, ...]:
+            own = (name for group in self.groups(focus) for name in (kept if group == "ee" else (group,)))
+            return (*own, *(minded if self.by_focus and focus == "base" else ()))
+
+        return replace(self, groups=groups) if left or minded else self
 
 
 def always(*groups: str) -> Callable[[Focus], tuple[str, ...]]:

@@ -19,17 +19,18 @@ class View:
 
     Attributes:
         state: of the robot.
-        tool: pose of the tool point.
-        opening: of the gripper, 0 closed, 1 open.
         task: the truth of this moment.
         observation: what is recorded of it: `agent_pos`, `environment_state`, and `pixels` by camera.
     """
 
     state: State
-    tool: Pose
-    opening: float
     task: TaskState
     observation: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def tool(self) -> Pose:
+        """Pose of the tool point."""
+        return self.task.tool
 
 
 class EpisodeEvent(StrEnum):
@@ -49,11 +50,6 @@ class EpisodeEvent(StrEnum):
 
 class Operator(Protocol):
     """Whoever steers: a script, a person, a trained policy."""
-
-    @property
-    def name(self) -> str:
-        """What the dataset says of who steered."""
-        ...
 
     def reset(self, view: View, rng: np.random.Generator) -> None:
         """Begin an episode."""

@@ -21,13 +21,7 @@ class DelayedOperator:
     """
 
     def __init__(self, operator: Operator, periods: int) -> None:
-        self._operator = operator
-        self._periods = periods
-
-    @property
-    def name(self) -> str:
-        """Who steers."""
-        return self._operator.name
+        self._operator, self._periods = operator, periods
 
     def reset(self, view: View, rng: np.random.Generator) -> None:
         """Begin an episode."""

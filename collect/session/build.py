@@ -2,15 +2,16 @@
 
 import importlib.metadata
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
 from handrail.collect.config import SessionConfig, check_fps
 from handrail.collect.envs.env import RENDER_SIZE, HandrailEnv
 from handrail.collect.operators.catalogue import OPERATORS
-from handrail.collect.operators.leaving import leaving
 from handrail.collect.operators.modes import MODES, TeleopMode, always
 from handrail.collect.operators.operator import Operator
+from handrail.collect.perturbations.shift import sample_shifted
 from handrail.collect.session.session import Observer, Session
 from handrail.collect.simulation.ideal_robot import IdealRobot
 from handrail.collect.simulation.simulation import Simulation
@@ -32,7 +33,7 @@ _VERSIONED = ("handrail", "lerobot", "mujoco", "pin", "coal", "casadi", "daqp", 
 
 
 def build_env(
-    config: SessionConfig, fps: int, render: tuple[int, int] | bool = False, task: Task | None = None
+    config: SessionConfig, fps: int, render: tuple[int, int] | bool = False, shift: float = 0.0
 ) -> HandrailEnv:
     """Return the environment of a session.
 
@@ -40,15 +41,16 @@ def build_env(
         config: of the session.
         fps: recording rate [Hz], and the robot's where the settings do not say another.
         render: whether `env.render()` shall give good-looking pictures; or their height and width [px].
-        task: instead of the one that the settings name.
+        shift: how far from the demonstrations' start the robot begins at most [m, rad].
 
     Raises:
         HandrailError: a setting is wrong, or cameras are asked for and GL is missing.
     """
     config.check()
     check_fps(fps)
+    task = build_task(config)
     return HandrailEnv(
-        task or build_task(config),
+        task,
         config.robot,
         fps=config.robot_fps or fps,
         plant=Simulation if config.physics else IdealRobot,
@@ -56,6 +58,7 @@ def build_env(
         image_size=(config.image_size, config.image_size),
         render_mode="rgb_array" if render else None,
         render_size=render if isinstance(render, tuple) else RENDER_SIZE,
+        sample=partial(sample_shifted, task, shift) if shift else None,
     )
 
 
@@ -121,7 +124,7 @@ def build_mode(config: SessionConfig, model: RobotModel) -> TeleopMode:
         mode = TeleopMode(config.mode_name, always(*names), mode.controller, "a mask of one's own")
     if not CONTROLLERS.find(mode.controller).objectives:
         return mode
-    return leaving(mode, task.left, task.minded)
+    return mode.leaving(task.left, task.minded)
 
 
 def _masked(mask: str, channels: Channels) -> tuple[str, ...]:

@@ -10,23 +10,20 @@ from PIL import Image
 
 from handrail.datasets.storage.atomic import explained, write_whole
 
+_GAP = 6  # between pictures [px]
 
-def contact_sheet(pictures: Sequence[NDArray[np.uint8]], columns: int = 4, gap: int = 6) -> NDArray[np.uint8]:
+
+def contact_sheet(pictures: Sequence[NDArray[np.uint8]], columns: int = 4) -> NDArray[np.uint8]:
     """Return the pictures in rows, in reading order, (height, width, 3).
 
     Args:
         pictures: of one size, (h, w, 3) each.
         columns: pictures a row.
-        gap: between them [pixels].
     """
-    height, width, _ = pictures[0].shape
-    rows = -(-len(pictures) // columns)
-    sheet = np.full((rows * (height + gap) + gap, columns * (width + gap) + gap, 3), 255, dtype=np.uint8)
-    for index, picture in enumerate(pictures):
-        row, column = divmod(index, columns)
-        top, left = gap + row * (height + gap), gap + column * (width + gap)
-        sheet[top : top + height, left : left + width] = picture
-    return sheet
+    tiles = [np.pad(picture, ((0, _GAP), (0, _GAP), (0, 0)), constant_values=255) for picture in pictures]
+    tiles += [np.full_like(tiles[0], 255)] * (-len(tiles) % columns)
+    rows = [np.hstack(tiles[start : start + columns]) for start in range(0, len(tiles), columns)]
+    return np.pad(np.vstack(rows), ((_GAP, 0), (_GAP, 0), (0, 0)), constant_values=255)
 
 
 def save_sheet(pictures: Sequence[NDArray[np.uint8]], path: Path) -> None:

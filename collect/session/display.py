@@ -3,7 +3,6 @@
 import contextlib
 import time
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 from handrail.collect.envs.env import HandrailEnv
@@ -43,7 +42,6 @@ class Display:
         self._drawing = Drawing(rr)
         rr.init("handrail")
         if save:
-            _check_file(Path(save))
             rr.save(save)
         if spawn or web:
             self._open_viewer(web)
@@ -114,10 +112,3 @@ class Display:
 
     def _read(self) -> bytes:
         return self._stream.read(flush=True, flush_timeout_sec=_PATIENCE) or b""
-
-
-def _check_file(path: Path) -> None:
-    if not path.parent.is_dir():
-        raise HandrailError(
-            f"--display_save {path}: expected an existing folder, found none at {path.parent}"
-        )

@@ -3,11 +3,31 @@
 import numpy as np
 
 from handrail.collect.envs.env import HandrailEnv
-from handrail.collect.session.rates import Rate
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.interface.command import Command
 from handrail.controllers.interface.controller import Controller, State
 from handrail.controllers.interface.intent import Intent
+
+_ROUNDING = 1e-9  # [s]
+
+
+class Rate:
+    """Says at which steps something is due that happens once a period; the first time at once.
+
+    Args:
+        period: [s].
+    """
+
+    def __init__(self, period: float) -> None:
+        self._period, self._next = period, 0.0
+
+    def due(self, time: float) -> bool:
+        """Whether it is due at a step's time [s]."""
+        return time >= self._next - _ROUNDING
+
+    def take(self) -> None:
+        """Take note that it happens."""
+        self._next += self._period
 
 
 class Driver:
@@ -28,7 +48,7 @@ class Driver:
 
     def __init__(self, controller: Controller, env: HandrailEnv, period: float) -> None:
         self._controller, self._env, self._rate = controller, env, Rate(period)
-        self._moving, self._holding = bool(env.episode.scene.movers), bool(env.world.held())
+        self._moving, self._holding = bool(env.start.scene.movers), bool(env.world.held())
         self._asked = 0
         controller.reset(env.world.obstacles())
 

@@ -3,7 +3,6 @@
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
-from types import TracebackType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,8 +17,8 @@ SIZE = (540, 960)  # height, width [px]
 _BAR = 64  # height of the caption [px]; both even, as h264 wants
 
 
-class Filmer:
-    """Encodes one picture a control period; an observer, and a context that closes the file.
+class Filmer(VideoFile):
+    """Adds one picture a control period to a file; an observer.
 
     The environment renders pictures of `SIZE`.
 
@@ -31,18 +30,8 @@ class Filmer:
     """
 
     def __init__(self, path: Path, fps: int, title: str, words: Callable[[Frame], str]) -> None:
+        super().__init__(path, (SIZE[0] + _BAR, SIZE[1]), fps)
         self._title, self._words = title, words
-        self._file = VideoFile(path, (SIZE[0] + _BAR, SIZE[1]), fps)
-
-    def __enter__(self) -> "Filmer":
-        """Begin."""
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        """Close the file."""
-        self._file.__exit__(kind, error, trace)
 
     def begin(self, env: HandrailEnv, seed: int) -> None:
         """Take note of the environment."""
@@ -52,7 +41,7 @@ class Filmer:
         """Add the picture of this moment."""
         picture = self._env.render()
         if picture is not None:
-            self._file.add(captioned(picture, _BAR, (self._title, 9, 20), (self._words(frame), 37, 16)))
+            self.add(captioned(picture, _BAR, (self._title, 9, 20), (self._words(frame), 37, 16)))
 
 
 def captioned(picture: NDArray[np.uint8], bar: int, *lines: tuple[str, int, int]) -> NDArray[np.uint8]:

@@ -36,8 +36,8 @@ class Drawing:
         rr.set_time("time", duration=0.0)
         rr.log("world", rr.Clear(recursive=True))
         rr.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP)
-        self._movers = env.episode.scene.movers
-        for obstacle in env.episode.scene.obstacles():
+        self._movers = env.start.scene.movers
+        for obstacle in env.start.scene.obstacles():
             self._log_shape(f"world/scene/{obstacle.name}", obstacle)
 
     def see(self, frame: Frame) -> None:

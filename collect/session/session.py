@@ -15,14 +15,12 @@ import numpy as np
 
 from handrail.collect.envs.env import HandrailEnv
 from handrail.collect.operators.operator import EpisodeEvent, Operator, View
-from handrail.collect.session.driver import Driver
+from handrail.collect.session.driver import Driver, Rate
 from handrail.collect.session.outcome import Outcome, Tally
-from handrail.collect.session.rates import Rate
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import Controller
 from handrail.controllers.interface.intent import Intent
 from handrail.controllers.numerics.threads import single_threaded
-from handrail.controllers.robot.model import RobotModel
 from handrail.datasets.recording.frames import Frame
 
 _CREEP = 1e-3  # slower, a paused robot is sent rest [m/s, rad/s]
@@ -90,11 +88,6 @@ class Session:
         self._control_period = control_period or env.period
         self._record_period = record_period or env.period
 
-    @property
-    def model(self) -> RobotModel:
-        """The robot's model."""
-        return self.env.model
-
     def run(self, seed: int, tell_paused: Callable[[bool], None] = lambda paused: None) -> Outcome:
         """Run one episode and return how it went; the same seed gives the same episode.
 
@@ -131,7 +124,7 @@ class Session:
             other.begin(self.env, seed)
         self._tally, self._recording = Tally(seed, self.env.period), Rate(self._record_period)
         self._recording.take()
-        self._intent = Intent.idle(Channels.of(self.model.description))
+        self._intent = Intent.idle(Channels.of(self.env.model.description))
         self._event: EpisodeEvent | None = None
         self._frame: Frame | None = None
         self._done = False
@@ -198,8 +191,7 @@ class Session:
         return commanded is not None and not commanded.any()
 
     def _view(self) -> View:
-        task = self.env.task_state()
-        return View(self.env.robot.state(), task.tool, task.opening, task, self._observation)
+        return View(self.env.robot.state(), self.env.task_state(), self._observation)
 
 
 def _lasting(first: Frame, last: Frame) -> Frame:

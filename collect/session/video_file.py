@@ -4,6 +4,7 @@ import os
 from fractions import Fraction
 from pathlib import Path
 from types import TracebackType
+from typing import Self
 
 import av
 import numpy as np
@@ -36,7 +37,7 @@ class VideoFile:
         self._stream.pix_fmt, self._stream.time_base = "yuv420p", self._tick
         self._count = 0
 
-    def __enter__(self) -> "VideoFile":
+    def __enter__(self) -> Self:
         """Begin."""
         return self
 

@@ -21,7 +21,7 @@ from handrail.controllers.errors import HandrailError
 _HERE = "127.0.0.1"  # this machine and no other
 _DATA_PORT, _PAGE_PORT = 9876, 9090  # rerun's own; others where these are taken
 _BEGIN, _END = 30.0, 5.0  # patience [s]
-_MOST_WAITING = 2**26  # [bytes]
+MOST_WAITING = 2**26  # [bytes]
 _PIECE = 2**16  # [bytes]
 _GRACE = 0.5  # time in which the last data reach a browser [s]
 
@@ -32,6 +32,10 @@ class Viewer:
     Args:
         first: beginning of the stream; a viewer begins when it has some.
         web: serve the web viewer instead of opening a window.
+
+    Attributes:
+        address: of the web viewer's page; empty for a window.
+        process: rerun's.
 
     Raises:
         HandrailError: it does not start.
@@ -46,7 +50,7 @@ class Viewer:
         self._said = tempfile.TemporaryFile()  # noqa: SIM115 (as long as the process)
         end, self._pipe = os.pipe()
         os.set_blocking(self._pipe, False)
-        self._process = subprocess.Popen(
+        self.process = subprocess.Popen(
             [_program(), "--bind", _HERE, "--port", str(data_port), *served, "-"],
             stdin=end,
             stdout=self._said,
@@ -72,7 +76,7 @@ class Viewer:
             while self._waiting:
                 del self._waiting[: os.write(self._pipe, self._waiting[:_PIECE])]
         except BlockingIOError:
-            if len(self._waiting) > _MOST_WAITING:
+            if len(self._waiting) > MOST_WAITING:
                 raise HandrailError("the viewer does not keep up") from None
         except BrokenPipeError:
             raise HandrailError("the viewer has ended") from None
@@ -98,7 +102,7 @@ class Viewer:
         """Wait until the viewer listens."""
         until = time.monotonic() + _BEGIN
         while not _listens(port):
-            if self._process.poll() is not None:
+            if self.process.poll() is not None:
                 raise HandrailError(f"the rerun viewer did not start: {self._last_words()}")
             if time.monotonic() > until:
                 raise HandrailError(f"the rerun viewer did not start within {_BEGIN:.0f} s")
@@ -110,12 +114,12 @@ class Viewer:
     def _last_words(self) -> str:
         self._said.seek(0)
         lines = self._said.read().decode(errors="replace").strip().splitlines()
-        last = lines[-1].rstrip(".") if lines else f"exit code {self._process.returncode}"
+        last = lines[-1].rstrip(".") if lines else f"exit code {self.process.returncode}"
         return re.sub(r"^Error: (.*\.rs:\d+: )?", "", last)  # without the place in rerun's source
 
     def _kill(self) -> None:
-        self._process.kill()
-        self._process.wait()
+        self.process.kill()
+        self.process.wait()
 
 
 def _program() -> str:

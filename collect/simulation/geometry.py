@@ -44,11 +44,6 @@ def box_inertia(mass: float, size: FloatArray) -> FloatArray:
     return mass / 12.0 * np.array([y + z, x + z, x + y])
 
 
-def shape_inertia(mass: float, shape: Shape) -> FloatArray:
-    """Return the inertia of the box that encloses a shape, (3,) [kg m²]."""
-    return box_inertia(mass, bounding_box(shape))
-
-
 def volume(shape: Shape) -> float:
     """Return the volume of a shape [m³]."""
     if shape.kind == "box":

@@ -16,10 +16,8 @@ _LIBRARIES = {"egl": ("libEGL.so.1",), "osmesa": ("libOSMesa.so.8", "libOSMesa.s
 
 _PROBE = """
 import mujoco
-context = mujoco.GLContext(16, 16)
-context.make_current()
 model = mujoco.MjModel.from_xml_string("<mujoco><worldbody><geom size='1'/></worldbody></mujoco>")
-mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100)
+mujoco.Renderer(model, 16, 16).close()
 """
 
 
@@ -79,17 +77,3 @@ type MjsBody = Any
 type MjsGeom = Any
 type MjModel = Any
 type MjData = Any
-type MjrContext = Any
-
-__all__ = [
-    "MjData",
-    "MjModel",
-    "MjSpec",
-    "MjrContext",
-    "MjsBody",
-    "MjsGeom",
-    "choose_backend",
-    "graphics_trouble",
-    "missing_graphics",
-    "mujoco",
-]

@@ -7,7 +7,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from handrail.collect.simulation.gate import Gate
 from handrail.collect.simulation.scene import Scene
-from handrail.collect.simulation.twist import Twist
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.errors import HandrailError
@@ -110,6 +109,6 @@ class IdealRobot:
             for item in self._scene.objects
         }
 
-    def twists(self) -> Mapping[str, Twist]:
+    def still(self) -> frozenset[str]:
         """Return nothing: nothing can be moved."""
-        return {}
+        return frozenset()

@@ -1,9 +1,7 @@
 """The arm's meshes as a camera sees them: STL files, split into their pieces, coloured."""
 
-import struct
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -22,13 +20,7 @@ _TRIANGLE = np.dtype([("normal", "<3f4"), ("vertices", "<9f4"), ("attribute", "<
 
 @dataclass(frozen=True)
 class Piece:
-    """A connected piece of a mesh.
-
-    Attributes:
-        vertices: in the mesh's frame [m], (k, 3).
-        faces: indices of vertices, (f, 3).
-        rgba: its colour.
-    """
+    """A connected piece of a mesh: vertices, (k, 3) [m], faces of their indices, (f, 3), and its colour."""
 
     vertices: FloatArray
     faces: NDArray[np.int64]
@@ -37,13 +29,12 @@ class Piece:
 
 @dataclass(frozen=True)
 class PlacedMesh:
-    """A link's mesh: its file, scale and placement in the frame of a pinocchio joint."""
+    """A link's mesh: its pieces, and its placement in the frame of a pinocchio joint."""
 
     name: str
-    path: Path
-    scale: FloatArray
     joint: int
     placement: pin.SE3
+    pieces: tuple[Piece, ...]
 
 
 def placed_meshes(model: RobotModel) -> Iterator[PlacedMesh]:
@@ -54,34 +45,33 @@ def placed_meshes(model: RobotModel) -> Iterator[PlacedMesh]:
         arm, str(description.urdf), pin.COLLISION, package_dirs=[str(description.mesh_root)]
     )
     for item in geometry.geometryObjects:
-        if not Path(item.meshPath).is_file():
+        path = Path(item.meshPath)
+        if not path.is_file():
             continue  # a primitive, such as the marker box on the UR's ee_link
         link = arm.frames[item.parentFrame]
         frame = model.pinocchio.frames[model.pinocchio.getFrameId(link.name, pin.FrameType.BODY)]
         placement = frame.placement * (link.placement.inverse() * item.placement)
-        yield PlacedMesh(item.name, Path(item.meshPath), item.meshScale, frame.parentJoint, placement)
+        yield PlacedMesh(item.name, frame.parentJoint, placement, _pieces(path, item.meshScale))
 
 
-@lru_cache(maxsize=64)
-def pieces(path: Path) -> tuple[Piece, ...]:
-    """Return the connected pieces of a binary STL file.
-
-    Raises:
-        HandrailError: it is not a binary STL file.
-    """
+def _pieces(path: Path, scale: FloatArray) -> tuple[Piece, ...]:
+    """Return the connected pieces of a binary STL file, without those that are flat."""
     vertices, faces = _read_stl(path)
     edges = np.vstack([faces[:, [0, 1]], faces[:, [1, 2]]])
     graph = coo_matrix((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), shape=(len(vertices),) * 2)
     count, labels = connected_components(graph, directed=False)
     parts = [_part(vertices, faces, labels == label) for label in range(count)]
     solid = [part for part in parts if np.ptp(part[0], axis=0).min() > 1e-3]
-    return tuple(Piece(*part, colour) for part, colour in zip(solid, _colours(solid), strict=True))
+    colours = [_colour(vertices) if len(solid) > 1 else _JOINT for vertices, _ in solid]
+    return tuple(
+        Piece(vertices * scale, faces, rgba) for (vertices, faces), rgba in zip(solid, colours, strict=True)
+    )
 
 
 def _read_stl(path: Path) -> tuple[FloatArray, NDArray[np.int64]]:
     data = path.read_bytes()
-    count = struct.unpack_from("<I", data, 80)[0] if len(data) >= 84 else -1
-    if len(data) < 84 + count * _TRIANGLE.itemsize or count < 0:
+    count = int.from_bytes(data[80:84], "little")
+    if len(data) < 84 + count * _TRIANGLE.itemsize:
         raise HandrailError(f"mesh {path}: expected a binary STL file")
     corners = np.frombuffer(data, _TRIANGLE, count, 84)["vertices"].reshape(-1, 3).astype(float)
     vertices, index = np.unique(corners.round(7), axis=0, return_inverse=True)
@@ -95,15 +85,7 @@ def _part(
     return vertices[keep], renumber[faces[keep[faces[:, 0]]]]
 
 
-def _colours(
-    parts: list[tuple[FloatArray, NDArray[np.int64]]],
-) -> list[tuple[float, float, float, float]]:
-    """Colour the flattest pieces as caps, the most slender as a tube, the others as joint housings."""
-    extents = [np.sort(np.ptp(vertices, axis=0)) for vertices, _ in parts]
-    if len(parts) == 1:
-        return [_JOINT]
-    colours = []
-    for low, middle, high in extents:
-        flat, slender = low < 0.75 * middle, high > 2.0 * middle
-        colours.append(_TUBE if slender else _CAP if flat else _JOINT)
-    return colours
+def _colour(vertices: FloatArray) -> tuple[float, float, float, float]:
+    """Return a slender piece's colour, a tube's, a flat one's, a cap's, or a joint housing's."""
+    low, middle, high = np.sort(np.ptp(vertices, axis=0))
+    return _TUBE if high > 2.0 * middle else _CAP if low < 0.75 * middle else _JOINT

@@ -6,7 +6,6 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from handrail.collect.simulation.twist import Twist
 from handrail.controllers.interface.controller import State
 from handrail.controllers.robot.model import Pose
 from handrail.controllers.robot.shape import Obstacle
@@ -73,8 +72,8 @@ class World(Protocol):
         """Return where every scene object is now, by name."""
         ...
 
-    def twists(self) -> Mapping[str, Twist]:
-        """Return how every movable object moves now, by name."""
+    def still(self) -> frozenset[str]:
+        """Return the names of the movable objects that are at rest: slower than 2 cm/s and 0.2 rad/s."""
         ...
 
 

@@ -12,7 +12,7 @@ import pinocchio as pin
 from handrail.collect.simulation import geometry
 from handrail.collect.simulation.gl import MjsBody, MjSpec, mujoco
 from handrail.collect.simulation.gripper import add_gripper
-from handrail.collect.simulation.meshes import pieces, placed_meshes
+from handrail.collect.simulation.meshes import placed_meshes
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.numerics.rotation import quaternion_from_matrix
 from handrail.controllers.robot.description import PlacedShape, Placement
@@ -40,25 +40,16 @@ class RobotSpec:
 
 
 class Mounts:
-    """Where pinocchio's joints and frames are in MuJoCo's tree."""
+    """Where pinocchio's frames are in MuJoCo's tree; the bodies are by pinocchio's joint index."""
 
     def __init__(self, model: RobotModel, bodies: list[MjsBody]) -> None:
-        self._model = model
-        self._bodies = bodies
-
-    def joint(self, index: int) -> MjsBody:
-        """Return the body that moves with a joint of pinocchio's."""
-        return self._bodies[index]
-
-    def frame(self, name: str) -> tuple[MjsBody, pin.SE3]:
-        """Return the body that carries a frame, and the frame's placement on it."""
-        frame = self._model.pinocchio.frames[self._model.frame_id(name)]
-        return self._bodies[frame.parentJoint], frame.placement
+        self._model, self.bodies = model, bodies
 
     def place(self, frame: str, placement: Placement) -> tuple[MjsBody, pin.SE3]:
         """Return the body that carries something placed on a frame, and where that is on the body."""
-        body, mount = self.frame(frame)
-        return body, mount * pin.SE3(np.array(placement.rotation), np.array(placement.translation))
+        mount = self._model.pinocchio.frames[self._model.frame_id(frame)]
+        on_frame = pin.SE3(np.array(placement.rotation), np.array(placement.translation))
+        return self.bodies[mount.parentJoint], mount.placement * on_frame
 
 
 def build_robot(model: RobotModel, meshes: bool = True, grips: bool = True) -> RobotSpec:
@@ -76,8 +67,9 @@ def build_robot(model: RobotModel, meshes: bool = True, grips: bool = True) -> R
     spec.modelname = model.description.name
     spec.compiler.degree = False
     mounts = Mounts(model, _add_bodies(spec, model))
-    site_body, placement = mounts.frame("tool")
-    site_body.add_site(name="tool", group=4, **geometry.pose(placement.translation, placement.rotation))
+    tool = model.pinocchio.frames[model.frame_id("tool")]
+    at = geometry.pose(tool.placement.translation, tool.placement.rotation)
+    mounts.bodies[tool.parentJoint].add_site(name="tool", group=4, **at)
     contact = _add_contact_shapes(model, mounts)
     gripper = model.description.gripper
     if gripper is not None:
@@ -219,15 +211,15 @@ def _add_servos(spec: MjSpec, model: RobotModel) -> None:
 
 def _add_meshes(spec: MjSpec, model: RobotModel, mounts: Mounts) -> None:
     for mesh in placed_meshes(model):
-        for index, piece in enumerate(pieces(mesh.path)):
+        for index, piece in enumerate(mesh.pieces):
             name = f"{mesh.name}_{index}"
             spec.add_mesh(
                 name=name,
-                uservert=(piece.vertices * mesh.scale).ravel(),
+                uservert=piece.vertices.ravel(),
                 userface=piece.faces.ravel(),
                 inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL,
             )
-            mounts.joint(mesh.joint).add_geom(
+            mounts.bodies[mesh.joint].add_geom(
                 name=name,
                 type=mujoco.mjtGeom.mjGEOM_MESH,
                 meshname=name,

@@ -9,7 +9,6 @@ import numpy as np
 from handrail.collect.simulation import geometry
 from handrail.collect.simulation.gl import MjsBody, MjSpec, mujoco
 from handrail.collect.simulation.patrol import Patrol
-from handrail.collect.simulation.slide import Slide
 from handrail.controllers.arrays import FloatArray, frozen
 from handrail.controllers.errors import HandrailError, unknown_name
 from handrail.controllers.robot.model import Pose
@@ -32,6 +31,27 @@ class Part:
         """Copy the arrays and make them read-only."""
         for name in ("position", "rotation"):
             object.__setattr__(self, name, frozen(getattr(self, name)))
+
+
+@dataclass(frozen=True)
+class Slide:
+    """A rail with stops at both ends, of a thing that slides: a drawer.
+
+    Attributes:
+        axis: direction in which it opens, in the object's frame, a unit vector, (3,).
+        travel: from closed to open [m].
+        damping: force per speed [N s/m].
+        friction: force that it takes to move it [N].
+    """
+
+    axis: FloatArray
+    travel: float
+    damping: float = 8.0
+    friction: float = 3.0
+
+    def __post_init__(self) -> None:
+        """Copy the array and make it read-only."""
+        object.__setattr__(self, "axis", frozen(self.axis))
 
 
 @dataclass(frozen=True)
@@ -82,6 +102,11 @@ class SceneObject:
         return float(self.position[2] + geometry.bounding_box(self.shape)[2] / 2)
 
     @property
+    def front(self) -> float:
+        """The x of its face towards the robot [m], for a box along the axes."""
+        return float(self.position[0] - self.shape.size[0] / 2)
+
+    @property
     def portable(self) -> bool:
         """Whether the hand can carry it away."""
         return self.movable and self.slide is None
@@ -112,7 +137,7 @@ class SceneObject:
 
 
 @dataclass(frozen=True)
-class View:
+class Viewpoint:
     """A camera in the world: where it stands, what it looks at [m], vertical field of view [deg]."""
 
     position: tuple[float, float, float] = (-2.9, -2.6, 2.3)
@@ -125,7 +150,7 @@ class Scene:
     """Everything around the robot but the floor, and the camera that overlooks it."""
 
     objects: tuple[SceneObject, ...] = ()
-    view: View = field(default_factory=View)
+    view: Viewpoint = field(default_factory=Viewpoint)
 
     def __post_init__(self) -> None:
         """Check the names.
@@ -210,7 +235,7 @@ def _add_freedom(body: MjsBody, item: SceneObject) -> None:
     if not item.parts:
         body.explicitinertial = True
         body.mass, body.ipos, body.iquat = item.mass, [0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0]
-        body.inertia = geometry.shape_inertia(item.mass, item.shape)
+        body.inertia = geometry.box_inertia(item.mass, geometry.bounding_box(item.shape))
 
 
 def _contact(item: SceneObject) -> dict[str, Any]:
@@ -224,7 +249,7 @@ def _contact(item: SceneObject) -> dict[str, Any]:
     }
 
 
-def _view_pose(view: View) -> dict[str, FloatArray]:
+def _view_pose(view: Viewpoint) -> dict[str, FloatArray]:
     """Return the pose of a camera that looks along −z with y up."""
     position = np.array(view.position)
     forward = np.array(view.target) - position

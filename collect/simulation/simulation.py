@@ -13,7 +13,6 @@ from handrail.collect.simulation.gate import Gate
 from handrail.collect.simulation.gl import mujoco
 from handrail.collect.simulation.robot import BASE_BODY, FINGERS, RobotSpec, build_robot
 from handrail.collect.simulation.scene import Scene, add_scene
-from handrail.collect.simulation.twist import Twist
 from handrail.collect.simulation.world import set_stage
 from handrail.controllers.arrays import FloatArray, IntArray
 from handrail.controllers.errors import HandrailError
@@ -45,7 +44,6 @@ class Simulation:
     Attributes:
         mujoco_model: the compiled model.
         data: its state.
-        substeps: integration steps in one control step.
     """
 
     def __init__(
@@ -66,10 +64,10 @@ class Simulation:
         self._gripper = model.description.gripper if grips else None
         self._scene = scene
         self._step = step
-        self.substeps = math.ceil(step / timestep - 1e-9)
-        self._shares = np.arange(1, self.substeps + 1) / self.substeps
+        substeps = math.ceil(step / timestep - 1e-9)
+        self._shares = np.arange(1, substeps + 1) / substeps
         with _understood(model):
-            robot = _robot(model, meshes, grips, step / self.substeps)
+            robot = _robot(model, meshes, grips, step / substeps)
             spec = robot.spec.copy()
             add_scene(spec, scene)
             self.mujoco_model = spec.compile()
@@ -212,9 +210,11 @@ class Simulation:
         """Return where every scene object is now, by name."""
         return {item.name: self._pose(item.name) for item in self._scene.objects}
 
-    def twists(self) -> dict[str, Twist]:
-        """Return how every movable object moves now, by name."""
-        return {item.name: self._twist(item.name) for item in self._scene.movables}
+    def still(self) -> frozenset[str]:
+        """Return the names of the movable objects that are at rest: slower than 2 cm/s and 0.2 rad/s."""
+        velocities = {item.name: self.data.joint(item.name).qvel for item in self._scene.movables}
+        norm = np.linalg.norm  # of v; of ω, of which what slides has none
+        return frozenset(name for name, v in velocities.items() if norm(v[:3]) < 0.02 and norm(v[3:]) < 0.2)
 
     def obstacles(self) -> tuple[Obstacle, ...]:
         """Return what stands around, where it is now, and what the fingers hold, fixed to the tool."""
@@ -229,13 +229,6 @@ class Simulation:
     def _pose(self, name: str) -> Pose:
         body = self.data.body(name)
         return Pose(body.xpos.copy(), body.xmat.reshape(3, 3).copy())
-
-    def _twist(self, name: str) -> Twist:
-        velocity = self.data.joint(name).qvel
-        rotation = self.data.body(name).xmat.reshape(3, 3)
-        if len(velocity) == 1:
-            return Twist(velocity[0] * self.data.joint(name).xaxis, np.zeros(3))
-        return Twist(velocity[:3].copy(), rotation @ velocity[3:])
 
 
 @exact_jit

@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from handrail.collect.simulation.scene import Colour, Part, SceneObject, box
-from handrail.collect.simulation.slide import Slide
+from handrail.collect.simulation.scene import Colour, Part, SceneObject, Slide, box
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.numerics.rotation import matrix_from_rpy
 

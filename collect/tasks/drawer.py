@@ -4,35 +4,31 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from handrail.collect.simulation.scene import Scene, View
+from handrail.collect.simulation.scene import Scene, Viewpoint
 from handrail.collect.tasks.cabinet import HANDLE, cabinet, drawer, inward
-from handrail.collect.tasks.task import Episode, TaskState, Verdict
+from handrail.collect.tasks.starts import near_home
+from handrail.collect.tasks.task import Start, TaskState, Verdict
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.robot.model import RobotModel
 
-_VIEW = View(position=(-0.9, -2.7, 1.9), target=(-0.1, 0.1, 0.6), fovy=52.0)
+_VIEW = Viewpoint(position=(-0.9, -2.7, 1.9), target=(-0.1, 0.1, 0.6), fovy=52.0)
+_OPENING = 0.20  # [m]
 
 
 @dataclass(frozen=True)
 class Drawer:
     """A cabinet that is out of reach at first, turned by up to 0.3 rad; the handle is at 0.64 to 0.83 m.
 
-    Success: the drawer open by `opening`, the gripper let go and away from the handle.
+    Success: the drawer open by 0.20 m of its 0.35 m, the gripper let go and away from the handle.
     There is no failure but running out of time.
 
     Attributes:
-        name: of the task.
         description: what the operator is asked to do.
         horizon: time limit [s].
-        opening: how far the drawer has to be open [m]; it opens 0.35 m.
-        retreat: least distance of the tool point from the handle at the end [m].
     """
 
-    name: str = "Drawer"
     description: str = "Pull the drawer open by its handle."
     horizon: float = 60.0
-    opening: float = 0.20
-    retreat: float = 0.08
 
     @property
     def state_names(self) -> tuple[str, ...]:
@@ -40,14 +36,11 @@ class Drawer:
         names = [f"handle.{axis}" for axis in "xyz"]
         return (*names, "inward.nx", "inward.ny", "drawer.opening", *(f"cabinet.{axis}" for axis in "xyz"))
 
-    def sample(self, model: RobotModel, rng: np.random.Generator) -> Episode:
-        """Draw the cabinet and the robot's start: home with 10 cm, 0.15 rad, 0.05 rad in the arm."""
+    def sample(self, model: RobotModel, rng: np.random.Generator) -> Start:
+        """Draw the cabinet, then the robot's start."""
         x, y = 0.95 + rng.uniform(-0.1, 0.1), rng.uniform(-0.6, 0.6)
         body = cabinet("cabinet", x, y, rng.uniform(-0.3, 0.3), rng.uniform(0.76, 0.95))
-        base = len(model.description.base_joints)
-        spread = np.concatenate([np.array([0.10, 0.10, 0.15])[:base], np.full(model.size - base, 0.05)])
-        q = model.description.home + rng.uniform(-spread, spread)
-        return Episode(Scene((body, drawer("drawer", body)), _VIEW), q)
+        return Start(Scene((body, drawer("drawer", body)), _VIEW), near_home(model, rng))
 
     def features(self, state: TaskState) -> FloatArray:
         """Return the numbers that `state_names` names, (9,)."""
@@ -57,8 +50,7 @@ class Drawer:
 
     def outcome(self, state: TaskState) -> Verdict:
         """Judge how far the drawer is open, and whether the hand has let go."""
-        away = float(np.linalg.norm(state.tool.position - handle(state))) >= self.retreat
-        return Verdict(success=opened(state) >= self.opening and away and state.opening > 0.8)
+        return Verdict(success=opened(state) >= _OPENING and state.let_go(handle(state)))
 
 
 def handle(state: TaskState) -> FloatArray:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from handrail.collect.tasks.task import Episode, TaskState, Verdict
+from handrail.collect.tasks.task import Start, TaskState, Verdict
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.robot.model import RobotModel
 
@@ -15,20 +15,18 @@ class FixedTask:
     """A task without anything random.
 
     Attributes:
-        name: of the task.
         begin: how every episode begins.
         judge: says how it stands.
         horizon: time limit [s].
     """
 
-    name: str
-    begin: Episode
+    begin: Start
     judge: Callable[[TaskState], Verdict]
     horizon: float
     description: str = ""
     state_names: tuple[str, ...] = ()
 
-    def sample(self, model: RobotModel, rng: np.random.Generator) -> Episode:
+    def sample(self, model: RobotModel, rng: np.random.Generator) -> Start:
         """Return the beginning."""
         return self.begin
 

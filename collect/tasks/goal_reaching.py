@@ -10,6 +10,7 @@ from handrail.controllers.arrays import FloatArray, frozen
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.numerics.jit import exact_jit
 from handrail.controllers.numerics.rotation import rotation_vector
+from handrail.controllers.robot.model import Pose
 
 STEP = 0.03  # of the simulation [s]
 T_MAX = 1000  # longest episode [steps]
@@ -21,28 +22,15 @@ _SPEED = 0.08  # of the planner over long distances [m/s]
 _LOWER, _UPPER = (-1.0, -1.0, 0.7), (1.0, 1.0, 1.0)  # of goals [m]
 
 
-@dataclass(frozen=True)
-class Goal:
-    """A pose of the tool to reach: position (3,) [m], rotation world from tool (3, 3)."""
-
-    position: FloatArray
-    rotation: FloatArray
-
-    def __post_init__(self) -> None:
-        """Copy the arrays and make them read-only."""
-        object.__setattr__(self, "position", frozen(self.position))
-        object.__setattr__(self, "rotation", frozen(self.rotation))
-
-
-def sample_goal(rng: np.random.Generator) -> Goal:
+def sample_goal(rng: np.random.Generator) -> Pose:
     """Draw a goal: x, y ∈ [−1, 1] m, z ∈ [0.7, 1.0] m, a normalised uniform-cube axis, an angle in [0, π]."""
     position = rng.uniform(_LOWER, _UPPER)
     axis = rng.uniform(-1.0, 1.0, 3)
     axis /= np.linalg.norm(axis)
-    return Goal(position, pin.exp3(axis * rng.uniform(0.0, np.pi)))
+    return Pose(position, pin.exp3(axis * rng.uniform(0.0, np.pi)))
 
 
-def pose_error(position: FloatArray, rotation: FloatArray, goal: Goal) -> tuple[float, float]:
+def pose_error(position: FloatArray, rotation: FloatArray, goal: Pose) -> tuple[float, float]:
     """Return d_p = ‖p − p_g‖ [m] and d_r = 1 − ⟨q, q_g⟩² = (3 − tr RᵀR_g) / 4, the paper's equations 7 and 8.
 
     Args:
@@ -72,7 +60,7 @@ def reached(d_p: float, d_r: float) -> bool:
 class StraightPlanner:
     """Moves the tool on a straight line with spherical interpolation, open loop, at a constant twist.
 
-    `p(t) = p_0 + v t h`, `R(t) = exp(ω t h) R_0` for `steps` steps of h seconds; at rest from then on.
+    `p(t) = p_0 + v t h`, `R(t) = exp(ω t h) R_0` for `steps` steps of h = 0.03 s; at rest from then on.
 
     Attributes:
         start_position: where it begins [m], (3,).
@@ -80,24 +68,17 @@ class StraightPlanner:
         goal: where it ends.
         velocity: (v, ω), world-aligned at the tool [m/s, rad/s], (6,).
         steps: how many it takes.
-        step: length h of one [s].
     """
 
     start_position: FloatArray
     start_rotation: FloatArray
-    goal: Goal
+    goal: Pose
     velocity: FloatArray
     steps: int
-    step: float = STEP
 
     @classmethod
     def plan(
-        cls,
-        start_position: FloatArray,
-        start_rotation: FloatArray,
-        goal: Goal,
-        step: float = STEP,
-        speed: float = 1.0,
+        cls, start_position: FloatArray, start_rotation: FloatArray, goal: Pose, speed: float = 1.0
     ) -> "StraightPlanner":
         """Plan a motion of `max(300, ⌈distance / (0.08 · 0.03)⌉) / speed` steps.
 
@@ -105,20 +86,18 @@ class StraightPlanner:
             start_position: of the tool [m], (3,).
             start_rotation: world from tool, (3, 3).
             goal: where to go.
-            step: length of a step [s].
             speed: how many times faster than the paper's.
 
         Raises:
-            HandrailError: step or speed is not a positive number.
+            HandrailError: the speed is not a positive number.
         """
-        for name, value in (("step", step), ("speed", speed)):
-            if not 0.0 < value < np.inf:
-                raise HandrailError(f"{name} of a planner: expected a positive number, got {value}")
+        if not 0.0 < speed < np.inf:
+            raise HandrailError(f"speed of a planner: expected a positive number, got {speed}")
         line = goal.position - start_position
         steps = ceil(max(_SHORTEST, ceil(float(np.linalg.norm(line)) / (_SPEED * STEP))) / speed)
         turn = rotation_vector(goal.rotation @ np.asarray(start_rotation).T)
-        velocity = np.concatenate([line, turn]) / (steps * step)
-        return cls(frozen(start_position), frozen(start_rotation), goal, frozen(velocity), steps, step)
+        velocity = np.concatenate([line, turn]) / (steps * STEP)
+        return cls(frozen(start_position), frozen(start_rotation), goal, frozen(velocity), steps)
 
     def twist(self, t: int) -> FloatArray:
         """Return (v, ω) from step t to the next, world-aligned at the tool [m/s, rad/s], (6,)."""
@@ -128,6 +107,6 @@ class StraightPlanner:
         """Return the pose after t steps: position [m], (3,), and rotation world from tool, (3, 3)."""
         if t >= self.steps:
             return self.goal.position, self.goal.rotation
-        time = max(t, 0) * self.step
+        time = max(t, 0) * STEP
         rotation = pin.exp3(self.velocity[3:] * time) @ self.start_rotation
         return self.start_position + self.velocity[:3] * time, rotation

@@ -4,10 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from handrail.collect.simulation.scene import Scene, SceneObject, View
+from handrail.collect.simulation.scene import Scene, SceneObject, Viewpoint
 from handrail.collect.tasks.clutter import obstacle_features, obstacle_names, sample_obstacles
 from handrail.collect.tasks.furniture import cube, open_bin, table
-from handrail.collect.tasks.task import Episode, TaskState, Verdict
+from handrail.collect.tasks.starts import near_home
+from handrail.collect.tasks.task import Start, TaskState, Verdict
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.numerics.rotation import quaternion_from_matrix
 from handrail.controllers.robot.model import RobotModel
@@ -15,7 +16,7 @@ from handrail.controllers.robot.model import RobotModel
 _EDGE, _MASS = 0.05, 0.1  # of the cube [m], [kg]
 _BIN_HEIGHT = 0.10
 _POSE = ("x", "y", "z", "qw", "qx", "qy", "qz")
-_VIEW = View(position=(3.0, 0.0, 3.5), target=(0.05, 0.0, 0.2), fovy=56.0)
+_VIEW = Viewpoint(position=(3.0, 0.0, 3.5), target=(0.05, 0.0, 0.2), fovy=56.0)
 
 
 @dataclass(frozen=True)
@@ -26,18 +27,14 @@ class PickPlace:
     Failure: the cube on the floor.
 
     Attributes:
-        name: of the task.
         description: what the operator is asked to do.
         horizon: time limit [s].
         clearance: between the robot's start and anything on the floor, and between obstacles [m].
-        retreat: least distance of the tool point from the cube at the end [m].
     """
 
-    name: str = "PickPlace"
     description: str = "Pick up the cube and put it into the bin on the other table."
     horizon: float = 90.0
     clearance: float = 0.15
-    retreat: float = 0.08
 
     @property
     def state_names(self) -> tuple[str, ...]:
@@ -46,12 +43,12 @@ class PickPlace:
         names += [f"{item}.{axis}" for item in ("bin", "cube_table", "bin_table") for axis in "xyz"]
         return (*names, *obstacle_names())
 
-    def sample(self, model: RobotModel, rng: np.random.Generator) -> Episode:
+    def sample(self, model: RobotModel, rng: np.random.Generator) -> Start:
         """Draw tables, cube, bin, obstacles and the robot's start."""
         side = rng.choice([-1.0, 1.0])
         cube_table = _sample_table("cube_table", side, rng)
         bin_table = _sample_table("bin_table", -side, rng)
-        q = _sample_start(model, rng)
+        q = near_home(model, rng)
         objects = (
             cube_table,
             bin_table,
@@ -59,7 +56,7 @@ class PickPlace:
             _sample_bin(bin_table, rng),
             *sample_obstacles(model, q, rng, self.clearance),
         )
-        return Episode(Scene(objects, _VIEW), q)
+        return Start(Scene(objects, _VIEW), q)
 
     def features(self, state: TaskState) -> FloatArray:
         """Return the numbers that `state_names` names, (28,)."""
@@ -68,16 +65,15 @@ class PickPlace:
         for name in ("cube_table", "bin_table"):
             item = state.object(name)
             numbers += [item.position[0], item.position[1], item.top]
-        return np.concatenate([numbers, obstacle_features(state.episode.scene)])
+        return np.concatenate([numbers, obstacle_features(state.start.scene)])
 
     def outcome(self, state: TaskState) -> Verdict:
         """Judge where the cube is, whether it rests, and where the gripper is."""
         position = state.pose("cube").position
         if position[2] < 2 * _EDGE:
             return Verdict(failure="dropped")
-        away = float(np.linalg.norm(state.tool.position - position)) >= self.retreat
-        rests = _inside_bin(state, position) and state.twists["cube"].is_still
-        return Verdict(success=rests and away and state.opening > 0.8)
+        rests = _inside_bin(state, position) and "cube" in state.still
+        return Verdict(success=rests and state.let_go(position))
 
 
 def _sample_table(name: str, side: float, rng: np.random.Generator) -> SceneObject:
@@ -85,13 +81,8 @@ def _sample_table(name: str, side: float, rng: np.random.Generator) -> SceneObje
     return table(name, x, y, (0.6, 0.7, rng.uniform(0.55, 0.65)))
 
 
-def _front_edge(item: SceneObject) -> float:
-    """Return the x of the table's edge that faces the robot [m]."""
-    return float(item.position[0] - item.shape.size[0] / 2)
-
-
 def _sample_cube(on: SceneObject, rng: np.random.Generator) -> SceneObject:
-    x = _front_edge(on) + rng.uniform(0.10, 0.20)
+    x = on.front + rng.uniform(0.10, 0.20)
     y = on.position[1] + rng.uniform(-0.15, 0.15)
     yaw = rng.uniform(-np.pi / 4, np.pi / 4)  # a cube looks the same every quarter turn
     return cube("cube", x, y, on.top, yaw, _EDGE, _MASS)
@@ -99,16 +90,9 @@ def _sample_cube(on: SceneObject, rng: np.random.Generator) -> SceneObject:
 
 def _sample_bin(on: SceneObject, rng: np.random.Generator) -> SceneObject:
     inner = rng.uniform(0.24, 0.28)
-    x = _front_edge(on) + inner / 2 + rng.uniform(0.04, 0.10)
+    x = on.front + inner / 2 + rng.uniform(0.04, 0.10)
     y = on.position[1] + rng.uniform(-0.12, 0.12)
     return open_bin("bin", x, y, on.top, inner, _BIN_HEIGHT)
-
-
-def _sample_start(model: RobotModel, rng: np.random.Generator) -> FloatArray:
-    """Return home with a little noise: 10 cm, 0.15 rad, 0.05 rad in the arm's joints."""
-    base = len(model.description.base_joints)
-    spread = np.concatenate([np.array([0.10, 0.10, 0.15])[:base], np.full(model.size - base, 0.05)])
-    return model.description.home + rng.uniform(-spread, spread)
 
 
 def _inside_bin(state: TaskState, position: FloatArray) -> bool:

@@ -4,12 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from handrail.collect.simulation.scene import Part, Scene, SceneObject, View
-from handrail.collect.tasks.goal_reaching import ORIENTATION_TOLERANCE, POSITION_TOLERANCE, sample_goal
+from handrail.collect.simulation.scene import Part, Scene, SceneObject, Viewpoint
+from handrail.collect.tasks.goal_reaching import pose_error, reached, sample_goal
 from handrail.collect.tasks.moving import mover_features, mover_names, sample_movers
-from handrail.collect.tasks.task import Episode, TaskState, Verdict
+from handrail.collect.tasks.task import Start, TaskState, Verdict
 from handrail.controllers.arrays import FloatArray
-from handrail.controllers.numerics.rotation import matrix_to_axis, orientation_error, quaternion_from_matrix
+from handrail.controllers.numerics.rotation import matrix_to_axis, quaternion_from_matrix
 from handrail.controllers.robot.model import Pose, RobotModel
 from handrail.controllers.robot.shape import Shape
 
@@ -24,19 +24,13 @@ class Reach:
     Success at the first moment with `d_p ≤ 0.1 m` and `d_r = 1 − ⟨q, g⟩² ≤ 0.05`.
 
     Attributes:
-        name: of the task.
         description: what the operator is asked to do.
         horizon: time limit [s].
-        position_tolerance: largest d_p [m].
-        orientation_tolerance: largest d_r.
         moving_obstacles: how many cylinders cross the robot's way; goals are the same with and without.
     """
 
-    name: str = "Reach"
     description: str = "Move the gripper to the goal frame."
     horizon: float = 30.0
-    position_tolerance: float = POSITION_TOLERANCE
-    orientation_tolerance: float = ORIENTATION_TOLERANCE
     moving_obstacles: int = 0
 
     @property
@@ -45,30 +39,24 @@ class Reach:
         goal = tuple(f"goal.{axis}" for axis in ("x", "y", "z", "qw", "qx", "qy", "qz"))
         return (*goal, *mover_names(self.moving_obstacles))
 
-    def sample(self, model: RobotModel, rng: np.random.Generator) -> Episode:
+    def sample(self, model: RobotModel, rng: np.random.Generator) -> Start:
         """Draw a goal, then the moving obstacles."""
-        drawn = sample_goal(rng)
-        goal = Pose(drawn.position, drawn.rotation)
+        goal = sample_goal(rng)
         movers = sample_movers(self.moving_obstacles, model, model.description.home, rng)
-        return Episode(Scene((goal_marker(goal), *movers), _VIEW), model.description.home, goal)
+        return Start(Scene((goal_marker(goal), *movers), _VIEW), model.description.home, goal)
 
     def features(self, state: TaskState) -> FloatArray:
         """Return the goal pose, (7,), and place, velocity and size of what moves, (6,) each."""
         goal = _goal(state)
-        movers = mover_features(state.episode.scene, state.time, self.moving_obstacles)
+        movers = mover_features(state.start.scene, state.time, self.moving_obstacles)
         return np.concatenate([goal.position, quaternion_from_matrix(goal.rotation), movers])
 
     def outcome(self, state: TaskState) -> Verdict:
         """Judge by the distance and the orientation error."""
-        goal = _goal(state)
-        distance = float(np.linalg.norm(state.tool.position - goal.position))
-        turn = orientation_error(
-            quaternion_from_matrix(state.tool.rotation), quaternion_from_matrix(goal.rotation)
-        )
-        return Verdict(distance <= self.position_tolerance and turn <= self.orientation_tolerance)
+        return Verdict(reached(*pose_error(state.tool.position, state.tool.rotation, _goal(state))))
 
 
-_VIEW = View(position=(-2.6, -3.0, 2.2), target=(-0.35, 0.0, 0.65))
+_VIEW = Viewpoint(position=(-2.6, -3.0, 2.2), target=(-0.35, 0.0, 0.65))
 
 
 def _goal(state: TaskState) -> Pose:

@@ -1,21 +1,22 @@
 """What a task is: it samples an episode, names its state, and judges the outcome."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
 from handrail.collect.simulation.scene import Scene, SceneObject
-from handrail.collect.simulation.twist import Twist
 from handrail.controllers.arrays import FloatArray, frozen
 from handrail.controllers.errors import unknown_name
 from handrail.controllers.robot.model import Pose, RobotModel
 from handrail.controllers.robot.shape import Obstacle
 
+_AWAY = 0.08  # [m]
+
 
 @dataclass(frozen=True)
-class Episode:
+class Start:
     """A sampled beginning.
 
     Attributes:
@@ -43,29 +44,33 @@ class TaskState:
         time: since the episode began [s].
         tool: pose of the tool point.
         opening: of the gripper, 0 closed to 1 open.
-        episode: how it began: scene with the objects' shapes, goal.
+        start: how the episode began: scene with the objects' shapes, goal.
         poses: of every object of the scene, by name.
-        twists: of every movable object, by name.
+        still: names of the movable objects that are at rest.
         stable: whether the physics went well so far.
     """
 
     time: float
     tool: Pose
     opening: float
-    episode: Episode
+    start: Start
     poses: Mapping[str, Pose]
-    twists: Mapping[str, Twist] = field(default_factory=dict)
+    still: frozenset[str] = frozenset()
     stable: bool = True
 
     @property
     def goal(self) -> Pose | None:
         """Where the tool has to go, if the task says so."""
-        return self.episode.goal
+        return self.start.goal
 
     @property
     def obstacles(self) -> tuple[Obstacle, ...]:
         """What the robot must not touch, where it is now."""
-        return self.episode.scene.obstacles(self.time)
+        return self.start.scene.obstacles(self.time)
+
+    def let_go(self, place: FloatArray) -> bool:
+        """Return whether the gripper is open, and the tool point 8 cm or more from a place, (3,) [m]."""
+        return float(np.linalg.norm(self.tool.position - place)) >= _AWAY and self.opening > 0.8
 
     def pose(self, name: str) -> Pose:
         """Return where an object is.
@@ -83,7 +88,7 @@ class TaskState:
         Raises:
             HandrailError: the scene has no such object.
         """
-        return self.episode.scene.find(name)
+        return self.start.scene.find(name)
 
 
 @dataclass(frozen=True)
@@ -103,11 +108,6 @@ class Task(Protocol):
     """A task; a frozen dataclass in its own file, with one entry in `handrail.collect.tasks.catalogue`."""
 
     @property
-    def name(self) -> str:
-        """A short name, as in `Reach`."""
-        ...
-
-    @property
     def description(self) -> str:
         """One sentence: what to do; LeRobot's `task` string."""
         ...
@@ -122,7 +122,7 @@ class Task(Protocol):
         """Names of the numbers in `environment_state`, (k,)."""
         ...
 
-    def sample(self, model: RobotModel, rng: np.random.Generator) -> Episode:
+    def sample(self, model: RobotModel, rng: np.random.Generator) -> Start:
         """Return the beginning of an episode."""
         ...
 

@@ -4,11 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from handrail.collect.simulation.scene import Scene, SceneObject, View
-from handrail.collect.tasks.arm_reach import reach_share
+from handrail.collect.simulation.scene import Scene, SceneObject, Viewpoint
 from handrail.collect.tasks.clutter import obstacle_features, obstacle_names, sample_obstacles
 from handrail.collect.tasks.furniture import TRAY_BAR, can, table, tray
-from handrail.collect.tasks.task import Episode, TaskState, Verdict
+from handrail.collect.tasks.starts import reach_share
+from handrail.collect.tasks.task import Start, TaskState, Verdict
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.channels import Channels
@@ -23,7 +23,7 @@ _TRAY_MASS, _CAN_MASS = 0.35, 0.20  # [kg]
 _RADIUS, _HEIGHT = 0.033, 0.10  # of the can [m]
 _POSE = ("x", "y", "z", "qw", "qx", "qy", "qz")
 _MOST_TRIES = 20  # starts drawn, until the arm can hold the tray there
-_VIEW = View(position=(2.2, 0.0, 2.9), target=(-0.2, 0.0, 0.3), fovy=62.0)
+_VIEW = Viewpoint(position=(2.2, 0.0, 2.9), target=(-0.2, 0.0, 0.3), fovy=62.0)
 _LEVEL = 20.0  # weight of its tilt
 HANDLE = np.array([0.0, 0.0, _SIZE[2]])  # centre of the handle's bar in the tray's frame [m]
 
@@ -36,18 +36,14 @@ class Tray:
     Failure: the can fell off or over; the tray dropped.
 
     Attributes:
-        name: of the task.
         description: what the operator is asked to do.
         horizon: time limit [s].
         clearance: between the robot's start and anything on the floor, and between obstacles [m].
-        retreat: least distance of the tool point from the handle at the end [m].
     """
 
-    name: str = "Tray"
     description: str = "Carry the tray to the table and put it down without spilling the can."
     horizon: float = 90.0
     clearance: float = 0.15
-    retreat: float = 0.08
 
     @property
     def state_names(self) -> tuple[str, ...]:
@@ -55,7 +51,7 @@ class Tray:
         names = [f"{item}.{axis}" for item in ("tray", "can") for axis in _POSE]
         return (*names, *(f"table.{axis}" for axis in "xyz"), *obstacle_names())
 
-    def sample(self, model: RobotModel, rng: np.random.Generator) -> Episode:
+    def sample(self, model: RobotModel, rng: np.random.Generator) -> Start:
         """Draw the table, the robot's start with the tray in hand, the can on it, and obstacles."""
         side = rng.choice([-1.0, 1.0])
         x, y = 1.05 + rng.uniform(-0.05, 0.05), side * 1.30 + rng.uniform(-0.10, 0.10)
@@ -64,7 +60,7 @@ class Tray:
         tool = model.pose(q)
         held = tray("tray", tool.position, _level(tool.rotation), _SIZE, _TRAY_MASS)
         objects = (goal, held, _sample_can(held, rng), *sample_obstacles(model, q, rng, self.clearance))
-        return Episode(Scene(objects, _VIEW), q, grip=TRAY_BAR)
+        return Start(Scene(objects, _VIEW), q, grip=TRAY_BAR)
 
     def features(self, state: TaskState) -> FloatArray:
         """Return the numbers that `state_names` names, (29,)."""
@@ -74,7 +70,7 @@ class Tray:
             numbers += [*pose.position, *quaternion_from_matrix(pose.rotation)]
         goal = state.object("table")
         numbers += [*goal.position[:2], goal.top]
-        return np.concatenate([numbers, obstacle_features(state.episode.scene)])
+        return np.concatenate([numbers, obstacle_features(state.start.scene)])
 
     def outcome(self, state: TaskState) -> Verdict:
         """Judge the tray, then the can on it, then whether the tray was left on the table."""
@@ -84,10 +80,9 @@ class Tray:
         if not _stands_on(held, state.pose("can")):
             return Verdict(failure="can_fell")
         inside = np.abs(held.position[:2] - goal.position[:2]) < goal.shape.size[:2] / 2
-        down = held.position[2] < goal.top + 0.02 and state.twists["tray"].is_still and inside.all()
+        down = held.position[2] < goal.top + 0.02 and "tray" in state.still and inside.all()
         handle = held.position + held.rotation @ HANDLE
-        away = float(np.linalg.norm(state.tool.position - handle)) >= self.retreat
-        return Verdict(success=bool(down) and away and state.opening > 0.8)
+        return Verdict(success=bool(down) and state.let_go(handle))
 
 
 def _stands_on(held: Pose, thing: Pose) -> bool:

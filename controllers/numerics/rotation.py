@@ -51,8 +51,3 @@ def matrix_from_quaternion(quaternion: ArrayLike) -> FloatArray:
 def rotation_vector(matrix: ArrayLike) -> FloatArray:
     """Return the rotation vector (axis times angle) [rad] of a rotation matrix, (3,)."""
     return Rotation.from_matrix(np.asarray(matrix)).as_rotvec()
-
-
-def orientation_error(quaternion: ArrayLike, goal: ArrayLike) -> float:
-    """Return `d_r = 1 - <q, g>²` in [0, 1] (the paper's equation 8)."""
-    return float(1.0 - np.dot(np.asarray(quaternion), np.asarray(goal)) ** 2)

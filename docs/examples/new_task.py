@@ -11,7 +11,7 @@ import numpy as np
 from handrail.collect import SessionConfig, build_env, build_session
 from handrail.collect.simulation.scene import Scene, SceneObject
 from handrail.collect.tasks.catalogue import TaskSpec
-from handrail.collect.tasks.task import Episode, TaskState, Verdict
+from handrail.collect.tasks.task import Start, TaskState, Verdict
 from handrail.controllers import Pose, RobotModel, Shape
 from handrail.controllers.arrays import FloatArray
 
@@ -20,17 +20,16 @@ from handrail.controllers.arrays import FloatArray
 class TouchBall:
     """Bring the tip of the hand within 3 cm of a ball that hangs in front of the robot."""
 
-    name: str = "TouchBall"
     description: str = "Touch the ball."
     horizon: float = 20.0  # [s]
     state_names: tuple[str, ...] = ("ball.x", "ball.y", "ball.z")
 
-    def sample(self, model: RobotModel, rng: np.random.Generator) -> Episode:
+    def sample(self, model: RobotModel, rng: np.random.Generator) -> Start:
         """Hang the ball somewhere in front of the robot; nothing else is there."""
         home = model.pose(model.description.home)
         place = home.position + rng.uniform((0.3, -0.6, -0.2), (1.0, 0.6, 0.2))
         ball = SceneObject("ball", Shape("sphere", np.array([0.03])), place, ghost=True)
-        return Episode(Scene((ball,)), model.description.home, Pose(place, home.rotation))
+        return Start(Scene((ball,)), model.description.home, Pose(place, home.rotation))
 
     def features(self, state: TaskState) -> FloatArray:
         """Return what is recorded as `observation.environment_state`: where the ball is, (3,) [m]."""

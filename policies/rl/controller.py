@@ -3,7 +3,7 @@
 import numpy as np
 import pinocchio as pin
 
-from handrail.collect.tasks.goal_reaching import STEP, Goal
+from handrail.collect.tasks.goal_reaching import STEP
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.baselines.arm_completion import ArmCompletion, clamp_twist
 from handrail.controllers.baselines.twist_completion import twist_controller
@@ -11,7 +11,7 @@ from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.command import Command
 from handrail.controllers.interface.controller import State
 from handrail.controllers.interface.intent import Intent
-from handrail.controllers.robot.model import RobotModel
+from handrail.controllers.robot.model import Pose, RobotModel
 from handrail.controllers.robot.shape import Obstacle
 from handrail.policies.rl.observation import (
     ACTION_SIZE,
@@ -65,7 +65,7 @@ class RlController:
         """Take where the obstacles are now, and what the hand holds."""
         self._inner.update_scene(obstacles)
 
-    def aim(self, goal: Goal) -> None:
+    def aim(self, goal: Pose) -> None:
         """Say where the twists of this episode lead; without it, the present twist is followed onward."""
         self._goal = (goal.position, goal.rotation)
 

@@ -15,7 +15,6 @@ from handrail.collect.tasks.goal_reaching import (
     POSITION_TOLERANCE,
     STEP,
     T_MAX,
-    Goal,
     StraightPlanner,
     pose_error,
     reached,
@@ -23,7 +22,7 @@ from handrail.collect.tasks.goal_reaching import (
 )
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.baselines.arm_completion import ArmCompletion, clamp_twist
-from handrail.controllers.robot.model import load_model
+from handrail.controllers.robot.model import Pose, load_model
 from handrail.policies.rl.observation import (
     ACTION_SIZE,
     OBSERVATION_SIZE,
@@ -68,7 +67,7 @@ class GoalReachingEnv(gymnasium.Env[FloatArray, FloatArray]):
     The damped least squares of the arm make a velocity of all joints, inside the robot's limits, and the
     benchmark's own robot follows it. An episode ends with success, after 1000 steps, or, where
     `early_failure` is on, after 20 steps off the planner's pose or when the robot touches itself or the
-    floor. `reset(options={"goal": Goal(…)})` sets the goal.
+    floor. `reset(options={"goal": Pose(…)})` sets the goal.
 
     Args:
         robot: name or description file; its base must be planar and its arm must have six joints.
@@ -94,7 +93,7 @@ class GoalReachingEnv(gymnasium.Env[FloatArray, FloatArray]):
         self._reward = reward or Reward()
         self._early_failure, self._physics = early_failure, physics
         self._repeat_missed = repeat_missed
-        self._missed: deque[Goal] = deque(maxlen=_MISSED)
+        self._missed: deque[Pose] = deque(maxlen=_MISSED)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -120,7 +119,7 @@ class GoalReachingEnv(gymnasium.Env[FloatArray, FloatArray]):
         touches = bool(self._plant.contacts)
         self._measure()
         self._time += 1
-        d, r = pose_error(*self._pose, Goal(*self.planner.pose(self._time)))
+        d, r = pose_error(*self._pose, Pose(*self.planner.pose(self._time)))
         reward = self._reward.value(d, r, action, self._previous)
         self._previous = action
         self._failures += not reached(d, r)
@@ -135,7 +134,7 @@ class GoalReachingEnv(gymnasium.Env[FloatArray, FloatArray]):
         info |= {"position_error": d_p, "orientation_error": d_r}
         return self._observation(), reward, success or failed, timed_out, info
 
-    def _draw(self) -> Goal:
+    def _draw(self) -> Pose:
         """Draw a goal, or take one that was missed: out of the list, into which it comes again if missed."""
         if self._repeat_missed and self._missed and self.np_random.random() < self._repeat_missed:
             index = int(self.np_random.integers(len(self._missed)))

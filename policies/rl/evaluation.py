@@ -5,8 +5,9 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from handrail.collect.experiments.benchmark.metrics import arm_effort, jerkiness
-from handrail.collect.tasks.goal_reaching import STEP, Goal, sample_goal
+from handrail.collect.tasks.goal_reaching import STEP, sample_goal
 from handrail.controllers.arrays import FloatArray
+from handrail.controllers.robot.model import Pose
 from handrail.policies.rl.env import GoalReachingEnv
 
 EVALUATION_SEED = 20_000  # of the goals watched in training, which are others
@@ -19,13 +20,13 @@ Score = dict[str, float]
 orientation_error, length [steps], arm_effort, base_path [m], jerkiness, contacts [steps]."""
 
 
-def evaluation_goals(count: int, seed: int = EVALUATION_SEED) -> tuple[Goal, ...]:
+def evaluation_goals(count: int, seed: int = EVALUATION_SEED) -> tuple[Pose, ...]:
     """Return the goals of a seed."""
     rng = np.random.default_rng(seed)
     return tuple(sample_goal(rng) for _ in range(count))
 
 
-def evaluate(policy: Policy, goals: Sequence[Goal], physics: bool = True) -> list[Score]:
+def evaluate(policy: Policy, goals: Sequence[Pose], physics: bool = True) -> list[Score]:
     """Return the score of every goal, early failure off."""
     env = GoalReachingEnv(early_failure=False, physics=physics)
     return [_score(env, policy, goal) for goal in goals]
@@ -45,7 +46,7 @@ def means(scores: Sequence[Score]) -> dict[str, float]:
     return {name: values["mean"] for name, values in spreads(scores).items()}
 
 
-def _score(env: GoalReachingEnv, policy: Policy, goal: Goal) -> Score:
+def _score(env: GoalReachingEnv, policy: Policy, goal: Pose) -> Score:
     """Run a policy until the episode ends."""
     observation, _ = env.reset(options={"goal": goal})
     velocities, contacts, done, info = [], 0, False, {}

@@ -8,7 +8,7 @@ from collect_helpers import environment
 
 from handrail.collect.simulation.scene import Scene
 from handrail.collect.tasks.furniture import pillar
-from handrail.collect.tasks.task import Episode
+from handrail.collect.tasks.task import Start
 from handrail.controllers.baselines.cbf_filter import ALPHA, MARGIN, CbfFilter
 from handrail.controllers.baselines.direct import DirectController
 from handrail.controllers.collision.model import CollisionModel
@@ -131,7 +131,7 @@ def test_nothing_is_touched_in_physics(make, touches):
     with environment("Reach") as env, single_threaded():
         env.reset(seed=0)
         around = [pillar(f"p{k}", -1.5 + 1.3 * np.cos(k), 1.3 * np.sin(k), 0.15, 1.2) for k in range(1, 6)]
-        env.reset(options={"episode": Episode(Scene(tuple(around)), HOME)})
+        env.reset(options={"start": Start(Scene(tuple(around)), HOME)})
         controller = make(MODEL, PERIOD)
         controller.reset(env.obstacles())
         rng = np.random.default_rng(1)

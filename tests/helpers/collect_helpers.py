@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 import handrail.collect  # noqa: F401  (registers the environments)
 from handrail.collect.envs.env import HandrailEnv
 from handrail.collect.simulation.scene import Scene, SceneObject
-from handrail.collect.tasks.task import Episode
+from handrail.collect.tasks.task import Start
 from handrail.controllers.robot.model import RobotModel
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -47,24 +47,24 @@ def reach(model: RobotModel, q: np.ndarray, position: np.ndarray, rotation: np.n
     return q
 
 
-def over_cube(env: HandrailEnv, seed: int, height: float) -> Episode:
+def over_cube(env: HandrailEnv, seed: int, height: float) -> Start:
     """Return the seed's episode with the open gripper `height` above the cube's centre, pointing down."""
     env.reset(seed=seed)
     state = env.task_state()
     cube = state.pose("cube")
     q = np.array([cube.position[0] - 1.05, cube.position[1], 0.0, 1.57, -1.2, 1.8, -2.2, -1.57, 0.0])
     q = reach(env.model, q, cube.position + height * UP, cube.rotation @ DOWN)
-    return Episode(state.episode.scene, q)
+    return Start(state.start.scene, q)
 
 
-def moved(episode: Episode, name: str, position: Any) -> Episode:
+def moved(episode: Start, name: str, position: Any) -> Start:
     """Return the episode with an object somewhere else."""
 
     def move(item: SceneObject) -> SceneObject:
         return replace(item, position=np.array(position), rotation=np.eye(3)) if item.name == name else item
 
     scene = Scene(tuple(move(item) for item in episode.scene.objects), episode.scene.view)
-    return Episode(scene, episode.q, episode.goal)
+    return Start(scene, episode.q, episode.goal)
 
 
 SMALL_ROBOT = """

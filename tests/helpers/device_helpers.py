@@ -39,7 +39,7 @@ def first_view() -> View:
     """Return what an operator sees at the beginning of an episode."""
     with environment("Reach") as env:
         env.reset(seed=0)
-        return View(env.state(), env.task_state().tool, 1.0, env.task_state())
+        return View(env.state(), env.task_state())
 
 
 def drive(view, mode, human, seconds=12.0, script=None, start=HOME):
@@ -59,6 +59,5 @@ def drive(view, mode, human, seconds=12.0, script=None, start=HOME):
 
 
 def at(view, q, v, time) -> View:
-    tool = MODEL.pose(q)
-    task = TaskState(time, tool, 1.0, view.task.episode, view.task.poses)
-    return View(State(q, v, time), tool, 1.0, task)
+    task = TaskState(time, MODEL.pose(q), 1.0, view.task.start, view.task.poses)
+    return View(State(q, v, time), task)

@@ -15,7 +15,7 @@ import numpy as np
 from handrail.collect.simulation.gate import Gate
 from handrail.collect.simulation.gl import mujoco
 from handrail.collect.simulation.robot import FINGERS
-from handrail.collect.simulation.scene import Scene, SceneObject, View
+from handrail.collect.simulation.scene import Scene, SceneObject, Viewpoint
 from handrail.collect.simulation.simulation import Simulation
 from handrail.collect.tasks.moving import sample_movers
 from handrail.controllers.arrays import FloatArray, IntArray
@@ -61,7 +61,7 @@ def cluttered(model: RobotModel, movers: int, rng: np.random.Generator) -> tuple
             break
     objects: list[SceneObject] = sample_movers(movers, model, q, rng)
     wanted = movers + int(rng.integers(4, 11))
-    view = View((-3, -3, 3), (0, 0, 0.5), 50.0)
+    view = Viewpoint((-3, -3, 3), (0, 0, 0.5), 50.0)
     for _ in range(400):
         if len(objects) == wanted:
             break

@@ -12,7 +12,7 @@ from handrail.collect.operators.modes import TeleopMode, always
 from handrail.collect.operators.scripts.scripted import scripted_operator
 from handrail.collect.simulation.scene import Scene
 from handrail.collect.tasks.catalogue import TaskSpec
-from handrail.collect.tasks.task import Episode, Verdict
+from handrail.collect.tasks.task import Start, Verdict
 from handrail.controllers.baselines.catalogue import ControllerSpec
 from handrail.controllers.baselines.twist_completion import WholeBodyCompletion, twist_controller
 from handrail.controllers.robot.catalogue import ROBOTS, RobotSpec
@@ -23,7 +23,6 @@ from handrail.controllers.robot.model import Pose
 class Press:
     """Bring the tool within 4 cm of a button near it."""
 
-    name: str = "Press"
     description: str = "Press the button."
     horizon: float = 20.0
     state_names: tuple[str, ...] = ("button.x", "button.y", "button.z")
@@ -31,7 +30,7 @@ class Press:
     def sample(self, model, rng):
         hand = model.pose(model.description.home)
         button = Pose(hand.position + rng.uniform(0.05, 0.15, 3), hand.rotation)
-        return Episode(Scene(()), model.description.home, button)
+        return Start(Scene(()), model.description.home, button)
 
     def features(self, state):
         return state.goal.position

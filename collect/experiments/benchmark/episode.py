@@ -17,8 +17,8 @@ from handrail.collect.operators.operator import View
 from handrail.collect.session.session import Session
 from handrail.collect.simulation.scene import Scene
 from handrail.collect.tasks.fixed import FixedTask
-from handrail.collect.tasks.goal_reaching import STEP, T_MAX, Goal, StraightPlanner, pose_error, reached
-from handrail.collect.tasks.task import Episode, TaskState, Verdict
+from handrail.collect.tasks.goal_reaching import STEP, T_MAX, StraightPlanner, pose_error, reached
+from handrail.collect.tasks.task import Start, TaskState, Verdict
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.interface.controller import Controller, State
 from handrail.controllers.interface.intent import Intent
@@ -43,7 +43,7 @@ class Conditions:
         seed: of the profile's noise, delays and dropouts.
     """
 
-    goal: Goal
+    goal: Pose
     scene: Scene
     config: BenchmarkConfig
     profile: str = "nominal"
@@ -63,9 +63,9 @@ def run_episode(
     """
     start = process_time()
     operator = _Planner(conditions, resolved(baseline.operator)(model))
-    begin = Episode(conditions.scene, model.description.home)
+    begin = Start(conditions.scene, model.description.home)
     judge = partial(_judged, given=conditions, planner=operator)
-    task = FixedTask("GoalReaching", begin, judge, horizon=(T_MAX - 0.5) * STEP)
+    task = FixedTask(begin, judge, horizon=(T_MAX - 0.5) * STEP)
     env = HandrailEnv(task, model, fps=1.0 / STEP, plant=plant(conditions.config.physics), observes=False)
     observer = _Observer(baseline, controller, conditions.goal)
     outcome = Session(env, controller, operator, [observer], control_period=baseline.period).run(seed=0)
@@ -82,7 +82,7 @@ class _Planner:
 
     def reset(self, view: View, rng: np.random.Generator) -> None:
         """Plan the way from here."""
-        given, tool = self._conditions, view.tool
+        given, tool = self._conditions, view.task.tool
         speed = SPEEDS.get(given.profile, 1.0)
         self._planner = StraightPlanner.plan(tool.position, tool.rotation, given.goal, speed=speed)
         self._commands = profile_commands(given.profile, self._planner, np.random.default_rng(given.seed))
@@ -96,7 +96,7 @@ class _Planner:
     def act(self, view: View) -> Intent:
         """Send this step's twist; return the newest message that has arrived, stamped when it was sent."""
         step = len(self._sent)
-        self._sent.append((self._twist(step, view.tool), view.state))
+        self._sent.append((self._twist(step, view.task.tool), view.state))
         index = int(self._commands.delivered[step])
         if index == NOTHING_YET:
             return self._ask(np.zeros(6), self._sent[0][1], step * STEP)
@@ -125,7 +125,7 @@ def _judged(state: TaskState, given: Conditions, planner: _Planner) -> Verdict:
 class _Observer:
     """Tells a controller that has to know it the goal; notes what happens, step by step."""
 
-    def __init__(self, baseline: Baseline, controller: Controller, goal: Goal) -> None:
+    def __init__(self, baseline: Baseline, controller: Controller, goal: Pose) -> None:
         self._baseline, self._controller, self._goal = baseline, controller, goal
 
     def begin(self, env: HandrailEnv, seed: int) -> None:

@@ -15,13 +15,13 @@ from handrail.collect.experiments.benchmark.episode import Conditions, run_episo
 from handrail.collect.experiments.benchmark.metrics import Trace, measure
 from handrail.collect.experiments.benchmark.scenes import cluttered_floor, empty_floor
 from handrail.collect.simulation.scene import Scene
-from handrail.collect.tasks.goal_reaching import Goal, sample_goal
+from handrail.collect.tasks.goal_reaching import sample_goal
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.controller import Controller
 from handrail.controllers.numerics.threads import single_threaded
-from handrail.controllers.robot.model import load_model
+from handrail.controllers.robot.model import Pose, load_model
 
 _PATHS = 12  # goals whose paths are kept, for drawing
 _EVERY = 5  # steps between two points of a path
@@ -35,7 +35,7 @@ class Episode:
     paths: tuple[FloatArray, ...] = ()
 
 
-def goals(config: BenchmarkConfig) -> list[Goal]:
+def goals(config: BenchmarkConfig) -> list[Pose]:
     """Return the goals of a seed; the first ones do not depend on how many there are."""
     rng = np.random.default_rng(config.seed)
     return [sample_goal(rng) for _ in range(config.goals)]
@@ -141,4 +141,4 @@ def _warm_up(baselines: tuple[Baseline, ...], config: BenchmarkConfig) -> None:
     model = load_model()
     here, short = model.pose(model.description.home), replace(config, early_stop=True)
     for baseline in baselines:
-        _trace(baseline, Conditions(Goal(here.position, here.rotation), Scene(), short))
+        _trace(baseline, Conditions(here, Scene(), short))

@@ -8,17 +8,16 @@ import numpy as np
 from handrail.collect.simulation.gate import Gate
 from handrail.collect.simulation.ideal_robot import IdealRobot
 from handrail.collect.simulation.protocols import Plant
-from handrail.collect.simulation.scene import Scene, SceneObject, View
+from handrail.collect.simulation.scene import Scene, SceneObject, Viewpoint
 from handrail.collect.simulation.simulation import Simulation
 from handrail.collect.tasks.furniture import footprint, pillar
-from handrail.collect.tasks.goal_reaching import Goal
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.errors import HandrailError
-from handrail.controllers.robot.model import RobotModel
+from handrail.controllers.robot.model import Pose, RobotModel
 from handrail.controllers.robot.shape import Obstacle
 
-VIEW = View(position=(-2.9, -3.4, 3.0), target=(-0.3, 0.0, 0.4), fovy=36.0)
+VIEW = Viewpoint(position=(-2.9, -3.4, 3.0), target=(-0.3, 0.0, 0.4), fovy=36.0)
 _CYLINDERS = ((0.3, 0.3), (0.3, 0.3), (0.25, 1.5))  # radius and height, as in the showcase [m]
 _AREA = (-1.2, -1.2), (1.2, 1.2)  # of their centres [m]
 _CLEAR_START = 0.2  # of the robot at home [m]
@@ -34,7 +33,7 @@ def empty_floor() -> Scene:
     return Scene(view=VIEW)
 
 
-def cluttered_floor(model: RobotModel, goal: Goal, rng: np.random.Generator) -> Scene:
+def cluttered_floor(model: RobotModel, goal: Pose, rng: np.random.Generator) -> Scene:
     """Draw two low cylinders and a tall one, clear of the robot's start, of the hand's way and of each other.
 
     Low ones stand in the way of the base, tall ones in the way of the arm; the straight way of the hand from

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from handrail.collect.simulation.scene import Colour, Scene, SceneObject, View
+from handrail.collect.simulation.scene import Colour, Scene, SceneObject, Viewpoint
 from handrail.collect.tasks.furniture import pillar
 from handrail.controllers.arrays import FloatArray, frozen
 from handrail.controllers.interface.frames import Frames
@@ -64,7 +64,7 @@ def _hand_forward() -> Case:
             pillar("low_2", 3.0, 0.9, 0.3, 0.3),
             _line("asked", (-0.013, 0.01, 0.004), (3.987, 0.01, 0.004), _HAND),
         ),
-        View(position=(0.8, -4.9, 3.3), target=(1.0, 0.15, 0.35), fovy=38.0),
+        Viewpoint(position=(0.8, -4.9, 3.3), target=(1.0, 0.15, 0.35), fovy=38.0),
     )
     return Case(
         name="a",
@@ -84,7 +84,7 @@ def _base_forward() -> Case:
             pillar("tall_2", 2.2, 0.7, 0.25, 1.5),
             _line("asked", (-1.5, 0.0, 0.004), (1.0, 0.0, 0.004), _BASE),
         ),
-        View(position=(-1.0, -3.8, 3.1), target=(0.4, 0.35, 0.6), fovy=38.0),
+        Viewpoint(position=(-1.0, -3.8, 3.1), target=(0.4, 0.35, 0.6), fovy=38.0),
     )
     return Case(
         name="b",
@@ -114,7 +114,9 @@ def _base_circle() -> Case:
     return Case(
         name="c",
         title="C: the operator drives the base in a circle; the hand stays at a point",
-        scene=Scene((*dots, ball), View(position=(-0.7, -3.0, 2.6), target=(0.6, 0.35, 0.45), fovy=38.0)),
+        scene=Scene(
+            (*dots, ball), Viewpoint(position=(-0.7, -3.0, 2.6), target=(0.6, 0.35, 0.45), fovy=38.0)
+        ),
         q=np.array([*_START, 0.0, *_AHEAD]),
         seconds=26.0,
         channels=("base.vx", "base.vy", "base.wz"),

@@ -17,7 +17,7 @@ from handrail.collect.session.film import SIZE, Filmer
 from handrail.collect.session.session import Observer, Session
 from handrail.collect.simulation.gl import graphics_trouble
 from handrail.collect.tasks.fixed import FixedTask
-from handrail.collect.tasks.task import Episode, Verdict
+from handrail.collect.tasks.task import Start, Verdict
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.interface.channel_matrix import channel_matrix
@@ -98,8 +98,8 @@ def run_case(case: Case, mpc: MaskedMpc, observers: tuple[Observer, ...] = (), *
         observers: who else sees it.
         render: mode and size of the environment's pictures.
     """
-    begin, end = Episode(case.scene, case.q), case.seconds - 0.5 / FPS
-    task = FixedTask("Showcase", begin, lambda state: Verdict(state.time > end), case.seconds + 1.0)
+    begin, end = Start(case.scene, case.q), case.seconds - 0.5 / FPS
+    task = FixedTask(begin, lambda state: Verdict(state.time > end), case.seconds + 1.0)
     env, observer = HandrailEnv(task, mpc.model, fps=FPS, **render), _Observer(case, mpc)
     try:
         operator = _Operator(case, mpc.channels)
@@ -133,8 +133,6 @@ def _realised(case: Case, mpc: MaskedMpc, state: State) -> FloatArray:
 
 class _Operator:
     """Commands what the case says."""
-
-    name = "showcase"
 
     def __init__(self, case: Case, channels: Channels) -> None:
         self._case, self._mask = case, channels.mask(*case.channels)

@@ -1,6 +1,6 @@
 """Input maps: how a goal becomes values on the channels of a mode; nothing else differs between modes."""
 
-from typing import Protocol
+from abc import ABC, abstractmethod
 
 import numpy as np
 
@@ -23,38 +23,47 @@ _LARGE = 2.0  # turn of the hand from which on the expert thinks of where the ar
 _RETURN = 0.5  # how fast it would go back there [1/s]
 
 
-class InputMap(Protocol):
-    """What lies between a goal and an intent.
+class InputMap(ABC):
+    """What lies between a goal and an intent: what the operator has in hand.
+
+    Args:
+        model: of the robot.
+        mode: the teleop mode.
+        gains: full stick of hand and base.
 
     Attributes:
         channels: of the robot.
+        full: full deflection of every input, (m,) [m/s, rad/s].
     """
 
-    channels: Channels
+    def __init__(self, model: RobotModel, mode: TeleopMode, gains: Gains) -> None:
+        self.mode = mode
+        self.channels = Channels.of(model.description)
+        self._model, self._gains = model, gains
+        self._base = len(self.channels.base)
+        self._arm = slice(self.channels.joint_slice.start + self._base, self.channels.size)
+        base, joints = gains.full[6:][: self._base], np.full(model.size, gains.joint_rate)
+        joints[: self._base] = base
+        self.full: FloatArray = np.concatenate([base, gains.full[:6], joints])
 
-    @property
-    def full(self) -> FloatArray:
-        """Full deflection of every input, (m,)."""
-        ...
-
+    @abstractmethod
     def reset(self, view: View, settings: HumanSettings, rng: np.random.Generator) -> None:
         """Begin an episode with a person."""
-        ...
 
+    @abstractmethod
     def wanted(self, goal: MotionGoal, state: State) -> tuple[BoolArray, FloatArray]:
         """Return the channels that the operator owns now, (m,), and how far they want each input, (m,)."""
-        ...
 
     def sent(self, moved: FloatArray, state: State) -> FloatArray:
-        """Return what the device makes of where the inputs are, (m,)."""
-        ...
+        """Return what the device makes of where the inputs are, (m,): of sticks, the velocities they mean."""
+        return moved
 
     def raw(self, moved: FloatArray) -> FloatArray:
-        """Return what the device reads: deflections from −1 to 1, a leader arm's angles [rad], (m,)."""
-        ...
+        """Return what the device reads, (m,): deflections from −1 to 1."""
+        return moved / self.full
 
 
-class StickMap:
+class StickMap(InputMap):
     """Velocity sticks on all channels of a mode at once.
 
     Where the mode has joint channels, the operator solves for them, as an expert would, with the arm's angles
@@ -62,32 +71,14 @@ class StickMap:
     `min ‖J(q + δ) v - hand‖² + w_b ‖v_base - base‖² + w_p ‖v_arm - k (q_home - q)‖² + λ ‖v / v_max‖²`.
     A large turn would fold the arm into itself that way; there they bring the arm's joints straight to where
     these belong (`LargeTurn`), while the base drives.
-
-    Args:
-        model: of the robot.
-        mode: the teleop mode.
-        gains: full stick of hand and base.
     """
-
-    def __init__(self, model: RobotModel, mode: TeleopMode, gains: Gains) -> None:
-        self.mode = mode
-        self.channels = Channels.of(model.description)
-        self._model = model
-        self._gains = gains
-        self._imagined = np.zeros(model.size)
-        self._turn = LargeTurn(model, gains, _LARGE)
-
-    @property
-    def full(self) -> FloatArray:
-        """Full stick of every channel, (m,)."""
-        return full_stick(self._model, self._gains)
 
     def reset(self, view: View, settings: HumanSettings, rng: np.random.Generator) -> None:
         """Draw the error of the arm's angles as this operator imagines them."""
         self._imagined = settings.inner_error * rng.standard_normal(self._model.size)
-        self._imagined[: len(self.channels.base)] = 0.0
+        self._imagined[: self._base] = 0.0
         if self.mask("hand")[self.channels.joint_slice].any():
-            self._turn.reset(view, settings.misjudgement, rng)
+            self._turn = LargeTurn(self._model, self._gains, _LARGE, view, settings.misjudgement, rng)
 
     def mask(self, focus: Focus) -> BoolArray:
         """Return the channels that the operator owns, (m,)."""
@@ -97,25 +88,16 @@ class StickMap:
         """Return the mask, and the goal on every channel of the mode, within full stick, (m,)."""
         mask = self.mask(goal.focus)
         values = np.zeros(self.channels.size)
-        values[self.channels.base_slice] = goal.base[: len(self.channels.base)]
+        values[self.channels.base_slice] = goal.base[: self._base]
         values[self.channels.tool_slice] = goal.hand
         if mask[self.channels.joint_slice].any():
             values[self.channels.joint_slice] = self._joint_velocities(goal, state.q)
         return mask, np.clip(np.where(mask, values, 0.0), -self.full, self.full)
 
-    def sent(self, moved: FloatArray, state: State) -> FloatArray:
-        """Return the velocities that the sticks are pushed to."""
-        return moved
-
-    def raw(self, moved: FloatArray) -> FloatArray:
-        """Return the deflections."""
-        return moved / self.full
-
     def _joint_velocities(self, goal: MotionGoal, q: FloatArray) -> FloatArray:
         """Return what the expert makes of a goal on all joints, (n,), within full stick."""
         if goal.target is not None and self._turn.is_ahead(goal.target, q):
-            base = goal.target.base[: len(self.channels.base)]
-            arm = self._turn.arm_velocity(goal.target, q, base)
+            arm = self._turn.arm_velocity(goal.target, q, goal.target.base[: self._base])
             return np.concatenate([self._base_world(goal, q), arm])
         return self._inner_kinematics(goal, q)
 
@@ -125,8 +107,8 @@ class StickMap:
         base = self._base_world(goal, q)
         weights = np.full(self._model.size, _DAMPING) / self._model.description.limits.velocity
         home = self._model.description.home - q
-        home[: len(self.channels.base)] = 0.0
-        posture = _POSTURE * np.any(goal.hand) * np.eye(self._model.size)[len(self.channels.base) :]
+        home[: self._base] = 0.0
+        posture = _POSTURE * np.any(goal.hand) * np.eye(self._model.size)[self._base :]
         rows = [jacobian, np.diag(weights), posture]
         targets = [goal.hand, np.zeros(self._model.size), posture @ (_RETURN * home)]
         if len(base):
@@ -137,11 +119,3 @@ class StickMap:
 
     def _base_world(self, goal: MotionGoal, q: FloatArray) -> FloatArray:
         return turned(goal.base, q[2]) if self.channels.base else np.zeros(0)
-
-
-def full_stick(model: RobotModel, gains: Gains) -> FloatArray:
-    """Return the full stick of every channel, (m,) [m/s, rad/s]."""
-    base = gains.full[6:][: len(model.description.base_joints)]
-    joints = np.full(model.size, gains.joint_rate)
-    joints[: len(base)] = base
-    return np.concatenate([base, gains.full[:6], joints])

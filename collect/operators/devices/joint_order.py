@@ -1,7 +1,5 @@
 """Where joints belong and in which order to move them one by one, so that nothing is hit on the way."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from handrail.collect.operators.devices.arm_solutions import REACHED, arm_solutions
@@ -12,18 +10,10 @@ from handrail.controllers.robot.model import Pose, RobotModel
 _SWEEP = np.linspace(0.25, 1.0, 4)  # where on a joint's way one looks whether something is hit
 
 
-@dataclass(frozen=True)
-class JointPlan:
-    """Where the joints belong, (n,), and an order in which they can go there, not all if none is clear."""
-
-    goal: FloatArray
-    order: tuple[int, ...]
-
-
 def plan_joints(
     model: RobotModel, collision: CollisionModel, q: FloatArray, goal: Pose, clear: float
-) -> JointPlan:
-    """Return how to bring the tool to the goal one arm joint at a time, hitting nothing.
+) -> tuple[FloatArray, list[int]]:
+    """Return where the joints belong, (n,), and an order in which they can go there, hitting nothing.
 
     The solution of the inverse kinematics nearest to q if there is an order for it; else the first that has
     one, starting from q with one joint turned by 1.5 rad either way; the most complete if none has.
@@ -35,7 +25,7 @@ def plan_joints(
         goal: of the tool.
         clear: distance kept on the way, less where the robot is nearer at either end [m].
     """
-    best, most = JointPlan(q, ()), -1.0
+    best, most = (q, list[int]()), -1.0
     arm = list(range(len(model.description.base_joints), model.size))
     at_start = _nearest(collision, q)
     for there, error in arm_solutions(model, q, goal):
@@ -44,7 +34,7 @@ def plan_joints(
         order = clear_order(collision, q, there, preferred, kept) if kept > 0.0 else []
         share = len(order) / len(arm) - (error > REACHED)
         if share > most:
-            best, most = JointPlan(there, tuple(order)), share
+            best, most = (there, order), share
         if share == 1.0:
             break
     return best

@@ -24,26 +24,29 @@ class LargeTurn:
         model: of the robot.
         gains: full stick of hand and joints.
         large: turn of the hand from which on it matters how the arm gets there [rad].
+        view: of the scene, at the beginning of an episode.
+        misjudgement: σ.
+        rng: of the operator's errors.
     """
 
-    def __init__(self, model: RobotModel, gains: Gains, large: float) -> None:
-        self._model = model
-        self._large = large
-        self._gains = gains
+    def __init__(
+        self,
+        model: RobotModel,
+        gains: Gains,
+        large: float,
+        view: View,
+        misjudgement: float,
+        rng: np.random.Generator,
+    ) -> None:
+        self._model, self._gains, self._large = model, gains, large
         self._base = len(model.description.base_joints)
-
-    def reset(self, view: View, misjudgement: float, rng: np.random.Generator) -> None:
-        """Look at the scene; the operator's errors are drawn from `rng`."""
-        self._rng = rng
-        self._error = misjudgement
-        self._collision = CollisionModel(self._model, view.task.obstacles)
+        self._rng, self._error = rng, misjudgement
+        self._collision = CollisionModel(model, view.task.obstacles)
         self._goal = view.state.q.copy()
         self._thought = b""
 
-    def is_ahead(self, target: Target | None, q: FloatArray) -> bool:
+    def is_ahead(self, target: Target, q: FloatArray) -> bool:
         """Return whether the hand has to turn far to where a goal leads."""
-        if target is None:
-            return False
         turn = target.hand.rotation @ self._model.pose(q).rotation.T
         return float(np.linalg.norm(rotation_vector(turn))) > self._large
 

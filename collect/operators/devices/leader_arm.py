@@ -2,18 +2,15 @@
 
 import numpy as np
 
-from handrail.collect.operators.devices.input_map import full_stick
+from handrail.collect.operators.devices.input_map import InputMap
 from handrail.collect.operators.devices.large_turn import LargeTurn
 from handrail.collect.operators.human.human import HumanSettings
 from handrail.collect.operators.human.motion_goal import MotionGoal
-from handrail.collect.operators.human.steering import Gains
 from handrail.collect.operators.human.wander import Wander
 from handrail.collect.operators.operator import View
 from handrail.controllers.arrays import BoolArray, FloatArray
 from handrail.controllers.baselines.arm_completion import ArmCompletion
-from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import State
-from handrail.controllers.robot.model import RobotModel
 
 _LARGE = (
     0.6  # turn of the hand from which on the operator brings the leader's joints there, not its hand [rad]
@@ -21,37 +18,20 @@ _LARGE = (
 _FOLLOW = 6.0  # of the joints towards the leader's [1/s]
 
 
-class LeaderArmMap:
+class LeaderArmMap(InputMap):
     """Absolute joint targets from one hand, a stick for the base in the other; nothing to switch.
 
     The hand takes the leader along, whose joints q_L follow by its mechanics: `q̇_L = J⁺ hand`. A large turn
     would fold the arm on the way; there the operator brings all joints at once to where these seem to belong
     (`LargeTurn`). The robot is sent `q̇ = q̇_L + k (q_L + tremor − q)`. The leader starts where the arm is, so
     that nothing jumps.
-
-    Args:
-        model: of the robot.
-        gains: full stick of hand and base.
     """
-
-    def __init__(self, model: RobotModel, gains: Gains) -> None:
-        self.channels = Channels.of(model.description)
-        self._model = model
-        self._gains = gains
-        self._base = len(model.description.base_joints)
-        self._arm = slice(self.channels.joint_slice.start + self._base, self.channels.size)
-        self._mechanics = ArmCompletion(model)
-        self._turn = LargeTurn(model, gains, _LARGE)
-
-    @property
-    def full(self) -> FloatArray:
-        """Full stick of the base, fastest motion of the leader's joints, (m,)."""
-        return full_stick(self._model, self._gains)
 
     def reset(self, view: View, settings: HumanSettings, rng: np.random.Generator) -> None:
         """Take hold of the leader, which stands as the arm does."""
         size = self._model.size - self._base
-        self._turn.reset(view, settings.misjudgement, rng)
+        self._mechanics = ArmCompletion(self._model)
+        self._turn = LargeTurn(self._model, self._gains, _LARGE, view, settings.misjudgement, rng)
         self._leader = view.state.q[self._base :].copy()
         self._tremor = settings.tremor
         self._wander = Wander((size,), settings.correlation, rng)

@@ -2,18 +2,15 @@
 
 import numpy as np
 
-from handrail.collect.operators.devices.input_map import full_stick
+from handrail.collect.operators.devices.input_map import InputMap
 from handrail.collect.operators.devices.joint_order import plan_joints, sweep_clearance
 from handrail.collect.operators.human.human import HumanSettings
 from handrail.collect.operators.human.motion_goal import MotionGoal, Target
-from handrail.collect.operators.human.steering import Gains
 from handrail.collect.operators.operator import View
 from handrail.controllers.arrays import BoolArray, FloatArray
 from handrail.controllers.collision.model import CollisionModel
-from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import State
 from handrail.controllers.numerics.rotation import turned
-from handrail.controllers.robot.model import RobotModel
 
 _NEAR = 0.35  # share of the tolerance that one axis may use up
 _MOST_CARE = 0.1
@@ -23,29 +20,13 @@ _SMALL_SHARES = (1.0, 0.5, 0.25, 0.12, 0.06)  # the same where the hand must not
 _CLEAR = 0.03  # what a sweep shall keep clear [m]
 
 
-class SingleAxisMap:
+class SingleAxisMap(InputMap):
     """A single stick on the base's axes and the arm's joints, one at a time; changing is a mode switch.
 
     The operator knows which joints would put the hand there, but not exactly: `q* = q + (q_ik − q)(1 + σ z)`.
     They move one joint after the other, in an order in which nothing is hit, and think anew when all are near
     q*. The base likewise, axis by axis.
-
-    Args:
-        model: of the robot.
-        gains: full stick of hand and base.
     """
-
-    def __init__(self, model: RobotModel, gains: Gains) -> None:
-        self.channels = Channels.of(model.description)
-        self._model = model
-        self._gains = gains
-        self._base = len(model.description.base_joints)
-        self._arm = slice(self.channels.joint_slice.start + self._base, self.channels.size)
-
-    @property
-    def full(self) -> FloatArray:
-        """Full stick of every channel, (m,)."""
-        return full_stick(self._model, self._gains)
 
     def reset(self, view: View, settings: HumanSettings, rng: np.random.Generator) -> None:
         """Begin with no axis chosen and nothing thought."""
@@ -73,14 +54,6 @@ class SingleAxisMap:
                 speed = self._fastest(goal.target, state.q)[axis]
                 values[axis] = self._push(errors[axis] - self._left, speed, self._least * self.full[axis])
         return np.arange(self.channels.size) == (self._axis or 0), values
-
-    def sent(self, moved: FloatArray, state: State) -> FloatArray:
-        """Return the velocity that the stick is pushed to."""
-        return moved
-
-    def raw(self, moved: FloatArray) -> FloatArray:
-        """Return the deflection."""
-        return moved / self.full
 
     def _push(self, way: float, fastest: float, slowest: float) -> float:
         """Return the speed at which an axis is driven on its way; nobody pushes a stick below `slowest`."""
@@ -149,10 +122,10 @@ class SingleAxisMap:
         done = np.all(self._goal_error(target, state.q) < 1.0) and state.time >= self._thinks_at
         if target.identity == self._thought and not done:
             return
-        plan = plan_joints(self._model, self._collision, state.q, target.hand, _CLEAR)
-        way = plan.goal - state.q
+        there, order = plan_joints(self._model, self._collision, state.q, target.hand, _CLEAR)
+        way = there - state.q
         self._goal = state.q + way * (1.0 + self._error * self._rng.standard_normal(len(way)))
-        self._order = [self.channels.joint_slice.start + joint for joint in plan.order]
+        self._order = [self.channels.joint_slice.start + joint for joint in order]
         self._care = 1.0 if target.identity != self._thought else max(0.5 * self._care, _MOST_CARE)
         self._thought, self._axis_holds = target.identity, False
         self._thinks_at = state.time + _PREPARATION
@@ -186,7 +159,7 @@ class SingleAxisMap:
 
     def _fastest(self, target: Target, q: FloatArray) -> FloatArray:
         """Return the largest speed of each axis: full stick, and no faster than the hand may go, (m,)."""
-        speeds = self.full
+        speeds = self.full.copy()
         linear, _ = self._levers(q)
         speeds[self._arm] = np.minimum(speeds[self._arm], target.pace * self._gains.hand_speed / linear)
         return speeds

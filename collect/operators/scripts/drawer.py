@@ -2,16 +2,14 @@
 
 import numpy as np
 
-from handrail.collect.operators.human.motion_goal import MotionGoal
-from handrail.collect.operators.human.steering import Gains
 from handrail.collect.operators.operator import View
 from handrail.collect.operators.scripts.base_placement import standing_within_reach
-from handrail.collect.operators.scripts.phases import Phase, PhaseRunner
+from handrail.collect.operators.scripts.phases import Phase, PhasedScript, from_phase
 from handrail.collect.tasks.cabinet import inward
 from handrail.collect.tasks.drawer import handle, opened
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.numerics.rotation import matrix_from_rpy
-from handrail.controllers.robot.model import Pose, RobotModel
+from handrail.controllers.robot.model import Pose
 
 _PULL = 0.26  # how far the operator means to open it [m]
 _ENOUGH = 0.21  # [m]
@@ -19,41 +17,19 @@ _BACK = 0.16  # hand before the handle at the beginning and at the end [m]
 _AWAY = 0.10  # from it that is far enough to leave it alone [m]
 
 
-class DrawerScript:
+class DrawerScript(PhasedScript):
     """Approach, grasp, pull, let go for `handrail/Drawer-v0`; a script.
 
     Who drives the base by itself turns the hand first, where there is room, and drives up to the handle then.
-
-    Args:
-        model: of the robot.
-        gains: of the operator.
-        drives: whether the operator drives the base by itself first.
     """
 
-    def __init__(self, model: RobotModel, gains: Gains, drives: bool) -> None:
-        self._model = model
-        self._drives = drives
-        self._runner = PhaseRunner(gains, self._redo)
-
-    def reset(self, view: View) -> None:
-        """Look at the scene and plan."""
-        self._runner.start(self._phases(view), view.state.time)
-
-    def motion_goal(self, view: View) -> MotionGoal:
-        """Return what is wanted now."""
-        return self._runner.motion_goal(view)
-
-    def _redo(self, view: View, name: str) -> int | None:
+    def replan(self, view: View, name: str) -> list[Phase] | None:
         """Begin again at the handle when the drawer did not come along; leave it as long as it is near."""
         if name == "release" and opened(view.task) <= _ENOUGH:
-            phases = self._phases(view)
-            index = next(i for i, phase in enumerate(phases) if phase.name == "stage")
-            self._runner.start(phases, view.state.time, index)
-            return index
+            return from_phase(self.plan(view), "stage")
         away = np.linalg.norm(view.tool.position - handle(view.task))
         if name == "release" or (name == "leave" and away < _AWAY):
-            self._runner.start([self._leave(view)], view.state.time)
-            return 0
+            return [self._leave(view)]
         return None
 
     def _leave(self, view: View) -> Phase:
@@ -61,9 +37,10 @@ class DrawerScript:
         into = inward(view.task.object("cabinet").rotation)
         back = Pose(handle(view.task) - _BACK * into, handle_rotation(view.tool.rotation, into))
         base = view.state.q[:3] if self._model.description.base_joints else np.zeros(3)
-        return Phase("leave", back, base, distance=0.03, angle=3.2, pace=0.5, patience=5.0)
+        return Phase(back, base, name="leave", distance=0.03, angle=3.2, pace=0.5, patience=5.0)
 
-    def _phases(self, view: View) -> list[Phase]:
+    def plan(self, view: View) -> list[Phase]:
+        """Return the way to the handle, how to pull it, and how to let go."""
         into = inward(view.task.object("cabinet").rotation)
         bar, grasp = handle(view.task), handle_rotation(view.tool.rotation, into)
         pull = max(_PULL - opened(view.task), 0.05)
@@ -72,7 +49,7 @@ class DrawerScript:
 
         def phase(name: str, back: float, **options: float) -> Phase:
             stand = base - np.array([pull * into[0], pull * into[1], 0.0]) * (name in ("pull", "release"))
-            return Phase(name, Pose(bar - back * into, grasp), stand, **options)  # type: ignore[arg-type]
+            return Phase(Pose(bar - back * into, grasp), stand, name=name, **options)  # type: ignore[arg-type]
 
         phases = [
             phase("stage", _BACK, distance=0.02, angle=0.10),
@@ -83,8 +60,12 @@ class DrawerScript:
         ]
         if self._drives:
             hand, now = phases[0].hand, view.state.q[:3]
-            ready = Phase("ready", before_driving(hand, base, now), now, distance=0.05, angle=0.15)
-            phases = [ready, Phase("drive", hand, base, focus="base", distance=0.08, angle=0.08), *phases]
+            ready = Phase(before_driving(hand, base, now), now, name="ready", distance=0.05, angle=0.15)
+            phases = [
+                ready,
+                Phase(hand, base, name="drive", focus="base", distance=0.08, angle=0.08),
+                *phases,
+            ]
         return phases
 
 

@@ -4,11 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from handrail.collect.operators.human.motion_goal import MotionGoal
-from handrail.collect.operators.human.steering import Gains, pose_errors
+from handrail.collect.operators.human.steering import pose_errors
 from handrail.collect.operators.operator import View
-from handrail.collect.operators.scripts.phases import Phase, PhaseRunner
-from handrail.collect.operators.scripts.route import Route, front_edge
+from handrail.collect.operators.scripts.phases import Phase, PhasedScript, from_phase
+from handrail.collect.operators.scripts.route import Route
 from handrail.collect.simulation.scene import SceneObject
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.robot.model import Pose, RobotModel
@@ -28,45 +27,23 @@ class _Place:
     thing: FloatArray
 
 
-class PickPlaceScript:
-    """Approach, grasp, lift, carry, place for `handrail/PickPlace-v0`; a script.
+class PickPlaceScript(PhasedScript):
+    """Approach, grasp, lift, carry, place for `handrail/PickPlace-v0`; a script."""
 
-    Args:
-        model: of the robot.
-        gains: of the operator.
-        drives: whether the operator drives the base by itself between the places (switching).
-    """
-
-    def __init__(self, model: RobotModel, gains: Gains, drives: bool) -> None:
-        self._model = model
-        self._gains = gains
-        self._drives = drives
-        self._runner = PhaseRunner(gains, self._redo)
-
-    def reset(self, view: View) -> None:
-        """Look at the scene and plan."""
-        self._runner.start(self._phases(view), view.state.time)
-
-    def motion_goal(self, view: View) -> MotionGoal:
-        """Return what is wanted now."""
-        return self._runner.motion_goal(view)
-
-    def _redo(self, view: View, name: str) -> int | None:
+    def replan(self, view: View, name: str) -> list[Phase] | None:
         """Grasp again when the cube stayed behind."""
         cube = view.task.pose("cube").position
         if name != "lift" or np.linalg.norm(cube - view.tool.position) < _HELD:
             return None
-        phases = self._phases(view)
-        index = next(i for i, phase in enumerate(phases) if phase.name == "above")
-        self._runner.start(phases, view.state.time, index)
-        return index
+        return from_phase(self.plan(view), "above")
 
-    def _phases(self, view: View) -> list[Phase]:
+    def plan(self, view: View) -> list[Phase]:
+        """Return the way to the cube, over to the bin, and what is done at both."""
         task = view.task
         self._route = Route(self._model, task)
         cube = task.pose("cube")
-        pick = _Place(front_edge(task, "cube_table"), cube.position)
-        place = _Place(front_edge(task, "bin_table"), task.pose("bin").position)
+        pick = _Place(task.object("cube_table").front, cube.position)
+        place = _Place(task.object("bin_table").front, task.pose("bin").position)
         down = grasp_rotation(view.tool.rotation, cube.rotation)
         rim = task.object("bin").top - place.thing[2]
         phases = self._pick(pick, down, self._room(task.object("cube")))
@@ -85,13 +62,13 @@ class PickPlaceScript:
             height = cube.position[2] + 0.30
             around = Pose(np.array([lane + _AHEAD, cube.position[1], height]), down)
             base = np.array([lane, cube.position[1], 0.0])
-            phases.insert(0, Phase("approach", around, base, distance=0.15, angle=0.5))
+            phases.insert(0, Phase(around, base, name="approach", distance=0.15, angle=0.5))
         return phases
 
     def _ready(self, base: FloatArray, pick: _Place, down: FloatArray) -> Phase:
         """Return the phase that folds the arm before it is driven up to the table, from where the base is."""
         hand = np.array([base[0] + _AHEAD, base[1], pick.thing[2] + 0.30])
-        return Phase("ready", Pose(hand, down), base, distance=0.15, angle=0.5)
+        return Phase(Pose(hand, down), base, name="ready", distance=0.15, angle=0.5)
 
     def _room(self, cube: SceneObject) -> float:
         """Return how far beside the cube the hand may be for the open fingers to close around it [m].
@@ -102,18 +79,14 @@ class PickPlaceScript:
         width = float(cube.shape.size[0]) * (np.cos(_ALIGNED) + np.sin(_ALIGNED))
         return _NEAR if gripper is None else max(_NEAR, (gripper.stroke - width) / 2)
 
-    def _height(self) -> float:
-        """Return how high the tool point is above the middle of a cube that the fingers close around [m]."""
-        return round(tips_beyond_tool(self._model) - _BELOW, 6)
-
     def _pick(self, pick: _Place, down: FloatArray, room: float) -> list[Phase]:
         """Go above the cube, down until it is between the fingers, close them, lift."""
         cube, base = pick.thing, self._stand(pick)
         stage = np.array([pick.edge - 0.15, cube[1], cube[2] + 0.30])
-        grasp = _above(cube, self._height())
+        grasp = _above(cube, round(tips_beyond_tool(self._model) - _BELOW, 6))
 
         def phase(name: str, position: FloatArray, **options: float) -> Phase:
-            return Phase(name, Pose(position, down), base, **options)  # type: ignore[arg-type]
+            return Phase(Pose(position, down), base, name=name, **options)  # type: ignore[arg-type]
 
         return [
             phase("stage", stage, distance=0.10, angle=0.30),
@@ -131,7 +104,7 @@ class PickPlaceScript:
 
         def phase(name: str, x: float, at: _Place, base: FloatArray) -> Phase:
             hand = Pose(np.array([x, at.thing[1], height]), down)
-            return Phase(name, hand, base, gripper=1.0, distance=0.12, angle=0.4)
+            return Phase(hand, base, name=name, gripper=1.0, distance=0.12, angle=0.4)
 
         if self._drives:
             retreat = phase("retreat", self._stand(pick)[0] + _AHEAD, pick, self._stand(pick))
@@ -148,7 +121,7 @@ class PickPlaceScript:
         base = self._stand(place)
 
         def phase(name: str, rise: float, **options: float) -> Phase:
-            return Phase(name, Pose(_above(rim, rise), down), base, **options)  # type: ignore[arg-type]
+            return Phase(Pose(_above(rim, rise), down), base, name=name, **options)  # type: ignore[arg-type]
 
         return [
             phase("over", 0.18, gripper=1.0, distance=0.03, angle=0.3),

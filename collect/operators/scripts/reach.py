@@ -2,32 +2,20 @@
 
 import numpy as np
 
-from handrail.collect.operators.human.motion_goal import MotionGoal
-from handrail.collect.operators.human.steering import Gains
 from handrail.collect.operators.operator import View
 from handrail.collect.operators.scripts.base_placement import standing_pose
-from handrail.collect.operators.scripts.phases import Phase, PhaseRunner
-from handrail.controllers.robot.model import RobotModel
+from handrail.collect.operators.scripts.phases import Phase, PhasedScript
 
 
-class ReachScript:
+class ReachScript(PhasedScript):
     """Reaches the goal of `handrail/Reach-v0`; a script."""
 
-    def __init__(self, model: RobotModel, gains: Gains, drives: bool) -> None:
-        self._model = model
-        self._drives = drives
-        self._runner = PhaseRunner(gains, redo=lambda view, name: None)
-
-    def reset(self, view: View) -> None:
-        """Plan to drive to where the goal is in comfortable reach, then to steer the hand to it."""
+    def plan(self, view: View) -> list[Phase]:
+        """Return the way: drive to where the goal is in comfortable reach, then steer the hand to it."""
         goal = view.task.goal or view.tool
         base = standing_pose(self._model, view.state.q, goal)
-        phases = [Phase("reach", goal, base, distance=0.06, angle=0.25)]
+        phases = [Phase(goal, base, name="reach", distance=0.06, angle=0.25)]
         far = np.hypot(*(base[:2] - view.state.q[:2])) > 0.4 or abs(base[2] - view.state.q[2]) > 0.2
         if self._drives and far:
-            phases.insert(0, Phase("drive", goal, base, focus="base", distance=0.15, angle=0.2))
-        self._runner.start(phases, view.state.time)
-
-    def motion_goal(self, view: View) -> MotionGoal:
-        """Return what is wanted now."""
-        return self._runner.motion_goal(view)
+            phases.insert(0, Phase(goal, base, name="drive", focus="base", distance=0.15, angle=0.2))
+        return phases

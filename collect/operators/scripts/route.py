@@ -26,7 +26,7 @@ class Route:
 
     def __init__(self, model: RobotModel, task: TaskState) -> None:
         self._model = model
-        self._obstacles = floor_obstacles(task.episode.scene)
+        self._obstacles = floor_obstacles(task.start.scene)
         behind = [item.position[0] - np.hypot(*item.shape.size[:2]) / 2 for item in self._obstacles]
         self.lane = float(min(behind, default=0.0)) - model.description.base_size[0] / 2 - _CLEARANCE
 
@@ -49,7 +49,7 @@ class Route:
             back, across = (np.array([min(self.lane, start[0]), y, 0.0]) for y in (start[1], goal[1]))
             points = [back, across, goal] if start[0] > self.lane else [across, goal]
         return [
-            Phase("drive", hand, point, focus="base", gripper=gripper, distance=0.12, angle=0.15)
+            Phase(hand, point, name="drive", focus="base", gripper=gripper, distance=0.12, angle=0.15)
             for point in points
         ]
 
@@ -64,9 +64,3 @@ class Route:
             if gap < width + np.hypot(*item.shape.size[:2]) / 2:
                 return True
         return False
-
-
-def front_edge(task: TaskState, table: str) -> float:
-    """Return the x of a table's edge that faces the robot [m]."""
-    item = task.object(table)
-    return float(item.position[0] - item.shape.size[0] / 2)

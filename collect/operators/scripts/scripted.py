@@ -5,7 +5,7 @@ from typing import Protocol
 
 import numpy as np
 
-from handrail.collect.operators.devices.devices import device_of, input_map
+from handrail.collect.operators.devices.devices import DEVICES
 from handrail.collect.operators.human.hand import HumanHand
 from handrail.collect.operators.human.human import HumanSettings
 from handrail.collect.operators.human.motion_goal import MotionGoal
@@ -45,23 +45,17 @@ class ScriptedOperator:
         script: of the task.
         mode: the teleop mode.
         human: who steers.
+
+    Attributes:
+        free_at: when the hand is back on the input after the last change of channels [s]; −∞ before any.
     """
 
     def __init__(self, model: RobotModel, script: Script, mode: TeleopMode, human: HumanSettings) -> None:
         self._script = script
         self._mode = mode
-        self._map = input_map(model, mode)
-        self._human = replace(human, refractory=human.refractory * device_of(mode).refractory)
-
-    @property
-    def name(self) -> str:
-        """What the dataset says of who steered."""
-        return "scripted"
-
-    @property
-    def free_at(self) -> float:
-        """When the hand is back on the input after the last change to other channels [s]; −∞ before any."""
-        return self._free_at
+        device = DEVICES.find(mode.device)
+        self._map = device.build(model, mode, device.gains)
+        self._human = replace(human, refractory=human.refractory * device.refractory)
 
     def reset(self, view: View, rng: np.random.Generator) -> None:
         """Begin an episode; how the person is today is drawn first."""
@@ -72,7 +66,7 @@ class ScriptedOperator:
         self._map.reset(view, self._settings, rng)
         self._mask: BoolArray | None = None
         self._switches = 0
-        self._free_at = -np.inf
+        self.free_at = -np.inf
 
     def act(self, view: View) -> Intent:
         """Return the intent now: the goal in this mode's channels, as the hand manages it."""
@@ -80,7 +74,7 @@ class ScriptedOperator:
         goal = self._perception.see(self._script.motion_goal(view), view.tool, time)
         mask, wanted = self._map.wanted(goal, view.state)
         self._switch(mask, time)
-        moved = self._hand.move(np.zeros_like(wanted) if time < self._free_at else wanted, time)
+        moved = self._hand.move(np.zeros_like(wanted) if time < self.free_at else wanted, time)
         moved = np.where(mask, moved, 0.0)
         values = np.where(mask, self._map.sent(moved, view.state), 0.0)
         raw = RawInput(self._map.raw(moved), int(np.count_nonzero(moved)), self._switches)
@@ -90,7 +84,7 @@ class ScriptedOperator:
         """Take the hand off the input for a moment when it acts on other channels from now on."""
         if self._mask is not None and not np.array_equal(mask, self._mask):
             self._switches += 1
-            self._free_at = time + self._settings.switch_time
+            self.free_at = time + self._settings.switch_time
         self._mask = mask
 
 
@@ -98,6 +92,6 @@ def scripted_operator(
     model: RobotModel, mode: TeleopMode, task: TaskSpec, human: HumanSettings
 ) -> ScriptedOperator:
     """Return who does a task's script in a mode, as brisk as people are with its device."""
-    device = device_of(mode)
+    device = DEVICES.find(mode.device)
     script = resolved(task.script)(model, device.gains, drives=device.drives or mode.by_focus)
     return ScriptedOperator(model, script, mode, human)

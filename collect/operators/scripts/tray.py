@@ -2,15 +2,13 @@
 
 import numpy as np
 
-from handrail.collect.operators.human.motion_goal import MotionGoal
-from handrail.collect.operators.human.steering import Gains
 from handrail.collect.operators.operator import View
-from handrail.collect.operators.scripts.phases import Phase, PhaseRunner
-from handrail.collect.operators.scripts.route import Route, front_edge
-from handrail.collect.tasks.arm_reach import reach_share
+from handrail.collect.operators.scripts.phases import Phase, PhasedScript
+from handrail.collect.operators.scripts.route import Route
+from handrail.collect.tasks.starts import reach_share
 from handrail.collect.tasks.tray import HANDLE
 from handrail.controllers.arrays import FloatArray
-from handrail.controllers.robot.model import Pose, RobotModel
+from handrail.controllers.robot.model import Pose
 
 _OVER = 0.10  # the tray above the table while it comes near [m]
 _ABOVE = 0.012  # the tray above the table when it is let go [m]
@@ -20,37 +18,19 @@ _TILT = 0.06  # that a person who minds the can allows on the way [rad]
 _AHEAD = 1.0  # hand before the base's centre while carrying, with an arm that reaches as far as usual [m]
 
 
-class TrayScript:
-    """Cross behind the obstacles, go up to the table, put down, let go for `handrail/Tray-v0`; a script.
+class TrayScript(PhasedScript):
+    """Cross behind the obstacles, go up to the table, put down, let go for `handrail/Tray-v0`; a script."""
 
-    Args:
-        model: of the robot.
-        gains: of the operator.
-        drives: whether the operator drives the base by itself.
-    """
-
-    def __init__(self, model: RobotModel, gains: Gains, drives: bool) -> None:
-        self._model = model
-        self._drives = drives
-        self._runner = PhaseRunner(gains, redo=lambda view, name: None)
-
-    def reset(self, view: View) -> None:
-        """Look at the scene and plan."""
-        self._runner.start(self._phases(view), view.state.time)
-
-    def motion_goal(self, view: View) -> MotionGoal:
-        """Return what is wanted now."""
-        return self._runner.motion_goal(view)
-
-    def _phases(self, view: View) -> list[Phase]:
+    def plan(self, view: View) -> list[Phase]:
+        """Return the way to the table, and what is done there."""
         task, route = view.task, Route(self._model, view.task)
-        table, edge = task.object("table"), front_edge(task, "table")
-        place = np.array([edge + _INSIDE, table.position[1], table.top + HANDLE[2] + _ABOVE])
-        stand = route.stand(place, edge)
+        table = task.object("table")
+        place = np.array([table.front + _INSIDE, table.position[1], table.top + HANDLE[2] + _ABOVE])
+        stand = route.stand(place, table.front)
         height = max(view.tool.position[2], place[2] + _OVER)
 
         def phase(name: str, hand: FloatArray, base: FloatArray, **options: float) -> Phase:
-            return Phase(name, Pose(hand, _DOWN), base, **({"gripper": 1.0} | options))  # type: ignore[arg-type]
+            return Phase(Pose(hand, _DOWN), base, name=name, **({"gripper": 1.0} | options))  # type: ignore[arg-type]
 
         over, up = (place + np.array([0.0, 0.0, rise]) for rise in (_OVER, _OVER + 0.08))
         phases = [

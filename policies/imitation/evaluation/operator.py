@@ -96,11 +96,6 @@ class PolicyOperator:
         self._mode = mode
         self.malformed = 0
 
-    @property
-    def name(self) -> str:
-        """Who steers."""
-        return "policy"
-
     def reset(self, view: View, rng: np.random.Generator) -> None:
         """Begin an episode."""
         self._policy.reset()

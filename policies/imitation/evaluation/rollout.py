@@ -12,8 +12,7 @@ from handrail.collect.config import SessionConfig
 from handrail.collect.envs.env import HandrailEnv
 from handrail.collect.perturbations.delayed import DelayedOperator
 from handrail.collect.perturbations.push import Pusher
-from handrail.collect.perturbations.shift import ShiftedTask
-from handrail.collect.session.build import build_env, build_task
+from handrail.collect.session.build import build_env
 from handrail.collect.session.outcome import Outcome
 from handrail.collect.session.session import Observer, Session
 from handrail.controllers.errors import HandrailError
@@ -87,8 +86,7 @@ def _session_config(arm: PolicyCondition) -> SessionConfig:
 @lru_cache(maxsize=8)
 def _env(config: SessionConfig, fps: int, shift: float, render: tuple[int, int] | bool) -> HandrailEnv:
     """Return an environment, built once a process."""
-    task = build_task(config)
-    return build_env(config, fps, render, ShiftedTask(task, shift) if shift else task)
+    return build_env(config, fps, render, shift)
 
 
 @lru_cache(maxsize=8)

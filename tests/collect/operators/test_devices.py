@@ -6,16 +6,19 @@ import numpy as np
 import pytest
 from device_helpers import GOAL, HOME, MODEL, PERIOD, Wisher, drive, first_view
 
-from handrail.collect.operators.devices.devices import device_of, input_map
+from handrail.collect.operators.devices.devices import DEVICES
+from handrail.collect.operators.devices.input_map import StickMap
 from handrail.collect.operators.devices.joint_order import clear_order, sweep_clearance
 from handrail.collect.operators.human.human import HumanSettings
 from handrail.collect.operators.human.motion_goal import MotionGoal
+from handrail.collect.operators.human.steering import Gains
 from handrail.collect.operators.modes import MODES
 from handrail.collect.operators.operator import View
 from handrail.collect.operators.scripts.scripted import scripted_operator
 from handrail.collect.tasks.catalogue import TaskSpec
 from handrail.controllers.baselines.split_controller import split_controller
 from handrail.controllers.collision.model import CollisionModel
+from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import State
 from handrail.controllers.interface.intent import Intent
 from handrail.controllers.robot.shape import Obstacle, Shape
@@ -37,7 +40,7 @@ def test_every_device_brings_the_hand_to_the_goal(view, name):
 
 def test_one_axis_at_a_time(view):
     intents, _ = drive(view, "direct_single", HumanSettings())
-    channels = input_map(MODEL, MODES["direct_single"]).channels
+    channels = Channels.of(MODEL.description)
     assert all(np.count_nonzero(intent.mask) == 1 for intent in intents)
     assert all(np.count_nonzero(intent.values) <= 1 for intent in intents)
     assert all(intent.raw.axes <= 1 for intent in intents)
@@ -67,7 +70,7 @@ def test_a_leader_starts_without_a_jump_and_never_outruns_its_operator(view):
     raw = np.array([intent.raw.values[arm] for intent in intents])
     np.testing.assert_allclose(raw[0], HOME[3:], atol=1e-9)
     np.testing.assert_allclose(intents[0].values, 0.0, atol=1e-9)
-    rate = device_of(MODES["leader"]).gains.joint_rate
+    rate = DEVICES["leader_arm"].gains.joint_rate
     assert np.max(np.abs(np.diff(raw, axis=0))) <= rate * PERIOD + 1e-9
     assert np.max(np.abs(path[:-1, 3:] - raw)) < 0.35
     assert len({intent.mask.tobytes() for intent in intents}) == 1
@@ -84,8 +87,7 @@ def test_a_still_leader_holds_the_arm(view):
 
 def test_the_split_controller_coordinates_nothing():
     """The base's stick moves no arm joint, the hand's moves no base joint."""
-    mode = MODES["decoupled"]
-    sticks = input_map(MODEL, mode)
+    sticks = StickMap(MODEL, MODES["decoupled"], Gains())
     controller = split_controller(MODEL)
     state = State(HOME, np.zeros(MODEL.size))
     operator_wish = MotionGoal(np.array([0.1, 0.0, 0.1, 0.0, 0.1, 0.0]), np.array([0.2, 0.1, 0.1]))

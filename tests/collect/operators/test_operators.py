@@ -4,6 +4,7 @@ from dataclasses import astuple, replace
 
 import numpy as np
 import pytest
+from device_helpers import first_view
 from scipy.spatial.transform import Rotation
 
 from handrail.collect.operators.devices.input_map import StickMap
@@ -162,6 +163,12 @@ def state(q=HOME, time=0.0):
     return State(q, np.zeros(MODEL.size), time)
 
 
+def sticks(mode):
+    inputs = StickMap(MODEL, mode, Gains())
+    inputs.reset(first_view(), HumanSettings.perfect(), np.random.default_rng(0))
+    return inputs
+
+
 def motion_goal(focus="hand"):
     return MotionGoal(np.array([0.1, -0.05, 0.1, 0.1, 0.0, -0.2]), np.array([0.2, 0.1, 0.1]), focus)
 
@@ -169,7 +176,7 @@ def motion_goal(focus="hand"):
 @pytest.mark.parametrize("name", STICKS)
 @pytest.mark.parametrize("focus", ["hand", "base"])
 def test_a_mode_speaks_only_on_its_channels(name, focus):
-    inputs = StickMap(MODEL, MODES[name], Gains())
+    inputs = sticks(MODES[name])
     mask, values = inputs.wanted(motion_goal(focus), state())
     np.testing.assert_array_equal(mask, inputs.mask(focus))
     assert np.any(values[mask])
@@ -178,13 +185,13 @@ def test_a_mode_speaks_only_on_its_channels(name, focus):
 
 
 def test_switching_follows_the_focus():
-    inputs = StickMap(MODEL, MODES["switching"], Gains())
+    inputs = sticks(MODES["switching"])
     np.testing.assert_array_equal(inputs.mask("hand"), inputs.channels.mask("ee"))
     np.testing.assert_array_equal(inputs.mask("base"), inputs.channels.mask("base"))
 
 
 def test_joint_inputs_move_the_hand_as_wished():
-    inputs = StickMap(MODEL, MODES["direct"], Gains())
+    inputs = sticks(MODES["direct"])
     velocities = inputs.wanted(motion_goal(), state())[1][inputs.channels.joint_slice]
     twist = MODEL.jacobian(HOME) @ velocities
     np.testing.assert_allclose(twist, motion_goal().hand, atol=0.02)

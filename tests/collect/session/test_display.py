@@ -71,15 +71,15 @@ def test_the_web_viewer_is_for_this_machine_alone_and_ends_with_the_recording(tm
 
 @pytest.mark.parametrize("trouble", [signal.SIGKILL, signal.SIGSTOP])
 def test_a_viewer_that_dies_or_stalls_never_stops_a_recording(trouble, tmp_path, monkeypatch):
-    monkeypatch.setattr(viewer, "_MOST_WAITING", 2**17)
+    monkeypatch.setattr(viewer, "MOST_WAITING", 2**17)
     honest, sent = viewer.Viewer.send, []
 
     def troubled(self, data):
         sent.append(data)
         if len(sent) == 4:
-            os.kill(self._process.pid, trouble)
+            os.kill(self.process.pid, trouble)
             if trouble == signal.SIGKILL:
-                self._process.wait()
+                self.process.wait()
         honest(self, data * (1 if len(sent) < 4 else 40))
 
     monkeypatch.setattr(viewer.Viewer, "send", troubled)
@@ -98,7 +98,7 @@ def test_a_viewer_that_dies_or_stalls_never_stops_a_recording(trouble, tmp_path,
 def test_what_goes_wrong_in_drawing_is_said_once_and_no_more(monkeypatch):
     said = []
     display = Display(say=said.append)
-    monkeypatch.setattr(display._drawing, "see", lambda frame: 1 / 0)
+    monkeypatch.setattr(Drawing, "see", lambda self, frame: 1 / 0)
     config = SessionConfig(task="reach", time_limit=1.0)
     build_session(config, build_env(config, 20), [display]).run(2)
     display.close()

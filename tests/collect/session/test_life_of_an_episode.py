@@ -28,8 +28,6 @@ CONTROLLERS = [lambda model: DirectController(model, 0.05), MaskedMpc]
 class Person:
     """Drives the base, and says what is in `says` at these calls of an episode, episode by episode."""
 
-    name = "person"
-
     def __init__(self, model, *says):
         self._channels, self._says = Channels.of(model.description), iter(says)
 

@@ -9,7 +9,7 @@ from handrail.collect.operators.operator import View
 from handrail.collect.perturbations.delayed import DelayedOperator
 from handrail.collect.perturbations.perturbations import DEFAULTS, Perturbation
 from handrail.collect.perturbations.push import Pusher, sample_pushes
-from handrail.collect.perturbations.shift import ShiftedTask
+from handrail.collect.perturbations.shift import sample_shifted
 from handrail.collect.session.build import build_task
 from handrail.collect.session.session import Session
 from handrail.collect.tasks.catalogue import TASKS
@@ -35,8 +35,6 @@ def test_what_is_written_is_what_is_read():
 
 class Motionless:
     """Asks for nothing, and notes what it sees."""
-
-    name = "motionless"
 
     def reset(self, view, rng):
         self.seen = []
@@ -133,16 +131,9 @@ def test_a_session_without_disturbance_is_what_it_was():
 @pytest.mark.parametrize("task", sorted(TASKS))
 def test_a_shifted_start_is_elsewhere_and_free(task):
     usual = build_task(SessionConfig(task=task))
-    shifted = ShiftedTask(usual, 0.3)
-    assert (shifted.name, shifted.horizon, shifted.state_names) == (
-        usual.name,
-        usual.horizon,
-        usual.state_names,
-    )
     for seed in range(4):
-        before, after, again = (
-            one.sample(MODEL, np.random.default_rng(seed)) for one in (usual, shifted, shifted)
-        )
+        before = usual.sample(MODEL, np.random.default_rng(seed))
+        after, again = (sample_shifted(usual, 0.3, MODEL, np.random.default_rng(seed)) for _ in range(2))
         np.testing.assert_array_equal(after.q, again.q)
         assert 0.1 < np.linalg.norm(after.q[:2] - before.q[:2]) <= 0.3 + 1e-9
         assert np.abs(after.q[2] - before.q[2]) <= 0.3
@@ -155,8 +146,8 @@ def test_a_shifted_start_is_elsewhere_and_free(task):
 
 
 def test_what_is_held_keeps_its_place_in_the_hand():
-    usual, shifted = Tray(), ShiftedTask(Tray(), 0.5)
-    before, after = (one.sample(MODEL, np.random.default_rng(1)) for one in (usual, shifted))
+    before = Tray().sample(MODEL, np.random.default_rng(1))
+    after = sample_shifted(Tray(), 0.5, MODEL, np.random.default_rng(1))
     for name in ("tray", "can"):
         places = []
         for episode in (before, after):
@@ -173,8 +164,7 @@ def test_delayed_is_what_was_seen_k_periods_ago(periods):
         operator = DelayedOperator(inner, periods)
         views = []
         for _ in range(10):
-            task = env.task_state()
-            views.append(View(env.state(), task.tool, task.opening, task))
+            views.append(View(env.state(), env.task_state()))
             if len(views) == 1:
                 operator.reset(views[0], np.random.default_rng(0))
             intent = operator.act(views[-1])
@@ -182,7 +172,6 @@ def test_delayed_is_what_was_seen_k_periods_ago(periods):
             assert intent.time == views[-1].state.time
             env.step(action(env, 0.1))
     assert inner.seen == [views[max(0, step - periods)] for step in range(10)]
-    assert operator.name == "motionless"
 
 
 def test_an_operator_sees_what_is_recorded():

@@ -104,8 +104,6 @@ def test_noise_zero_is_smoother():
 class Unruly:
     """An operator whose commands are garbage now and then."""
 
-    name = "unruly"
-
     def __init__(self, channels):
         self._channels = channels
         self._asked = 0

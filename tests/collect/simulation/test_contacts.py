@@ -5,19 +5,19 @@ from collect_helpers import action, environment
 
 from handrail.collect.simulation.scene import Scene, SceneObject, box
 from handrail.collect.tasks.furniture import pillar
-from handrail.collect.tasks.task import Episode
+from handrail.collect.tasks.task import Start
 
 
-def in_the_way(env) -> Episode:
+def in_the_way(env) -> Start:
     env.reset(seed=0)
-    episode = env.episode
+    episode = env.start
     block = pillar("block", -0.7, 0.0, 0.15, 0.4)
-    return Episode(Scene((*episode.scene.objects, block)), episode.q, episode.goal)
+    return Start(Scene((*episode.scene.objects, block)), episode.q, episode.goal)
 
 
 def test_driving_into_an_obstacle_is_counted_and_ends_nothing():
     with environment("Reach") as env:
-        env.reset(options={"episode": in_the_way(env)})
+        env.reset(options={"start": in_the_way(env)})
         seen, terminated = set(), False
         for _ in range(40):
             *_, terminated, _, info = env.step(action(env, [1.0] + [0.0] * 8))
@@ -37,10 +37,10 @@ def test_driving_freely_touches_nothing():
 def test_touching_oneself_is_counted():
     with environment("Reach") as env:
         env.reset(seed=0)
-        q = np.array(env.episode.q)
+        q = np.array(env.start.q)
         q[3:] = [0.0, -1.57, 2.6, 0.0, 0.0, 0.0]
         names = set()
-        env.reset(options={"episode": Episode(env.episode.scene, q, env.episode.goal)})
+        env.reset(options={"start": Start(env.start.scene, q, env.start.goal)})
         for _ in range(40):
             names.update(env.step(action(env, [0, 0, 0, 0, 0, 1.0, 0, 0, 0]))[4]["contact_names"])
         assert any("forearm" in name or "wrist" in name or "palm" in name for name in names), names
@@ -50,10 +50,8 @@ def test_the_cube_in_the_fingers_is_no_forbidden_contact_but_the_table_is():
     table = SceneObject("table", box([0.4, 0.4, 0.4]), np.array([0.0, 0.174, 0.25]), work_surface=True)
     with environment("Reach") as env:
         env.reset(seed=0)
-        episode = env.episode
-        env.reset(
-            options={"episode": Episode(Scene((*episode.scene.objects, table)), episode.q, episode.goal)}
-        )
+        episode = env.start
+        env.reset(options={"start": Start(Scene((*episode.scene.objects, table)), episode.q, episode.goal)})
         names = set()
         for _ in range(30):  # the home pose is horizontal above this table: lower the arm
             names.update(env.step(action(env, [0, 0, 0, 0, 0.5, 0, 0, 0, 0]))[4]["contact_names"])

@@ -12,6 +12,7 @@ from collect_helpers import action, environment, moved, write_small_robot
 from gymnasium.utils.env_checker import check_env
 
 from handrail.collect.simulation.gl import mujoco
+from handrail.collect.tasks.reach import Reach
 from handrail.controllers.errors import HandrailError
 
 CAMERAS = ("wrist", "scene")
@@ -131,9 +132,8 @@ def test_a_step_lasts_one_period(fps):
 
 
 def test_the_episode_is_truncated_at_the_horizon():
-    with environment("Reach") as env:
+    with environment("Reach", task=Reach(horizon=0.15)) as env:
         env.reset(seed=0)
-        env._max_episode_steps = 3
         ends = [env.step(action(env))[2:] for _ in range(3)]
     assert [truncated for _, truncated, _ in ends] == [False, False, True]
     assert ends[-1][2]["failure_reason"] == "timeout"
@@ -241,6 +241,6 @@ def test_mujoco_runs_as_configured():
 def test_moved_is_a_new_episode():
     with environment() as env:
         env.reset(seed=0)
-        before = env.episode
+        before = env.start
         after = moved(before, "cube", [0.0, 0.0, 2.0])
         assert before.scene.find("cube").position[2] < 1.0 < after.scene.find("cube").position[2]

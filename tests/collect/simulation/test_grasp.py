@@ -6,9 +6,16 @@ from collect_helpers import action, environment, over_cube
 
 from handrail.collect.config import SessionConfig
 from handrail.collect.operators.scripts.pick_place import tips_beyond_tool
-from handrail.collect.session.build import build_env, build_session
+from handrail.collect.session.build import (
+    build_controller,
+    build_env,
+    build_mode,
+    build_operator,
+    build_session,
+)
+from handrail.collect.session.session import Session
 from handrail.collect.simulation.geometry import box_around
-from handrail.collect.tasks.task import Episode
+from handrail.collect.tasks.task import Start
 from handrail.controllers.numerics.rotation import matrix_from_rpy
 from handrail.controllers.robot.model import load_model
 from handrail.controllers.robot.shape import Shape
@@ -18,7 +25,7 @@ MODEL = load_model()
 
 def test_the_fingers_hold_what_both_of_them_touch():
     with environment("PickPlace") as env:
-        env.reset(options={"episode": over_cube(env, 3, 0.01)})
+        env.reset(options={"start": over_cube(env, 3, 0.01)})
         assert env.simulation.held() == ()
         for _ in range(20):
             env.step(action(env, gripper=1.0))
@@ -37,7 +44,7 @@ def test_the_fingers_hold_what_both_of_them_touch():
 def test_fingers_that_rest_on_a_thing_do_not_hold_it():
     with environment("PickPlace") as env:
         episode = over_cube(env, 3, 0.045)  # the finger tips 5 mm above the cube
-        env.reset(options={"episode": Episode(episode.scene, episode.q, grip=0.0)})
+        env.reset(options={"start": Start(episode.scene, episode.q, grip=0.0)})
         touched = False
         for _ in range(30):
             down = np.linalg.pinv(env.model.jacobian(env.state().q)) @ [0.0, 0.0, -0.01, 0.0, 0.0, 0.0]
@@ -57,7 +64,7 @@ def test_a_held_tray_is_the_box_around_its_parts():
         for _ in range(3):
             env.step(action(env, gripper=1.0))
         (tray,) = env.simulation.held()
-        item, now, tool = env.episode.scene.find("tray"), env.task_state().pose("tray"), env.task_state().tool
+        item, now, tool = env.start.scene.find("tray"), env.task_state().pose("tray"), env.task_state().tool
         corners = np.array(np.meshgrid(*[[-0.5, 0.5]] * 3)).reshape(3, -1).T * tray.shape.size
         box = tool.position + (tray.position + corners @ tray.rotation.T) @ tool.rotation.T
         local = (box - now.position) @ now.rotation
@@ -71,7 +78,7 @@ def test_a_held_tray_is_the_box_around_its_parts():
 def test_a_drawer_is_held_by_its_rail_not_by_the_hand():
     with environment("Drawer") as env:
         env.reset(seed=0)
-        assert not any(item.portable for item in env.episode.scene.movables)
+        assert not any(item.portable for item in env.start.scene.movables)
 
 
 class Watch:
@@ -96,9 +103,9 @@ def test_a_session_tells_the_controller_what_is_held_until_it_is_let_go():
     config = SessionConfig(task="tray", mode="ee", noise=0.0)
     env = build_env(config, 20)
     try:
-        session = build_session(config, env)
-        session._controller = watch = Watch(session._controller)
-        outcome = session.run(seed=1)
+        mode = build_mode(config, env.model)
+        watch = Watch(build_controller(mode, env.model, 20, "tray"))
+        outcome = Session(env, watch, build_operator(config, mode, env.model)).run(seed=1)
     finally:
         env.close()
     assert outcome.success

@@ -14,7 +14,7 @@ from handrail.collect.simulation.patrol import Patrol
 from handrail.collect.simulation.scene import Scene, SceneObject
 from handrail.collect.tasks.moving import FASTEST, sample_movers
 from handrail.collect.tasks.reach import Reach
-from handrail.collect.tasks.task import Episode
+from handrail.collect.tasks.task import Start
 from handrail.controllers.baselines.direct import DirectController
 from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.errors import HandrailError
@@ -101,13 +101,11 @@ class Meeting(Reach):
     def sample(self, model, rng):
         shape = Shape("cylinder", [0.2, 0.5])
         item = SceneObject("mover_0", shape, DIRECT_AT_THE_BASE.start, patrol=DIRECT_AT_THE_BASE)
-        return Episode(Scene((item,)), HOME, Pose(np.array([0.0, 0.0, 9.0]), np.eye(3)))
+        return Start(Scene((item,)), HOME, Pose(np.array([0.0, 0.0, 9.0]), np.eye(3)))
 
 
 class Idle:
     """Touches nothing."""
-
-    name = "idle"
 
     def reset(self, view, rng):
         self._channels = Channels.of(MODEL.description)

@@ -7,7 +7,7 @@ from collect_helpers import environment, write_small_robot
 
 from handrail.collect.simulation.geometry import bounding_box
 from handrail.collect.simulation.gl import mujoco
-from handrail.collect.simulation.meshes import PlacedMesh, pieces, placed_meshes
+from handrail.collect.simulation.meshes import PlacedMesh, placed_meshes
 from handrail.collect.simulation.robot import FINGERS, build_robot
 from handrail.collect.simulation.scene import Scene, SceneObject, box
 from handrail.collect.simulation.simulation import Simulation
@@ -97,7 +97,7 @@ def signed_distance(shape: Shape, points: np.ndarray) -> np.ndarray:
 
 def outside(model: RobotModel, mesh: PlacedMesh) -> float:
     """Return how far a mesh's vertices stick out of the collision shapes on the same body [m]."""
-    vertices = np.vstack([piece.vertices for piece in pieces(mesh.path)]) * mesh.scale
+    vertices = np.vstack([piece.vertices for piece in mesh.pieces])
     points = vertices @ mesh.placement.rotation.T + mesh.placement.translation
     nearest = np.full(len(points), np.inf)
     for placed in model.description.collision:
@@ -119,7 +119,7 @@ def test_collision_shapes_enclose_every_vertex_of_the_meshes(shipped):
 
 def test_collision_shapes_are_not_absurdly_large(shipped):
     for mesh in placed_meshes(shipped):
-        vertices = np.vstack([piece.vertices for piece in pieces(mesh.path)]) * mesh.scale
+        vertices = np.vstack([piece.vertices for piece in mesh.pieces])
         points = vertices @ mesh.placement.rotation.T + mesh.placement.translation
         box = np.sort(np.ptp(points, axis=0))
         for placed in shipped.description.collision:

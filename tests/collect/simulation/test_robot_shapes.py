@@ -38,7 +38,7 @@ def distances(model: RobotModel, pairs: list[tuple[str, str]], q: np.ndarray) ->
     shapes = ShapePairs(model, ())
     shapes.geometry.removeAllCollisionPairs()
     for pair in pairs:
-        shapes.geometry.addCollisionPair(pin.CollisionPair(*(shapes._index[name] for name in pair)))
+        shapes.geometry.addCollisionPair(pin.CollisionPair(*map(shapes.geometry.getGeometryId, pair)))
     data, results = model.pinocchio.createData(), pin.GeometryData(shapes.geometry)
     values = np.empty((len(q), len(pairs)))
     for k, each in enumerate(q):

@@ -12,7 +12,7 @@ from handrail.collect.envs.env import HandrailEnv
 from handrail.collect.session.build import build_env, build_session, build_task
 from handrail.collect.tasks.cabinet import HANDLE, TRAVEL, inward
 from handrail.collect.tasks.drawer import Drawer, handle, opened
-from handrail.collect.tasks.task import Episode
+from handrail.collect.tasks.task import Start
 from handrail.collect.tasks.tray import Tray
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.robot.description import robot_names
@@ -101,10 +101,10 @@ def test_the_gripper_holds_the_tray_and_dropping_it_fails(robot):
 def test_a_can_beside_or_under_the_tray_fails(offset):
     with environment("Tray") as env:
         env.reset(seed=0)
-        episode = env.episode
+        episode = env.start
         place = episode.scene.find("tray").position + offset
         scene = moved(episode, "can", place).scene
-        env.reset(options={"episode": replace(episode, scene=scene)})
+        env.reset(options={"start": replace(episode, scene=scene)})
         assert hold(env, 5, 1.0)["failure_reason"] == "can_fell"
 
 
@@ -125,13 +125,13 @@ def test_a_tilted_hand_spills_the_can():
 def test_the_tray_has_to_be_left_on_the_table(grip, success):
     with environment("Tray") as env:
         env.reset(seed=0)
-        episode = env.episode
+        episode = env.start
         table, tray, can = (episode.scene.find(name) for name in ("table", "tray", "can"))
         place = np.array([*table.position[:2], table.top + 0.012])
         on_it = place + tray.rotation.T @ (can.position - tray.position)
         scene = moved(episode, "tray", place).scene
-        scene = moved(Episode(scene, episode.q), "can", on_it).scene
-        env.reset(options={"episode": Episode(scene, episode.q, grip=grip)})
+        scene = moved(Start(scene, episode.q), "can", on_it).scene
+        env.reset(options={"start": Start(scene, episode.q, grip=grip)})
         info = hold(env, 40, float(grip is not None))
         assert info["is_success"] == success, info
 
@@ -176,7 +176,7 @@ def test_a_drawer_stays_shut_opens_along_its_rail_and_stops_at_its_end():
         state = env.task_state()
         assert opened(state) == pytest.approx(TRAVEL, abs=0.01)
         np.testing.assert_allclose(handle(state) - shut, -opened(state) * into, atol=1e-6)
-        assert env.task_state().twists["drawer"].is_still
+        assert "drawer" in env.task_state().still
 
 
 def test_the_drawer_counts_only_when_the_hand_has_let_go():
@@ -199,12 +199,12 @@ def test_a_light_friction_is_felt():
 
 def test_a_thing_weighs_what_the_task_says():
     """Mass is spread over parts by volume; either way the body weighs what the task says."""
-    for task, names in ((Tray(), ("tray", "can")), (Drawer(), ("drawer",))):
-        with environment("Tray" if task.name == "Tray" else "Drawer") as env:
+    for task, names in (("Tray", ("tray", "can")), ("Drawer", ("drawer",))):
+        with environment(task) as env:
             env.reset(seed=0)
             for name in names:
                 body = env.simulation.mujoco_model.body(name)
-                assert body.mass[0] == pytest.approx(env.episode.scene.find(name).mass)
+                assert body.mass[0] == pytest.approx(env.start.scene.find(name).mass)
 
 
 @pytest.mark.parametrize("task", ["drawer", "pick_place", "reach", "tray"])

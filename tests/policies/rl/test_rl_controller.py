@@ -9,12 +9,12 @@ from rl_helpers import random_actor
 from handrail.collect.simulation.gate import Gate
 from handrail.collect.simulation.ideal_robot import IdealRobot
 from handrail.collect.simulation.scene import Scene
-from handrail.collect.tasks.goal_reaching import STEP, Goal
+from handrail.collect.tasks.goal_reaching import STEP
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.command import Status
 from handrail.controllers.interface.controller import State
 from handrail.controllers.interface.intent import Intent
-from handrail.controllers.robot.model import load_model
+from handrail.controllers.robot.model import Pose, load_model
 from handrail.policies.rl.controller import RlController
 from handrail.policies.rl.env import GoalReachingEnv
 
@@ -87,7 +87,7 @@ def test_a_new_episode_knows_nothing_of_the_one_before(controller):
         return q
 
     first = drive()
-    controller.aim(Goal(np.array([0.5, 0.5, 0.8]), np.eye(3)))
+    controller.aim(Pose(np.array([0.5, 0.5, 0.8]), np.eye(3)))
     second = drive()
     controller.reset()
     assert not np.allclose(first, second)

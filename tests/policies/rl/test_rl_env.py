@@ -12,18 +12,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import handrail.policies  # noqa: F401  (registers the environment)
-from handrail.collect.tasks.goal_reaching import STEP, T_MAX, Goal, pose_error, sample_goal
+from handrail.collect.tasks.goal_reaching import STEP, T_MAX, pose_error, sample_goal
 from handrail.controllers.baselines.arm_completion import ArmCompletion
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.numerics.rotation import turned
-from handrail.controllers.robot.model import load_model
+from handrail.controllers.robot.model import Pose, load_model
 from handrail.policies.rl.env import GoalReachingEnv, Reward
 from handrail.policies.rl.observation import Situation, base_velocity, observe
 
 SEEDS = st.integers(0, 2**32 - 1)
-NEAR = Goal(np.array([-0.6, 0.3, 0.9]), np.eye(3))
+NEAR = Pose(np.array([-0.6, 0.3, 0.9]), np.eye(3))
 HOME = load_model().pose(load_model().description.home)
-FOLDED = Goal(HOME.position, pin.exp3(np.array([0.0, 0.0, -2.2])) @ HOME.rotation)
+FOLDED = Pose(HOME.position, pin.exp3(np.array([0.0, 0.0, -2.2])) @ HOME.rotation)
 """Reached with a base at rest, the palm meets the forearm on the way, without any tracking error."""
 
 
@@ -135,12 +135,12 @@ def test_the_arm_follows_the_planner_where_nothing_limits_it():
     env = GoalReachingEnv(early_failure=False)
     env._arm = ArmCompletion(env.model, damping=1e-9)
     start = env.model.pose(env.model.description.home)
-    goal = Goal(start.position + [-0.1, 0.1, 0.05], start.rotation)
+    goal = Pose(start.position + [-0.1, 0.1, 0.05], start.rotation)
     env.reset(options={"goal": goal})
     for t in range(env.planner.steps + 3):
         env.step(np.zeros(3))
         tool = env.model.pose(env.q)
-        d, r = pose_error(tool.position, tool.rotation, Goal(*env.planner.pose(t + 1)))
+        d, r = pose_error(tool.position, tool.rotation, Pose(*env.planner.pose(t + 1)))
         assert d < 0.01  # the first steps, while the arm accelerates, and first-order integration
         assert r < 1e-3
 
@@ -158,7 +158,7 @@ def run(env, action):
     while not (terminated or truncated):
         *_, terminated, truncated, info = env.step(action)
         tool = env.model.pose(env.q)
-        d, r = pose_error(tool.position, tool.rotation, Goal(*env.planner.pose(env._time)))
+        d, r = pose_error(tool.position, tool.rotation, Pose(*env.planner.pose(env._time)))
         lost += d > 0.1 or r > 0.05
     return lost, terminated, truncated, info
 

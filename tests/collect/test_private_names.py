@@ -1,0 +1,50 @@
+"""Tests of this floor look at what is public: they survive a change of what is inside."""
+
+import ast
+from pathlib import Path
+
+import pytest
+
+FILES = sorted(Path(__file__).parent.rglob("test_*.py"))
+
+
+def is_private(name: str) -> bool:
+    return name.startswith("_") and not name.startswith("__")
+
+
+def private_names(tree: ast.Module) -> list[str]:
+    """Return the private names of others that a test reads, imports or patches."""
+    nodes = list(ast.walk(tree))
+    own = {id(part) for node in nodes if isinstance(node, ast.ClassDef) for part in ast.walk(node)}
+    found = []
+    for node in nodes:
+        match node:
+            case ast.Attribute(value=ast.Name(id="self" | "cls")) if id(node) in own:
+                pass
+            case ast.Attribute(attr=name) if is_private(name):
+                found.append(ast.unparse(node))
+            case ast.ImportFrom(names=names):
+                found += [entry.name for entry in names if is_private(entry.name)]
+            case ast.Call(func=ast.Attribute(attr="setattr"), args=arguments):
+                said = [str(part.value) for part in arguments[:2] if isinstance(part, ast.Constant)]
+                found += [name for name in said if is_private(name.rpartition(".")[2])]
+    return found
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
+def test_no_test_reaches_into_private_names(path):
+    assert not private_names(ast.parse(path.read_text()))
+
+
+@pytest.mark.parametrize(
+    "code",
+    [
+        "session._controller",
+        "from handrail.collect.session.viewer import _END",
+        'monkeypatch.setattr(viewer, "_END", 1)',
+        'monkeypatch.setattr("handrail.collect.session.viewer._END", 1)',
+        "def sent(self): return self._pipe",
+    ],
+)
+def test_the_law_sees_a_private_name(code):
+    assert private_names(ast.parse(code))
