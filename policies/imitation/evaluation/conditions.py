@@ -1,4 +1,4 @@
-"""What is evaluated: a checkpoint under a condition, which together are an arm."""
+"""What is evaluated: a checkpoint under a condition."""
 
 import hashlib
 import itertools
@@ -22,8 +22,6 @@ from handrail.policies.imitation.evaluation.features import pictures, place_of
 from handrail.policies.imitation.interface.checkpoint import NAME, PolicyMeta, model_folder, read_meta
 from handrail.policies.imitation.interface.interface import PolicyInterface
 from handrail.policies.imitation.interface.trust import check_policy_folder
-
-_PART = 2**20  # bytes
 
 
 @dataclass(frozen=True)
@@ -148,44 +146,40 @@ def _plain(place: Path, settings: Mapping[str, Any], config: EvaluateConfig) -> 
     )
 
 
-def arms(config: EvaluateConfig, refused: list[str] | None = None) -> tuple[PolicyCondition, ...]:
-    """Return every checkpoint under every condition of the settings.
-
-    Args:
-        config: of the evaluation.
-        refused: takes why a checkpoint is none, or cannot be under a condition; without it that is an error.
+def policy_conditions(config: EvaluateConfig) -> tuple[list[PolicyCondition], list[str]]:
+    """Return every checkpoint under every condition of the settings, and why some cannot be.
 
     Raises:
-        HandrailError: there is no arm, they are for several tasks, or two are one and the same policy.
+        HandrailError: there is none, they are for several tasks, or two are one and the same policy.
     """
-    why: list[str] = []
+    refused: list[str] = []
     checkpoints = [
         each
         for folder in config.folders
-        if (each := _tried(why, lambda f=folder: read_checkpoint(f, config)))
+        if (each := _tried(refused, lambda f=folder: read_checkpoint(f, config)))
     ]
     environments = {checkpoint.meta.environment for checkpoint in checkpoints}
     if len(environments) > 1:
         raise HandrailError(
             f"--policy: expected policies for one task, got {', '.join(sorted(environments))}"
         )
-    conditions = itertools.product(config.perturbations, config.protections, checkpoints)
     found: dict[tuple[str, tuple[int, int]], PolicyCondition] = {}
-    for perturbation, protection, checkpoint in conditions:
-        arm = _tried(why, lambda: _arm(checkpoint, protection, perturbation, config))  # noqa: B023
-        if arm is None:
+    for settings in itertools.product(config.perturbations, config.protections, checkpoints):
+        condition = _tried(refused, lambda s=settings: _condition(*s, config))
+        if condition is None:
             continue
-        before = found.setdefault((arm.label, checkpoint.key), arm)
-        if before != arm:
+        checkpoint = condition.checkpoint
+        before = found.setdefault((condition.label, checkpoint.key), condition)
+        if before != condition:
             raise HandrailError(
-                f"--policy {checkpoint.folder}: expected each dataset draw and training seed once, but arm "
-                f"{arm.label!r} has {checkpoint.key} already, {before.checkpoint.folder}; give it a --label"
+                f"--policy {checkpoint.folder}: expected each dataset draw and training seed once, but"
+                f" condition {condition.label!r} has {checkpoint.key} already, {before.checkpoint.folder};"
+                " give it a --label"
             )
-    if why and (refused is None or not found):
-        raise HandrailError("; ".join(dict.fromkeys(why)))
-    if refused is not None:
-        refused += dict.fromkeys(why)
-    return tuple(found.values())
+    refused = list(dict.fromkeys(refused))
+    if not found:
+        raise HandrailError("; ".join(refused))
+    return list(found.values()), refused
 
 
 def _tried[Value](refused: list[str], make: Callable[[], Value]) -> Value | None:
@@ -196,18 +190,20 @@ def _tried[Value](refused: list[str], make: Callable[[], Value]) -> Value | None
         return None
 
 
-def _arm(
-    checkpoint: Checkpoint, protection: str, perturbation: Perturbation, config: EvaluateConfig
+def _condition(
+    perturbation: Perturbation, protection: str, checkpoint: Checkpoint, config: EvaluateConfig
 ) -> PolicyCondition:
-    own = own_protection(checkpoint.intent_mode)
+    meta, own = checkpoint.meta, own_protection(checkpoint.intent_mode)
     chosen = own if protection == "own" else protection
     if chosen in ("mpc", "filter") and chosen != own and not _fits(checkpoint, chosen):
         raise HandrailError(
             f"--protection {protection}: expected a policy that commands every joint, or own or none; "
-            f"{checkpoint.folder} decides on the intent of mode {checkpoint.meta.mode}"
+            f"{checkpoint.folder} decides on the intent of mode {meta.mode}"
         )
-    words = [config.label or _name(checkpoint), _protected(chosen, own), perturbation.words]
-    return PolicyCondition(checkpoint, chosen, perturbation, config.time_limit, " ".join(filter(None, words)))
+    name = (meta.mode or meta.policy) + (" intent" if checkpoint.intent_mode else "")
+    protected = "" if chosen == own else "unprotected" if chosen == "none" else chosen
+    label = " ".join(filter(None, (config.label or name, protected, perturbation.words)))
+    return PolicyCondition(checkpoint, chosen, perturbation, config.time_limit, label)
 
 
 def own_protection(mode: str) -> str:
@@ -245,17 +241,6 @@ def _commands_joints(interface: PolicyInterface | None) -> bool:
     return bool(np.all(joints.all(axis=1) | driven))
 
 
-def _name(checkpoint: Checkpoint) -> str:
-    meta = checkpoint.meta
-    return (meta.mode or meta.policy) + (" intent" if checkpoint.intent_mode else "")
-
-
-def _protected(chosen: str, own: str) -> str:
-    if chosen == own:
-        return ""
-    return "unprotected" if chosen == "none" else chosen
-
-
 def _digest(folder: Path) -> str:
     """Return a short digest of a folder's files."""
     digest = hashlib.sha256()
@@ -263,6 +248,5 @@ def _digest(folder: Path) -> str:
         if path.is_file():
             digest.update(path.name.encode())
             with open(path, "rb") as file:
-                while part := file.read(_PART):
-                    digest.update(part)
+                hashlib.file_digest(file, lambda: digest)  # adds the file to it
     return digest.hexdigest()[:16]
