@@ -7,12 +7,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from handrail.collect.operators.modes import MODES
 from handrail.collect.perturbations.perturbations import Perturbation
 from handrail.collect.tasks.catalogue import TASKS
-from handrail.controllers.baselines.catalogue import CONTROLLERS, ControllerSpec
+from handrail.controllers.baselines.catalogue import CONTROLLERS
 from handrail.controllers.entries import is_count
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.robot.catalogue import ROBOTS
@@ -103,7 +101,9 @@ def read_checkpoint(folder: Path, config: EvaluateConfig) -> Checkpoint:
     )
     if config.task and meta.environment in TASKS and meta.environment != config.task:
         raise HandrailError(f"{where}: expected one trained for {config.task}, got {meta.environment!r}")
-    _admit(meta, config)
+    TASKS.admit(meta.environment, (config.task,))  # before anything that a policy names is imported
+    MODES.admit(meta.mode, (config.mode,))
+    ROBOTS.admit(meta.robot, (config.robot,))
     if interface is not None:
         if not TASKS.accepts(meta.environment):
             raise HandrailError(
@@ -117,13 +117,6 @@ def read_checkpoint(folder: Path, config: EvaluateConfig) -> Checkpoint:
         )
         meta, movers = replace(meta, environment=known.task, robot=known.robot), known.movers
     return Checkpoint(place, meta, interface, pictures(settings, where), movers, _digest(place))
-
-
-def _admit(meta: PolicyMeta, config: EvaluateConfig) -> None:
-    """Check what a policy names before anything of it is imported."""
-    TASKS.admit(meta.environment, (config.task,))
-    MODES.admit(meta.mode, (config.mode,))
-    ROBOTS.admit(meta.robot, (config.robot,))
 
 
 def _plain(place: Path, settings: Mapping[str, Any], config: EvaluateConfig) -> PolicyMeta:
@@ -195,9 +188,9 @@ def _condition(
 ) -> PolicyCondition:
     meta, own = checkpoint.meta, own_protection(checkpoint.intent_mode)
     chosen = own if protection == "own" else protection
-    if chosen in ("mpc", "filter") and chosen != own and not _fits(checkpoint, chosen):
+    if checkpoint.intent_mode and chosen not in (own, "none"):
         raise HandrailError(
-            f"--protection {protection}: expected a policy that commands every joint, or own or none; "
+            f"--protection {protection}: expected a policy of joint velocities, or own or none; "
             f"{checkpoint.folder} decides on the intent of mode {meta.mode}"
         )
     name = (meta.mode or meta.policy) + (" intent" if checkpoint.intent_mode else "")
@@ -210,39 +203,11 @@ def own_protection(mode: str) -> str:
     """Return the protection that a policy's actions have by themselves: intents of a mode, or none of any."""
     if not mode:
         return "none"
-    spec = _controller(mode)
+    spec = CONTROLLERS.find(MODES.find(mode).controller)
     return spec.name if spec.protects else "none"
 
 
-def _controller(mode: str) -> ControllerSpec:
-    return CONTROLLERS.find(MODES.find(mode).controller)
-
-
-def _fits(checkpoint: Checkpoint, protection: str) -> bool:
-    """Return whether a controller can stand in for a policy's own.
-
-    The filter completes nothing, so it needs every joint; so does the MPC where joints that nobody commands
-    are meant to rest.
-    """
-    if not checkpoint.intent_mode:
-        return True
-    completes = _controller(checkpoint.intent_mode).completes
-    return (protection == "mpc" and completes) or _commands_joints(checkpoint.interface)
-
-
-def _commands_joints(interface: PolicyInterface | None) -> bool:
-    """Return whether every mask leaves nothing over: all joints, or the base's twist and the arm's joints."""
-    if interface is None:
-        return True
-    names, masks = interface.channels, np.array(interface.masks, bool)  # (k, m)
-    base, joint = (np.array([name.startswith(group) for name in names]) for group in ("base.", "joint."))
-    joints = masks[:, joint]  # (k, n), the base's first
-    driven = masks[:, base].all(axis=1) & joints[:, base.sum() :].all(axis=1) & base.any()
-    return bool(np.all(joints.all(axis=1) | driven))
-
-
 def _digest(folder: Path) -> str:
-    """Return a short digest of a folder's files."""
     digest = hashlib.sha256()
     for path in sorted(folder.iterdir()):
         if path.is_file():

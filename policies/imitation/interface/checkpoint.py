@@ -25,13 +25,12 @@ from handrail.datasets.storage.atomic import sync_folder, write_whole
 from handrail.datasets.storage.strict_json import load_json
 from handrail.policies.fields import check_fields
 from handrail.policies.imitation.config import ACTION_SPACES
-from handrail.policies.imitation.interface.interface import PolicyInterface
+from handrail.policies.imitation.interface.interface import ENVIRONMENT, STATE, PolicyInterface
 from handrail.policies.imitation.interface.trust import CONFIG, check_policy_folder, registered_policies
 
 FORMAT = "handrail.policy/2"
 NAME = "handrail.json"
 MODEL = "pretrained_model"
-_KEYS = ("observation.state", "observation.environment_state")
 _VERSIONED = ("handrail", "lerobot", "torch", "numpy")
 _LOW, _HIGH = FPS_RANGE
 _CHECKED = {  # what more has to hold of `PolicyMeta` than the types of its fields say
@@ -122,7 +121,7 @@ class TrainedPolicy:
 
         batch = {
             key: torch.from_numpy(np.asarray(values, np.float32))[None]
-            for key, values in zip(_KEYS, (state, environment), strict=True)
+            for key, values in zip((STATE, ENVIRONMENT), (state, environment), strict=True)
             if key in self.policy.config.input_features and values is not None and np.size(values)
         }
         for camera, picture in (images or {}).items():

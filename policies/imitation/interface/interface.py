@@ -23,7 +23,8 @@ from handrail.policies.imitation.interface.relative import RelativeView
 Columns = Mapping[str, np.ndarray]
 Mask = tuple[bool, ...]
 ACTIONS = ("realised", "intent")
-COLUMNS = ("observation.state", "observation.environment_state", "action", "teleop.values", "teleop.mask")
+STATE, ENVIRONMENT, ACTION = "observation.state", "observation.environment_state", "action"
+COLUMNS = (STATE, ENVIRONMENT, ACTION, "teleop.values", "teleop.mask")
 _GRIPPER = "gripper"
 _HALF = 0.5  # a gripper command beyond it closes
 _CHANNELS = Entry("names of channels", lists(is_text))
@@ -64,10 +65,7 @@ class PolicyInterface:
         """
         if actions not in ACTIONS:
             raise unknown_name("action space", actions, ACTIONS)
-        state, environment, asked = (
-            _names(features, key)
-            for key in ("observation.state", "observation.environment_state", "teleop.values")
-        )
+        state, environment, asked = (_names(features, key) for key in (STATE, ENVIRONMENT, "teleop.values"))
         names = tuple(name for name in asked if name != _GRIPPER)
         masks = _masks_of(_channels(names), episodes) if actions == "intent" else ()
         return cls(actions, state, environment, names, masks)
@@ -92,7 +90,7 @@ class PolicyInterface:
 
     def encode(self, columns: Columns) -> FloatArray:
         """Return the actions of a recorded episode, (T, a) float32, from its `COLUMNS`."""
-        state = columns["observation.state"].astype(float)
+        state = columns[STATE].astype(float)
         values, gripper = self._asked(columns) if self.masks else self._realised(state, columns)
         pose = self._view.pose(state)
         for pair in self._pairs:
@@ -143,7 +141,7 @@ class PolicyInterface:
         velocities = self._view.velocities(state)
         values = np.zeros((len(state), len(self.channels)))
         values[:, self._known.joint_slice] = np.concatenate([velocities[1:], velocities[-1:]])
-        return values, columns["action"][:, -1]
+        return values, columns[ACTION][:, -1]
 
     @cached_property
     def _known(self) -> Channels:

@@ -20,7 +20,7 @@ from handrail.datasets.comparison.config import CompareConfig
 from handrail.datasets.reading.reader import read_episodes, read_info
 from handrail.datasets.storage.atomic import remove
 from handrail.policies.imitation.interface.checkpoint import last_checkpoint
-from handrail.policies.study.design.design import StudyDesign, TaskDesign
+from handrail.policies.study.design.design import StudyDesign
 from handrail.policies.study.design.jobs import CONDITIONS, Cell, Job, Layout, StudyPolicy
 from handrail.policies.study.design.progress import StudyProgress, read_json, write_json
 from handrail.policies.study.design.settings import evaluations, fingerprint, recording, training
@@ -124,7 +124,7 @@ def _collect(cell: Cell, design: StudyDesign, layout: Layout) -> dict[str, Any]:
 
     wanted, root = design.tasks[cell.task], layout.dataset(cell)
     found = _collected(root) if root.exists() else {"episodes": 0, "successes": 0, "minutes": 0.0}
-    while not _enough(found, wanted):
+    while found["successes"] < wanted.episodes or found["minutes"] < wanted.minutes:
         code = record(recording(cell, design, root, found["episodes"]))
         if code:
             raise HandrailError(f"collecting {cell.name}: recording ended with exit code {code}")
@@ -144,10 +144,6 @@ def _collected(root: Any) -> dict[str, Any]:
         "successes": sum(bool(episode["success"]) for episode in episodes),
         "minutes": sum(episode["length"] for episode in episodes) / read_info(root).fps / 60.0,
     }
-
-
-def _enough(found: Mapping[str, Any], wanted: TaskDesign) -> bool:
-    return found["successes"] >= wanted.episodes and found["minutes"] >= wanted.minutes
 
 
 def _train_and_evaluate(job: Job, policy: StudyPolicy, design: StudyDesign, layout: Layout) -> None:

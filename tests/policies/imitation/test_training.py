@@ -170,6 +170,19 @@ def test_only_what_lerobot_refuses_is_put_into_its_mouth(recorded, tmp_path, mon
         train(tiny(recorded, tmp_path), quiet=True)
 
 
+@pytest.mark.parametrize("kind", ["FSDP", "DEEPSPEED"])
+def test_a_launch_that_splits_the_model_is_refused_in_one_line(kind, recorded, tmp_path, monkeypatch):
+    """Law: accelerate's FSDP and DeepSpeed, whose parts a checkpoint does not gather, train nothing."""
+    from accelerate import Accelerator
+    from accelerate.utils import DistributedType
+
+    monkeypatch.setattr(Accelerator, "distributed_type", DistributedType[kind])
+    with pytest.raises(HandrailError, match=f"expected one process or --multi_gpu, got {kind}") as error:
+        train(tiny(recorded, tmp_path / "policy"), quiet=True)
+    assert "\n" not in str(error.value)
+    assert not (tmp_path / "policy").exists()
+
+
 def _ours(self, indices):
     raise ValueError("an error of ours")
 

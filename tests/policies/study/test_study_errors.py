@@ -36,7 +36,10 @@ def preset(tmp_path):
         (("seeds = [0, 1]", "seeds = [0, 0]"), "seeds"),
         (("minutes = 0.1", "minutes = nan"), "minutes: expected a finite number, got nan"),
         (("minutes = 0.1", "minutes = 0.1\nrollout_limit = -1.0"), "time_limit -1.0: expected 0"),
-        (("minutes = 0.1", "minutes = 0.1\ntime_limit = {ee = -3.0}"), "time_limit: expected numbers by name"),
+        (
+            ("minutes = 0.1", "minutes = 0.1\ntime_limit = {ee = -3.0}"),
+            "time_limit: expected numbers by name",
+        ),
         (
             ("minutes = 0.1", "minutes = 0.1\nbatch_size = -4"),
             "batch_size: expected a whole number, 0 or more, got -4",
