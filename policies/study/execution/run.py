@@ -116,7 +116,8 @@ def _run_all(start: Start, workers: int, progress: StudyProgress, state: _State,
             for job in state.ready(todo):
                 if len(state.running) >= workers:
                     break
-                layout.log(job).unlink(missing_ok=True)  # of an earlier time
+                with explained(str(layout.log(job))):
+                    layout.log(job).unlink(missing_ok=True)  # of an earlier time
                 state.running[job.name] = (job, start(job, design, layout))
             if not state.running:
                 break

@@ -30,7 +30,10 @@ def tables(results: TaskResults) -> list[Table]:
     compared = Outcomes((), tuple(differences))
     made = [
         replace(collection_table(list(results.collected.values())), title="Collecting"),
-        replace(conditions_table(results.policies or compared), title="Policies, undisturbed"),
+        replace(
+            conditions_table(results.policies or compared),
+            title="Policies, undisturbed; “intent” goes through the MPC",
+        ),
         replace(outcome_differences_table(compared), title="Differences"),
         _treatments(results),
         _sweep(results),
