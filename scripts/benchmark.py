@@ -4,12 +4,9 @@ from handrail.collect.experiments.benchmark.config import BenchmarkConfig
 from handrail.scripts import cli
 
 
-def main() -> None:
+@cli.command("handrail-benchmark", BenchmarkConfig)
+def main(config: BenchmarkConfig) -> int:
     """Run the command."""
-    cli.run(lambda: _benchmark(cli.parse(BenchmarkConfig, "handrail-benchmark")))
-
-
-def _benchmark(config: BenchmarkConfig) -> int:
     config.check()
     from rich.console import Console
 

@@ -1,6 +1,7 @@
 """What every command shares: LeRobot-like flags, one line an error, exit codes."""
 
 import contextlib
+import functools
 import importlib.metadata
 import inspect
 import io
@@ -45,6 +46,22 @@ def parse[Config](config: Callable[..., Config], prog: str, arguments: Sequence[
         if stop.code:
             fail(_one_line(said.getvalue(), prog), BAD_INPUT)
         raise
+
+
+def command[Config](
+    prog: str, config: type[Config]
+) -> Callable[[Callable[[Config], int | None]], Callable[[], NoReturn]]:
+    """Make a command of what is done with a config: it reads the command line first.
+
+    Args:
+        prog: name of the command.
+        config: what its command line says.
+    """
+
+    def of(body: Callable[[Config], int | None]) -> Callable[[], NoReturn]:
+        return functools.wraps(body)(lambda: run(lambda: body(parse(config, prog))))
+
+    return of
 
 
 def run(main: Callable[[], int | None]) -> NoReturn:

@@ -4,12 +4,9 @@ from handrail.datasets.comparison.config import CompareConfig
 from handrail.scripts import cli
 
 
-def main() -> None:
+@cli.command("handrail-compare", CompareConfig)
+def main(config: CompareConfig) -> int:
     """Run the command."""
-    cli.run(lambda: _compare(cli.parse(CompareConfig, "handrail-compare")))
-
-
-def _compare(config: CompareConfig) -> int:
     config.check()
     from rich.console import Console
 

@@ -4,12 +4,9 @@ from handrail.collect.commands.config import DemoConfig
 from handrail.scripts import cli
 
 
-def main() -> None:
+@cli.command("handrail-demo", DemoConfig)
+def main(config: DemoConfig) -> int:
     """Run the command."""
-    cli.run(lambda: _demo(cli.parse(DemoConfig, "handrail-demo")))
-
-
-def _demo(config: DemoConfig) -> int:
     from handrail.collect.commands.demo import demo
 
     return demo(config)

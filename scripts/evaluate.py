@@ -7,12 +7,9 @@ from handrail.policies.imitation.training.installed import check_installed
 from handrail.scripts import cli
 
 
-def main() -> None:
+@cli.command("handrail-evaluate", EvaluateConfig)
+def main(config: EvaluateConfig) -> int:
     """Run the command."""
-    cli.run(lambda: _evaluate(cli.parse(EvaluateConfig, "handrail-evaluate")))
-
-
-def _evaluate(config: EvaluateConfig) -> int:
     config.check()
     check_installed("handrail-evaluate", ("torch",))
     from rich.console import Console

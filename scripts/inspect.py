@@ -4,12 +4,9 @@ from handrail.collect.commands.config import InspectConfig
 from handrail.scripts import cli
 
 
-def main() -> None:
+@cli.command("handrail-inspect", InspectConfig)
+def main(config: InspectConfig) -> int:
     """Run the command."""
-    cli.run(lambda: _inspect(cli.parse(InspectConfig, "handrail-inspect")))
-
-
-def _inspect(config: InspectConfig) -> int:
     from rich.console import Console
 
     from handrail.collect.commands.tables import quality_table, summary_table

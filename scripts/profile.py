@@ -6,12 +6,9 @@ from handrail.collect.experiments.profiling.config import ProfileConfig
 from handrail.scripts import cli
 
 
-def main() -> None:
+@cli.command("handrail-profile", ProfileConfig)
+def main(config: ProfileConfig) -> int:
     """Run the command."""
-    cli.run(lambda: _profile(cli.parse(ProfileConfig, "handrail-profile")))
-
-
-def _profile(config: ProfileConfig) -> int:
     config.check()
     from rich.console import Console
 

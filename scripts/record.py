@@ -4,12 +4,9 @@ from handrail.collect.config import RecordConfig
 from handrail.scripts import cli
 
 
-def main() -> None:
+@cli.command("handrail-record", RecordConfig)
+def main(config: RecordConfig) -> int:
     """Run the command."""
-    cli.run(lambda: _record(cli.parse(RecordConfig, "handrail-record")))
-
-
-def _record(config: RecordConfig) -> int:
     config.check()
     from handrail.collect.commands.record import (
         record,  # loads the simulator: only once the settings are right

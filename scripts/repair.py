@@ -4,12 +4,8 @@ from handrail.collect.commands.config import RepairConfig
 from handrail.scripts import cli
 
 
-def main() -> None:
-    """Run the command."""
-    cli.run(lambda: _repair(cli.parse(RepairConfig, "handrail-repair")))
-
-
-def _repair(config: RepairConfig) -> int:
+@cli.command("handrail-repair", RepairConfig)
+def main(config: RepairConfig) -> int:
     """Return 0 only if everything that was saved is in the dataset and whole."""
     from handrail.datasets.recording.repair import repair
 

@@ -13,12 +13,9 @@ _PICTURES = 8
 _HEADINGS = ("episode", "largest deviation", "of", "tool at end [m]", "success", "recorded", "contacts begun")
 
 
-def main() -> None:
+@cli.command("handrail-replay", ReplayConfig)
+def main(config: ReplayConfig) -> int:
     """Run the command."""
-    cli.run(lambda: _replay(cli.parse(ReplayConfig, "handrail-replay")))
-
-
-def _replay(config: ReplayConfig) -> int:
     config.check()
     from rich.console import Console
 

@@ -6,12 +6,9 @@ from handrail.collect.experiments.showcase.config import ShowcaseConfig
 from handrail.scripts import cli
 
 
-def main() -> None:
+@cli.command("handrail-showcase", ShowcaseConfig)
+def main(config: ShowcaseConfig) -> int:
     """Run the command."""
-    cli.run(lambda: _showcase(cli.parse(ShowcaseConfig, "handrail-showcase")))
-
-
-def _showcase(config: ShowcaseConfig) -> int:
     config.check()
     from rich.console import Console
 

@@ -4,12 +4,9 @@ from handrail.policies.study.config import StudyConfig
 from handrail.scripts import cli
 
 
-def main() -> None:
+@cli.command("handrail-study", StudyConfig)
+def main(config: StudyConfig) -> int:
     """Run the command."""
-    cli.run(lambda: _study(cli.parse(StudyConfig, "handrail-study")))
-
-
-def _study(config: StudyConfig) -> int:
     config.check()
     from handrail.policies.study.execution.run import run_study
 

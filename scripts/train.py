@@ -5,12 +5,9 @@ from handrail.policies.imitation.training.installed import check_installed
 from handrail.scripts import cli
 
 
-def main() -> None:
+@cli.command("handrail-train", TrainConfig)
+def main(config: TrainConfig) -> int:
     """Run the command."""
-    cli.run(lambda: _train(cli.parse(TrainConfig, "handrail-train")))
-
-
-def _train(config: TrainConfig) -> int:
     config.check()
     check_installed("handrail-train", ("torch", "accelerate"), config.policy)
     from handrail.policies.imitation.training.training import train

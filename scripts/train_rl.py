@@ -5,12 +5,9 @@ from handrail.policies.rl.config import TrainRlConfig
 from handrail.scripts import cli
 
 
-def main() -> None:
+@cli.command("handrail-train-rl", TrainRlConfig)
+def main(config: TrainRlConfig) -> int:
     """Run the command."""
-    cli.run(lambda: _train(cli.parse(TrainRlConfig, "handrail-train-rl")))
-
-
-def _train(config: TrainRlConfig) -> int:
     config.check()
     check_installed("handrail-train-rl", ("stable_baselines3", "tensorboard"), extra="rl")
     from handrail.policies.rl.train import train

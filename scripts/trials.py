@@ -4,12 +4,9 @@ from handrail.collect.experiments.trials.config import TrialsConfig
 from handrail.scripts import cli
 
 
-def main() -> None:
+@cli.command("handrail-trials", TrialsConfig)
+def main(config: TrialsConfig) -> int:
     """Run the command."""
-    cli.run(lambda: _trials(cli.parse(TrialsConfig, "handrail-trials")))
-
-
-def _trials(config: TrialsConfig) -> int:
     config.check()
     from rich.console import Console
 

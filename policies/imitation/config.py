@@ -9,7 +9,6 @@ from handrail.controllers.errors import HandrailError
 from handrail.datasets.lists import Words
 
 ACTION_SPACES = ("realised", "intent", "recorded")
-PRESETS = ("cpu", "gpu")
 FREE_ON_RESUME = (
     "output",
     "save_freq",

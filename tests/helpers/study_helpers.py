@@ -10,8 +10,8 @@ from datasets_helpers import create, frame_of
 from handrail.datasets.comparison.evaluations import FORMAT
 from handrail.policies.study.design.jobs import Layout, jobs
 from handrail.policies.study.design.load import load_design
+from handrail.policies.study.design.progress import write_json
 from handrail.policies.study.design.settings import evaluations, fingerprint
-from handrail.policies.study.progress.notes import write_json
 
 DESIGN = """
 modes = ["ee", "direct"]

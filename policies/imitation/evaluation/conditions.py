@@ -1,4 +1,4 @@
-"""What is evaluated: a checkpoint under a condition, which together are an arm."""
+"""What is evaluated: a checkpoint under a condition."""
 
 import hashlib
 import itertools
@@ -7,12 +7,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from handrail.collect.operators.modes import MODES
 from handrail.collect.perturbations.perturbations import Perturbation
 from handrail.collect.tasks.catalogue import TASKS
-from handrail.controllers.baselines.catalogue import CONTROLLERS, ControllerSpec
+from handrail.controllers.baselines.catalogue import CONTROLLERS
 from handrail.controllers.entries import is_count
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.robot.catalogue import ROBOTS
@@ -22,8 +20,6 @@ from handrail.policies.imitation.evaluation.features import pictures, place_of
 from handrail.policies.imitation.interface.checkpoint import NAME, PolicyMeta, model_folder, read_meta
 from handrail.policies.imitation.interface.interface import PolicyInterface
 from handrail.policies.imitation.interface.trust import check_policy_folder
-
-_PART = 2**20  # bytes
 
 
 @dataclass(frozen=True)
@@ -105,7 +101,9 @@ def read_checkpoint(folder: Path, config: EvaluateConfig) -> Checkpoint:
     )
     if config.task and meta.environment in TASKS and meta.environment != config.task:
         raise HandrailError(f"{where}: expected one trained for {config.task}, got {meta.environment!r}")
-    _admit(meta, config)
+    TASKS.admit(meta.environment, (config.task,))  # before anything that a policy names is imported
+    MODES.admit(meta.mode, (config.mode,))
+    ROBOTS.admit(meta.robot, (config.robot,))
     if interface is not None:
         if not TASKS.accepts(meta.environment):
             raise HandrailError(
@@ -119,13 +117,6 @@ def read_checkpoint(folder: Path, config: EvaluateConfig) -> Checkpoint:
         )
         meta, movers = replace(meta, environment=known.task, robot=known.robot), known.movers
     return Checkpoint(place, meta, interface, pictures(settings, where), movers, _digest(place))
-
-
-def _admit(meta: PolicyMeta, config: EvaluateConfig) -> None:
-    """Check what a policy names before anything of it is imported."""
-    TASKS.admit(meta.environment, (config.task,))
-    MODES.admit(meta.mode, (config.mode,))
-    ROBOTS.admit(meta.robot, (config.robot,))
 
 
 def _plain(place: Path, settings: Mapping[str, Any], config: EvaluateConfig) -> PolicyMeta:
@@ -148,44 +139,40 @@ def _plain(place: Path, settings: Mapping[str, Any], config: EvaluateConfig) -> 
     )
 
 
-def arms(config: EvaluateConfig, refused: list[str] | None = None) -> tuple[PolicyCondition, ...]:
-    """Return every checkpoint under every condition of the settings.
-
-    Args:
-        config: of the evaluation.
-        refused: takes why a checkpoint is none, or cannot be under a condition; without it that is an error.
+def policy_conditions(config: EvaluateConfig) -> tuple[list[PolicyCondition], list[str]]:
+    """Return every checkpoint under every condition of the settings, and why some cannot be.
 
     Raises:
-        HandrailError: there is no arm, they are for several tasks, or two are one and the same policy.
+        HandrailError: there is none, they are for several tasks, or two are one and the same policy.
     """
-    why: list[str] = []
+    refused: list[str] = []
     checkpoints = [
         each
         for folder in config.folders
-        if (each := _tried(why, lambda f=folder: read_checkpoint(f, config)))
+        if (each := _tried(refused, lambda f=folder: read_checkpoint(f, config)))
     ]
     environments = {checkpoint.meta.environment for checkpoint in checkpoints}
     if len(environments) > 1:
         raise HandrailError(
             f"--policy: expected policies for one task, got {', '.join(sorted(environments))}"
         )
-    conditions = itertools.product(config.perturbations, config.protections, checkpoints)
     found: dict[tuple[str, tuple[int, int]], PolicyCondition] = {}
-    for perturbation, protection, checkpoint in conditions:
-        arm = _tried(why, lambda: _arm(checkpoint, protection, perturbation, config))  # noqa: B023
-        if arm is None:
+    for settings in itertools.product(config.perturbations, config.protections, checkpoints):
+        condition = _tried(refused, lambda s=settings: _condition(*s, config))
+        if condition is None:
             continue
-        before = found.setdefault((arm.label, checkpoint.key), arm)
-        if before != arm:
+        checkpoint = condition.checkpoint
+        before = found.setdefault((condition.label, checkpoint.key), condition)
+        if before != condition:
             raise HandrailError(
-                f"--policy {checkpoint.folder}: expected each dataset draw and training seed once, but arm "
-                f"{arm.label!r} has {checkpoint.key} already, {before.checkpoint.folder}; give it a --label"
+                f"--policy {checkpoint.folder}: expected each dataset draw and training seed once, but"
+                f" condition {condition.label!r} has {checkpoint.key} already, {before.checkpoint.folder};"
+                " give it a --label"
             )
-    if why and (refused is None or not found):
-        raise HandrailError("; ".join(dict.fromkeys(why)))
-    if refused is not None:
-        refused += dict.fromkeys(why)
-    return tuple(found.values())
+    refused = list(dict.fromkeys(refused))
+    if not found:
+        raise HandrailError("; ".join(refused))
+    return list(found.values()), refused
 
 
 def _tried[Value](refused: list[str], make: Callable[[], Value]) -> Value | None:
@@ -196,73 +183,35 @@ def _tried[Value](refused: list[str], make: Callable[[], Value]) -> Value | None
         return None
 
 
-def _arm(
-    checkpoint: Checkpoint, protection: str, perturbation: Perturbation, config: EvaluateConfig
+def _condition(
+    perturbation: Perturbation, protection: str, checkpoint: Checkpoint, config: EvaluateConfig
 ) -> PolicyCondition:
-    own = own_protection(checkpoint.intent_mode)
+    meta, own = checkpoint.meta, own_protection(checkpoint.intent_mode)
     chosen = own if protection == "own" else protection
-    if chosen in ("mpc", "filter") and chosen != own and not _fits(checkpoint, chosen):
+    if checkpoint.intent_mode and chosen not in (own, "none"):
         raise HandrailError(
-            f"--protection {protection}: expected a policy that commands every joint, or own or none; "
-            f"{checkpoint.folder} decides on the intent of mode {checkpoint.meta.mode}"
+            f"--protection {protection}: expected a policy of joint velocities, or own or none; "
+            f"{checkpoint.folder} decides on the intent of mode {meta.mode}"
         )
-    words = [config.label or _name(checkpoint), _protected(chosen, own), perturbation.words]
-    return PolicyCondition(checkpoint, chosen, perturbation, config.time_limit, " ".join(filter(None, words)))
+    name = (meta.mode or meta.policy) + (" intent" if checkpoint.intent_mode else "")
+    protected = "" if chosen == own else "unprotected" if chosen == "none" else chosen
+    label = " ".join(filter(None, (config.label or name, protected, perturbation.words)))
+    return PolicyCondition(checkpoint, chosen, perturbation, config.time_limit, label)
 
 
 def own_protection(mode: str) -> str:
     """Return the protection that a policy's actions have by themselves: intents of a mode, or none of any."""
     if not mode:
         return "none"
-    spec = _controller(mode)
+    spec = CONTROLLERS.find(MODES.find(mode).controller)
     return spec.name if spec.protects else "none"
 
 
-def _controller(mode: str) -> ControllerSpec:
-    return CONTROLLERS.find(MODES.find(mode).controller)
-
-
-def _fits(checkpoint: Checkpoint, protection: str) -> bool:
-    """Return whether a controller can stand in for a policy's own.
-
-    The filter completes nothing, so it needs every joint; so does the MPC where joints that nobody commands
-    are meant to rest.
-    """
-    if not checkpoint.intent_mode:
-        return True
-    completes = _controller(checkpoint.intent_mode).completes
-    return (protection == "mpc" and completes) or _commands_joints(checkpoint.interface)
-
-
-def _commands_joints(interface: PolicyInterface | None) -> bool:
-    """Return whether every mask leaves nothing over: all joints, or the base's twist and the arm's joints."""
-    if interface is None:
-        return True
-    names, masks = interface.channels, np.array(interface.masks, bool)  # (k, m)
-    base, joint = (np.array([name.startswith(group) for name in names]) for group in ("base.", "joint."))
-    joints = masks[:, joint]  # (k, n), the base's first
-    driven = masks[:, base].all(axis=1) & joints[:, base.sum() :].all(axis=1) & base.any()
-    return bool(np.all(joints.all(axis=1) | driven))
-
-
-def _name(checkpoint: Checkpoint) -> str:
-    meta = checkpoint.meta
-    return (meta.mode or meta.policy) + (" intent" if checkpoint.intent_mode else "")
-
-
-def _protected(chosen: str, own: str) -> str:
-    if chosen == own:
-        return ""
-    return "unprotected" if chosen == "none" else chosen
-
-
 def _digest(folder: Path) -> str:
-    """Return a short digest of a folder's files."""
     digest = hashlib.sha256()
     for path in sorted(folder.iterdir()):
         if path.is_file():
             digest.update(path.name.encode())
             with open(path, "rb") as file:
-                while part := file.read(_PART):
-                    digest.update(part)
+                hashlib.file_digest(file, lambda: digest)  # adds the file to it
     return digest.hexdigest()[:16]

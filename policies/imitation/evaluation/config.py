@@ -38,7 +38,7 @@ class EvaluateConfig:
     """What disturbs, one or more: none, push, shift, delay, with a size such as push:2 or delay:5, joined
     by + to have several at once."""
     label: str = ""
-    """Name of the arm; the teleop mode, and what is special about it, when empty."""
+    """Name of the condition; the teleop mode, and what is special about it, when empty."""
     task: Annotated[str, one_of(TASKS)] = ""
     """Of policies that do not say it, such as lerobot-train's, or that say a module:name."""
     mode: str = ""
@@ -54,7 +54,7 @@ class EvaluateConfig:
     video: str = ""
     """Also film the first rollout to this .mp4 file (needs OpenGL)."""
     checkpoints: Annotated[tyro.conf.Positional[Words], tyro.conf.arg(metavar="FOLDER [FOLDER …]")] = ()
-    """Checkpoint folders; several training seeds of one arm add up."""
+    """Checkpoint folders; several training seeds of one condition add up."""
 
     @property
     def folders(self) -> tuple[Path, ...]:

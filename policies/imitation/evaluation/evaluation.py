@@ -2,8 +2,9 @@
 
 import multiprocessing
 from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
+from functools import partial
 from pathlib import Path
 from time import monotonic
 from typing import Any
@@ -12,12 +13,14 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from handrail.controllers.errors import HandrailError
-from handrail.policies.imitation.evaluation.conditions import arms
+from handrail.policies.imitation.evaluation.conditions import PolicyCondition, policy_conditions
 from handrail.policies.imitation.evaluation.config import EvaluateConfig
 from handrail.policies.imitation.evaluation.file import EvaluationFile
-from handrail.policies.imitation.evaluation.operator import Policy
-from handrail.policies.imitation.evaluation.rollout import Load, Rollout, Row, run_rollout
+from handrail.policies.imitation.evaluation.rollout import Load, Row, run_rollout
+from handrail.policies.imitation.interface.checkpoint import load_policy
 
+Rollout = tuple[PolicyCondition, int]  # and the seed of its episode
+_Tried = tuple[PolicyCondition, Row | HandrailError]
 _SAVE_EVERY = 2.0  # [s]
 
 
@@ -35,20 +38,13 @@ class UnevaluatedError(HandrailError):
         self.reasons = tuple(reasons)
 
 
-def load_trained(folder: Path) -> Policy:
-    """Return the trained policy in a checkpoint folder."""
-    from handrail.policies.imitation.interface.checkpoint import load_policy
-
-    return load_policy(folder)
-
-
 def evaluate(
-    config: EvaluateConfig, console: Console | None = None, load: Load = load_trained
+    config: EvaluateConfig, console: Console | None = None, load: Load = load_policy
 ) -> dict[str, Any]:
     """Run what is not in the file yet, write it, and return the content of the file.
 
-    Every arm meets the same episodes and the same disturbances, and a rollout depends on nothing but its arm
-    and seed: neither on the number of processes nor on what ran before.
+    Every condition meets the same episodes and the same disturbances, and a rollout depends on nothing but
+    its condition and seed: neither on the number of processes nor on what ran before.
 
     Args:
         config: what to run.
@@ -60,11 +56,10 @@ def evaluate(
         HandrailError: a setting is wrong, no policy could be evaluated, or the file cannot be written.
     """
     config.check()
-    refused: list[str] = []
-    found = arms(config, refused)
+    conditions, refused = policy_conditions(config)
     file = EvaluationFile(config.file if config.json else None)
-    file.open(found)
-    rollouts = [Rollout(arm, seed) for arm in found for seed in config.seeds if seed not in file.done(arm)]
+    file.open(conditions)
+    rollouts = [(each, seed) for each in conditions for seed in config.seeds if seed not in file.done(each)]
     try:
         refused += _run_all(rollouts, config.workers, load, file, console or Console(quiet=True))
     finally:
@@ -84,8 +79,8 @@ def _run_all(
     saved, successes, refused = monotonic(), 0, dict[Path, str]()
     with Progress(*columns, TextColumn("{task.fields[success]}"), console=console) as progress:
         bar = progress.add_task("rollouts", total=len(rollouts), success="")
-        for count, (rollout, row) in enumerate(_results(rollouts, workers, load, refused), start=1):
-            file.add(rollout.arm, row)
+        for count, (condition, row) in enumerate(_results(rollouts, workers, load, refused), start=1):
+            file.add(condition, row)
             successes += row["success"]
             progress.update(bar, advance=1, success=f"{successes}/{count} succeeded")
             if monotonic() - saved > _SAVE_EVERY:
@@ -96,43 +91,43 @@ def _run_all(
 
 def _results(
     rollouts: Sequence[Rollout], workers: int, load: Load, refused: dict[Path, str]
-) -> Iterator[tuple[Rollout, Row]]:
+) -> Iterator[tuple[PolicyCondition, Row]]:
     """Yield the rollouts as they are done, in any order; note policies that cannot be run."""
-    tried = _here(rollouts, load, refused) if min(workers, len(rollouts)) <= 1 else None
-    for rollout, row in tried or _in_processes(rollouts, workers, load, refused):
+    run = _here if min(workers, len(rollouts)) <= 1 else partial(_in_processes, workers)
+    for condition, row in run(rollouts, load, refused):
         if isinstance(row, HandrailError):
-            refused.setdefault(rollout.arm.checkpoint.folder, str(row))
+            refused.setdefault(condition.checkpoint.folder, str(row))
         else:
-            yield rollout, row
+            yield condition, row
 
 
 def _try(rollout: Rollout, load: Load) -> Row | HandrailError:
     """Return how a rollout went, or why it could not be run."""
     try:
-        return run_rollout(rollout, load)
+        return run_rollout(*rollout, load)
     except HandrailError as error:
         return HandrailError(str(error))
 
 
-def _here(
-    rollouts: Sequence[Rollout], load: Load, refused: dict[Path, str]
-) -> Iterator[tuple[Rollout, Row | HandrailError]]:
-    for rollout in rollouts:
-        if rollout.arm.checkpoint.folder not in refused:
-            yield rollout, _try(rollout, load)
+def _here(rollouts: Sequence[Rollout], load: Load, refused: Mapping[Path, str]) -> Iterator[_Tried]:
+    for condition, seed in rollouts:
+        if condition.checkpoint.folder not in refused:
+            yield condition, _try((condition, seed), load)
 
 
 def _in_processes(
-    rollouts: Sequence[Rollout], workers: int, load: Load, refused: dict[Path, str]
-) -> Iterator[tuple[Rollout, Row | HandrailError]]:
+    workers: int, rollouts: Sequence[Rollout], load: Load, refused: Mapping[Path, str]
+) -> Iterator[_Tried]:
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(min(workers, len(rollouts)), context) as pool:
         try:
-            running = {pool.submit(_try, rollout, load): rollout for rollout in rollouts}
+            running = {pool.submit(_try, rollout, load): rollout[0] for rollout in rollouts}
             for done in as_completed(running):
                 if not done.cancelled():
                     yield running[done], done.result()
-                _cancel(running, refused)
+                for future, condition in running.items() if refused else ():
+                    if condition.checkpoint.folder in refused:
+                        future.cancel()
         except BrokenProcessPool as error:
             raise HandrailError(
                 "evaluation: a worker was killed, perhaps for want of memory; what was done is kept, and the "
@@ -141,10 +136,3 @@ def _in_processes(
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
             raise
-
-
-def _cancel(running: Mapping[Future[Any], Rollout], refused: Mapping[Path, str]) -> None:
-    """Do not begin what is left of policies that cannot be run."""
-    for future, rollout in running.items() if refused else ():
-        if rollout.arm.checkpoint.folder in refused:
-            future.cancel()

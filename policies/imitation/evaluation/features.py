@@ -14,9 +14,9 @@ from handrail.collect.tasks.catalogue import TASKS
 from handrail.controllers.entries import is_count
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.robot.description import load_description, robot_names
+from handrail.policies.imitation.interface.interface import ACTION, ENVIRONMENT, STATE
 
 IMAGES = "observation.images."
-STATE, ENVIRONMENT, ACTION = "observation.state", "observation.environment_state", "action"
 
 
 @dataclass(frozen=True)

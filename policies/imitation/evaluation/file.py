@@ -13,9 +13,9 @@ from handrail.policies.imitation.evaluation.conditions import Checkpoint, Policy
 
 
 class EvaluationFile:
-    """The rollouts of all arms, in memory and on the disk.
+    """The rollouts of all policies under all conditions, in memory and on the disk.
 
-    Beside what `handrail-compare` reads it says of each arm under which `conditions` it ran, and of each
+    Beside what `handrail-compare` reads it says of each label under which `conditions` it ran, and of each
     policy which `checkpoint` it was, so that nothing of another kind is added to it later.
 
     Args:
@@ -33,44 +33,47 @@ class EvaluationFile:
             self.content |= read_json(path)
             if not isinstance(self.content["conditions"], dict):
                 raise HandrailError(
-                    f"--json {path}: expected conditions by arm, got {self.content['conditions']!r:.80}"
+                    f"--json {path}: expected conditions by label, got {self.content['conditions']!r:.80}"
                 )
 
-    def open(self, arms: Sequence[PolicyCondition]) -> None:
-        """Check that arms fit what is there.
+    def open(self, conditions: Sequence[PolicyCondition]) -> None:
+        """Check that conditions fit what is there.
 
         Raises:
-            HandrailError: the file is of another task, an arm ran under other conditions, or a policy is
+            HandrailError: the file is of another task, a label stands for other conditions, or a policy is
                 another.
         """
-        task = self.content.setdefault("task", arms[0].checkpoint.meta.environment)
-        for arm in arms:
-            where = f"--json {self._path}: arm {arm.label!r}"
-            if arm.checkpoint.meta.environment != task:
-                raise HandrailError(f"{where}: expected task {task}, got {arm.checkpoint.meta.environment}")
-            before = self.content["conditions"].get(arm.label)
-            if arm.label in self.content["arms"] and before != arm.conditions:
+        task = self.content.setdefault("task", conditions[0].checkpoint.meta.environment)
+        for condition in conditions:
+            label, checkpoint = condition.label, condition.checkpoint
+            where = f"--json {self._path}: condition {label!r}"
+            if checkpoint.meta.environment != task:
+                raise HandrailError(f"{where}: expected task {task}, got {checkpoint.meta.environment}")
+            before = self.content["conditions"].get(label)
+            if label in self.content["arms"] and before != condition.conditions:
                 raise HandrailError(
-                    f"{where}: expected {before}, got {arm.conditions}; choose another --label or --json"
+                    f"{where}: expected {before}, got {condition.conditions};"
+                    " choose another --label or --json"
                 )
-            entry = self._entry(arm)
-            if entry and entry.get("checkpoint") != arm.checkpoint.digest:
+            entry = self._entry(condition)
+            if entry and entry.get("checkpoint") != checkpoint.digest:
                 raise HandrailError(
-                    f"{where}: has another policy with dataset draw and training seed {arm.checkpoint.key} "
-                    f"than {arm.checkpoint.folder}; choose another --label or --json"
+                    f"{where}: has another policy with dataset draw and training seed {checkpoint.key} "
+                    f"than {checkpoint.folder}; choose another --label or --json"
                 )
 
-    def done(self, arm: PolicyCondition) -> set[int]:
+    def done(self, condition: PolicyCondition) -> set[int]:
         """Return the seeds that have been run."""
-        return {row["seed"] for row in (self._entry(arm) or {"rollouts": ()})["rollouts"]}
+        entry = self._entry(condition)
+        return {row["seed"] for row in entry["rollouts"]} if entry else set()
 
-    def add(self, arm: PolicyCondition, row: dict[str, Any]) -> None:
+    def add(self, condition: PolicyCondition, row: dict[str, Any]) -> None:
         """Add a rollout; they are kept in the order of their seeds."""
-        entry = self._entry(arm)
+        entry = self._entry(condition)
         if entry is None:
-            entry = _new_entry(arm.checkpoint)
-            self.content["conditions"][arm.label] = arm.conditions
-            self.content["arms"].setdefault(arm.label, []).append(entry)
+            entry = _new_entry(condition.checkpoint)
+            self.content["conditions"][condition.label] = condition.conditions
+            self.content["arms"].setdefault(condition.label, []).append(entry)
         entry["rollouts"].append(row)
         entry["rollouts"].sort(key=lambda rollout: rollout["seed"])
 
@@ -85,9 +88,10 @@ class EvaluationFile:
         with explained(f"--json {self._path}"):
             write_whole(self._path, (json.dumps(self.content, indent=1, allow_nan=False) + "\n").encode())
 
-    def _entry(self, arm: PolicyCondition) -> dict[str, Any] | None:
-        for entry in self.content["arms"].get(arm.label, ()):
-            if (int(entry.get("dataset_draw", 0)), int(entry["training_seed"])) == arm.checkpoint.key:
+    def _entry(self, condition: PolicyCondition) -> dict[str, Any] | None:
+        key = condition.checkpoint.key
+        for entry in self.content["arms"].get(condition.label, ()):
+            if (int(entry.get("dataset_draw", 0)), int(entry["training_seed"])) == key:
                 return entry
         return None
 

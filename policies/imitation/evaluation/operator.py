@@ -1,8 +1,6 @@
 """A trained policy as an operator: it sees what was recorded and asks for what it learned."""
 
-from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any, Protocol
 
 import numpy as np
 
@@ -10,46 +8,13 @@ from handrail.collect.operators.operator import View
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.intent import Intent
+from handrail.policies.imitation.interface.checkpoint import TrainedPolicy
 
 _CLOSED = 0.5  # a gripper command beyond it closes
 
 
-class Interface(Protocol):
-    """How a policy's numbers come from and go to what Handrail records."""
-
-    @property
-    def action_names(self) -> tuple[str, ...]:
-        """Names of the numbers in an action, (a,)."""
-        ...
-
-    def observe(self, state: FloatArray, environment: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return what the policy sees of an observation."""
-        ...
-
-    def decode(self, action: FloatArray, state: FloatArray) -> Intent:
-        """Return what an action asks for."""
-        ...
-
-
-class Policy(Protocol):
-    """A trained policy."""
-
-    @property
-    def interface(self) -> Any:
-        """How it is spoken to: an `Interface`; None if it reads and writes what is recorded."""
-        ...
-
-    def reset(self) -> None:
-        """Forget the episode before."""
-        ...
-
-    def act(self, state: FloatArray, environment: FloatArray, images: Mapping[str, np.ndarray]) -> FloatArray:
-        """Return the action, (a,)."""
-        ...
-
-
 class AsRecorded:
-    """Observations and commanded joint velocities as the dataset has them; an interface.
+    """Observations and commanded joint velocities as the dataset has them; in place of a `PolicyInterface`.
 
     Args:
         channels: of the robot.
@@ -89,9 +54,9 @@ class PolicyOperator:
         malformed: unusable actions of this episode so far.
     """
 
-    def __init__(self, policy: Policy, channels: Channels, mode: str) -> None:
+    def __init__(self, policy: TrainedPolicy, channels: Channels, mode: str) -> None:
         self._policy = policy
-        self._interface: Interface = policy.interface or AsRecorded(channels)
+        self._interface = policy.interface or AsRecorded(channels)
         self._channels = channels
         self._mode = mode
         self.malformed = 0

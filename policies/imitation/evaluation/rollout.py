@@ -1,7 +1,6 @@
 """One rollout of a trained policy through the one session loop."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -10,38 +9,30 @@ import numpy as np
 
 from handrail.collect.config import SessionConfig
 from handrail.collect.envs.env import HandrailEnv
+from handrail.collect.operators.modes import MODES
 from handrail.collect.perturbations.delayed import DelayedOperator
 from handrail.collect.perturbations.push import Pusher
-from handrail.collect.session.build import build_env
+from handrail.collect.session.build import build_controller, build_env
 from handrail.collect.session.outcome import Outcome
 from handrail.collect.session.session import Observer, Session
+from handrail.controllers.baselines.direct import DirectController
+from handrail.controllers.baselines.unprotected import unprotected_controller
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import Controller
-from handrail.policies.imitation.evaluation.conditions import PolicyCondition
-from handrail.policies.imitation.evaluation.operator import Policy, PolicyOperator
-from handrail.policies.imitation.evaluation.protection import build_protection
-from handrail.policies.imitation.evaluation.torch_state import one_thread, repeatable
+from handrail.policies.imitation.evaluation.conditions import PolicyCondition, own_protection
+from handrail.policies.imitation.evaluation.operator import PolicyOperator
+from handrail.policies.imitation.interface.checkpoint import TrainedPolicy
+from handrail.policies.imitation.interface.torch_state import repeatable, threads
 
-Load = Callable[[Path], Policy]
+Load = Callable[[Path], TrainedPolicy]
 Row = dict[str, Any]
-
-
-@dataclass(frozen=True)
-class Rollout:
-    """What to run.
-
-    Attributes:
-        arm: policy and condition.
-        seed: of the episode.
-    """
-
-    arm: PolicyCondition
-    seed: int
+_STAND_IN = {"mpc": "joints", "filter": "direct_filtered"}  # the mode whose controller it is
 
 
 def run_rollout(
-    rollout: Rollout,
+    condition: PolicyCondition,
+    seed: int,
     load: Load,
     observers: Sequence[Observer] = (),
     render: tuple[int, int] | bool = False,
@@ -49,37 +40,40 @@ def run_rollout(
     """Run a policy once and return how it went, as an evaluation file has it.
 
     Args:
-        rollout: what to run.
+        condition: policy, and what protects and disturbs it.
+        seed: of the episode.
         load: reads the policy of a folder.
         observers: shown every moment.
         render: height and width of good-looking pictures that the environment draws [px], if it does.
     """
-    arm = rollout.arm
-    env = _env(_session_config(arm), arm.checkpoint.meta.fps, arm.perturbation.shift, render)
-    controller = _controller(arm.protection, arm.checkpoint.intent_mode, arm.checkpoint.meta.environment, env)
-    policy = _policy(arm.checkpoint.folder, arm.checkpoint.digest, load)
-    with one_thread(), repeatable(rollout.seed):
-        operator = PolicyOperator(policy, Channels.of(env.model.description), arm.checkpoint.meta.mode)
-        perturbation = arm.perturbation
+    checkpoint, perturbation = condition.checkpoint, condition.perturbation
+    meta = checkpoint.meta
+    env = _env(_session_config(condition), meta.fps, perturbation.shift, render)
+    controller = _controller(condition.protection, checkpoint.intent_mode, meta.environment, env)
+    policy = _policy(checkpoint.folder, checkpoint.digest, load)
+    with threads(1), repeatable(seed):
+        operator = PolicyOperator(policy, Channels.of(env.model.description), meta.mode)
         late = DelayedOperator(operator, perturbation.delay)
         pushers = (Pusher(perturbation.push),) if perturbation.push else ()
         session = Session(env, controller, late, observers, disturbances=pushers)
-        outcome = session.run(rollout.seed)
+        outcome = session.run(seed)
     return _row(outcome, operator.malformed)
 
 
-def _session_config(arm: PolicyCondition) -> SessionConfig:
-    meta, pictures = arm.checkpoint.meta, arm.checkpoint.pictures
-    sizes = {size for picture in pictures.values() for size in picture} or {128}
+def _session_config(condition: PolicyCondition) -> SessionConfig:
+    checkpoint = condition.checkpoint
+    sizes = {size for picture in checkpoint.pictures.values() for size in picture} or {128}
     if len(sizes) > 1:
-        raise HandrailError(f"{arm.checkpoint.folder}: expected square pictures of one size, got {pictures}")
+        raise HandrailError(
+            f"{checkpoint.folder}: expected square pictures of one size, got {checkpoint.pictures}"
+        )
     return SessionConfig(
-        task=meta.environment,
-        robot=meta.robot,
-        moving_obstacles=arm.checkpoint.movers,
-        cameras=",".join(pictures),
+        task=checkpoint.meta.environment,
+        robot=checkpoint.meta.robot,
+        moving_obstacles=checkpoint.movers,
+        cameras=",".join(checkpoint.pictures),
         image_size=sizes.pop(),
-        time_limit=arm.time_limit,
+        time_limit=condition.time_limit,
     )
 
 
@@ -91,12 +85,23 @@ def _env(config: SessionConfig, fps: int, shift: float, render: tuple[int, int] 
 
 @lru_cache(maxsize=8)
 def _controller(protection: str, mode: str, task: str, env: HandrailEnv) -> Controller:
-    """Return a controller, built once a process."""
-    return build_protection(protection, mode, task, env.model, env.fps)
+    """Return what stands between a policy and the robot, built once a process.
+
+    An intent under its mode's own protection gets that mode's very controller. Otherwise `mpc` is the masked
+    MPC with the objectives that the task brings, `filter` the multi-step safety filter. `none` keeps the
+    limits of the joints and nothing else: joint velocities are clipped, a partial intent is completed by
+    damped least squares.
+    """
+    if mode and protection == own_protection(mode):
+        return build_controller(MODES.find(mode), env.model, env.fps, task)
+    if protection == "none":
+        complete = unprotected_controller if mode else DirectController
+        return complete(env.model, 1.0 / env.fps)
+    return build_controller(MODES[_STAND_IN[protection]], env.model, env.fps, task)
 
 
 @lru_cache(maxsize=4)
-def _policy(folder: Path, digest: str, load: Load) -> Policy:
+def _policy(folder: Path, digest: str, load: Load) -> TrainedPolicy:
     """Return a policy, read once a process."""
     return load(folder)
 

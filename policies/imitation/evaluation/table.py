@@ -27,7 +27,7 @@ def evaluation_table(content: Mapping[str, Any]) -> Table:
     Args:
         content: of an evaluation file.
     """
-    rollouts = [row for arm in content["arms"].values() for entry in arm for row in entry["rollouts"]]
+    rollouts = [row for entries in content["arms"].values() for entry in entries for row in entry["rollouts"]]
     lines = [
         (label, str(len(entries)), *_cells([row for entry in entries for row in entry["rollouts"]]))
         for label, entries in content["arms"].items()

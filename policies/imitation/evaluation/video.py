@@ -7,13 +7,13 @@ from typing import Any
 from handrail.collect.session.film import SIZE, Filmer
 from handrail.collect.simulation.gl import graphics_trouble
 from handrail.datasets.recording.frames import Frame
-from handrail.policies.imitation.evaluation.conditions import arms
+from handrail.policies.imitation.evaluation.conditions import policy_conditions
 from handrail.policies.imitation.evaluation.config import EvaluateConfig
-from handrail.policies.imitation.evaluation.evaluation import load_trained
-from handrail.policies.imitation.evaluation.rollout import Load, Rollout, run_rollout
+from handrail.policies.imitation.evaluation.rollout import Load, run_rollout
+from handrail.policies.imitation.interface.checkpoint import load_policy
 
 
-def film(config: EvaluateConfig, content: Mapping[str, Any], load: Load = load_trained) -> str:
+def film(config: EvaluateConfig, content: Mapping[str, Any], load: Load = load_policy) -> str:
     """Film the first rollout of the first policy that drove; return why there is no video, or nothing.
 
     Args:
@@ -25,12 +25,13 @@ def film(config: EvaluateConfig, content: Mapping[str, Any], load: Load = load_t
     if trouble:
         return trouble
     drove = {entry.get("checkpoint") for entries in content["arms"].values() for entry in entries}
-    arm = next((arm for arm in arms(config, refused=[]) if arm.checkpoint.digest in drove), None)
-    if arm is None:
+    conditions, _ = policy_conditions(config)
+    condition = next((each for each in conditions if each.checkpoint.digest in drove), None)
+    if condition is None:
         return "no policy drove"
-    rollout = Rollout(arm, config.seeds[0])
-    with Filmer(Path(config.video).expanduser(), arm.checkpoint.meta.fps, arm.label, _words) as filmer:
-        run_rollout(rollout, load, (filmer,), SIZE)
+    fps = condition.checkpoint.meta.fps
+    with Filmer(Path(config.video).expanduser(), fps, condition.label, _words) as filmer:
+        run_rollout(condition, config.seeds[0], load, (filmer,), SIZE)
     return ""
 
 

@@ -17,19 +17,30 @@ from typing import Any
 
 import numpy as np
 
+from handrail.collect.config import FPS_RANGE
 from handrail.controllers.arrays import FloatArray
+from handrail.controllers.entries import Entry, is_count, is_name, is_table
 from handrail.controllers.errors import HandrailError, message_of
 from handrail.datasets.storage.atomic import sync_folder, write_whole
 from handrail.datasets.storage.strict_json import load_json
-from handrail.policies.imitation.interface.interface import PolicyInterface
-from handrail.policies.imitation.interface.meta_check import check_meta
+from handrail.policies.fields import check_fields
+from handrail.policies.imitation.config import ACTION_SPACES
+from handrail.policies.imitation.interface.interface import ENVIRONMENT, STATE, PolicyInterface
 from handrail.policies.imitation.interface.trust import CONFIG, check_policy_folder, registered_policies
 
 FORMAT = "handrail.policy/2"
 NAME = "handrail.json"
-MODEL, STATE = "pretrained_model", "training_state"
-_KEYS = ("observation.state", "observation.environment_state")
+MODEL = "pretrained_model"
 _VERSIONED = ("handrail", "lerobot", "torch", "numpy")
+_LOW, _HIGH = FPS_RANGE
+_CHECKED = {  # what more has to hold of `PolicyMeta` than the types of its fields say
+    "robot": Entry("the name of a robot", lambda value: is_name(value) and not value.endswith(".toml")),
+    "fps": Entry(
+        f"a whole number from {_LOW} to {_HIGH}", lambda value: is_count(value) and _LOW <= value <= _HIGH
+    ),
+    "actions": Entry(f"one of {', '.join(ACTION_SPACES)}", lambda value: value in ACTION_SPACES),
+    "sizes": Entry("settings by name", lambda value: _are_sizes(value), needed=False),
+}
 
 
 @dataclass(frozen=True)
@@ -108,12 +119,11 @@ class TrainedPolicy:
         """
         import torch
 
-        seen = zip(_KEYS, (state, environment), strict=True)
-        read = self.policy.config.input_features
-        numbers = {
-            k: np.asarray(values, np.float32) for k, values in seen if values is not None and k in read
+        batch = {
+            key: torch.from_numpy(np.asarray(values, np.float32))[None]
+            for key, values in zip((STATE, ENVIRONMENT), (state, environment), strict=True)
+            if key in self.policy.config.input_features and values is not None and np.size(values)
         }
-        batch = {key: torch.from_numpy(values)[None] for key, values in numbers.items() if values.size}
         for camera, picture in (images or {}).items():
             pixels = torch.from_numpy(np.ascontiguousarray(picture)).permute(2, 0, 1)
             batch[f"observation.images.{camera}"] = pixels[None].float() / 255.0
@@ -165,7 +175,7 @@ def read_meta(folder: Path) -> tuple[PolicyInterface | None, PolicyMeta]:
         raise HandrailError(f"{str(path)!r}: expected the format {FORMAT}, got {known!r:.80}")
     del content["format"]
     interface = content.pop("interface")
-    check_meta(content, repr(str(path)))
+    check_fields(content, PolicyMeta, repr(str(path)), **_CHECKED)
     meta = PolicyMeta(**content)
     described = None if interface is None else PolicyInterface.from_dict(interface)
     written = "recorded" if described is None else described.actions
@@ -177,9 +187,13 @@ def read_meta(folder: Path) -> tuple[PolicyInterface | None, PolicyMeta]:
     return described, meta
 
 
+def _are_sizes(value: Any) -> bool:
+    return is_table(value) and is_count(value.get("steps", 0)) and is_table(value.get("options", {}))
+
+
 def write_meta(folder: Path, interface: PolicyInterface | None, meta: PolicyMeta) -> None:
     """Write `handrail.json` into a `pretrained_model` folder."""
-    described = None if interface is None else interface.to_dict()
+    described = None if interface is None else asdict(interface)
     content = {"format": FORMAT, "interface": described} | asdict(meta)
     write_whole(folder / NAME, (json.dumps(content, indent=1, allow_nan=False) + "\n").encode())
 

@@ -1,30 +1,34 @@
-"""What a policy reads and writes, and how both come from and go to what Handrail records."""
+"""What a policy reads and writes, and how both come from and go to what Handrail records.
+
+It writes the joint velocities that came about, or the operator's own command: both are values on channels, in
+the base's axes like what the policy sees.
+"""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray
+from handrail.controllers.entries import Entry, is_text, lists
 from handrail.controllers.errors import HandrailError, unknown_name
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.intent import Intent
 from handrail.datasets.format.schema import Feature
-from handrail.policies.imitation.interface.actions import (
-    Actions,
-    Columns,
-    IntentActions,
-    Mask,
-    RealisedActions,
-    masks_of,
-)
+from handrail.policies.fields import check_fields
 from handrail.policies.imitation.interface.relative import RelativeView
 
+Columns = Mapping[str, np.ndarray]
+Mask = tuple[bool, ...]
 ACTIONS = ("realised", "intent")
-COLUMNS = ("observation.state", "observation.environment_state", "action", "teleop.values", "teleop.mask")
+STATE, ENVIRONMENT, ACTION = "observation.state", "observation.environment_state", "action"
+COLUMNS = (STATE, ENVIRONMENT, ACTION, "teleop.values", "teleop.mask")
 _GRIPPER = "gripper"
+_HALF = 0.5  # a gripper command beyond it closes
+_CHANNELS = Entry("names of channels", lists(is_text))
+_MASKS = Entry("lists of true and false", lambda value: value == [] or lists(lists(_is_bool))(value))
 
 
 @dataclass(frozen=True)
@@ -61,12 +65,9 @@ class PolicyInterface:
         """
         if actions not in ACTIONS:
             raise unknown_name("action space", actions, ACTIONS)
-        state, environment, asked = (
-            _names(features, key)
-            for key in ("observation.state", "observation.environment_state", "teleop.values")
-        )
+        state, environment, asked = (_names(features, key) for key in (STATE, ENVIRONMENT, "teleop.values"))
         names = tuple(name for name in asked if name != _GRIPPER)
-        masks = masks_of(_channels(names), episodes) if actions == "intent" else ()
+        masks = _masks_of(_channels(names), episodes) if actions == "intent" else ()
         return cls(actions, state, environment, names, masks)
 
     @property
@@ -76,8 +77,9 @@ class PolicyInterface:
 
     @property
     def action_names(self) -> tuple[str, ...]:
-        """Names of what the policy writes, (a,)."""
-        return self._space.names
+        """Names of what the policy writes: channels, a number for each mask if several, the gripper, (a,)."""
+        flags = tuple(f"mask.{index}" for index in range(len(self.masks))) if len(self.masks) > 1 else ()
+        return (*(self.channels[index] for index in self._commanded), *flags, _GRIPPER)
 
     def observe(self, state: FloatArray, environment: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return what the policy reads, ([T,] s') and ([T,] e') float32, of what is recorded."""
@@ -88,16 +90,25 @@ class PolicyInterface:
 
     def encode(self, columns: Columns) -> FloatArray:
         """Return the actions of a recorded episode, (T, a) float32, from its `COLUMNS`."""
-        return self._space.encode(columns).astype(np.float32)
+        state = columns[STATE].astype(float)
+        values, gripper = self._asked(columns) if self.masks else self._realised(state, columns)
+        pose = self._view.pose(state)
+        for pair in self._pairs:
+            values[:, pair] = pose.turned(values[:, pair])
+        rows = columns["teleop.mask"][:, : len(self.channels)].astype(bool)
+        flags = [(rows == mask).all(axis=1) for mask in self.masks] if len(self.masks) > 1 else []
+        return np.column_stack([values[:, self._commanded], *flags, gripper]).astype(np.float32)
 
     def decode(self, action: FloatArray, state: FloatArray) -> Intent:
-        """Return what an action (a,) asks for in an observed state (s,)."""
-        pose = self._view.pose(np.asarray(state, float)[None])
-        return self._space.decode(np.asarray(action, float), pose)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the interface as JSON has it."""
-        return asdict(self)
+        """Return what an action (a,) asks for, on the likeliest mask, in an observed state (s,)."""
+        action, pose = np.asarray(action, float), self._view.pose(np.asarray(state, float)[None])
+        values, count = np.zeros((1, len(self.channels))), len(self._commanded)
+        values[0, self._commanded] = action[:count]
+        for pair in self._pairs:
+            values[:, pair] = pose.turned_back(values[:, pair])
+        flags = action[count:-1]
+        mask = np.array(self._sets[int(np.argmax(flags)) if len(flags) else 0], dtype=bool)
+        return Intent(values[0], mask, gripper=float(action[-1] > _HALF))
 
     @classmethod
     def from_dict(cls, content: Mapping[str, Any]) -> "PolicyInterface":
@@ -106,37 +117,72 @@ class PolicyInterface:
         Raises:
             HandrailError: it describes none.
         """
-        names = [field.name for field in fields(cls)]
-        found = content if isinstance(content, Mapping) and set(content) == set(names) else {}
-        size = len(found["channels"]) if found and _texts(found["channels"]) else 0
-        if not (
-            size
-            and _texts(found["state_names"])
-            and _texts(found["environment_names"])
-            and _masks(found["masks"], size)
-        ):
-            raise HandrailError(f"policy interface: expected {', '.join(names)}, got {content!r:.200}")
-        if found["actions"] not in ACTIONS:
-            raise unknown_name("action space", found["actions"], ACTIONS)
-        if found["actions"] == "intent" and not found["masks"]:
-            raise HandrailError("policy interface: expected masks of an intent, got none")
+        check_fields(content, cls, "policy interface", channels=_CHANNELS, masks=_MASKS)
+        if content["actions"] not in ACTIONS:
+            raise unknown_name("action space", content["actions"], ACTIONS)
         state, environment, channels = (
-            tuple(found[name]) for name in ("state_names", "environment_names", "channels")
+            tuple(content[name]) for name in ("state_names", "environment_names", "channels")
         )
-        return cls(found["actions"], state, environment, channels, tuple(map(tuple, found["masks"])))
+        masks = tuple(map(tuple, content["masks"]))
+        if {len(mask) for mask in masks} != ({len(channels)} if content["actions"] == "intent" else set()):
+            raise HandrailError(
+                f"policy interface: expected masks of {len(channels)} channels for an intent and none else,"
+                f" got {content['masks']!r:.80} for {content['actions']}"
+            )
+        return cls(content["actions"], state, environment, channels, masks)
+
+    def _asked(self, columns: Columns) -> tuple[FloatArray, FloatArray]:
+        """Return what the operator asked for, (T, m), and of the gripper, (T,)."""
+        values = columns["teleop.values"].astype(float)
+        return values[:, :-1].copy(), values[:, -1]
+
+    def _realised(self, state: FloatArray, columns: Columns) -> tuple[FloatArray, FloatArray]:
+        """Return the next frame's joint velocities, (T, m), the last frame's its own; and the gripper."""
+        velocities = self._view.velocities(state)
+        values = np.zeros((len(state), len(self.channels)))
+        values[:, self._known.joint_slice] = np.concatenate([velocities[1:], velocities[-1:]])
+        return values, columns[ACTION][:, -1]
+
+    @cached_property
+    def _known(self) -> Channels:
+        return _channels(self.channels)
 
     @cached_property
     def _view(self) -> RelativeView:
-        channels = _channels(self.channels)
-        joints = tuple(name.removeprefix("joint.") for name in channels.joints)
-        return RelativeView(self.state_names, self.environment_names, joints, bool(channels.base))
+        joints = tuple(name.removeprefix("joint.") for name in self._known.joints)
+        return RelativeView(self.state_names, self.environment_names, joints, bool(self._known.base))
+
+    @property
+    def _sets(self) -> tuple[Mask, ...]:
+        """Every set of channels that is commanded."""
+        return self.masks or (tuple(self._known.mask("joint").tolist()),)
 
     @cached_property
-    def _space(self) -> Actions:
-        channels = _channels(self.channels)
-        if self.actions == "intent":
-            return IntentActions(self._view, channels, self.masks)
-        return RealisedActions(self._view, channels)
+    def _commanded(self) -> list[int]:
+        return np.flatnonzero(np.any(self._sets, axis=0)).tolist()
+
+    @cached_property
+    def _pairs(self) -> list[list[int]]:
+        """(x, y) pairs along the world's axes; one that a mask splits stays so."""
+        tool, joint = self._known.tool_slice.start, self._known.joint_slice.start
+        starts = (tool, tool + 3, joint) if self._known.base else (tool, tool + 3)
+        whole = [start for start in starts if all(mask[start] == mask[start + 1] for mask in self._sets)]
+        return [[start, start + 1] for start in whole]
+
+
+def _masks_of(channels: Channels, episodes: Sequence[Columns]) -> tuple[Mask, ...]:
+    """Return every set of channels that an operator owned in some episodes."""
+    masks: set[Mask] = set()
+    for columns in episodes:
+        rows = columns["teleop.mask"][:, : channels.size].astype(bool)
+        masks |= set(map(tuple, np.unique(rows, axis=0).tolist()))
+    if not any(map(any, masks)):
+        raise HandrailError("intent as action: expected episodes in which an operator steers, got none")
+    return tuple(sorted(masks))
+
+
+def _is_bool(value: Any) -> bool:
+    return isinstance(value, bool)
 
 
 def _channels(names: Sequence[str]) -> Channels:
@@ -156,14 +202,3 @@ def _names(features: Mapping[str, Feature], key: str) -> tuple[str, ...]:
             f" got {'none' if feature is None else 'one without names'}"
         )
     return feature.names
-
-
-def _texts(value: Any) -> bool:
-    return isinstance(value, list) and all(isinstance(each, str) for each in value)
-
-
-def _masks(value: Any, size: int) -> bool:
-    return isinstance(value, list) and all(
-        isinstance(mask, list) and len(mask) == size and all(isinstance(each, bool) for each in mask)
-        for mask in value
-    )

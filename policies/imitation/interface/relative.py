@@ -124,10 +124,9 @@ class RelativeView:
     @property
     def names(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
         """What the numbers are called: of the state, of the environment."""
-        arm = tuple(f"{joint}.pos" for joint in self._arm)
         tool = (*_TOOL[:3], *(f"tool.{entry}" for entry in _MATRIX))
         environment = tuple(f"{group.name}.{part}" for group in self._groups for part in _parts(group))
-        return (*arm, *self._other, *tool), environment
+        return (*self._own, *tool), environment
 
     def __call__(self, state: FloatArray, environment: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return both as the policy reads them, (T, s') and (T, e') float32.
@@ -140,8 +139,7 @@ class RelativeView:
         pose = self.pose(state)
         place = np.column_stack([pose.tool[:, :2] - pose.base, pose.tool[:, 2]])
         own = (
-            state[:, self._positions],
-            state[:, self._others],
+            self._of(state, self._own),
             pose.turned(place),
             (pose.matrices().transpose(0, 2, 1) @ pose.rotation).reshape(-1, 9),
         )
@@ -151,58 +149,31 @@ class RelativeView:
 
     def pose(self, state: FloatArray) -> RobotPose:
         """Return where the robot is, from recorded states, (T, s)."""
+        base = np.zeros((len(state), 3))
         if self.mobile:
-            base = state[:, [self._at(f"{joint}.pos") for joint in self.joints[:3]]]
-        else:
-            base = np.zeros((len(state), 3))
-        tool = state[:, [self._at(name) for name in _TOOL]]
+            base = self._of(state, [f"{joint}.pos" for joint in self.joints[:3]])
+        tool = self._of(state, _TOOL)
         rotation = Rotation.from_quat(tool[:, 3:], scalar_first=True).as_matrix()
         return RobotPose(base[:, :2], base[:, 2], tool[:, :3], rotation)
 
     def velocities(self, state: FloatArray) -> FloatArray:
         """Return the joint velocities in recorded states, (T, n)."""
-        return state[:, self._velocities]
-
-    def to_base(self, pose: RobotPose, velocities: FloatArray) -> FloatArray:
-        """Return joint velocities with the base's in its own axes, (T, n)."""
-        if not self.mobile:
-            return velocities
-        return np.column_stack([pose.turned(velocities[:, :2]), velocities[:, 2:]])
-
-    def to_world(self, pose: RobotPose, velocities: FloatArray) -> FloatArray:
-        """Return joint velocities with the base's in the world's axes, as channels have them, (T, n)."""
-        if not self.mobile:
-            return velocities
-        return np.column_stack([pose.turned_back(velocities[:, :2]), velocities[:, 2:]])
-
-    @property
-    def _arm(self) -> tuple[str, ...]:
-        return self.joints[3:] if self.mobile else self.joints
+        return self._of(state, [f"{joint}.vel" for joint in self.joints])
 
     @cached_property
-    def _positions(self) -> list[int]:
-        return [self._at(f"{joint}.pos") for joint in self._arm]
-
-    @cached_property
-    def _velocities(self) -> list[int]:
-        return [self._at(f"{joint}.vel") for joint in self.joints]
-
-    @cached_property
-    def _other(self) -> tuple[str, ...]:
-        """Numbers of the state that are neither a joint's nor the tool's."""
+    def _own(self) -> tuple[str, ...]:
+        """The arm's joints, and numbers of the state that are neither a joint's nor the tool's."""
         known = {*_TOOL, *(f"{joint}.{kind}" for joint in self.joints for kind in ("pos", "vel"))}
-        return tuple(name for name in self.state_names if name not in known)
-
-    @cached_property
-    def _others(self) -> list[int]:
-        return [self._at(name) for name in self._other]
+        arm = self.joints[3:] if self.mobile else self.joints
+        others = (name for name in self.state_names if name not in known)
+        return (*(f"{joint}.pos" for joint in arm), *others)
 
     @cached_property
     def _groups(self) -> tuple[Group, ...]:
         return grouped(self.environment_names)
 
-    def _at(self, name: str) -> int:
-        return self.state_names.index(name)
+    def _of(self, state: FloatArray, names: Sequence[str]) -> FloatArray:
+        return state[:, [self.state_names.index(name) for name in names]]
 
 
 def grouped(names: Sequence[str]) -> tuple[Group, ...]:

@@ -40,12 +40,8 @@ def check_links(folder: Path) -> None:
             )
 
 
-def policy_settings(folder: Path) -> dict[str, Any]:
-    """Return the settings in `config.json`, `type` included, without what is only noted.
-
-    Raises:
-        HandrailError: there are none, or of no registered policy.
-    """
+def _settings(folder: Path) -> dict[str, Any]:
+    """Return the settings in `config.json`, `type` included, without what is only noted."""
     path = folder / CONFIG
     settings = load_json(path, "a policy of LeRobot")
     if not isinstance(settings, dict):
@@ -68,23 +64,19 @@ def check_policy_folder(folder: Path, asked: Iterable[Any] = ()) -> dict[str, An
         HandrailError: loading it could run somebody's code, or lead somewhere else.
     """
     check_links(folder)
-    settings = policy_settings(folder)
+    settings = _settings(folder)
     known = {*_texts(_defaults(registered_policies()[settings["type"]])), *_texts(list(asked))}
-    check_places(folder / CONFIG, settings, known)
+    _check_places(folder / CONFIG, settings, known)
     for name in PROCESSORS:
         for step in _steps(folder / name, settings["type"]):
-            check_places(folder / name, step, known)
+            _check_places(folder / name, step, known)
     if not (folder / WEIGHTS).is_file():
         raise HandrailError(f"policy {str(folder)!r}: expected weights in {WEIGHTS}, found none")
     return settings
 
 
-def check_places(path: Path, settings: Any, known: Iterable[str]) -> None:
-    """Check that settings name no other place.
-
-    Raises:
-        HandrailError: one does.
-    """
+def _check_places(path: Path, settings: Any, known: Iterable[str]) -> None:
+    """Check that settings name no other place."""
     for text in set(_texts(settings)).difference(known):
         if "/" in text or "\\" in text or (text and _is_there(text)):
             raise HandrailError(

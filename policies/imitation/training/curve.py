@@ -1,12 +1,8 @@
-"""How a training goes: a progress bar, and the curve of its loss in `curve.csv`."""
+"""How a training goes: the curve of its loss in `curve.csv`."""
 
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
-
-from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from handrail.datasets.storage.atomic import write_whole
 
@@ -57,52 +53,3 @@ def _numbers(line: str) -> list[float]:
         return [float(cell) for cell in line.split(",")]
     except ValueError:
         return []
-
-
-class Bar:
-    """A progress bar with the last loss.
-
-    Args:
-        done: updates already made.
-        total: updates in the end.
-        shown: whether there is anything to see.
-    """
-
-    def __init__(self, done: int, total: int, shown: bool = True) -> None:
-        columns = (TextColumn("training"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-        self._progress = Progress(
-            *columns, TextColumn("{task.description}"), console=Console(stderr=True), disable=not shown
-        )
-        self._task = self._progress.add_task("", total=total, completed=done)
-        self._progress.start()
-
-    def advance(self) -> None:
-        """Count an update."""
-        self._progress.advance(self._task)
-
-    def say(self, loss: float) -> None:
-        """Show a loss."""
-        self._progress.update(self._task, description=f"loss {loss:.4f}")
-
-    def close(self) -> None:
-        """Leave the bar as it is."""
-        self._progress.stop()
-
-
-@dataclass(frozen=True)
-class Watch:
-    """What is seen of a training.
-
-    Attributes:
-        curve: of the loss; None in a process that does not write it.
-        bar: its progress.
-    """
-
-    curve: Curve | None
-    bar: Bar
-
-    def see(self, row: Row) -> None:
-        """Write down and show the means of some updates."""
-        if self.curve is not None:
-            self.curve.add(row)
-            self.bar.say(row["loss"])

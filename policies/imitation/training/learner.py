@@ -7,7 +7,7 @@ from typing import Any
 import torch
 from accelerate import Accelerator
 from accelerate.utils import DistributedDataParallelKwargs, DistributedType
-from lerobot.common.train_utils import load_training_state, save_checkpoint
+from lerobot.common.train_utils import load_training_state
 from lerobot.configs.train import TrainPipelineConfig
 from lerobot.optim.factory import make_optimizer_and_scheduler
 from lerobot.policies.factory import make_policy, make_pre_post_processors
@@ -35,12 +35,6 @@ class Learner:
     before: Any
     after: Any
     step: int
-
-    def save(self, folder: Path, step: int, settings: TrainPipelineConfig, accelerator: Accelerator) -> None:
-        """Write LeRobot's checkpoint."""
-        policy, processes = accelerator.unwrap_model(self.policy), accelerator.num_processes
-        parts = (policy, self.optimizer, self.schedule, self.before, self.after)
-        save_checkpoint(folder, step, settings, *parts, processes, settings.batch_size)
 
 
 def build_learner(

@@ -70,18 +70,8 @@ class MemoryDataset:
     windows: Mapping[str, Sequence[int]] = field(default_factory=dict)
     pictures: "LeRobotDataset | None" = None
 
-    @property
-    def num_frames(self) -> int:
-        """How many samples."""
-        return sum(self.meta.lengths)
-
-    @property
-    def num_episodes(self) -> int:
-        """How many episodes."""
-        return len(self.meta.lengths)
-
     def __len__(self) -> int:
-        return self.num_frames
+        return sum(self.meta.lengths)
 
     def batch(self, indices: Sequence[int]) -> dict[str, Any]:
         """Return samples (B,), each column stacked, (B, …) or (B, W, …)."""

@@ -57,14 +57,13 @@ _PRESETS = {
 }
 
 
-def preset_of(config: TrainConfig) -> Preset:
-    """Return the sizes; a policy without a preset is trained as LeRobot has it."""
-    return _PRESETS.get((config.policy, config.preset), Preset(lr=0.0))
-
-
 def resolved(config: TrainConfig) -> Preset:
-    """Return what a training really uses: the preset, and over it what the config says."""
-    preset, options = preset_of(config), dict(preset_of(config).options)
+    """Return what a training really uses: the preset, and over it what the config says.
+
+    A policy without a preset is trained as LeRobot has it.
+    """
+    preset = _PRESETS.get((config.policy, config.preset), Preset(lr=0.0))
+    options = dict(preset.options)
     given = {key: _value(text) for key, text in config.options().items()}
     if "n_action_steps" in given:
         options.pop(_ENSEMBLE, None)  # averaging is for a look at every step
@@ -103,7 +102,10 @@ def policy_config(config: TrainConfig) -> "PreTrainedConfig":
     """
     import draccus
 
-    kind = _registered(config.policy)
+    choices = registered_policies()
+    if config.policy not in choices:
+        raise unknown_name("policy", config.policy, choices)
+    kind = choices[config.policy]
     known = {entry.name for entry in fields(kind)}
     given = _given(config, known)
     wanted = {"pretrained_backbone_weights": None, "push_to_hub": False, "device": device_of(config)}
@@ -152,13 +154,6 @@ def _given(config: TrainConfig, known: set[str]) -> dict[str, Any]:
             raise unknown_name(f"setting of the policy {config.policy}", key, known)
     rates = ("optimizer_lr", "optimizer_lr_backbone") if sizes.lr else ()
     return {key: sizes.lr for key in rates if key in known} | dict(sizes.options)
-
-
-def _registered(name: str) -> type:
-    choices = registered_policies()
-    if name not in choices:
-        raise unknown_name("policy", name, choices)
-    return choices[name]
 
 
 def _value(text: str) -> Any:

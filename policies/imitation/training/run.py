@@ -10,17 +10,19 @@ from typing import Any
 from accelerate import Accelerator
 from accelerate.data_loader import BatchSamplerShard
 from accelerate.utils import send_to_device
-from lerobot.common.train_utils import get_step_checkpoint_dir, should_save_checkpoint
+from lerobot.common.train_utils import get_step_checkpoint_dir, save_checkpoint, should_save_checkpoint
 from lerobot.configs.train import TrainPipelineConfig
 from lerobot.datasets.sampler import EpisodeAwareSampler, compute_sampler_state
 from lerobot.scripts.lerobot_train import update_policy
 from lerobot.utils.logging_utils import AverageMeter, MetricsTracker
 from lerobot.utils.random_utils import set_seed
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from torch.utils.data import BatchSampler
 
 from handrail.datasets.storage.atomic import publish_folder
 from handrail.policies.imitation.interface.checkpoint import MODEL, point_to
-from handrail.policies.imitation.training.curve import Bar, Curve, Watch
+from handrail.policies.imitation.training.curve import Curve
 from handrail.policies.imitation.training.learner import Learner, build_accelerator, build_learner
 from handrail.policies.imitation.training.memory import MemoryDataset
 
@@ -48,8 +50,8 @@ class Run:
     finish: Callable[[Path, int], None]
     quiet: bool = False
 
-    def train(self) -> Curve | None:
-        """Train to the end; return the curve of the loss in the process that writes it.
+    def train(self) -> None:
+        """Train to the end; one of the processes writes checkpoints and the curve, and shows the progress.
 
         Raises:
             HandrailError: accelerate would split the model between processes.
@@ -60,29 +62,32 @@ class Run:
         learner = build_learner(settings, self.dataset.meta, self.checkpoint, accelerator)
         main = accelerator.is_main_process
         curve = Curve(settings.output_dir, learner.step) if main else None
-        watch = Watch(curve, Bar(learner.step, settings.steps, shown=main and not self.quiet))
-        try:
-            self._loop(learner, watch, accelerator)
-        finally:
-            watch.bar.close()
+        columns = TextColumn("training"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
+        told, shown = TextColumn("{task.description}"), main and not self.quiet
+        with Progress(*columns, told, console=Console(stderr=True), disable=not shown) as progress:
+            self._loop(learner, accelerator, curve, progress)
         accelerator.end_training()
-        return curve
 
-    def _loop(self, learner: Learner, watch: Watch, accelerator: Accelerator) -> None:
+    def _loop(
+        self, learner: Learner, accelerator: Accelerator, curve: Curve | None, progress: Progress
+    ) -> None:
         settings, means = self.settings, self._means(learner.step, accelerator)
         assert settings.optimizer is not None
         around = settings.optimizer.grad_clip_norm, accelerator, learner.schedule
         batches = self._batches(learner.step, accelerator)
+        bar = progress.add_task("", total=settings.steps, completed=learner.step)
         for step in range(learner.step + 1, settings.steps + 1):
             began = time.perf_counter()
             batch = learner.before(next(batches))
             means.dataloading_s = time.perf_counter() - began
             update_policy(means, learner.policy, batch, learner.optimizer, *around)
             means.step()
-            watch.bar.advance()
+            progress.advance(bar)
             if step % settings.log_freq == 0:
                 means.reduce_across_ranks()
-                watch.see(means.to_dict() | {"step": step})
+                if curve is not None:
+                    curve.add(row := means.to_dict() | {"step": step})
+                    progress.update(bar, description=f"loss {row['loss']:.4f}")
                 means.reset_averages()
             if should_save_checkpoint(step, settings.save_freq, settings.steps):
                 if accelerator.is_main_process:
@@ -91,7 +96,7 @@ class Run:
 
     def _means(self, step: int, accelerator: Accelerator) -> MetricsTracker:
         meters = {name: AverageMeter(name, reduction=how) for name, how in _OVER_PROCESSES.items()}
-        sizes = self.settings.batch_size, self.dataset.num_frames, self.dataset.num_episodes
+        sizes = self.settings.batch_size, len(self.dataset), len(self.dataset.meta.lengths)
         return MetricsTracker(*sizes, meters, step, accelerator)  # pyright: ignore[reportArgumentType]
 
     def _batches(self, step: int, accelerator: Accelerator) -> Iterator[Any]:
@@ -117,7 +122,9 @@ class Run:
         folder = get_step_checkpoint_dir(self.settings.output_dir, self.settings.steps, step)
         draft = folder.with_name(f".{folder.name}")
         shutil.rmtree(draft, ignore_errors=True)
-        learner.save(draft, step, self.settings, accelerator)
+        policy, processes = accelerator.unwrap_model(learner.policy), accelerator.num_processes
+        parts = (policy, learner.optimizer, learner.schedule, learner.before, learner.after)
+        save_checkpoint(draft, step, self.settings, *parts, processes, self.settings.batch_size)
         self.finish(draft / MODEL, step)
         publish_folder(draft, folder)
         point_to(folder)

@@ -17,7 +17,13 @@ from handrail.datasets.reading.check import check_whole
 from handrail.datasets.reading.reader import DatasetInfo, read_episodes, read_info, read_rows_of, with_success
 from handrail.policies.imitation.config import TrainConfig
 from handrail.policies.imitation.interface.checkpoint import PolicyMeta
-from handrail.policies.imitation.interface.interface import COLUMNS, PolicyInterface
+from handrail.policies.imitation.interface.interface import (
+    ACTION,
+    COLUMNS,
+    ENVIRONMENT,
+    STATE,
+    PolicyInterface,
+)
 from handrail.policies.imitation.training.memory import MemoryDataset, MemoryMeta
 from handrail.policies.imitation.training.selection import Selection, select, select_again
 
@@ -26,7 +32,6 @@ if TYPE_CHECKING:
     from lerobot.datasets.lerobot_dataset import LeRobotDataset
 
 Columns = dict[str, np.ndarray]
-STATE, ENVIRONMENT, ACTION = "observation.state", "observation.environment_state", "action"
 _LEARNT = ("observation", "action", "next.")
 _COUNTERS = ("timestamp", "frame_index", "episode_index", "index", "task_index")
 _NOWHERE = "handrail/local--only"  # no name on the hub, from where LeRobot would fetch what is missing

@@ -1,10 +1,8 @@
 """Training of an imitation policy: a part of a dataset, through an interface, with LeRobot's own parts."""
 
-import json
 import logging
 import os
 import shutil
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict
@@ -13,7 +11,6 @@ from typing import TYPE_CHECKING
 
 from handrail.controllers.entries import is_name
 from handrail.controllers.errors import HandrailError
-from handrail.datasets.storage.atomic import write_whole
 from handrail.policies.imitation.config import TrainConfig
 from handrail.policies.imitation.interface.checkpoint import (
     MODEL,
@@ -23,6 +20,7 @@ from handrail.policies.imitation.interface.checkpoint import (
     software_versions,
     write_meta,
 )
+from handrail.policies.imitation.interface.torch_state import threads
 from handrail.policies.imitation.interface.trust import check_links, check_policy_folder
 from handrail.policies.imitation.training.curve import NAME as CURVE
 from handrail.policies.imitation.training.presets import policy_config, resolved
@@ -33,7 +31,6 @@ from handrail.policies.imitation.training.source import Source, read_source
 if TYPE_CHECKING:
     from lerobot.configs.train import TrainPipelineConfig
 
-RECORD = "training.json"
 _LOG_EVERY = 50  # updates
 _WARMUP = 500  # updates in which the learning rate rises, or a tenth of all if that is fewer
 
@@ -56,7 +53,7 @@ def train(config: TrainConfig, quiet: bool = False) -> Path:
         check_data(source, began)
     if checkpoint is not None and int(checkpoint.name) >= steps:
         return checkpoint / MODEL
-    with _threads(config.threads), _no_pages_of_logs(), in_one_line(config):
+    with threads(config.threads), _no_pages_of_logs(), in_one_line(config):
         _run(config, source, steps, checkpoint, quiet)
     last = last_checkpoint(config.folder)
     assert last is not None
@@ -78,23 +75,13 @@ def _run(config: TrainConfig, source: Source, steps: int, checkpoint: Path | Non
 
     settings = _settings(config, steps)
     assert settings.policy is not None
-    dataset = source.dataset(settings.policy)
-    run = Run(
+    Run(
         settings,
-        dataset,
+        source.dataset(settings.policy),
         checkpoint,
         lambda folder, step: write_meta(folder, source.interface, _meta(source, step)),
         quiet,
-    )
-    began = time.monotonic()
-    curve = run.train()
-    if curve is not None:
-        seconds = time.monotonic() - began
-        done = steps - (int(checkpoint.name) if checkpoint else 0)
-        record = {"seconds": seconds, "steps_a_second": done / seconds, "steps": steps}
-        record |= {"frames": len(dataset), "loss": curve.rows[-1]["loss"] if curve.rows else None}
-        content = record | asdict(_meta(source, steps))
-        write_whole(config.folder / RECORD, (json.dumps(content, indent=1) + "\n").encode())
+    ).train()
 
 
 def _settings(config: TrainConfig, steps: int) -> "TrainPipelineConfig":
@@ -144,7 +131,7 @@ def _begin(config: TrainConfig) -> Path | None:
 
 def _foreign(folder: Path) -> list[str]:
     """Return what lies in a training's folder and is not the training's."""
-    files = {name for each in (RECORD, CURVE) for name in (each, f".{each}.partial")}
+    files = {CURVE, f".{CURVE}.partial", "training.json"}  # the last of an earlier version
     kept = [path for path in (folder / "checkpoints").glob("*") if not _is_checkpoint(path)]
     others = [path for path in folder.iterdir() if path.name not in files | {"checkpoints"}]
     return sorted(path.relative_to(folder).as_posix() for path in (*others, *kept))
@@ -187,18 +174,6 @@ def _common(values: list[str]) -> str:
 
 def _is_main_process() -> bool:
     return os.environ.get("RANK", "0") == "0"
-
-
-@contextmanager
-def _threads(count: int) -> Iterator[None]:
-    import torch
-
-    before = torch.get_num_threads()
-    torch.set_num_threads(count)
-    try:
-        yield
-    finally:
-        torch.set_num_threads(before)
 
 
 @contextmanager

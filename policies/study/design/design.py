@@ -15,18 +15,18 @@ minutes = 10.0                  of the operator's time with each mode, with fail
 steps = 4000                    updates of each policy
 batch_size = 0                  samples an update; 0 for the preset's
 policy_options = ["dropout=0.1"]        more of LeRobot's settings of the policy
-time_limit = {direct_single = 60.0}     of an episode by mode [s]
+time_limit = {direct_single = 60.0}     of an episode by mode [s]; the task's own where none is named
 rollout_limit = 20.0            after which a policy's rollout has failed [s]; the task's own without it
 
-[robustness]                    optional
-perturbations = ["push", "shift", "delay"]
+[robustness]                    optional: what else policies of the main design go through
+perturbations = ["push", "shift", "delay"]      each a condition of its own
 protections = ["mpc", "filter"] of policies that command joint velocities
 rollouts = 50                   under each condition
 seeds = [0]                     of the trainings whose policies go through it
 
 [sweep]                         optional: how human the operator is
 tasks = ["reach"]
-noises = [0.0, 2.0]
+noises = [0.0, 2.0]             besides 1, which the study itself has
 seeds = [0]
 """
 
@@ -44,17 +44,7 @@ BUDGETS = ("time", "number")
 
 @dataclass(frozen=True)
 class TaskDesign:
-    """One task of a study.
-
-    Attributes:
-        episodes: successful demonstrations of each mode, at least; the budget `number`.
-        minutes: of the operator's time with each mode, failed attempts included; the budget `time`.
-        steps: updates of each policy.
-        batch_size: samples an update; 0 for the preset's.
-        time_limit: of an episode by mode [s]; the task's own where a mode is not named.
-        rollout_limit: after which a policy's rollout has failed [s]; the task's own when 0.
-        policy_options: more of LeRobot's settings of the policy, `key=value` each.
-    """
+    """One task of a study; its settings are explained above."""
 
     episodes: int = 50
     minutes: float = 0.0
@@ -67,14 +57,7 @@ class TaskDesign:
 
 @dataclass(frozen=True)
 class Robustness:
-    """What else policies of the main design go through.
-
-    Attributes:
-        perturbations: each a condition of its own.
-        protections: of policies that command joint velocities.
-        rollouts: under each condition.
-        seeds: of the trainings whose policies do.
-    """
+    """What else policies of the main design go through; explained above."""
 
     perturbations: tuple[str, ...] = ("push", "shift", "delay")
     protections: tuple[str, ...] = ("filter",)
@@ -84,13 +67,7 @@ class Robustness:
 
 @dataclass(frozen=True)
 class Sweep:
-    """How the ranking depends on how human the operator is.
-
-    Attributes:
-        tasks: some of the study's.
-        noises: besides 1, which the study itself has.
-        seeds: of the trainings.
-    """
+    """How the ranking depends on how human the operator is; explained above."""
 
     tasks: tuple[str, ...]
     noises: tuple[float, ...] = (0.0, 2.0)
@@ -99,22 +76,7 @@ class Sweep:
 
 @dataclass(frozen=True)
 class StudyDesign:
-    """A whole study.
-
-    Attributes:
-        name: of the preset or file.
-        modes: teleop modes.
-        tasks: by name.
-        baseline: the mode that the others are compared with.
-        policy: that LeRobot has registered.
-        seeds: of the trainings.
-        rollouts: of each policy.
-        budgets: `time`: what fits into the task's minutes; `number`: as many successes as its episodes.
-        persons: scripted operators, who take turns.
-        seed: of the scenes in which is recorded, and in which is evaluated.
-        robustness: further conditions, if any.
-        sweep: over the operator's noise, if any.
-    """
+    """A whole study, called after its file; its settings are explained above."""
 
     name: str
     modes: tuple[str, ...]

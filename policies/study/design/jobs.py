@@ -9,7 +9,6 @@ from typing import Literal
 from handrail.collect.operators.modes import MODES
 from handrail.policies.study.design.design import StudyDesign
 
-Kind = Literal["collect", "policy", "compare"]
 Actions = Literal["realised", "intent"]
 CONDITIONS = ("nominal", "disturbed", "protected")
 
@@ -58,10 +57,9 @@ class StudyPolicy:
 
 @dataclass(frozen=True)
 class Job:
-    """One piece of work.
+    """One piece of work: collect a dataset; train and evaluate a policy; compare the modes of a task.
 
     Attributes:
-        kind: collect a dataset; train and evaluate a policy; compare the modes of a task.
         name: of the job, unique.
         needs: names of the jobs that come before.
         cell: to collect.
@@ -70,7 +68,6 @@ class Job:
         robust: whether the policy also goes through the further conditions.
     """
 
-    kind: Kind
     name: str
     needs: tuple[str, ...] = ()
     cell: Cell | None = None
@@ -115,13 +112,11 @@ def _policies(cell: Cell, budget: str, seed: int) -> list[StudyPolicy]:
 
 
 def _collect(cell: Cell) -> Job:
-    return Job("collect", f"collect/{cell.name}", cell=cell)
+    return Job(f"collect/{cell.name}", cell=cell)
 
 
 def _policy(policy: StudyPolicy, robust: bool) -> Job:
-    return Job(
-        "policy", f"policy/{policy.name}", (f"collect/{policy.cell.name}",), policy=policy, robust=robust
-    )
+    return Job(f"policy/{policy.name}", (f"collect/{policy.cell.name}",), policy=policy, robust=robust)
 
 
 def _compare(task: str, others: list[Job]) -> Job:
@@ -130,7 +125,7 @@ def _compare(task: str, others: list[Job]) -> Job:
         for job in others
         if (job.cell and job.cell.task == task) or (job.policy and job.policy.cell.task == task)
     ]
-    return Job("compare", f"compare/{task}", tuple(mine), task=task)
+    return Job(f"compare/{task}", tuple(mine), task=task)
 
 
 @dataclass(frozen=True)

@@ -1,17 +1,19 @@
 """Reading a study's design from a TOML file, and checking it whole."""
 
 from pathlib import Path
-from typing import Any
 
 import draccus
 
-from handrail.controllers.errors import HandrailError, message_of, unknown_name
+from handrail.controllers.entries import Entry, is_name, is_table
+from handrail.controllers.errors import unknown_name
 from handrail.controllers.strict_toml import read_toml
-from handrail.policies.study.design.check import check_design
-from handrail.policies.study.design.design import StudyDesign
+from handrail.policies.fields import check_fields
+from handrail.policies.study.design.design import Robustness, StudyDesign, Sweep, TaskDesign
 from handrail.policies.study.design.settings import check_jobs
 
 PRESETS = Path(__file__).parent / "presets"
+_NAME = Entry("no name: a study is called after its file", lambda _: False, needed=False)
+_TASKS = Entry("a table of tasks", lambda value: is_table(value) and all(map(is_name, value)))
 
 
 def design_names() -> list[str]:
@@ -28,18 +30,14 @@ def load_design(name: str) -> StudyDesign:
     path = Path(name).expanduser() if name.endswith(".toml") else PRESETS / f"{name}.toml"
     if not path.is_file():
         raise unknown_name("study", name, [*design_names(), "a file that ends in .toml"])
-    content = read_toml(path, "study")
-    check_design(content, f"study {name}")
-    design = _design(path.stem, content)
+    content, where = read_toml(path, "study"), f"study {name}"
+    check_fields(content, StudyDesign, where, name=_NAME, tasks=_TASKS)
+    for task, entries in content["tasks"].items():
+        check_fields(entries, TaskDesign, f"{where}: [tasks.{task}]")
+    for part, kind in (("robustness", Robustness), ("sweep", Sweep)):
+        if part in content:
+            check_fields(content[part], kind, f"{where}: [{part}]")
+    design = draccus.decode(StudyDesign, {"name": path.stem, **content})
     design.check()
     check_jobs(design)
     return design
-
-
-def _design(name: str, content: dict[str, Any]) -> StudyDesign:
-    from draccus.utils import DecodingError, ParsingError
-
-    try:
-        return draccus.decode(StudyDesign, {"name": name, **content})
-    except (DecodingError, ParsingError, TypeError, ValueError) as error:
-        raise HandrailError(f"study {name}: {message_of(error)}") from error

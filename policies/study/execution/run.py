@@ -5,7 +5,6 @@ import multiprocessing
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from datetime import datetime
 from multiprocessing.process import BaseProcess
 from pathlib import Path
 
@@ -14,21 +13,19 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.presentation.markdown import read_page, with_part
-from handrail.datasets.storage.atomic import explained, make_folder
+from handrail.datasets.storage.atomic import explained
 from handrail.datasets.storage.lock import DatasetLock
 from handrail.policies.imitation.training.installed import check_installed
 from handrail.policies.study.config import StudyConfig
 from handrail.policies.study.design.design import StudyDesign
 from handrail.policies.study.design.jobs import Job, Layout, jobs
 from handrail.policies.study.design.load import load_design
+from handrail.policies.study.design.progress import StudyProgress
 from handrail.policies.study.design.settings import check_policies
-from handrail.policies.study.execution.child import do
-from handrail.policies.study.progress.progress import StudyProgress
+from handrail.policies.study.execution.work import FAILED, do
 
-FAILED = 1
 _PRELOAD = "handrail.policies.study.execution.preload"
 _ASLEEP = 0.2  # between two looks at the running jobs [s]
-_BEGINS = "=== handrail-study begins"
 _TAIL = 300  # characters of a failed job's last words
 
 
@@ -119,7 +116,8 @@ def _run_all(start: Start, workers: int, progress: StudyProgress, state: _State,
             for job in state.ready(todo):
                 if len(state.running) >= workers:
                     break
-                _mark(layout.log(job), job.name)
+                with explained(str(layout.log(job))):
+                    layout.log(job).unlink(missing_ok=True)  # of an earlier time
                 state.running[job.name] = (job, start(job, design, layout))
             if not state.running:
                 break
@@ -142,20 +140,11 @@ def _collect_finished(state: _State, layout: Layout) -> None:
             state.failed[name] = _last_words(layout.log(job), process.exitcode)
 
 
-def _mark(log: Path, name: str) -> None:
-    """Write into a log that a job begins: what stands before is of an earlier time."""
-    with explained(str(log)):
-        make_folder(log.parent)
-        with open(log, "a", encoding="utf-8") as file:
-            file.write(f"\n{_BEGINS} {name}, {datetime.now():%Y-%m-%d %H:%M:%S}\n")
-
-
 def _last_words(log: Path, code: int | None) -> str:
-    """Return what a job said last since it began: its error in a line, or the end of what it wrote."""
+    """Return what a job said last: its error in a line, or the end of what it wrote."""
     text = log.read_text(encoding="utf-8", errors="replace") if log.is_file() else ""
-    lines = text.rpartition(_BEGINS)[2].strip().splitlines()[1:]
-    errors = [line for line in lines if line.startswith("error: ")]
-    words = errors[-1].removeprefix("error: ") if errors else "\n".join(lines)[-_TAIL:] or "without a word"
+    errors = [line for line in text.splitlines() if line.startswith("error: ")]
+    words = errors[-1].removeprefix("error: ") if errors else text.strip()[-_TAIL:] or "without a word"
     return f"{words} (exit code {code}; {log})"
 
 

@@ -1,7 +1,17 @@
-"""Does one job of a study, in a process of its own; whatever is killed goes on where it was."""
+"""Does one job of a study, in a process of its own; whatever is killed goes on where it was.
 
+The processes are forked from a server that has loaded LeRobot, PyTorch and the simulator once (`preload.py`):
+that takes longer than many a job.
+"""
+
+import os
+import signal
+import sys
+import threading
+import time
 from collections.abc import Mapping
 from dataclasses import replace
+from multiprocessing import connection, parent_process
 from pathlib import Path
 from typing import Any
 
@@ -9,15 +19,52 @@ from handrail.controllers.errors import HandrailError
 from handrail.datasets.comparison.config import CompareConfig
 from handrail.datasets.reading.reader import read_episodes, read_info
 from handrail.datasets.storage.atomic import remove
-from handrail.policies.imitation.evaluation.config import EvaluateConfig
 from handrail.policies.imitation.interface.checkpoint import last_checkpoint
-from handrail.policies.study.design.design import StudyDesign, TaskDesign
+from handrail.policies.study.design.design import StudyDesign
 from handrail.policies.study.design.jobs import CONDITIONS, Cell, Job, Layout, StudyPolicy
+from handrail.policies.study.design.progress import StudyProgress, read_json, write_json
 from handrail.policies.study.design.settings import evaluations, fingerprint, recording, training
-from handrail.policies.study.progress.notes import read_json, write_json
-from handrail.policies.study.progress.progress import StudyProgress
 
+FAILED = 1
 _MOST_ATTEMPTS = 6  # for each success that is wanted
+
+
+def do(job: Job, design: StudyDesign, root: Path) -> None:
+    """Do a job of a study, write that it is done, and leave the process with 0, or 1 and a line."""
+    layout = Layout(root)
+    _end_with_parent()
+    _say_into(layout.log(job))
+    start = time.time()
+    try:
+        begin(job, design, layout)
+        result = work(job, design, layout)
+        settings, seconds = fingerprint(job, design), round(time.time() - start, 1)
+        write_json(layout.done(job), {"settings": settings, "result": result, "seconds": seconds})
+    except (HandrailError, OSError) as error:
+        print(f"error: {error}", file=sys.stderr)
+        sys.exit(FAILED)
+
+
+def _say_into(log: Path) -> None:
+    """Send everything that this process says into a file."""
+    log.parent.mkdir(parents=True, exist_ok=True)
+    file = os.open(log, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o644)
+    for stream in (sys.stdout, sys.stderr):
+        os.dup2(file, stream.fileno())
+    os.close(file)
+
+
+def _end_with_parent() -> None:
+    """End this process when the study ends, also when that was killed; the server may outlive it."""
+    study = parent_process()
+    if study is None:
+        return
+
+    def watch() -> None:
+        connection.wait([study.sentinel])
+        os.kill(os.getpid(), signal.SIGTERM)
+
+    threading.Thread(target=watch, daemon=True).start()
 
 
 def begin(job: Job, design: StudyDesign, layout: Layout) -> None:
@@ -57,7 +104,7 @@ def _stale(job: Job, now: Mapping[str, Any], before: Mapping[str, Any], layout: 
 
 
 def work(job: Job, design: StudyDesign, layout: Layout) -> dict[str, Any]:
-    """Do a job and return what is worth noting about it.
+    """Do a job and return what is to be noted of it: how much there is of a dataset.
 
     Raises:
         HandrailError: it cannot be done.
@@ -65,8 +112,10 @@ def work(job: Job, design: StudyDesign, layout: Layout) -> dict[str, Any]:
     if job.cell:
         return _collect(job.cell, design, layout)
     if job.policy:
-        return _policy(job, job.policy, design, layout)
-    return _compare(job.task, design, layout)
+        _train_and_evaluate(job, job.policy, design, layout)
+    else:
+        _compare(job.task, design, layout)
+    return {}
 
 
 def _collect(cell: Cell, design: StudyDesign, layout: Layout) -> dict[str, Any]:
@@ -75,7 +124,7 @@ def _collect(cell: Cell, design: StudyDesign, layout: Layout) -> dict[str, Any]:
 
     wanted, root = design.tasks[cell.task], layout.dataset(cell)
     found = _collected(root) if root.exists() else {"episodes": 0, "successes": 0, "minutes": 0.0}
-    while not _enough(found, wanted):
+    while found["successes"] < wanted.episodes or found["minutes"] < wanted.minutes:
         code = record(recording(cell, design, root, found["episodes"]))
         if code:
             raise HandrailError(f"collecting {cell.name}: recording ended with exit code {code}")
@@ -97,48 +146,31 @@ def _collected(root: Any) -> dict[str, Any]:
     }
 
 
-def _enough(found: Mapping[str, Any], wanted: TaskDesign) -> bool:
-    return found["successes"] >= wanted.episodes and found["minutes"] >= wanted.minutes
-
-
-def _policy(job: Job, policy: StudyPolicy, design: StudyDesign, layout: Layout) -> dict[str, Any]:
-    """Train a policy and let it drive."""
+def _train_and_evaluate(job: Job, policy: StudyPolicy, design: StudyDesign, layout: Layout) -> None:
+    """Train a policy and let it drive, under every condition into a file of its own."""
+    from handrail.policies.imitation.evaluation.evaluation import evaluate
     from handrail.policies.imitation.training.training import train
 
     folder = train(training(policy, design, layout.dataset(policy.cell), layout.policy(policy)))
-    driven = evaluations(job, design, str(folder))
-    shares = {what: _evaluate(config, layout.evaluation(policy, what)) for what, config in driven.items()}
-    return {"checkpoint": str(folder.relative_to(layout.root)), "success": shares}
+    for what, config in evaluations(job, design, str(folder)).items():
+        file = layout.evaluation(policy, what)
+        file.parent.mkdir(parents=True, exist_ok=True)
+        evaluate(replace(config, json=str(file)))
 
 
-def _evaluate(config: EvaluateConfig, file: Path) -> dict[str, float]:
-    """Run rollouts into a file of their own and return the success of each policy in it."""
-    from handrail.datasets.comparison.evaluations import read_evaluations
-    from handrail.policies.imitation.evaluation.evaluation import evaluate
-
-    file.parent.mkdir(parents=True, exist_ok=True)
-    evaluate(replace(config, json=str(file)))
-    policies = read_evaluations([file])
-    return {label: float(found.runs()[0].values.mean()) for label, found in policies.items()}
-
-
-def _compare(task: str, design: StudyDesign, layout: Layout) -> dict[str, Any]:
+def _compare(task: str, design: StudyDesign, layout: Layout) -> None:
     """Write the report of a task: its datasets and what the policies did."""
     from handrail.datasets.comparison.compare import compare
-    from handrail.datasets.comparison.findings import findings
     from handrail.datasets.comparison.report.report import write_report
 
     cells = [Cell(task, mode) for mode in design.modes]
     progress = StudyProgress(design, layout)
     files = [path for cell in cells for path in progress.evaluations(cell, "nominal")]
-    comparison = compare(
-        CompareConfig(
-            datasets=tuple(str(layout.dataset(cell)) for cell in cells),
-            labels=design.modes,
-            baseline=design.baseline,
-            evaluations=tuple(map(str, files)),
-            output=str(layout.comparison(task)),
-        )
+    config = CompareConfig(
+        datasets=tuple(str(layout.dataset(cell)) for cell in cells),
+        labels=design.modes,
+        baseline=design.baseline,
+        evaluations=tuple(map(str, files)),
+        output=str(layout.comparison(task)),
     )
-    write_report(comparison)
-    return {"findings": [finding.text for finding in findings(comparison)]}
+    write_report(compare(config))

@@ -9,10 +9,9 @@ from handrail.datasets.comparison.outcomes import LIKE_FOR_LIKE, Pair
 from handrail.policies.study.design.design import StudyDesign
 from handrail.policies.study.design.jobs import Actions, Cell, StudyPolicy
 
-UNPROTECTED = "joint velocities, unprotected"
-THROUGH_MPC = "intent through the MPC"
-CONTROLLER = "policy-plus-controller"  # families of comparisons, besides like for like
+CONTROLLER = "policy-plus-controller"
 PROTECTED = "protected"
+FAMILIES = (LIKE_FOR_LIKE, PROTECTED, CONTROLLER)  # of comparisons, in the order to be read
 
 
 @dataclass(frozen=True)
@@ -42,11 +41,6 @@ class StudyCondition:
         if self.actions == "intent":
             return CONTROLLER
         return PROTECTED if self.treatment else LIKE_FOR_LIKE
-
-    @property
-    def driven(self) -> str:
-        """What drives the robot: the policy alone, or a policy and a controller."""
-        return THROUGH_MPC if self.actions == "intent" else UNPROTECTED
 
 
 def identify(design: StudyDesign, labels: Sequence[str]) -> dict[str, StudyCondition]:

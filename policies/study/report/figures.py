@@ -29,12 +29,11 @@ def figures(design: StudyDesign, results: Sequence[TaskResults]) -> dict[str, An
     return made
 
 
-def _colour(design: StudyDesign, condition: StudyCondition) -> str:
-    return COLOURS[design.modes.index(condition.mode) % len(COLOURS)]
-
-
-def _mark(condition: StudyCondition) -> str:
-    return "D" if condition.actions == "intent" else "o"
+def _style(design: StudyDesign, condition: StudyCondition) -> dict[str, Any]:
+    """Return how a condition is drawn: the mode's colour, the action's mark."""
+    colour = COLOURS[design.modes.index(condition.mode) % len(COLOURS)]
+    mark = "D" if condition.actions == "intent" else "o"
+    return {"color": colour, "marker": mark, "ms": 5, "label": _name(condition)}
 
 
 def _name(condition: StudyCondition) -> str:
@@ -50,7 +49,8 @@ def _answer(design: StudyDesign, results: Sequence[TaskResults]) -> Any:
     grid = figure.subplots(1, len(results), squeeze=False)[0]
     for axes, each in zip(grid, results, strict=True):
         for row, found in enumerate(each.undisturbed.values()):
-            outcome, colour = found.outcome, _colour(design, found.condition)
+            outcome, style = found.outcome, _style(design, found.condition) | {"ms": 8, "mec": "white"}
+            colour = style["color"]
             axes.plot(np.multiply(100, outcome.wilson), [row, row], color=colour, lw=5.0, alpha=0.35)
             if outcome.nested:
                 axes.plot(np.multiply(100, outcome.nested), [row, row], color=colour, lw=1.4)
@@ -61,7 +61,7 @@ def _answer(design: StudyDesign, results: Sequence[TaskResults]) -> Any:
                 color=colour,
                 ms=6,
             )
-            axes.plot(100 * outcome.share, row, _mark(found.condition), color=colour, ms=8, mec="white")
+            axes.plot(100 * outcome.share, row, **style)
         labels = [_name(found.condition) for found in each.undisturbed.values()]
         axes.set(title=each.task.replace("_", " "), xlabel="policy success [%]", xlim=(-3, 103))
         axes.set(ylim=(len(labels) - 0.4, -0.6), yticks=range(len(labels)), yticklabels=labels)
@@ -88,13 +88,7 @@ def _robustness(design: StudyDesign, results: Sequence[TaskResults]) -> Any:
             values = np.array([outcome.share for outcome in shown.values()])
             spans = np.array([outcome.wilson for outcome in shown.values()])
             errors = np.abs(spans.T - values) * 100
-            style = {
-                "color": _colour(design, condition),
-                "fmt": _mark(condition),
-                "ms": 5,
-                "lw": 1.2,
-                "label": _name(condition),
-            }
+            style = _style(design, condition) | {"ls": "", "elinewidth": 1.2}
             axes.errorbar(np.array(xs) + shift, 100 * values, yerr=errors, **style)
         axes.set(title=each.task.replace("_", " "), xticks=range(len(names)), ylim=(-3, 103))
         axes.set_xticklabels(names, rotation=20)
@@ -126,13 +120,7 @@ def _sweep(design: StudyDesign, results: Sequence[TaskResults]) -> Any:
             noises = [point.noise for point in found]
             shares = np.array([point.outcome.share for point in found])
             spans = np.array([point.outcome.wilson for point in found])
-            style = {
-                "color": _colour(design, condition),
-                "marker": _mark(condition),
-                "ms": 5,
-                "lw": 1.4,
-                "label": _name(condition),
-            }
+            style = _style(design, condition) | {"lw": 1.4}
             left.errorbar(noises, 100 * shares, yerr=100 * np.abs(spans.T - shares), **style)
             if condition.actions == "realised":
                 right.plot(noises, [point.seconds for point in found], **style)

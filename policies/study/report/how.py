@@ -91,8 +91,8 @@ def _tests(results: Sequence[TaskResults]) -> Iterator[str]:
     told = families(each.family for each in found)
     yield (
         f"p is adjusted by Holm over {told} of all tasks. Which family a comparison belongs to follows from"
-        " what is compared, never from what came out. ● marks a detected difference; “detectable” is what"
-        " would be seen as one in 80 % of such studies."
+        " what is compared, never from what came out. “Detectable” is what would be seen as a difference in"
+        " 80 % of such studies."
     )
 
 

@@ -10,18 +10,18 @@ from typing import Any
 import numpy as np
 
 from handrail.collect.session.build import software_versions
-from handrail.controllers.errors import HandrailError
 from handrail.datasets.comparison.finding import Finding
 from handrail.datasets.comparison.report.report import plain
 from handrail.datasets.presentation import markup
 from handrail.datasets.presentation.drawing import png, svg
 from handrail.datasets.presentation.markdown import markdown_table, write_part
-from handrail.datasets.storage.atomic import write_whole
+from handrail.datasets.storage.atomic import explained, write_whole
 from handrail.policies.study.config import StudyConfig
-from handrail.policies.study.progress.progress import StudyProgress
+from handrail.policies.study.design.progress import StudyProgress
 from handrail.policies.study.report.figures import figures
+from handrail.policies.study.report.gather import gather
 from handrail.policies.study.report.how import how
-from handrail.policies.study.report.results import TaskResults, gather
+from handrail.policies.study.report.results import TaskResults
 from handrail.policies.study.report.tables import tables
 
 _CAPTIONS = {
@@ -50,14 +50,12 @@ def write_study(config: StudyConfig, progress: StudyProgress) -> list[Path]:
         root / "report.html": _html(progress, results, drawn),
         root / "study.json": _json(progress, results),
     }
-    try:
+    with explained("study: expected a folder that can be written"):
         for path, text in files.items():
             write_whole(path, text.encode())
         written = list(files)
         if config.page:
             written += _write_page(Path(config.page).expanduser(), progress, results, drawn)
-    except OSError as error:
-        raise HandrailError(f"study: expected a folder that can be written, got {error}") from error
     return written
 
 

@@ -1,125 +1,44 @@
-"""The tables of a study, for a page in HTML and one in Markdown alike."""
+"""The tables of a study, for a page in HTML and one in Markdown alike; the first three are a comparison's."""
 
-from collections.abc import Mapping
+from dataclasses import replace
 
-from handrail.datasets.comparison.outcomes import ConditionOutcome, OutcomeDifference
+from handrail.datasets.comparison.outcomes import ConditionOutcome, Outcomes
+from handrail.datasets.comparison.report.tables import (
+    collection_table,
+    conditions_table,
+    outcome_differences_table,
+)
 from handrail.datasets.presentation.table import Table
 from handrail.datasets.presentation.wording import (
     DASH,
     THESE_POLICIES,
-    WITH_TRAINING,
-    duration,
     number,
-    p_value,
     percent,
     percent_span,
     points,
     points_span,
 )
-from handrail.policies.study.report.conditions import StudyCondition
-from handrail.policies.study.report.results import TaskResults
-from handrail.policies.study.report.treatments import ConditionResult
+from handrail.policies.study.report.conditions import FAMILIES
+from handrail.policies.study.report.results import ConditionResult, TaskResults
 
 
 def tables(results: TaskResults) -> list[Table]:
     """Return the tables of a task that have something in them."""
+    both = [each for each in (results.policies, results.shielded) if each]
+    differences = [each for outcomes in both for each in outcomes.differences]
+    differences.sort(key=lambda each: FAMILIES.index(each.family))
+    compared = Outcomes((), tuple(differences))
     made = [
-        _collected(results),
-        _policies(results),
-        _differences(results),
+        replace(collection_table(list(results.collected.values())), title="Collecting"),
+        replace(
+            conditions_table(results.policies or compared),
+            title="Policies, undisturbed; “intent” goes through the MPC",
+        ),
+        replace(outcome_differences_table(compared), title="Differences"),
         _treatments(results),
         _sweep(results),
     ]
     return [table for table in made if table.rows]
-
-
-def _collected(results: TaskResults) -> Table:
-    headings = (
-        "mode", "episodes", "success", "95 %", "operator time", "s a success", "successes / h", "failures",
-    )  # fmt: skip
-    rows = []
-    for mode, each in results.collected.items():
-        seconds = each.operator_time / each.successes if each.successes else None
-        reasons = ", ".join(f"{reason} ({count})" for reason, count in each.reasons.items())
-        rows.append(
-            (
-                mode,
-                str(each.episodes),
-                percent(each.success),
-                percent_span(each.success_interval),
-                duration(each.operator_time),
-                number(seconds),
-                number(each.successes_an_hour),
-                reasons or DASH,
-            )
-        )
-    return Table(headings, rows, "Collecting")
-
-
-def _policies(results: TaskResults) -> Table:
-    headings = (
-        "policy", "what drives", "success", THESE_POLICIES, WITH_TRAINING, "each training seed", "length s",
-        "rollouts with contact", "trained on",
-    )  # fmt: skip
-    rows = []
-    for label, found in results.undisturbed.items():
-        outcome = found.outcome
-        length = f"{number(outcome.means['length'][0])}" if "length" in outcome.means else DASH
-        rows.append(
-            (
-                label,
-                found.condition.driven,
-                _share(outcome),
-                percent_span(outcome.wilson),
-                percent_span(outcome.nested),
-                ", ".join(percent(share) for share in outcome.seeds),
-                length,
-                percent(found.touched),
-                _data(outcome.trained_on),
-            )
-        )
-    return Table(headings, rows, "Policies, undisturbed")
-
-
-def _differences(results: TaskResults) -> Table:
-    headings = (
-        "policy",
-        "against",
-        "what is compared",
-        "points",
-        THESE_POLICIES,
-        WITH_TRAINING,
-        "p (Holm)",
-        "detectable",
-    )
-    found = [
-        (results_[each.label], each)
-        for outcomes, results_ in (
-            (results.policies, results.undisturbed),
-            (results.shielded, results.protected),
-        )
-        for each in (outcomes.differences if outcomes else ())
-    ]
-    found.sort(key=lambda pair: pair[0].condition.actions == "intent")  # like for like first
-    return Table(headings, [_difference(each, what.condition) for what, each in found], "Differences")
-
-
-def _difference(each: OutcomeDifference, condition: StudyCondition) -> tuple[str, ...]:
-    alike = (
-        f"joint velocities, both through the {condition.treatment}"
-        if condition.treatment
-        else condition.driven
-    )
-    return (
-        each.label,
-        each.baseline,
-        "policy plus controller" if condition.actions == "intent" else alike,
-        points(each.rollouts.estimate) + (" ●" if each.detected else ""),
-        points_span(each.rollouts.interval),
-        DASH if each.nested is None else points_span(each.nested),
-        p_value(each.p_adjusted).removeprefix("p = ").removeprefix("p "),
-        f"{100 * each.detectable:.0f} points",
-    )
 
 
 def _treatments(results: TaskResults) -> Table:
@@ -178,12 +97,3 @@ def _sweep(results: TaskResults) -> Table:
 
 def _share(condition: ConditionOutcome) -> str:
     return f"{percent(condition.share)} ({condition.successes} of {condition.rollouts})"
-
-
-def _data(trained_on: Mapping[str, float]) -> str:
-    parts = []
-    if "episodes" in trained_on:
-        parts.append(f"{trained_on['episodes']:.0f} episodes")
-    if "operator_time" in trained_on:
-        parts.append(duration(trained_on["operator_time"]))
-    return ", ".join(parts) or DASH

@@ -1,64 +1,52 @@
 """What a task's policies say: like for like first, then policies with a controller, then cautions."""
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
 
 from handrail.datasets.comparison.cautions import training_cautions
 from handrail.datasets.comparison.finding import Finding
 from handrail.datasets.comparison.outcome_findings import outcome_findings
-from handrail.datasets.comparison.outcomes import OutcomeDifference, Outcomes
-from handrail.policies.study.report.conditions import StudyCondition
+from handrail.datasets.comparison.outcomes import Outcomes
+from handrail.policies.study.report.conditions import FAMILIES, StudyCondition
+from handrail.policies.study.report.results import ConditionResult, TaskResults
 
 _UNPROTECTED = "Like for like, joint velocities, unprotected"
 _PROTECTED = "Like for like, joint velocities, both through the"
 _CONTROLLER = "Policy plus controller, intent through the MPC against joint velocities, unprotected"
 
 
-@dataclass(frozen=True)
-class Judged:
-    """Conditions under treatments of one kind, and each against its baseline.
-
-    Attributes:
-        conditions: what they are, by label.
-        outcomes: how they fared; None before any was evaluated.
-    """
-
-    conditions: Mapping[str, StudyCondition]
-    outcomes: Outcomes | None
-
-
-def findings(undisturbed: Judged, shielded: Judged, baseline: str) -> tuple[Finding, ...]:
+def findings(results: TaskResults, baseline: str) -> tuple[Finding, ...]:
     """Return all findings of a task; each says first what is compared with what."""
-    found = [
-        replace(finding, text=f"{title}: {finding.text}") for title, finding in _titled(undisturbed, shielded)
-    ]
-    cautions = [*_missing(undisturbed, baseline), *_cautions(undisturbed), *_cautions(shielded)]
+    found = [replace(finding, text=f"{title}: {finding.text}") for title, finding in _titled(results)]
+    cautions = list(_missing(results, baseline))
+    for outcomes, conditions in _judged(results):
+        cautions += _cautions(outcomes, conditions)
     return (*found, *(Finding("caution", text) for text in dict.fromkeys(cautions)))
 
 
-def answer(undisturbed: Judged, shielded: Judged) -> str:
+def answer(results: TaskResults) -> str:
     """Return the answer in a few sentences, one for each kind of comparison."""
     parts: dict[str, list[str]] = {}
-    for title, finding in _titled(undisturbed, shielded):
+    for title, finding in _titled(results):
         parts.setdefault(title, []).append(finding.short)
     return " ".join(f"{title}: {'; '.join(shorts)}." for title, shorts in parts.items())
 
 
-def _titled(undisturbed: Judged, shielded: Judged) -> Iterator[tuple[str, Finding]]:
-    """Yield findings with what they compare: joint velocities, these through a protection, then intents."""
-    found = [*_of(undisturbed), *_of(shielded)]
-    for wanted in (
-        _alike,
-        lambda condition: bool(condition.treatment),
-        lambda condition: condition.actions == "intent",
+def _judged(results: TaskResults) -> Iterator[tuple[Outcomes, Mapping[str, ConditionResult]]]:
+    """Yield the outcomes there are, undisturbed and protected, and what their conditions are."""
+    for outcomes, conditions in (
+        (results.policies, results.undisturbed),
+        (results.shielded, results.protected),
     ):
-        for condition, finding in found:
-            if wanted(condition):
-                yield _title(condition), finding
+        if outcomes:
+            yield outcomes, conditions
 
 
-def _alike(condition: StudyCondition) -> bool:
-    return condition.actions == "realised" and not condition.treatment
+def _titled(results: TaskResults) -> list[tuple[str, Finding]]:
+    """Return findings with what they compare: joint velocities, these through a protection, then intents."""
+    found = [pair for judged in _judged(results) for pair in _of(*judged)]
+    found.sort(key=lambda pair: FAMILIES.index(pair[0].family))
+    return [(_title(condition), finding) for condition, finding in found]
 
 
 def _title(condition: StudyCondition) -> str:
@@ -67,27 +55,27 @@ def _title(condition: StudyCondition) -> str:
     return f"{_PROTECTED} {condition.treatment}" if condition.treatment else _UNPROTECTED
 
 
-def _of(judged: Judged) -> Iterator[tuple[StudyCondition, Finding]]:
+def _of(
+    outcomes: Outcomes, conditions: Mapping[str, ConditionResult]
+) -> Iterator[tuple[StudyCondition, Finding]]:
     """Yield what every difference says, conditions called after their data alone: the title says the rest."""
-    if judged.outcomes is None:
-        return
-    by_label = {condition.label: condition for condition in judged.outcomes.conditions}
-    for difference in judged.outcomes.differences:
+    by_label = {condition.label: condition for condition in outcomes.conditions}
+    for difference in outcomes.differences:
         labels = [difference.label, difference.baseline]
-        names = [judged.conditions[label].label for label in labels]
+        names = [conditions[label].condition.label for label in labels]
         both = tuple(replace(by_label[label], label=name) for label, name in zip(labels, names, strict=True))
         named = replace(difference, label=names[0], baseline=names[1])
         (finding,) = outcome_findings(Outcomes(both, (named,)))
-        yield judged.conditions[difference.label], finding
+        yield conditions[difference.label].condition, finding
 
 
-def _missing(judged: Judged, baseline: str) -> Iterator[str]:
-    differences = judged.outcomes.differences if judged.outcomes else ()
+def _missing(results: TaskResults, baseline: str) -> Iterator[str]:
+    differences = results.policies.differences if results.policies else ()
     compared = {each.label for each in differences}
     alone = [
         label
-        for label, condition in judged.conditions.items()
-        if label not in compared and (condition.mode, condition.actions) != (baseline, "realised")
+        for label, each in results.undisturbed.items()
+        if label not in compared and (each.condition.mode, each.condition.actions) != (baseline, "realised")
     ]
     if alone:
         yield (
@@ -96,15 +84,11 @@ def _missing(judged: Judged, baseline: str) -> Iterator[str]:
         )
 
 
-def _cautions(judged: Judged) -> Iterator[str]:
+def _cautions(outcomes: Outcomes, conditions: Mapping[str, ConditionResult]) -> Iterator[str]:
     """Yield what the intervals leave out; budgets differ on purpose, so each for itself."""
-    found = judged.outcomes
-    for budget in dict.fromkeys(condition.budget for condition in judged.conditions.values()):
-        mine = {label for label, condition in judged.conditions.items() if condition.budget == budget}
-        if found and any(each.label in mine for each in found.differences):
-            conditions = tuple(condition for condition in found.conditions if condition.label in mine)
-            yield from training_cautions(Outcomes(conditions, _only(found.differences, mine)))
-
-
-def _only(differences: Sequence[OutcomeDifference], labels: set[str]) -> tuple[OutcomeDifference, ...]:
-    return tuple(each for each in differences if each.label in labels)
+    for budget in dict.fromkeys(each.condition.budget for each in conditions.values()):
+        mine = {label for label, each in conditions.items() if each.condition.budget == budget}
+        differences = tuple(each for each in outcomes.differences if each.label in mine)
+        if differences:
+            of_budget = tuple(condition for condition in outcomes.conditions if condition.label in mine)
+            yield from training_cautions(Outcomes(of_budget, differences))

@@ -20,7 +20,7 @@ from handrail.datasets.quality.catalogue import METRICS
 from handrail.datasets.quality.load import read_demonstrations
 from handrail.datasets.quality.measure import measure
 from handrail.scripts import cli
-from handrail.scripts.compare import _compare
+from handrail.scripts.compare import main
 
 
 @pytest.fixture(scope="module")
@@ -198,18 +198,22 @@ WRONG = {
 
 
 @pytest.mark.parametrize(("arguments", "message"), WRONG.values(), ids=WRONG)
-def test_wrong_input_is_one_line_and_code_2(arguments, message, ours, capsys):
+def test_wrong_input_is_one_line_and_code_2(arguments, message, ours, capsys, monkeypatch):
     words = [word.format(quick=ours[0], slow=ours[1]) for word in arguments]
+    monkeypatch.setattr("sys.argv", ["handrail-compare", *words])
     with pytest.raises(SystemExit) as stop:
-        cli.run(lambda: _compare(cli.parse(CompareConfig, "handrail-compare", words)))
+        main()
     assert stop.value.code == cli.BAD_INPUT
     (line,) = capsys.readouterr().err.strip().splitlines()
     assert re.search(message, line), line
 
 
-def test_the_command_says_what_it_found(ours, tmp_path, capsys):
+def test_the_command_says_what_it_found(ours, tmp_path, capsys, monkeypatch):
     words = [*ours, "--output", str(tmp_path / "out"), "--no_pictures"]
-    assert _compare(cli.parse(CompareConfig, "handrail-compare", words)) == 0
+    monkeypatch.setattr("sys.argv", ["handrail-compare", *words])
+    with pytest.raises(SystemExit) as stop:
+        main()
+    assert stop.value.code == 0
     said = capsys.readouterr().out
     assert "An operator hour gives" in said
     assert str(tmp_path / "out" / "report.html") in said

@@ -12,7 +12,7 @@ from policy_helpers import StandIn, checkpoint, load
 
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.comparison.evaluations import read_evaluations
-from handrail.policies.imitation.evaluation.conditions import arms
+from handrail.policies.imitation.evaluation.conditions import policy_conditions
 from handrail.policies.imitation.evaluation.config import FIRST_SEED, EvaluateConfig
 from handrail.policies.imitation.evaluation.evaluation import evaluate
 from handrail.policies.imitation.evaluation.table import evaluation_table
@@ -163,7 +163,7 @@ def test_an_intent_meets_the_controller_of_its_mode(folder):
 @pytest.mark.parametrize(("name", "protection"), [("bold", "mpc"), ("bold", "filter"), ("bold_hand", "own")])
 def test_protected_policies_touch_nothing_whatever_they_do(folder, name, protection):
     asked = config(folder, name, protection=protection, episodes=3, time_limit=10.0)
-    label = arms(asked)[0].label
+    label = policy_conditions(asked)[0][0].label
     for row in rollouts(evaluate(asked, load=load), label):
         assert row["contacts"] == 0
         assert row["smallest_distance"] > 0.0
@@ -179,7 +179,7 @@ def test_without_protection_the_same_policy_does_touch(folder):
 @pytest.mark.parametrize("protection", ["own", "none"])
 def test_unusable_actions_brake_and_are_counted(folder, protection):
     asked = config(folder, "nan", protection=protection, episodes=1, time_limit=2.0)
-    (row,) = rollouts(evaluate(asked, load=load), arms(asked)[0].label)
+    (row,) = rollouts(evaluate(asked, load=load), policy_conditions(asked)[0][0].label)
     assert row["malformed"] == 8  # every fifth of 40 actions
     assert row["brakes"] >= row["malformed"]
     assert row["length"] == 2.0
@@ -204,8 +204,8 @@ WRONG = {
         "expected a whole number of control periods",
     ),
     "twice": ({"perturbation": "push+push"}, ("chase",), "expected each of push, shift, delay once"),
-    "filter": ({"protection": "filter"}, ("chase",), "expected a policy that commands every joint"),
-    "rests": ({"protection": "mpc"}, ("single",), "expected a policy that commands every joint"),
+    "filter": ({"protection": "filter"}, ("chase",), "expected a policy of joint velocities"),
+    "rests": ({"protection": "mpc"}, ("single",), "expected a policy of joint velocities"),
     "tasks": ({}, ("chase", "bold"), "expected policies for one task, got pick_place, reach"),
     "the same policy": ({}, ("chase", "nan"), "expected each dataset draw and training seed once"),
     "json": ({"json": "no/such/folder/e.json"}, ("chase",), "expected a .json file in an existing folder"),

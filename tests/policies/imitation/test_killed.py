@@ -20,8 +20,8 @@ from handrail.policies.imitation.training.training import train
 from handrail.policies.study.config import StudyConfig
 from handrail.policies.study.design.jobs import Layout, jobs
 from handrail.policies.study.design.load import load_design
-from handrail.policies.study.execution.child import do
 from handrail.policies.study.execution.run import run_study
+from handrail.policies.study.execution.work import do
 
 pytestmark = [
     pytest.mark.slow,

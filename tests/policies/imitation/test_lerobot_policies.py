@@ -10,7 +10,7 @@ from policy_helpers import checkpoint, load, unable, untrained_act
 from rich.console import Console
 
 from handrail.controllers.errors import HandrailError
-from handrail.policies.imitation.evaluation.conditions import arms
+from handrail.policies.imitation.evaluation.conditions import policy_conditions
 from handrail.policies.imitation.evaluation.config import EvaluateConfig
 from handrail.policies.imitation.evaluation.evaluation import UnevaluatedError, evaluate
 from handrail.policies.imitation.evaluation.table import evaluation_table
@@ -64,8 +64,8 @@ def test_a_policy_of_plain_lerobot_drives(honest):
 
 
 def test_the_rate_is_the_one_that_is_asked_for(honest):
-    (arm,) = arms(config(honest, fps=50))
-    assert arm.checkpoint.meta.fps == 50
+    (condition,), _ = policy_conditions(config(honest, fps=50))
+    assert condition.checkpoint.meta.fps == 50
 
 
 @pytest.mark.parametrize(
@@ -74,8 +74,8 @@ def test_the_rate_is_the_one_that_is_asked_for(honest):
 )
 def test_the_features_say_which_task(size, movers, task, plain):
     reads(plain, **FEATURES | {"observation.environment_state": {"type": "ENV", "shape": [size]}})
-    (arm,) = arms(config(plain))
-    assert (arm.checkpoint.meta.environment, arm.checkpoint.movers) == (task, movers)
+    (condition,), _ = policy_conditions(config(plain))
+    assert (condition.checkpoint.meta.environment, condition.checkpoint.movers) == (task, movers)
 
 
 def picture(*shape):
@@ -91,9 +91,12 @@ def test_without_the_environment_s_state_the_task_has_to_be_said(plain):
         },
     )
     with pytest.raises(HandrailError, match="expected --task with one of drawer, pick_place, reach, tray"):
-        arms(config(plain))
-    (arm,) = arms(config(plain, task="tray"))
-    assert (arm.checkpoint.meta.environment, dict(arm.checkpoint.pictures)) == ("tray", {"wrist": (64, 64)})
+        policy_conditions(config(plain))
+    (condition,), _ = policy_conditions(config(plain, task="tray"))
+    assert (condition.checkpoint.meta.environment, dict(condition.checkpoint.pictures)) == (
+        "tray",
+        {"wrist": (64, 64)},
+    )
 
 
 @pytest.mark.parametrize(
@@ -123,7 +126,7 @@ def test_what_cannot_be_evaluated_says_why_in_one_line(features, words, plain):
 
 def test_a_task_that_is_not_its_own_is_refused(plain):
     with pytest.raises(HandrailError, match="expected the features of a task"):
-        arms(config(plain, task="drawer"))
+        policy_conditions(config(plain, task="drawer"))
 
 
 def test_what_a_policy_does_not_take_is_one_line(plain):
@@ -191,7 +194,7 @@ def test_a_label_is_shown_as_it_is(folder, tmp_path):
     Console(file=(shown := io.StringIO()), width=200).print(evaluation_table(content))
     assert "[/red]" in shown.getvalue()
     (tmp_path / "e.json").write_text(json.dumps(content | {"conditions": []}))
-    with pytest.raises(HandrailError, match="expected conditions by arm"):
+    with pytest.raises(HandrailError, match="expected conditions by label"):
         evaluate(config(folder / "good", json=str(tmp_path / "e.json")), load=load)
 
 

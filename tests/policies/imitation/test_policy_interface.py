@@ -158,7 +158,7 @@ def test_what_is_not_there_stays_zero():
 def test_json_round_trip(actions):
     columns = episode(np.random.default_rng(5), [("base",), ("ee",)])
     interface = PolicyInterface.of_dataset(FEATURES, [columns], actions)
-    assert PolicyInterface.from_dict(json.loads(json.dumps(interface.to_dict()))) == interface
+    assert PolicyInterface.from_dict(json.loads(json.dumps(dataclasses.asdict(interface)))) == interface
 
 
 def test_wrong_inputs_are_named():

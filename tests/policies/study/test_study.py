@@ -11,8 +11,8 @@ from handrail.controllers.errors import HandrailError
 from handrail.policies.study.config import StudyConfig
 from handrail.policies.study.design.jobs import jobs
 from handrail.policies.study.design.load import design_names, load_design
+from handrail.policies.study.design.progress import read_json, write_json
 from handrail.policies.study.execution.run import run_study
-from handrail.policies.study.progress.notes import read_json, write_json
 
 
 @pytest.fixture(autouse=True)
@@ -44,7 +44,7 @@ def test_changed_settings_are_done_again_and_nothing_else(tmp_path, preset):
     Path(preset).write_text(DESIGN.replace("steps = 10", "steps = 20"))
     again = Starter()
     assert run_study(config, again) == 0
-    expected = [job.name for job in jobs(load_design(preset)) if job.kind != "collect"]
+    expected = [job.name for job in jobs(load_design(preset)) if not job.cell]
     assert sorted(again.begun) == sorted(expected)
 
 

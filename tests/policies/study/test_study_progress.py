@@ -13,11 +13,10 @@ from handrail.policies.imitation.training import presets
 from handrail.policies.study.config import StudyConfig
 from handrail.policies.study.design.jobs import jobs
 from handrail.policies.study.design.load import load_design
+from handrail.policies.study.design.progress import StudyProgress, is_done, read_json, write_json
 from handrail.policies.study.design.settings import fingerprint
 from handrail.policies.study.execution.run import run_study
 from handrail.policies.study.execution.work import begin
-from handrail.policies.study.progress.notes import read_json, write_json
-from handrail.policies.study.progress.progress import StudyProgress, is_done
 
 
 @pytest.fixture

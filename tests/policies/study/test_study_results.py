@@ -13,7 +13,7 @@ from handrail.datasets.comparison.outcomes import LIKE_FOR_LIKE
 from handrail.datasets.statistics.proportions import holm
 from handrail.policies.study.design.design import Robustness, StudyDesign, Sweep, TaskDesign
 from handrail.policies.study.design.jobs import jobs
-from handrail.policies.study.report import results as studied
+from handrail.policies.study.report import gather as studied
 from handrail.policies.study.report.conditions import CONTROLLER, PROTECTED, identify
 from handrail.policies.study.report.figures import _by_treatment, figures
 from handrail.policies.study.report.how import how
@@ -112,10 +112,10 @@ def test_like_for_like_comes_first_and_a_controller_is_named(gathered):
     assert [found.answer.index(start) for start in starts] == sorted(map(found.answer.index, starts))
     assert pairs(found.shielded) == [("ee filter", "direct filter")]
     (table,) = [each for each in tables(found) if each.title == "Differences"]
-    assert [row[2] for row in table.rows] == [
-        "joint velocities, unprotected",
-        "joint velocities, both through the filter",
-        "policy plus controller",
+    assert [str(row[5]).partition("\n")[2] for row in table.rows] == [
+        "over 1 like-for-like difference",
+        "over 1 protected difference",
+        "over 1 policy-plus-controller difference",
     ]
 
 

@@ -1,5 +1,6 @@
 """How a study stands: which jobs were done with its present settings and left whole files."""
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -9,12 +10,13 @@ from typing import Any
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.comparison.evaluations import read_evaluations
 from handrail.datasets.reading.reader import read_info
+from handrail.datasets.storage import strict_json
+from handrail.datasets.storage.atomic import write_whole
 from handrail.policies.imitation.evaluation.config import EvaluateConfig
 from handrail.policies.imitation.interface.checkpoint import model_folder
 from handrail.policies.study.design.design import StudyDesign
 from handrail.policies.study.design.jobs import Cell, Job, Layout, jobs
 from handrail.policies.study.design.settings import evaluations, fingerprint
-from handrail.policies.study.progress.notes import read_json
 
 _NAMED = 3  # jobs that are not done, in words
 
@@ -97,3 +99,21 @@ def _has_rollouts(file: Path, config: EvaluateConfig) -> bool:
     wanted = set(config.seeds)
     whole = [policy for policy in policies for policy in policy.policies if wanted <= policy.rollouts.keys()]
     return len(policies) == len(whole) == len(config.protections) * len(config.perturbations)
+
+
+def read_json(path: Path) -> dict[str, Any]:
+    """Return a JSON object; an empty one if there is none."""
+    try:
+        content = strict_json.read_json(path)
+    except (OSError, ValueError):
+        return {}
+    return content if isinstance(content, dict) else {}
+
+
+def write_json(path: Path, content: Mapping[str, Any]) -> None:
+    """Write a JSON object under its name at once.
+
+    Raises:
+        OSError: the disk does not take it.
+    """
+    write_whole(path, (json.dumps(content, indent=1) + "\n").encode())
