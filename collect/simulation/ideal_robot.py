@@ -14,6 +14,8 @@ from handrail.controllers.interface.controller import State
 from handrail.controllers.robot.model import Pose, RobotModel
 from handrail.controllers.robot.shape import Obstacle
 
+_FAR = 0.15  # a pair that stays farther apart than this need not be measured exactly [m]
+
 
 class IdealRobot:
     """Integrates what it is sent; shapes that overlap count as contacts. A robot and a world.
@@ -51,6 +53,7 @@ class IdealRobot:
         self._collision = CollisionModel(model, scene.obstacles())
         self._q, self._steps = np.array(q), 0
         self._distances = self._collision.values(self._q[None])[0]
+        self._far = np.full(self._collision.size, _FAR)
 
     def state(self) -> State:
         """Return position, velocity and time."""
@@ -66,7 +69,7 @@ class IdealRobot:
         if self._scene.movers:
             self._collision.update_scene(self.obstacles())
             known = None
-        self._distances = self._collision.values(self._q[None], now=known)[0]
+        self._distances = self._collision.values(self._q[None], now=known, within=self._far)[0]
         return sent
 
     def stop(self) -> None:

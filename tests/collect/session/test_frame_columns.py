@@ -61,7 +61,7 @@ class Answer:
             work_distance=1.5 + 0.01 * k,
         )
         velocities = np.stack([state.commanded, wanted, 0.0 * wanted])
-        self.commands.append(Command(velocities, 1.0 / FPS, 0.5 + 0.01 * k, diagnostics))
+        self.commands.append(Command(velocities, 1.0 / FPS, gripper=0.5 + 0.01 * k, diagnostics=diagnostics))
         return self.commands[-1]
 
 
