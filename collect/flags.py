@@ -96,7 +96,7 @@ def command_line(command: str, config: Any) -> str:
     for entry in fields(config):
         value = getattr(config, entry.name)
         if isinstance(value, bool) and value != entry.default:
-            words.append(f"--{entry.name}" if value else f"--no_{entry.name}")
+            words.append("--" + ("" if value else "no_") + entry.name)
         elif value != entry.default:
             words.append(f"--{entry.name} {value}")
     return " ".join(words)
