@@ -2,12 +2,15 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from handrail.controllers.arrays import BoolArray
 from handrail.controllers.errors import unknown_name
-from handrail.controllers.robot.description import RobotDescription
+
+if TYPE_CHECKING:  # the command line asks for names of channels, and shall not wait for a robot
+    from handrail.controllers.robot.description import RobotDescription
 
 _BASE = ("base.vx", "base.vy", "base.wz")
 TOOL = ("ee.vx", "ee.vy", "ee.vz", "ee.wx", "ee.wy", "ee.wz")
@@ -31,7 +34,7 @@ class Channels:
     joints: tuple[str, ...]
 
     @classmethod
-    def of(cls, description: RobotDescription) -> "Channels":
+    def of(cls, description: "RobotDescription") -> "Channels":
         """Return the channels of a robot."""
         joints = tuple(f"joint.{name}" for name in description.joints)
         return cls(_BASE if description.base_joints else (), TOOL, joints)
