@@ -35,7 +35,7 @@ def _checksums_elsewhere(tmp_path_factory: pytest.TempPathFactory):
     from handrail.datasets.recording import checksums
 
     folder = tmp_path_factory.mktemp("checksums")
-    with mock.patch.object(checksums, "_folder", return_value=folder):
+    with mock.patch.object(checksums, "memory_folder", return_value=folder):
         yield
 
 

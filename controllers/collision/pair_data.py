@@ -14,6 +14,9 @@ class PairData:
     Coal's results lie in one C++ vector, each with normal and both nearest points side by side, and the
     binding hands out views of that memory: one strided view reads them all. Where a build lays them out
     otherwise, they are read one by one.
+
+    Attributes:
+        view: of that memory, (P, 9); None where it does not serve.
     """
 
     def __init__(
@@ -22,7 +25,7 @@ class PairData:
         self.geometry = pin.GeometryData(geometry)
         pin.computeDistances(model, data, geometry, self.geometry, neutral)
         self._results = self.geometry.distanceResults
-        self._view = self._strided(self._results)
+        self.view = self._strided(self._results)
         self._selected = np.ones(len(geometry.collisionPairs), dtype=bool)
         self._chosen = np.flatnonzero(self._selected)
         self._key = self._selected.tobytes()
@@ -42,7 +45,7 @@ class PairData:
 
     def read(self) -> FloatArray:
         """Return normals, first and second nearest points in the world, side by side, (P, 9)."""
-        return self._one_by_one() if self._view is None else self._view
+        return self.one_by_one() if self.view is None else self.view
 
     def _strided(self, results: pin.StdVec_DistanceResult) -> FloatArray | None:
         if not len(results):
@@ -52,11 +55,12 @@ class PairData:
         if first.flags.owndata or last.flags.owndata or rest or not 72 <= stride <= 4096:
             return None
         view = np.lib.stride_tricks.as_strided(first, (len(results), 9), (stride, 8), writeable=False)
-        if stride not in _STRIDES and np.array_equal(view, self._one_by_one()):
+        if stride not in _STRIDES and np.array_equal(view, self.one_by_one()):
             _STRIDES.add(stride)
         return view if stride in _STRIDES else None
 
-    def _one_by_one(self) -> FloatArray:
+    def one_by_one(self) -> FloatArray:
+        """Return what `read` does, (P, 9), asking coal for every pair."""
         rows = [[*r.normal, *r.getNearestPoint1(), *r.getNearestPoint2()] for r in self._results]
         return np.array(rows).reshape(-1, 9)
 

@@ -104,7 +104,7 @@ def compare(config: CompareConfig) -> Comparison:
     groups = load_groups(config.datasets, config.by, config.labels, config.columns)
     baseline = baseline_of(groups, config.baseline)
     conditions = _conditions(config, groups)
-    pairs = _pairs(list(conditions), baseline, [group.label for group in groups])
+    pairs = pairs_between(list(conditions), baseline, [group.label for group in groups])
     rng = np.random.default_rng(config.seed)
     chosen = {
         "all episodes": groups,
@@ -149,7 +149,7 @@ def _conditions(config: CompareConfig, groups: Sequence[Group]) -> dict[str, Con
     return conditions
 
 
-def _pairs(conditions: Sequence[str], baseline: str, labels: Sequence[str]) -> list[Pair]:
+def pairs_between(conditions: Sequence[str], baseline: str, labels: Sequence[str]) -> list[Pair]:
     """Return each condition of another group with that of the baseline's group it is compared with.
 
     That is the one that shares most of the words after the label and has none of its own: `ee intent same

@@ -27,7 +27,9 @@ class Checksums:
     def __init__(self, root: Path, anew: bool = False):
         """See the class."""
         self._root = root
-        self._memory = _folder() / f"{hashlib.sha256(str(root.resolve()).encode()).hexdigest()[:24]}.json"
+        self._memory = (
+            memory_folder() / f"{hashlib.sha256(str(root.resolve()).encode()).hexdigest()[:24]}.json"
+        )
         self._known: dict[str, Any] = {} if anew else self._remembered()
         self._used: dict[str, Any] = {}
 
@@ -58,6 +60,7 @@ class Checksums:
         return content if isinstance(content, dict) else {}
 
 
-def _folder() -> Path:
+def memory_folder() -> Path:
+    """Return where it is kept what was checked, and when."""
     cache = Path(os.environ.get("XDG_CACHE_HOME", "~/.cache")).expanduser()
     return cache / "handrail" / "checksums"

@@ -89,7 +89,7 @@ class GoalReachingEnv(gymnasium.Env[FloatArray, FloatArray]):
         check_robot(self.model)
         self.observation_space = spaces.Box(-_BOUND, _BOUND, (OBSERVATION_SIZE,), np.float32)
         self.action_space = spaces.Box(-1.0, 1.0, (ACTION_SIZE,), np.float32)
-        self._arm = ArmCompletion(self.model)
+        self.arm = ArmCompletion(self.model)
         self._reward = reward or Reward()
         self._early_failure, self._physics = early_failure, physics
         self._repeat_missed = repeat_missed
@@ -107,19 +107,19 @@ class GoalReachingEnv(gymnasium.Env[FloatArray, FloatArray]):
         self._measure()
         self.planner = StraightPlanner.plan(*self._pose, goal)
         self._start, self._previous = self.q[:3].copy(), np.zeros(ACTION_SIZE)
-        self._time = self._failures = 0
+        self.time = self._failures = 0
         return self._observation(), {}
 
     def step(self, action: FloatArray) -> tuple[FloatArray, float, bool, bool, dict[str, Any]]:
         """Drive the base for one step and let the arm follow the planner's twist."""
         action = np.clip(np.asarray(action, dtype=np.float64), -1.0, 1.0)
-        base, twist = base_velocity(action, self.q[2]), clamp_twist(self.planner.twist(self._time))
-        self.command = self._arm.velocity(self.q, self.command, base, twist, STEP)
+        base, twist = base_velocity(action, self.q[2]), clamp_twist(self.planner.twist(self.time))
+        self.command = self.arm.velocity(self.q, self.command, base, twist, STEP)
         self._plant.send(np.append(self.command, 0.0))
         touches = bool(self._plant.contacts)
         self._measure()
-        self._time += 1
-        d, r = pose_error(*self._pose, Pose(*self.planner.pose(self._time)))
+        self.time += 1
+        d, r = pose_error(*self._pose, Pose(*self.planner.pose(self.time)))
         reward = self._reward.value(d, r, action, self._previous)
         self._previous = action
         self._failures += not reached(d, r)
@@ -127,7 +127,7 @@ class GoalReachingEnv(gymnasium.Env[FloatArray, FloatArray]):
         reward -= self._reward.scale * self._reward.failure * failed
         d_p, d_r = pose_error(*self._pose, self.planner.goal)
         success = reached(d_p, d_r) and not failed
-        timed_out = self._time >= T_MAX
+        timed_out = self.time >= T_MAX
         if (failed or timed_out) and not success:
             self._missed.append(self.planner.goal)
         info = {"is_success": success, "failed": failed, "touches": touches}
@@ -153,9 +153,9 @@ class GoalReachingEnv(gymnasium.Env[FloatArray, FloatArray]):
         situation = Situation(
             q=self.q,
             start=self._start,
-            twist=clamp_twist(self.planner.twist(self._time)),
+            twist=clamp_twist(self.planner.twist(self.time)),
             current=self._pose,
-            desired=self.planner.pose(self._time),
+            desired=self.planner.pose(self.time),
             goal=(goal.position, goal.rotation),
             previous=self._previous,
         )

@@ -125,13 +125,14 @@ class Watch(BaseCallback):
 
 def _new(config: TrainRlConfig) -> tuple[SAC, Curve]:
     begin_run(config)
-    model = _model(config)
+    model = new_model(config)
     if config.start_from:
         model.policy.load_state_dict(last_networks(Path(config.start_from).expanduser()))
     return model, []
 
 
-def _model(config: TrainRlConfig) -> SAC:
+def new_model(config: TrainRlConfig) -> SAC:
+    """Return an actor and critics that have learned nothing."""
     return SAC(
         "MlpPolicy",
         _environment(config),
@@ -154,7 +155,7 @@ def _model(config: TrainRlConfig) -> SAC:
 
 def _resumed(config: TrainRlConfig) -> tuple[SAC, Curve]:
     last = check_resumes(config)
-    model = _model(config)
+    model = new_model(config)
     curve = resume_run(last, model)
     model.set_random_seed(config.seed + model.num_timesteps)  # else the same goals would come again
     return model, curve

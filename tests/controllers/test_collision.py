@@ -1,9 +1,12 @@
 """Distances' laws: gradients against finite differences, bulk reading against one by one."""
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 from handrail.controllers.collision.model import CollisionModel
+from handrail.controllers.collision.pair_data import PairData
+from handrail.controllers.collision.shape_pairs import ShapePairs
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.robot.model import load_model
 from handrail.controllers.robot.shape import Obstacle, Shape
@@ -39,12 +42,13 @@ def test_gradients_are_the_derivatives_of_the_distances():
 
 
 def test_bulk_reading_is_reading_one_by_one():
-    collision = CollisionModel(MODEL, scene(np.random.default_rng(1)))
-    reader = collision._all
-    assert reader._view is not None, "coal lays its results out differently: updates will be slow"
+    model, geometry = MODEL.pinocchio, ShapePairs(MODEL, scene(np.random.default_rng(1))).geometry
+    data = model.createData()
+    reader = PairData(model, data, geometry, pin.neutral(model))
+    assert reader.view is not None, "coal lays its results out differently: updates will be slow"
     for q in np.random.default_rng(2).uniform(-2, 2, (10, MODEL.size)):
-        collision.values(q[None])
-        np.testing.assert_array_equal(reader.read(), reader._one_by_one())
+        pin.computeDistances(model, data, geometry, reader.geometry, q)
+        np.testing.assert_array_equal(reader.read(), reader.one_by_one())
 
 
 def test_what_is_skipped_is_far():

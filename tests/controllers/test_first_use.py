@@ -54,6 +54,28 @@ def test_a_library_of_casadi_is_told_and_one_in_the_cache_is_not(told, tmp_path,
     assert told == ["compiling"]
 
 
+@pytest.mark.parametrize("missing", ["compiler", "wish", "compiler that works"])
+def test_without_a_compiler_the_numbers_are_the_same(told, tmp_path, monkeypatch, missing):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    monkeypatch.delenv("HANDRAIL_COMPILE", raising=False)
+    x = ca.SX.sym("x", 3)
+    function = ca.Function("tangled", [x], [ca.sin(x[0]) * x[1] / (1.0 + x[2] ** 2) + ca.exp(x)])
+    fast = compiled(function)
+    if missing == "wish":
+        monkeypatch.setenv("HANDRAIL_COMPILE", "0")
+    else:
+        monkeypatch.setenv("PATH", str(tmp_path))
+    if missing == "compiler that works":
+        monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "empty"))
+        (tmp_path / "cc").write_text("#!/bin/sh\nexit 1\n")
+        (tmp_path / "cc").chmod(0o755)
+    slow = compiled(function)
+    assert slow is function
+    for number in range(20):
+        point = [0.1 * number, 2.0 - number, 0.3]
+        assert fast(point).full().tolist() == slow(point).full().tolist()
+
+
 def test_a_command_says_it_on_standard_error_in_one_line():
     code = (
         "from handrail.scripts import cli;"

@@ -34,7 +34,7 @@ class Preset:
 
 
 _ENSEMBLE = "temporal_ensemble_coeff"
-_ACT_CPU: dict[str, Any] = {
+ACT_CPU: dict[str, Any] = {
     "chunk_size": 20,
     "n_action_steps": 1,
     _ENSEMBLE: 0.01,  # averaging over overlapping chunks: 90 % instead of 65 % on pick_place
@@ -50,7 +50,7 @@ _DIFFUSION: dict[str, Any] = {"noise_scheduler_type": "DDIM", "num_inference_ste
 _DIFFUSION_CPU = _DIFFUSION | {"horizon": 16, "n_action_steps": 8, "down_dims": [64, 128, 256]}
 _DIFFUSION_GPU = _DIFFUSION | {"horizon": 32, "n_action_steps": 16, "drop_n_last_frames": 15}
 _PRESETS = {
-    ("act", "cpu"): Preset(_ACT_CPU, lr=5e-4, cosine=True, steps=10_000, batch_size=32),
+    ("act", "cpu"): Preset(ACT_CPU, lr=5e-4, cosine=True, steps=10_000, batch_size=32),
     ("act", "gpu"): Preset(_ACT_GPU, lr=5e-5, cosine=True),
     ("diffusion", "cpu"): Preset(_DIFFUSION_CPU, lr=3e-4, steps=10_000),
     ("diffusion", "gpu"): Preset(_DIFFUSION_GPU, lr=1e-4),

@@ -25,7 +25,7 @@ from handrail.policies.study.design.settings import check_policies
 from handrail.policies.study.execution.work import FAILED, do
 
 _PRELOAD = "handrail.policies.study.execution.preload"
-_ASLEEP = 0.2  # between two looks at the running jobs [s]
+LOOK_PERIOD = 0.2  # between two looks at the running jobs [s]
 _TAIL = 300  # characters of a failed job's last words
 
 
@@ -121,7 +121,7 @@ def _run_all(start: Start, workers: int, progress: StudyProgress, state: _State,
                 state.running[job.name] = (job, start(job, design, layout))
             if not state.running:
                 break
-            time.sleep(_ASLEEP)
+            time.sleep(LOOK_PERIOD)
             _collect_finished(state, layout)
             now = ", ".join(state.running)
             shown.update(bar, completed=len(state.done), now=now)
@@ -137,10 +137,10 @@ def _collect_finished(state: _State, layout: Layout) -> None:
         if process.exitcode == 0:
             state.done.add(name)
         else:
-            state.failed[name] = _last_words(layout.log(job), process.exitcode)
+            state.failed[name] = last_words(layout.log(job), process.exitcode)
 
 
-def _last_words(log: Path, code: int | None) -> str:
+def last_words(log: Path, code: int | None) -> str:
     """Return what a job said last: its error in a line, or the end of what it wrote."""
     text = log.read_text(encoding="utf-8", errors="replace") if log.is_file() else ""
     errors = [line for line in text.splitlines() if line.startswith("error: ")]

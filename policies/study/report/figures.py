@@ -82,7 +82,7 @@ def _robustness(design: StudyDesign, results: Sequence[TaskResults]) -> Any:
             dict.fromkeys(replace(found.condition, treatment="") for found in each.disturbed.values())
         )
         for place, condition in enumerate(conditions):
-            shown = _by_treatment(each, condition)
+            shown = by_treatment(each, condition)
             xs = [names.index(name) for name in shown]
             shift = 0.5 * ((place + 0.5) / len(conditions) - 0.5)
             values = np.array([outcome.share for outcome in shown.values()])
@@ -100,7 +100,7 @@ def _robustness(design: StudyDesign, results: Sequence[TaskResults]) -> Any:
     return figure
 
 
-def _by_treatment(results: TaskResults, condition: StudyCondition) -> dict[str, ConditionOutcome]:
+def by_treatment(results: TaskResults, condition: StudyCondition) -> dict[str, ConditionOutcome]:
     """Return a condition disturbed, and undisturbed: the same policies in the same scenes."""
     mine = [
         found for found in results.disturbed.values() if replace(found.condition, treatment="") == condition

@@ -34,10 +34,10 @@ def gather(progress: StudyProgress, rng: np.random.Generator) -> list[TaskResult
         rng: of the resampling.
     """
     design = progress.design
-    return _in_words([_task(task, design, progress, rng) for task in design.tasks], design)
+    return in_words([task_results(task, design, progress, rng) for task in design.tasks], design)
 
 
-def _in_words(results: Sequence[TaskResults], design: StudyDesign) -> list[TaskResults]:
+def in_words(results: Sequence[TaskResults], design: StudyDesign) -> list[TaskResults]:
     """Return results with p adjusted over all tasks, every family for itself, and what that says."""
     found = [outcomes for each in results for outcomes in (each.policies, each.shielded)]
     adjusted = iter(in_families([each for outcomes in found if outcomes for each in outcomes.differences]))
@@ -51,12 +51,15 @@ def _in_words(results: Sequence[TaskResults], design: StudyDesign) -> list[TaskR
     return [replace(each, answer=answer(each), findings=findings(each, design.baseline)) for each in judged]
 
 
-def _task(task: str, design: StudyDesign, progress: StudyProgress, rng: np.random.Generator) -> TaskResults:
+def task_results(
+    task: str, design: StudyDesign, progress: StudyProgress, rng: np.random.Generator
+) -> TaskResults:
+    """Return what came of a task, p not adjusted yet."""
     cells = {mode: Cell(task, mode) for mode in design.modes}
-    data = {mode: _collected(progress, cell) for mode, cell in cells.items()}
-    nominal = _conditions(design, progress, task, "nominal")
-    disturbed = _conditions(design, progress, task, "disturbed")
-    protected = _conditions(design, progress, task, "protected")
+    data = {mode: read_collected(progress, cell) for mode, cell in cells.items()}
+    nominal = read_conditions(design, progress, task, "nominal")
+    disturbed = read_conditions(design, progress, task, "disturbed")
+    protected = read_conditions(design, progress, task, "protected")
     kinds = [identify(design, list(conditions)) for conditions in (nominal, disturbed, protected)]
     return TaskResults(
         task=task,
@@ -80,14 +83,15 @@ def _judged(
     return judge_pairs(ordered, pairs(kinds, baseline), rng) if conditions else None
 
 
-def _collected(progress: StudyProgress, cell: Cell) -> Collected | None:
+def read_collected(progress: StudyProgress, cell: Cell) -> Collected | None:
+    """Return what was collected in a cell; None where there is no dataset."""
     root = progress.dataset(cell)
     if root is None:
         return None
     return collected(Group(cell.mode, read_info(root), tuple(read_demonstrations(root))))
 
 
-def _conditions(
+def read_conditions(
     design: StudyDesign, progress: StudyProgress, task: str, what: str, noise: float = 1.0
 ) -> dict[str, Condition]:
     """Return the conditions of a task under some treatments, in the order of the design's modes."""
@@ -104,8 +108,8 @@ def _sweep(
         return {}
     points: dict[str, list[SweepPoint]] = {}
     for noise in sorted({1.0, *design.sweep.noises}):
-        conditions = _conditions(design, progress, task, "nominal", noise)
-        data = {mode: _collected(progress, Cell(task, mode, noise)) for mode in design.modes}
+        conditions = read_conditions(design, progress, task, "nominal", noise)
+        data = {mode: read_collected(progress, Cell(task, mode, noise)) for mode in design.modes}
         for label, kind in identify(design, list(conditions)).items():
             found, condition = data[kind.mode], _of_sweep(conditions[label], design.sweep)
             if kind.budget == design.budgets[0] and found and found.successes and condition:

@@ -1,6 +1,7 @@
 """The safety fuzz: rude intents in clutter with movers, in physics, without the environment's limiter."""
 
 from collections import Counter
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -35,7 +36,7 @@ def check(seeds, seconds, movers=0, robot="ridgeback_ur10", make=MaskedMpc, fail
     assert not {seed: r.standing for seed, r in results.items() if r.standing}
     assert max(result.velocity_excess for result in results.values()) < EXCESS
     assert max(result.acceleration_excess for result in results.values()) < EXCESS
-    assert travelled[1] > 0.3 * seconds  # a robot that freezes is safe too
+    assert travelled[1] > 0.3 * seconds, f"travelled {travelled[1]} m: a robot that freezes is safe too"
     return statuses, [seed for seed, result in results.items() if result.moving]
 
 
@@ -54,6 +55,18 @@ def test_rude_intents_among_movers(movers):
 def test_rude_intents_in_clutter_with_a_solver_that_fails():
     statuses, _ = check(range(1000, 1004), seconds=5.0, failures=0.05)
     assert statuses["solver_failed"] > 20
+
+
+class Frozen(MaskedMpc):
+    """Safe, and of no use: it lets the operator move nothing."""
+
+    def update(self, state, intent):
+        return super().update(state, replace(intent, values=np.zeros_like(intent.values)))
+
+
+def test_a_controller_that_freezes_fails():
+    with pytest.raises(AssertionError, match="travelled"):
+        check(range(1000, 1002), 5.0, make=Frozen)
 
 
 @pytest.mark.slow

@@ -238,14 +238,14 @@ def test_how_many_trials_scenes_are_worth():
 def test_an_arm_is_compared_with_the_baseline_of_its_own_kind():
     labels = ["ee", "direct"]
     arms = ["ee", "ee intent", "direct", "ee intent same number", "direct same number", "ee filter"]
-    assert comparing._pairs(arms, "direct", labels) == [
+    assert comparing.pairs_between(arms, "direct", labels) == [
         Pair("ee", "direct"),
         Pair("ee intent", "direct", comparing.MIXED),
         Pair("ee intent same number", "direct same number", comparing.MIXED),
         Pair("ee filter", "direct", comparing.MIXED),
     ]
-    assert comparing._pairs(["ee"], "direct", labels) == []
+    assert comparing.pairs_between(["ee"], "direct", labels) == []
     with pytest.raises(
         HandrailError, match="expected a condition 'direct' to compare 'ee' with, got ee, direct same"
     ):
-        comparing._pairs(["ee", "direct same number"], "direct", labels)
+        comparing.pairs_between(["ee", "direct same number"], "direct", labels)

@@ -64,7 +64,7 @@ def test_a_whole_dataset_is_hashed_once(root, hashed):
 def test_torn_memory_is_no_memory(root, hashed):
     check_whole(root)
     for content in (b"{", b"[]", b'{"data/chunk-000/file-000.parquet": 3}', b"\xff" * 9):
-        for path in checksums._folder().iterdir():
+        for path in checksums.memory_folder().iterdir():
             path.write_bytes(content)
         hashed.clear()
         check_whole(root)

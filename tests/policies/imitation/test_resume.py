@@ -79,7 +79,7 @@ def test_a_training_does_not_go_on_with_other_data_fewer_steps_or_other_sizes(
             train(dataclasses.replace(config, dataset=StoredConfig(root=str(root))), quiet=True)
     with pytest.raises(HandrailError, match="--steps 5: expected 6 or more"):
         train(dataclasses.replace(config, steps=5), quiet=True)
-    monkeypatch.setitem(presets._ACT_CPU, "dropout", 0.1)
+    monkeypatch.setitem(presets.ACT_CPU, "dropout", 0.1)
     with pytest.raises(HandrailError, match=r"dropout 0\.1: expected 0\.0"):
         train(config, quiet=True)
 

@@ -133,7 +133,7 @@ def test_physics_are_the_ideal_robot_s_but_for_the_servos():
 def test_the_arm_follows_the_planner_where_nothing_limits_it():
     """Law: without damping and with a base at rest the tool arrives where the planner does."""
     env = GoalReachingEnv(early_failure=False)
-    env._arm = ArmCompletion(env.model, damping=1e-9)
+    env.arm = ArmCompletion(env.model, damping=1e-9)
     start = env.model.pose(env.model.description.home)
     goal = Pose(start.position + [-0.1, 0.1, 0.05], start.rotation)
     env.reset(options={"goal": goal})
@@ -158,7 +158,7 @@ def run(env, action):
     while not (terminated or truncated):
         *_, terminated, truncated, info = env.step(action)
         tool = env.model.pose(env.q)
-        d, r = pose_error(tool.position, tool.rotation, Pose(*env.planner.pose(env._time)))
+        d, r = pose_error(tool.position, tool.rotation, Pose(*env.planner.pose(env.time)))
         lost += d > 0.1 or r > 0.05
     return lost, terminated, truncated, info
 
@@ -224,7 +224,7 @@ def test_an_evaluation_goes_on_to_the_last_step():
     lost, terminated, truncated, info = run(env, np.array([-1.0, 0.0, 0.0]))
     assert lost > 20
     assert (terminated, truncated) == (False, True)
-    assert env._time == T_MAX
+    assert env.time == T_MAX
     assert not info["failed"]
 
 

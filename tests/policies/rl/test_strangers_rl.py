@@ -22,7 +22,7 @@ pytest.importorskip("tensorboard")
 import torch
 
 from handrail.policies.rl.checkpoint import resume_run
-from handrail.policies.rl.train import _model, train
+from handrail.policies.rl.train import new_model, train
 
 TINY = TrainRlConfig(
     steps=40,
@@ -155,7 +155,7 @@ def test_malformed_settings_are_one_line(content, run):
 
 def test_a_run_goes_on_with_all_that_it_had(honest):
     """Law: networks, optimisers, temperature, transitions and counters are those of the checkpoint."""
-    model = _model(honest)
+    model = new_model(honest)
     curve = resume_run(checkpoint(honest), model)
     place = checkpoint(honest)
     from stable_baselines3 import SAC

@@ -18,7 +18,7 @@ from handrail.policies.study.execution.run import run_study
 @pytest.fixture(autouse=True)
 def impatient(monkeypatch):
     """Made-up jobs end at once: look at them more often than at real ones."""
-    monkeypatch.setattr("handrail.policies.study.execution.run._ASLEEP", 0.005)
+    monkeypatch.setattr("handrail.policies.study.execution.run.LOOK_PERIOD", 0.005)
 
 
 @pytest.fixture

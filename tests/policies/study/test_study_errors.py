@@ -13,7 +13,7 @@ from handrail.policies.study.config import StudyConfig
 from handrail.policies.study.design import design as design_module
 from handrail.policies.study.design.design import Robustness, StudyDesign, Sweep, TaskDesign
 from handrail.policies.study.design.load import load_design
-from handrail.policies.study.execution.run import _last_words, run_study
+from handrail.policies.study.execution.run import last_words, run_study
 from handrail.scripts.study import main
 
 
@@ -98,7 +98,7 @@ def test_a_failed_job_is_told_by_what_it_said_this_time(tmp_path, preset, capsys
     run_study(StudyConfig(preset, str(tmp_path / "study")), Starter(failing="collect/reach/ee"))
     assert "collect/reach/ee: without a word (exit code 1" in capsys.readouterr().err.replace("\n", " ")
     log.write_text("warning\nerror: of today\nlast\n")
-    assert _last_words(log, 1).startswith("of today (exit code 1")
+    assert last_words(log, 1).startswith("of today (exit code 1")
 
 
 @pytest.mark.parametrize("marks", ["{0}\nold", "old\n{1}", "{1}\nold\n{0}", "{0}\n{0}\n{1}", "{0}\n{1}\n{1}"])

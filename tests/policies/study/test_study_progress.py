@@ -75,7 +75,7 @@ def test_the_preset_s_sizes_are_part_of_what_a_policy_depends_on(tmp_path, prese
     design, layout, found = everything(tmp_path, preset)
     policies = {job.name for job in found if job.policy}
     assert StudyProgress(design, layout).missing == []
-    monkeypatch.setitem(presets._ACT_CPU, "dropout", 0.1)
+    monkeypatch.setitem(presets.ACT_CPU, "dropout", 0.1)
     lost = {job.name for job in found if not is_done(job, design, layout)}
     assert lost == policies | {job.name for job in found if job.task}
 

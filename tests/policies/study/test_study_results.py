@@ -15,7 +15,7 @@ from handrail.policies.study.design.design import Robustness, StudyDesign, Sweep
 from handrail.policies.study.design.jobs import jobs
 from handrail.policies.study.report import gather as studied
 from handrail.policies.study.report.conditions import CONTROLLER, PROTECTED, identify
-from handrail.policies.study.report.figures import _by_treatment, figures
+from handrail.policies.study.report.figures import by_treatment, figures
 from handrail.policies.study.report.how import how
 from handrail.policies.study.report.tables import tables
 
@@ -56,13 +56,13 @@ def gathered(monkeypatch):
         def read(design, _, task, what, noise=1.0):
             return {k: v for k, v in made(design, task, what, noise).items() if k not in missing}
 
-        monkeypatch.setattr(studied, "_conditions", read)
+        monkeypatch.setattr(studied, "read_conditions", read)
         monkeypatch.setattr(
-            studied, "_collected", lambda _, cell: Collected(cell.mode, 10, 9, (0.6, 1.0), 90.0, 900, {})
+            studied, "read_collected", lambda _, cell: Collected(cell.mode, 10, 9, (0.6, 1.0), 90.0, 900, {})
         )
         rng = np.random.default_rng(0)
-        found = [studied._task(task, design, None, rng) for task in design.tasks]  # type: ignore[arg-type]
-        return studied._in_words(found, design)
+        found = [studied.task_results(task, design, None, rng) for task in design.tasks]  # type: ignore[arg-type]
+        return studied.in_words(found, design)
 
     return gather
 
@@ -152,7 +152,7 @@ def test_undisturbed_beside_disturbed_is_the_same_policies_in_the_same_scenes(ga
         assert (each.change.paired, each.change.trials) == (True, (15,))
         assert each.change.estimate == pytest.approx(each.outcome.share - each.without.share)
     pushed = found.disturbed["ee pushed"]
-    shown = _by_treatment(found, found.undisturbed["ee"].condition)
+    shown = by_treatment(found, found.undisturbed["ee"].condition)
     assert shown == {"undisturbed": pushed.without, "pushed": pushed.outcome}
 
 

@@ -1,15 +1,18 @@
-"""Tests of this floor look at what is public: they survive a change of what is inside."""
+"""Tests look at what is public: they survive a change of what is inside."""
 
 import ast
 from pathlib import Path
 
 import pytest
 
-FILES = sorted(Path(__file__).parent.rglob("test_*.py"))
+FILES = sorted(Path(__file__).parent.parent.rglob("test_*.py"))
+
+
+OTHERS = {"_replace", "_asdict", "_n_updates"}  # of named tuples, and of stable-baselines3
 
 
 def is_private(name: str) -> bool:
-    return name.startswith("_") and not name.startswith("__")
+    return name.startswith("_") and not name.startswith("__") and name not in OTHERS
 
 
 def private_names(tree: ast.Module) -> list[str]:
