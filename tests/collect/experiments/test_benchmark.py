@@ -9,11 +9,13 @@ from io import StringIO
 import numpy as np
 import pytest
 from command_helpers import command
+from figure_helpers import shows
 from rich.console import Console
 
 from handrail.collect.experiments.benchmark.benchmark import benchmark
 from handrail.collect.experiments.benchmark.catalogue import BASELINES
 from handrail.collect.experiments.benchmark.config import BenchmarkConfig
+from handrail.collect.experiments.benchmark.figures import figures
 from handrail.collect.experiments.benchmark.metrics import METRICS
 from handrail.collect.experiments.benchmark.report import write_page
 from handrail.collect.experiments.benchmark.run import available, conditions, goals, run, trace_of
@@ -58,6 +60,26 @@ def test_the_json_has_every_controller_measure_and_episode(written):
     keys = {(row["controller"], row["profile"], row["goal"]) for row in found["episodes"]}
     assert len(keys) == len(found["episodes"]) == 8
     assert set(METRICS) <= set(found["episodes"][0])
+
+
+def test_figures_show_what_was_measured(written):
+    folder, _ = written
+    found = json.loads((folder / "all.json").read_text())
+    config = replace(QUICK, profile="nominal,fast3")
+    episodes = [each for some in run(config, (BASELINES["mpc"], BASELINES["dls"])) for each in some]
+    made = figures(found, episodes, goals(config))
+    for name in ("mpc", "dls"):
+        own = [row for row in found["episodes"] if row["profile"] == "nominal" and row["controller"] == name]
+        assert shows(made["distributions"], np.median([row["arm_effort"] for row in own]))
+        assert shows(
+            made["profiles"], [cell[name]["jerkiness"]["mean"] for cell in found["profiles"].values()]
+        )
+    entry = found["paired"]["nominal"]["dls"]["base_path"]
+    assert shows(made["paired"], [entry["mean"], *entry["bootstrap_interval"]])
+    for each in episodes:
+        if each.paths and each.row["profile"] == "nominal":
+            assert shows(made["paths"], each.paths[1][[0, -1]])
+    assert not shows(made["paired"], 12.345)
 
 
 def test_the_report_carries_everything_with_it(written):

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from compare_helpers import check_texts, handrail_dataset, quick_and_slow
+from figure_helpers import drawn_numbers, shows
 
 from handrail.datasets.comparison.compare import compare
 from handrail.datasets.comparison.config import CompareConfig
@@ -93,6 +94,27 @@ def test_intervals_that_are_cut_carry_arrows():
 def test_right_is_better():
     assert drawn(LENGTH, 3.0, 1.0, 9.0, sign=-1.0) == [(-4.0, "<"), (-3.0, "o")]
     assert (turned(LENGTH, True), turned(DISTANCE, True), turned(LENGTH, False)) == (True, False, False)
+
+
+def test_figures_show_what_was_measured(alike):
+    everything = alike.everything
+    (first, _) = answer_panels(alike)
+    assert shows(first.figure, [100 * each.successes / each.episodes for each in everything.collected])
+    for panel, metric in zip(metrics_panels(alike), shown_metrics(alike), strict=True):
+        for found in everything.measurements.values[metric].values():
+            if found.applies:
+                assert shows(panel.figure, [found.mean, *found.known])
+    tested = [each for each in everything.differences if each.tested and not each.reason]
+    near = [abs(each.effect[0]) for each in tested if abs(each.effect[0]) < 4.0]
+    pictures = np.abs(np.concatenate([drawn_numbers(panel.figure) for panel in effects_panels(alike)]))
+    assert near
+    assert all(np.isclose(pictures, value).any() for value in near)
+
+
+def shown_metrics(comparison):
+    values = comparison.everything.measurements.values
+    names = dict.fromkeys(each.metric.name for each in comparison.everything.differences)
+    return [name for name in names if any(found.applies for found in values[name].values())]
 
 
 def test_metrics_are_turned_so_that_right_is_better(alike):

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from compare_helpers import check_texts
+from figure_helpers import shows
 
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.comparison.collection import Collected
@@ -197,6 +198,20 @@ def test_how_to_read_it_says_what_was_done(gathered):
     )
     empty = how(DESIGN, gathered(DESIGN, missing=("ee", "direct", "ee intent")))
     assert not any(words in empty for words in ("Holm", "Intervals", "McNemar"))
+
+
+def test_figures_show_what_was_found(gathered):
+    design = replace(ROBUST, sweep=Sweep(tuple(ROBUST.tasks), (0.0, 2.0), (0, 1)))
+    (found,) = gathered(design)
+    made = figures(design, [found])
+    shares = [100 * each.outcome.share for each in found.undisturbed.values()]
+    assert len(set(shares)) > 1
+    assert shows(made["answer"], shares)
+    assert shows(made["robustness"], [100 * each.outcome.share for each in found.disturbed.values()])
+    points = [point for line in found.sweep.values() for point in line]
+    assert shows(made["sweep"], [100 * point.outcome.share for point in points])
+    assert shows(made["sweep"], [point.seconds for point in points])
+    assert not shows(made["answer"], 12.345)
 
 
 def test_no_text_of_a_figure_covers_another(gathered):
