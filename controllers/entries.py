@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from difflib import get_close_matches
 from typing import Any, TypeGuard
 
 from handrail.controllers.errors import HandrailError, shown
@@ -41,8 +42,10 @@ def check_entries(content: Any, entries: Mapping[str, Entry], where: str) -> Non
         raise HandrailError(f"{where}: expected a table of {', '.join(entries)}, got {shown(content)}")
     for name in content:
         if name not in entries:
+            near = get_close_matches(str(name), entries, 1)
+            hint = f"; nearest: {near[0]}" if near else ""
             raise HandrailError(
-                f"{where}: unknown entry {shown(name)}; expected some of {', '.join(entries)}"
+                f"{where}: unknown entry {shown(name)}; expected some of {', '.join(entries)}{hint}"
             )
     for name, entry in entries.items():
         if name not in content:

@@ -247,6 +247,18 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             "time": state.time,
         }
 
+    def checkpoint(self) -> object:
+        """Return where the episode stands, to come back to."""
+        return self.world.checkpoint(), self._steps
+
+    def restore(self, checkpoint: Any) -> tuple[Observation, dict[str, Any]]:
+        """Come back to where the episode stood; from there all goes on as it did."""
+        plant, self._steps = checkpoint
+        self.world.restore(plant)
+        state = self.task_state()
+        sent = np.append(self.robot.state().commanded, 0.0).astype(np.float32)
+        return self._observe(state), self._info(state, Verdict(), sent)
+
     def render(self) -> NDArray[np.uint8] | None:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Return a good-looking picture from the scene camera, if `render_mode` is `rgb_array`."""
         return self._paint("render", "scene") if self.render_mode else None

@@ -16,11 +16,13 @@ class OperatorSpec:
         build: `(model, mode, task, human) -> Operator`, or where that is, `module:name`. It gets the robot's
             model, the `TeleopMode`, the `TaskSpec`, and the `HumanSettings` of the person.
         help: one line.
+        interactive: whether it is someone now at this computer: in real time, free to change the mode.
     """
 
     name: str
     build: Callable[..., Any] | str
     help: str
+    interactive: bool = False
 
 
 OPERATORS = Registry(
@@ -31,6 +33,36 @@ OPERATORS = Registry(
             "scripted",
             "handrail.collect.operators.scripts.scripted:scripted_operator",
             "a script with a human-like hand",
+        ),
+        OperatorSpec(
+            "browser",
+            "handrail.collect.cockpit.cockpit:open_cockpit",
+            "a person at a browser, with keys, a gamepad or touch",
+            interactive=True,
+        ),
+        OperatorSpec(
+            "gamepad",
+            "handrail.collect.local_operators.open_devices:open_gamepad",
+            "a person with a gamepad at this computer",
+            interactive=True,
+        ),
+        OperatorSpec(
+            "spacemouse",
+            "handrail.collect.local_operators.open_devices:open_spacemouse",
+            "a person with a SpaceMouse",
+            interactive=True,
+        ),
+        OperatorSpec(
+            "keyboard",
+            "handrail.collect.local_operators.open_devices:open_keyboard",
+            "a person with the keys of this terminal",
+            interactive=True,
+        ),
+        OperatorSpec(
+            "leader_arm",
+            "handrail.collect.local_operators.open_devices:open_leader_arm",
+            "a person with a leader arm of LeRobot's (--teleop.type)",
+            interactive=True,
         ),
     ),
 )

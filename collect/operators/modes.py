@@ -4,7 +4,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from handrail.controllers.interface.channels import TOOL
+from handrail.controllers.errors import HandrailError
+from handrail.controllers.interface.channels import TOOL, Channels
 from handrail.controllers.registry import Registry
 
 Focus = Literal["hand", "base"]
@@ -57,6 +58,29 @@ def always(*groups: str) -> Callable[[Focus], tuple[str, ...]]:
 def base_or_hand(focus: Focus) -> tuple[str, ...]:
     """Return the mask of the base's twist or the hand's."""
     return ("base",) if focus == "base" else ("ee",)
+
+
+MASK = "mask:"  # the name of a mode of one's own begins so
+
+
+def mode_of_mask(mask: str, channels: Channels, controller: str = "mpc") -> TeleopMode:
+    """Return the mode of an operator who owns the channels of a mask, on velocity sticks.
+
+    Args:
+        mask: 0 or 1 for each channel.
+        channels: of the robot.
+        controller: what becomes of the command.
+
+    Raises:
+        HandrailError: the mask has the wrong size or other characters than 0 and 1.
+    """
+    if set(mask) - {"0", "1"} or len(mask) != channels.size:
+        raise HandrailError(
+            f"--mask {mask}: expected {channels.size} characters 0 or 1, "
+            f"one each for {', '.join(channels.names)}; got {len(mask)}"
+        )
+    names = tuple(name for name, bit in zip(channels.names, mask, strict=True) if bit == "1")
+    return TeleopMode(MASK + mask, always(*names), controller, "a mask of one's own")
 
 
 MODES = Registry(

@@ -40,12 +40,19 @@ class EpisodeEvent(StrEnum):
     FAILURE = "failure"  # it is done, and went wrong
     DISCARD = "discard"  # throw it away, go on with another one
     RESTART = "restart"  # throw it away, begin the same one again
+    QUIT = "quit"  # throw it away, and record no more
+    UNDO = "undo"  # back to where they paused last, or to the beginning; what came after is forgotten
     PAUSE = "pause"  # stand still; said at every call until it goes on
 
     @property
     def judges(self) -> bool:
         """Whether it ends an episode that is kept."""
         return self in (EpisodeEvent.SUCCESS, EpisodeEvent.FAILURE)
+
+    @property
+    def drops(self) -> bool:
+        """Whether it ends an episode that is not kept, at once."""
+        return self in (EpisodeEvent.DISCARD, EpisodeEvent.RESTART, EpisodeEvent.QUIT)
 
 
 class Operator(Protocol):

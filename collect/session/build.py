@@ -2,6 +2,7 @@
 
 import importlib.metadata
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -9,16 +10,16 @@ import numpy as np
 from handrail.collect.config import SessionConfig, check_fps
 from handrail.collect.envs.env import RENDER_SIZE, HandrailEnv
 from handrail.collect.operators.catalogue import OPERATORS
-from handrail.collect.operators.modes import MODES, TeleopMode, always
+from handrail.collect.operators.modes import MODES, TeleopMode, mode_of_mask
 from handrail.collect.operators.operator import Operator
 from handrail.collect.perturbations.shift import sample_shifted
+from handrail.collect.session.mode_controller import ModeController
 from handrail.collect.session.session import Observer, Session
 from handrail.collect.simulation.ideal_robot import IdealRobot
 from handrail.collect.simulation.simulation import Simulation
 from handrail.collect.tasks.catalogue import TASKS
 from handrail.collect.tasks.task import Task
 from handrail.controllers.baselines.catalogue import CONTROLLERS
-from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import Controller
 from handrail.controllers.objectives.objective import Objective
@@ -70,22 +71,36 @@ def build_task(config: SessionConfig) -> Task:
 
 
 def build_session(
-    config: SessionConfig, env: HandrailEnv, observers: Sequence[Observer] = (), fps: float | None = None
+    config: SessionConfig,
+    env: HandrailEnv,
+    observers: Sequence[Observer] = (),
+    fps: float | None = None,
+    person: Operator | None = None,
 ) -> Session:
-    """Return the session of an environment, recorded at a rate [Hz]; at the robot's by default."""
+    """Return the session of an environment.
+
+    Args:
+        config: of the session.
+        env: a robot, its world and a task.
+        observers: shown every frame.
+        fps: recording rate [Hz]; the robot's by default.
+        person: who steers now and may change the mode, instead of the operator of the settings.
+    """
     fps = fps or env.fps
     control_fps = config.control_fps or fps
     mode = build_mode(config, env.model)
-    operator = build_operator(config, mode, env.model)
-    controller = build_controller(mode, env.model, control_fps, config.task)
+    operator = person or build_operator(config, mode, env.model)
+    build = partial(build_controller, model=env.model, fps=control_fps, task=config.task)
+    controller = ModeController(build_modes(config, env), build, mode) if person else build(mode)
     return Session(
         env,
         controller,
         operator,
         observers,
-        config.realtime,
+        config.realtime or person is not None,
         control_period=1.0 / control_fps,
         record_period=1.0 / fps,
+        undoes=person is not None,
     )
 
 
@@ -120,20 +135,16 @@ def build_mode(config: SessionConfig, model: RobotModel) -> TeleopMode:
     """
     mode, task = MODES.find(config.mode), TASKS.find(config.task)
     if config.mask:
-        names = _masked(config.mask, Channels.of(model.description))
-        mode = TeleopMode(config.mode_name, always(*names), mode.controller, "a mask of one's own")
+        mode = mode_of_mask(config.mask, Channels.of(model.description), mode.controller)
     if not CONTROLLERS.find(mode.controller).objectives:
         return mode
     return mode.leaving(task.left, task.minded)
 
 
-def _masked(mask: str, channels: Channels) -> tuple[str, ...]:
-    if set(mask) - {"0", "1"} or len(mask) != channels.size:
-        raise HandrailError(
-            f"--mask {mask}: expected {channels.size} characters 0 or 1, "
-            f"one each for {', '.join(channels.names)}; got {len(mask)}"
-        )
-    return tuple(name for name, bit in zip(channels.names, mask, strict=True) if bit == "1")
+def build_modes(config: SessionConfig, env: HandrailEnv) -> dict[str, TeleopMode]:
+    """Return the modes that a person can change to, by name: all that there are, and that of the settings."""
+    modes = (build_mode(replace(config, mode=name, mask=""), env.model) for name in MODES)
+    return {mode.name: mode for mode in (build_mode(config, env.model), *modes)}
 
 
 def session_features(env: HandrailEnv) -> dict[str, Feature]:

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from handrail.collect.envs.env import HandrailEnv
+from handrail.collect.session.outcome import Outcome
 from handrail.collect.session.rerun_drawing import Drawing
 from handrail.collect.session.viewer import Viewer
 from handrail.controllers.errors import HandrailError, message_of, not_installed
@@ -72,6 +73,10 @@ class Display:
         self._attempt(lambda: self._drawing.see(frame))
         if time.monotonic() > self._sent + _PERIOD:
             self._attempt(self._pass_on)
+
+    def end(self, outcome: Outcome) -> None:
+        """Log how the episode went."""
+        self._attempt(lambda: self._drawing.end(outcome))
 
     def close(self) -> None:
         """Write out what is still buffered."""

@@ -16,10 +16,11 @@ class Rate:
 
     Args:
         period: [s].
+        start: when it is due first [s].
     """
 
-    def __init__(self, period: float) -> None:
-        self._period, self._next = period, 0.0
+    def __init__(self, period: float, start: float = 0.0) -> None:
+        self._period, self._next = period, start
 
     def due(self, time: float) -> bool:
         """Whether it is due at a step's time [s]."""
@@ -39,6 +40,7 @@ class Driver:
         controller: is reset.
         env: in which an episode has begun.
         period: of the controller [s].
+        step: with which it begins.
 
     Attributes:
         command: of the controller's last update.
@@ -46,10 +48,10 @@ class Driver:
 
     command: Command
 
-    def __init__(self, controller: Controller, env: HandrailEnv, period: float) -> None:
-        self._controller, self._env, self._rate = controller, env, Rate(period)
+    def __init__(self, controller: Controller, env: HandrailEnv, period: float, step: int = 0) -> None:
+        self._controller, self._env, self._rate = controller, env, Rate(period, step * env.period)
         self._moving, self._holding = bool(env.start.scene.movers), bool(env.world.held())
-        self._asked = 0
+        self._asked = step
         controller.reset(env.world.obstacles())
 
     def drive(self, step: int, state: State, intent: Intent) -> bool:

@@ -3,6 +3,7 @@
 import contextlib
 import time
 from collections.abc import Iterator, Mapping
+from copy import copy
 from dataclasses import dataclass
 from typing import Any
 
@@ -33,6 +34,8 @@ class Outcome:
         started: Unix time at its beginning [s].
         ended_by: what the operator said to end it; None where the task was the judge.
         paused: time for which the operator had the robot stand still, the braking not counted [s].
+        undos: how often the operator went back to an earlier moment.
+        practice: whether it was only tried, and is not to be saved.
     """
 
     seed: int
@@ -50,11 +53,13 @@ class Outcome:
     started: float
     ended_by: EpisodeEvent | None = None
     paused: float = 0.0
+    undos: int = 0
+    practice: bool = False
 
     @property
     def kept(self) -> bool:
-        """Whether it is to be saved: neither thrown away nor begun again."""
-        return self.ended_by is None or self.ended_by.judges
+        """Whether it is to be saved: neither practice, nor thrown away, nor begun again."""
+        return not self.practice and (self.ended_by is None or self.ended_by.judges)
 
 
 class Tally:
@@ -68,8 +73,9 @@ class Tally:
     def __init__(self, seed: int, period: float) -> None:
         self._seed, self._period = seed, period
         self._started, self._start = time.time(), time.perf_counter()
-        self.frames = 0
+        self.frames = self.undos = 0
         self._brakes = self._late = self._held = 0
+        self._deadline = 0.0
         self._contacts: list[int] = []
         self._smallest = np.inf
         self._spent: dict[str, float] = {}
@@ -100,13 +106,31 @@ class Tally:
         """Count a period in which a paused robot stood still."""
         self._held += 1
 
+    def mark(self) -> "Tally":
+        """Return what was counted so far."""
+        marked = copy(self)
+        marked._contacts = list(self._contacts)
+        return marked
+
+    def undo(self, marked: "Tally") -> None:
+        """Forget what the robot did since a mark; how often that happened, and the clock, go on."""
+        self.frames, self._brakes = marked.frames, marked._brakes
+        self._contacts, self._smallest = list(marked._contacts), marked._smallest
+        self.undos += 1
+
     def pace(self) -> None:
-        """Wait for the end of the period, or note that it is over."""
-        ahead = (self.frames + self._held) * self._period - self.elapsed
+        """Wait for the end of the period, or note that it is over.
+
+        After a halt of more than a period the beat begins anew: what was missed is not caught up in a rush.
+        """
+        self._deadline += self._period
+        ahead = self._deadline - self.elapsed
         if ahead > 0:
             time.sleep(ahead)
-        else:
-            self._late += 1
+            return
+        self._late += 1
+        if -ahead > self._period:
+            self._deadline = self.elapsed
 
     def outcome(self, info: Mapping[str, Any], ended_by: EpisodeEvent | None) -> Outcome:
         """Return how it went, as the task judges, or else as the operator says."""
@@ -130,4 +154,5 @@ class Tally:
             started=self._started,
             ended_by=ended_by,
             paused=self._held * self._period,
+            undos=self.undos,
         )

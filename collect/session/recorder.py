@@ -14,24 +14,33 @@ class Recorder:
     Args:
         writer: of the dataset.
         task: what is being done, in words.
-        columns: what every episode's metadata says of the session (operator, mode, …).
+        columns: what every episode's metadata says of the session (operator, mode, …), as of its end.
     """
 
     def __init__(self, writer: EpisodeWriter, task: str, columns: Mapping[str, Scalar]) -> None:
         self._writer = writer
         self._task = task
-        self._columns = dict(columns)
+        self._columns = columns
+        self._undoable: list[Frame] = []
 
     def begin(self, env: HandrailEnv, seed: int) -> None:
         """Drop what an episode that ended early left open."""
+        self._undoable.clear()
         if self._writer.open_frames:
             self._writer.discard_episode()
 
     def see(self, frame: Frame) -> None:
-        """Add a frame."""
-        self._writer.add_frame(frame_row(frame), self._task)
+        """Add a frame, once no undo can take it back."""
+        del self._undoable[frame.number - self._writer.open_frames :]
+        self._undoable.append(frame)
+        self._add(frame.safe)
 
-    def save(self, outcome: Outcome) -> None:
+    def _add(self, safe: int) -> None:
+        """Write the frames up to a number."""
+        while self._undoable and self._writer.open_frames < safe:
+            self._writer.add_frame(frame_row(self._undoable.pop(0)), self._task)
+
+    def end(self, outcome: Outcome) -> None:
         """Save the episode with how it went; or forget it, if the operator threw it away or begins it again.
 
         Raises:
@@ -40,8 +49,9 @@ class Recorder:
         if not outcome.kept:
             self._writer.discard_episode()
             return
+        self._add(outcome.frames)
         self._writer.save_episode(
-            self._columns
+            dict(self._columns)
             | {
                 "success": outcome.success,
                 "failure_reason": outcome.failure_reason,
@@ -50,6 +60,7 @@ class Recorder:
                 "wall_time": outcome.wall_time,
                 "brakes": outcome.brakes,
                 "late": outcome.late,
+                "undos": outcome.undos,
                 "contact_onsets": outcome.contacts,
                 "contact_periods": outcome.contact_periods,
             }

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 
 from handrail.collect.envs.env import HandrailEnv
+from handrail.collect.session.outcome import Outcome
 from handrail.controllers.interface.channel_matrix import channel_matrix
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.robot.shape import Obstacle
@@ -59,6 +60,11 @@ class Drawing:
         rr.log("controller/solve_time_ms", rr.Scalars(1e3 * diagnostics.solve_time))
         rr.log("controller/slack", rr.Scalars(diagnostics.slack))
         rr.log("controller/status", rr.TextLog(f"{frame.intent.mode}: {diagnostics.status.value}"))
+
+    def end(self, outcome: Outcome) -> None:
+        """Log how the episode went."""
+        said = "success" if outcome.success else f"failed: {outcome.failure_reason}"
+        self._rr.log("controller/status", self._rr.TextLog(said if outcome.kept else "not kept"))
 
     def _log_robot(self, q: np.ndarray) -> None:
         """Draw the robot's collision shapes where they are."""

@@ -7,9 +7,11 @@ view ─▶ operator ─ intent ─▶ controller ─ command ─▶ env.step �
 ```
 """
 
+import gc
 from collections.abc import Callable, Sequence
+from copy import copy
 from dataclasses import replace
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -35,7 +37,7 @@ class Observer(Protocol):
         ...
 
     def see(self, frame: Frame) -> None:
-        """Take one moment."""
+        """Take one moment; after an undo its number has been there before, and what that was is forgotten."""
         ...
 
 
@@ -49,6 +51,16 @@ class Disturbance(Protocol):
     def act(self) -> None:
         """Act during the period that begins now."""
         ...
+
+
+class _Mark(NamedTuple):
+    """A moment to come back to."""
+
+    world: object
+    tally: Tally
+    recording: Rate
+    frame: Frame | None
+    number: int
 
 
 class Session:
@@ -66,6 +78,7 @@ class Session:
         disturbances: what acts on the robot from outside.
         control_period: of the controller [s]; the robot's by default.
         record_period: of the frames [s]; the robot's by default.
+        undoes: whether the operator may go back.
     """
 
     def __init__(
@@ -78,6 +91,7 @@ class Session:
         disturbances: Sequence[Disturbance] = (),
         control_period: float | None = None,
         record_period: float | None = None,
+        undoes: bool = False,
     ) -> None:
         self.env = env
         self._controller = controller
@@ -87,6 +101,18 @@ class Session:
         self._disturbances = disturbances
         self._control_period = control_period or env.period
         self._record_period = record_period or env.period
+        self._undoes = undoes
+
+    def warm_up(self, seed: int, operator: Operator) -> None:
+        """Run an episode that nobody sees, so that what is compiled or built at its first use is there.
+
+        Args:
+            seed: of the episode.
+            operator: steers in every way that there will be.
+        """
+        unseen = copy(self)
+        unseen._operator, unseen._observers, unseen._realtime = operator, (), False
+        unseen.run(seed)
 
     def run(self, seed: int, tell_paused: Callable[[bool], None] = lambda paused: None) -> Outcome:
         """Run one episode and return how it went; the same seed gives the same episode.
@@ -103,9 +129,12 @@ class Session:
             try:
                 while not self._done:
                     self._listen(tell_paused)
-                    if self._event in (EpisodeEvent.DISCARD, EpisodeEvent.RESTART):
+                    if self._event is not None and self._event.drops:
                         break
-                    if self._event is EpisodeEvent.PAUSE and self._rests:
+                    if self._event is EpisodeEvent.UNDO and self._undoes:
+                        self._undo()
+                    elif self._event is EpisodeEvent.PAUSE and self._rests:
+                        self._mark()
                         self._tally.held()
                     else:
                         self._show(self._step())
@@ -117,6 +146,8 @@ class Session:
             return self._tally.outcome(self._info, None if paused else self._event)
 
     def _begin(self, seed: int) -> None:
+        if self._realtime:
+            _tidy()
         self._observation, self._info = self.env.reset(seed=seed)
         self._driver = Driver(self._controller, self.env, self._control_period)
         self._operator.reset(self._view(), np.random.default_rng([seed, 1]))
@@ -127,7 +158,25 @@ class Session:
         self._intent = Intent.idle(Channels.of(self.env.model.description))
         self._event: EpisodeEvent | None = None
         self._frame: Frame | None = None
-        self._done = False
+        self._done, self._number = False, 0
+        self._marked: _Mark | None = None
+        self._mark()
+
+    def _mark(self) -> None:
+        """Take note of this moment, to come back to; the robot rests."""
+        if self._undoes and (self._marked is None or self._marked.tally.frames < self._tally.frames):
+            now = self.env.checkpoint(), self._tally.mark(), copy(self._recording), self._frame, self._number
+            self._marked = _Mark(*now)
+
+    def _undo(self) -> None:
+        """Go back to the moment that was noted last."""
+        marked = self._marked
+        if marked is None or marked.tally.frames == self._tally.frames:
+            return
+        self._observation, self._info = self.env.restore(marked.world)
+        self._tally.undo(marked.tally)
+        self._recording, self._frame, self._number = copy(marked.recording), marked.frame, marked.number
+        self._driver = Driver(self._controller, self.env, self._control_period, self._tally.frames)
 
     def _listen(self, tell_paused: Callable[[bool], None]) -> None:
         """Ask the operator; while they do not steer, what the controller hears is stale, and it brakes."""
@@ -153,6 +202,7 @@ class Session:
             action = self._driver.action(tally.frames)
             if self._event is EpisodeEvent.PAUSE and np.abs(action[:-1]).max() < _CREEP:
                 action[:-1] = 0.0  # a controller may come ever nearer to rest
+        commanded = tally.elapsed
         with tally.timed("environment"):
             for disturbance in self._disturbances:
                 disturbance.act()
@@ -172,6 +222,11 @@ class Session:
             success=self._event is EpisodeEvent.SUCCESS if judged else bool(self._info["is_success"]),
             done=self._done,
             wall_clock=self._wall_clock,
+            number=self._number,
+            safe=self._marked.number if self._marked else self._number + 1,
+            undos=self._tally.undos,
+            plan=self._driver.command,
+            commanded=commanded,
         )
 
     def _show(self, frame: Frame) -> None:
@@ -183,7 +238,7 @@ class Session:
             for observer in self._observers:
                 observer.see(self._frame)
         self._recording.take()
-        self._frame = None
+        self._frame, self._number = None, self._number + 1
 
     @property
     def _rests(self) -> bool:
@@ -192,6 +247,13 @@ class Session:
 
     def _view(self) -> View:
         return View(self.env.robot.state(), self.env.task_state(), self._observation)
+
+
+def _tidy() -> None:
+    """Collect garbage now, and let later collections look at what is new only: none may halt the loop."""
+    gc.unfreeze()
+    gc.collect()
+    gc.freeze()
 
 
 def _lasting(first: Frame, last: Frame) -> Frame:

@@ -51,6 +51,14 @@ class Gate:
         self.velocity = sent[:size].astype(np.float64)
         return sent
 
+    def state(self) -> tuple[FloatArray, float]:
+        """Return what was sent last, to come back to."""
+        return self.velocity.copy(), self.gripper
+
+    def restore(self, state: tuple[FloatArray, float]) -> None:
+        """Come back to a state."""
+        self.velocity, self.gripper = state[0].copy(), state[1]
+
     def bring_to_rest(self, robot: Robot) -> None:
         """Send its robot nothing usable, which brakes, until it was sent rest."""
         while np.abs(self.velocity).max() > 0.0:

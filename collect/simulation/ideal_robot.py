@@ -1,6 +1,7 @@
 """The ideal robot: it does exactly what it is sent, in a world where nothing can be moved."""
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -71,6 +72,17 @@ class IdealRobot:
             known = None
         self._distances = self._collision.values(self._q[None], now=known, within=self._far)[0]
         return sent
+
+    def checkpoint(self) -> object:
+        """Return the whole state, to come back to."""
+        return self._q.copy(), self._steps, self._gate.state()
+
+    def restore(self, checkpoint: Any) -> None:
+        """Come back to a state: from there all goes on as it did."""
+        self._q, self._steps, sent = checkpoint
+        self._gate.restore(sent)
+        self._collision.update_scene(self.obstacles())
+        self._distances = self._collision.values(self._q[None])[0]
 
     def stop(self) -> None:
         """Brake until it rests."""

@@ -35,6 +35,14 @@ class Robot(Protocol):
 class World(Protocol):
     """What is around the robot, and the truth by which a task judges."""
 
+    def checkpoint(self) -> object:
+        """Return the whole state, robot and things, to come back to."""
+        ...
+
+    def restore(self, checkpoint: Any) -> None:
+        """Come back to a state: from there all goes on as it did."""
+        ...
+
     @property
     def time(self) -> float:
         """Since the episode began [s]."""

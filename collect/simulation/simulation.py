@@ -3,7 +3,9 @@
 import math
 from collections.abc import Iterator
 from contextlib import contextmanager
+from copy import copy
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -138,6 +140,17 @@ class Simulation:
     def stop(self) -> None:
         """Brake until the robot is sent rest."""
         self._gate.bring_to_rest(self)
+
+    def checkpoint(self) -> object:
+        """Return the whole state, to come back to."""
+        return copy(self.data), self._gate.state()
+
+    def restore(self, checkpoint: Any) -> None:
+        """Come back to a state: from there all goes on as it did."""
+        data, sent = checkpoint
+        mujoco.mj_copyData(self.data, self.mujoco_model, data)
+        self._gate.restore(sent)
+        self._contacts.clear()
 
     @property
     def contacts(self) -> tuple[str, ...]:

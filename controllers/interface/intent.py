@@ -21,11 +21,17 @@ class RawInput:
             (0,) if it is not known.
         axes: how many inputs the operator moves now.
         switches: how often they changed to other inputs in this episode so far.
+        device: what they moved; empty for a script or a policy.
+        age: of the reading when it became a command [s].
+        round_trip: from what the device's screen showed to the answer, on one clock [s].
     """
 
     values: FloatArray = field(default_factory=lambda: np.zeros(0))
     axes: int = 0
     switches: int = 0
+    device: str = ""
+    age: float = 0.0
+    round_trip: float = 0.0
 
     def __post_init__(self) -> None:
         """Copy the array and make it read-only."""

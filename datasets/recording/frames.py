@@ -9,6 +9,7 @@ import numpy as np
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.interface.command import Diagnostics
 from handrail.controllers.interface.intent import Intent
+from handrail.controllers.interface.trajectory import Trajectory
 from handrail.datasets.format.schema import Feature
 
 FARTHEST = 10.0  # [m] what a distance is cut to: nothing is nearer, there is nothing to measure, or no state
@@ -31,6 +32,11 @@ class Frame:
         success: whether the task is done at the end of the period.
         done: whether the episode ends with it.
         wall_clock: wall time since the episode began [s].
+        number: its place in the episode; after an undo it has been there before.
+        safe: how many frames, from the first on, no undo will take back.
+        undos: how often the operator has gone back in this episode.
+        plan: where the controller leads the robot from here; shown, not recorded.
+        commanded: wall time since the episode began at which the command was there [s]; shown, not recorded.
     """
 
     state: FloatArray
@@ -44,6 +50,11 @@ class Frame:
     success: bool
     done: bool
     wall_clock: float
+    number: int
+    safe: int
+    undos: int = 0
+    plan: Trajectory | None = None
+    commanded: float = 0.0
 
 
 def frame_features(
@@ -82,6 +93,10 @@ def frame_features(
         "teleop.raw": Feature("float32", (len(channels),), tuple(channels)),
         "teleop.axes": Feature("int64"),
         "teleop.switches": Feature("int64"),
+        "teleop.device": Feature("string"),
+        "teleop.age": scalar,
+        "teleop.round_trip": scalar,
+        "teleop.undos": Feature("int64"),
         "controller.command": Feature("float32", (len(velocities),), velocities),
         "controller.solve_time": scalar,
         "controller.status": Feature("string"),
@@ -113,6 +128,10 @@ def frame_row(frame: Frame) -> dict[str, Any]:
         "teleop.raw": _finite(raw if raw.size else np.zeros(len(intent.values))),
         "teleop.axes": intent.raw.axes,
         "teleop.switches": intent.raw.switches,
+        "teleop.device": intent.raw.device,
+        "teleop.age": _finite(intent.raw.age),
+        "teleop.round_trip": _finite(intent.raw.round_trip),
+        "teleop.undos": frame.undos,
         "controller.command": frame.command,
         "controller.solve_time": diagnostics.solve_time,
         "controller.status": diagnostics.status.value,

@@ -1,6 +1,6 @@
 """How human an operator is: perception, delay, intermittency, noise, drift, switching; who it is."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
@@ -28,6 +28,8 @@ class HumanSettings:
         tremor: standard deviation of a hand that holds a leader arm, at the joints [rad].
         persons: how much people differ, standard deviation of the logarithm of each number above.
         moods: the same for the same person from episode to episode.
+        briskness: how briskly they steer, over what the device's gains say: a throughput of
+            `briskness · gain / ln 2` [bit/s] (`Gains`); no weakness, so noise, persons and moods leave it.
     """
 
     delay: float = 0.2
@@ -43,27 +45,30 @@ class HumanSettings:
     tremor: float = 0.003
     persons: float = 0.15
     moods: float = 0.08
+    briskness: float = 1.0
 
     def __post_init__(self) -> None:
         """Check the numbers.
 
         Raises:
-            HandrailError: one is negative or not finite.
+            HandrailError: one is negative or not finite, or nobody would ever move.
         """
         for entry in fields(self):
             value = getattr(self, entry.name)
             if not np.isfinite(value) or value < 0:
                 raise HandrailError(f"--human.{entry.name}: expected a finite number >= 0, got {value}")
+        if not self.briskness:
+            raise HandrailError("--human.briskness: expected a number > 0, got 0")
 
     @classmethod
     def perfect(cls) -> "HumanSettings":
         """Return an operator without delay, noise or drift."""
-        return cls(**{entry.name: 0.0 for entry in fields(cls)})
+        return cls(**dict.fromkeys(_weaknesses(), 0.0))
 
     def scaled(self, factor: float) -> "HumanSettings":
-        """Return the settings with everything but the correlation time multiplied by a factor."""
-        values = {entry.name: getattr(self, entry.name) * factor for entry in fields(self)}
-        return HumanSettings(**values | {"correlation": self.correlation})
+        """Return the settings with every weakness but the correlation time multiplied by a factor."""
+        values = {name: getattr(self, name) * factor for name in _weaknesses()}
+        return replace(self, **values | {"correlation": self.correlation})
 
     def person(self, rng: np.random.Generator) -> "HumanSettings":
         """Draw a person around these settings: each number times `exp(persons · z)`."""
@@ -74,7 +79,12 @@ class HumanSettings:
         return self._drawn(self.moods, rng)
 
     def _drawn(self, spread: float, rng: np.random.Generator) -> "HumanSettings":
-        factors = np.exp(spread * np.clip(rng.standard_normal(len(fields(self))), -_WIDEST, _WIDEST))
-        names = [entry.name for entry in fields(self)]
+        names = _weaknesses()
+        factors = np.exp(spread * np.clip(rng.standard_normal(len(names)), -_WIDEST, _WIDEST))
         values = {name: getattr(self, name) * factor for name, factor in zip(names, factors, strict=True)}
-        return HumanSettings(**values | {"persons": self.persons, "moods": self.moods})
+        return replace(self, **values | {"persons": self.persons, "moods": self.moods})
+
+
+def _weaknesses() -> list[str]:
+    """Return the names of what makes an operator human: all but how briskly they steer."""
+    return [entry.name for entry in fields(HumanSettings) if entry.name != "briskness"]

@@ -10,6 +10,7 @@ from handrail.collect.operators.human.hand import HumanHand
 from handrail.collect.operators.human.human import HumanSettings
 from handrail.collect.operators.human.motion_goal import MotionGoal
 from handrail.collect.operators.human.perception import Perception
+from handrail.collect.operators.human.steering import Gains
 from handrail.collect.operators.modes import TeleopMode
 from handrail.collect.operators.operator import View
 from handrail.collect.tasks.catalogue import TaskSpec
@@ -45,16 +46,24 @@ class ScriptedOperator:
         script: of the task.
         mode: the teleop mode.
         human: who steers.
+        gains: how briskly; as people are with the mode's device, and this person is, by default.
 
     Attributes:
         free_at: when the hand is back on the input after the last change of channels [s]; −∞ before any.
     """
 
-    def __init__(self, model: RobotModel, script: Script, mode: TeleopMode, human: HumanSettings) -> None:
+    def __init__(
+        self,
+        model: RobotModel,
+        script: Script,
+        mode: TeleopMode,
+        human: HumanSettings,
+        gains: Gains | None = None,
+    ) -> None:
         self._script = script
         self._mode = mode
         device = DEVICES.find(mode.device)
-        self._map = device.build(model, mode, device.gains)
+        self._map = device.build(model, mode, gains or gains_of(mode, human))
         self._human = replace(human, refractory=human.refractory * device.refractory)
 
     def reset(self, view: View, rng: np.random.Generator) -> None:
@@ -92,6 +101,17 @@ def scripted_operator(
     model: RobotModel, mode: TeleopMode, task: TaskSpec, human: HumanSettings
 ) -> ScriptedOperator:
     """Return who does a task's script in a mode, as brisk as people are with its device."""
-    device = DEVICES.find(mode.device)
-    script = resolved(task.script)(model, device.gains, drives=device.drives or mode.by_focus)
-    return ScriptedOperator(model, script, mode, human)
+    gains = gains_of(mode, human)
+    return ScriptedOperator(model, script_of(model, mode, task, gains), mode, human, gains)
+
+
+def script_of(model: RobotModel, mode: TeleopMode, task: TaskSpec, gains: Gains) -> Script:
+    """Return a task's script for an operator of a mode."""
+    drives = DEVICES.find(mode.device).drives or mode.by_focus
+    return resolved(task.script)(model, gains, drives=drives)
+
+
+def gains_of(mode: TeleopMode, human: HumanSettings) -> Gains:
+    """Return how briskly a person steers with a mode's device."""
+    gains = DEVICES.find(mode.device).gains
+    return replace(gains, gain=human.briskness * gains.gain)

@@ -88,7 +88,7 @@ def recorded(tmp_path_factory):
     with EpisodeWriter.create(root, manifest) as writer:
         recorder = Recorder(writer, "count", {})
         outcome = Session(env, controller, operator, [recorder]).run(3)
-        recorder.save(outcome)
+        recorder.end(outcome)
     assert outcome.frames == STEPS
     return env, operator, controller, read_frames(root, 0)
 
@@ -150,13 +150,12 @@ def test_what_happened_is_the_worlds(recorded):
     assert np.all(np.diff(clock) > 0)
 
 
+RAW = RawInput([0.8, 0.9], 10, 11, "pad", 0.21, 0.22)
 FRAME = Frame(
     state=np.array([1.0, 2.0]),
     environment=np.array([3.0]),
     images={"wrist": np.zeros((2, 2, 3), np.uint8)},
-    intent=Intent(
-        np.array([4.0, 5.0]), np.array([True, True]), 0.6, "ee", 0.7, raw=RawInput([0.8, 0.9], 10, 11)
-    ),
+    intent=Intent(np.array([4.0, 5.0]), np.array([True, True]), 0.6, "ee", 0.7, raw=RAW),
     action=np.array([12.0, 0.0]),
     command=np.array([13.0, 1.0]),
     diagnostics=Diagnostics(Status.CLIPPED, 0.14, 0.15, 0.16, 0.17),
@@ -164,6 +163,9 @@ FRAME = Frame(
     success=False,
     done=False,
     wall_clock=19.0,
+    number=0,
+    safe=1,
+    undos=23,
 )
 INTENT, SAID = FRAME.intent, FRAME.diagnostics
 MUTATIONS = {
@@ -176,6 +178,10 @@ MUTATIONS = {
     "teleop.raw": {"intent": replace(INTENT, raw=replace(INTENT.raw, values=np.array([0.8, 0.95])))},
     "teleop.axes": {"intent": replace(INTENT, raw=replace(INTENT.raw, axes=20))},
     "teleop.switches": {"intent": replace(INTENT, raw=replace(INTENT.raw, switches=21))},
+    "teleop.device": {"intent": replace(INTENT, raw=replace(INTENT.raw, device="keys"))},
+    "teleop.age": {"intent": replace(INTENT, raw=replace(INTENT.raw, age=0.23))},
+    "teleop.round_trip": {"intent": replace(INTENT, raw=replace(INTENT.raw, round_trip=0.24))},
+    "teleop.undos": {"undos": 25},
     "controller.command": {"command": np.array([13.5, 1.0])},
     "controller.status": {"diagnostics": replace(SAID, status=Status.OK)},
     "controller.solve_time": {"diagnostics": replace(SAID, solve_time=0.145)},

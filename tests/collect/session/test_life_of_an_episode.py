@@ -9,8 +9,10 @@ from handrail.collect.commands.record import episode_seed, record
 from handrail.collect.config import DatasetConfig, RecordConfig, SessionConfig
 from handrail.collect.operators.operator import EpisodeEvent
 from handrail.collect.session import build
-from handrail.collect.session.build import build_env, session_features
+from handrail.collect.session.build import build_env, build_modes, session_features
+from handrail.collect.session.outcome import Tally
 from handrail.collect.session.recorder import Recorder
+from handrail.collect.session.rehearsal import Rehearsal
 from handrail.collect.session.session import Session
 from handrail.controllers.baselines.direct import DirectController
 from handrail.controllers.interface.channels import Channels
@@ -21,7 +23,7 @@ from handrail.datasets.format.manifest import Manifest
 from handrail.datasets.reading.reader import read_episodes, read_frames
 from handrail.datasets.recording.writer import EpisodeWriter
 
-SUCCESS, FAILURE, DISCARD, RESTART, PAUSE = EpisodeEvent
+SUCCESS, FAILURE, DISCARD, RESTART, QUIT, _, PAUSE = EpisodeEvent
 CONTROLLERS = [lambda model: DirectController(model, 0.05), MaskedMpc]
 
 
@@ -116,7 +118,7 @@ def test_a_late_operator_is_braked(env):
     assert not watcher.frames[60].action[:-1].any()
 
 
-@pytest.mark.parametrize("event", [DISCARD, RESTART])
+@pytest.mark.parametrize("event", [DISCARD, RESTART, QUIT])
 def test_what_is_not_kept_is_over_at_once(env, event, tmp_path):
     with EpisodeWriter.create(tmp_path / "d", Manifest("x/d", 20, "robot", session_features(env))) as writer:
         recorder, person = Recorder(writer, "reach", {}), Person(env.model, {9: event}, {5: SUCCESS})
@@ -124,9 +126,9 @@ def test_what_is_not_kept_is_over_at_once(env, event, tmp_path):
         outcome = session.run(3)
         assert (outcome.kept, outcome.ended_by, outcome.frames) == (False, event, 8)
         assert not env.state().commanded.any()
-        recorder.save(outcome)
+        recorder.end(outcome)
         assert (writer.num_episodes, writer.open_frames) == (0, 0)
-        recorder.save(session.run(3))
+        recorder.end(session.run(3))
     assert [row["length"] for row in read_episodes(tmp_path / "d")] == [5]
 
 
@@ -169,6 +171,40 @@ def test_a_pause_does_not_make_the_loop_late(env, monkeypatch):
     assert outcome.late == 0
     assert outcome.wall_time == pytest.approx(person.asked * env.period)
     assert outcome.paused > 1.0
+
+
+def test_a_halt_is_not_caught_up_in_a_rush(env, monkeypatch):
+    """After a long period the beat begins anew: no two periods are shorter than they are."""
+    now, begun = [0.0], []
+    monkeypatch.setattr(time, "perf_counter", lambda: now[0])
+    monkeypatch.setattr(time, "sleep", lambda seconds: now.__setitem__(0, now[0] + seconds))
+    tally = Tally(0, 0.05)
+    for number in range(20):
+        begun.append(now[0])
+        now[0] += 3.0 if number == 7 else 0.01
+        tally.pace()
+    lasted = np.diff(begun)
+    assert np.allclose(np.delete(lasted, 7), 0.05)
+    assert tally.outcome({"is_success": True, "failure_reason": ""}, None).late == 1
+
+
+def test_a_warm_up_tries_every_mode_and_leaves_no_trace(env):
+    """What a person may do, its controllers have done once; nobody watches, and nothing is paced."""
+    modes = build_modes(SessionConfig(task="reach", physics=False), env)
+    asked = []
+
+    class Watched(DirectController):
+        def update(self, state, intent):
+            asked.append((intent.mode, tuple(np.flatnonzero(intent.mask))))
+            return super().update(state, intent)
+
+    watcher = Watcher()
+    session = Session(env, Watched(env.model, env.period), Person(env.model, {}), [watcher], undoes=True)
+    session.warm_up(3, Rehearsal(env.model, modes))
+    assert {mode for mode, _ in asked} == set(modes)
+    assert len({mask for mode, mask in asked if mode == "switching"}) == 2  # hand and base
+    assert not hasattr(watcher, "frames")
+    assert not env.state().commanded.any()
 
 
 def test_three_rates(env):

@@ -144,10 +144,11 @@ def test_no_column_is_ever_infinite(number):
     """Whatever an operator sends, and however little a controller knows."""
     channels = ("base.vx", "ee.vx", "joint.a")
     bad = np.full(3, number)
-    intent = Intent(bad, np.array([True, False, True]), gripper=number, raw=RawInput(bad))
+    raw = RawInput(bad, age=number, round_trip=number)
+    intent = Intent(bad, np.array([True, False, True]), gripper=number, raw=raw)
     diagnostics = Diagnostics(Status.INVALID_STATE, slack=abs(number))
     still = np.zeros(2)
-    frame = Frame(still, np.zeros(1), {}, intent, still, still, diagnostics, 0, False, False, 0.0)
+    frame = Frame(still, np.zeros(1), {}, intent, still, still, diagnostics, 0, False, False, 0.0, 0, 1)
     row = check_frame(frame_row(frame), frame_features("ab", "e", "a", channels))
     numbers = {key: value for key, value in row.items() if not isinstance(value, str)}
     assert all(np.isfinite(value).all() for value in numbers.values())

@@ -1,0 +1,63 @@
+"""What a person's device says: where its inputs are now, and what they ask for."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """Where the inputs are.
+
+    Attributes:
+        on: whether somebody holds the dead-man, and is there: a page seen, a device connected.
+        device: what is moved.
+        grip: whether the gripper shall be closed.
+        axes: deflection of each channel, from −1 to 1, (m,).
+        view: from where the person looks, about the vertical [rad].
+        targets: where the arm's joints shall go, as a leader arm or sliders say it [rad]; empty while let go.
+    """
+
+    on: bool
+    device: str
+    grip: bool
+    axes: tuple[float, ...]
+    view: float = 0.0
+    targets: tuple[float, ...] = ()
+
+    @property
+    def is_let_go(self) -> bool:
+        """Whether nothing is deflected."""
+        return not any(self.axes) and not self.targets
+
+    def let_go(self) -> "Inputs":
+        """Return them with nothing deflected."""
+        return replace(self, axes=(0.0,) * len(self.axes), targets=())
+
+
+ASKS: Mapping[str, type] = {
+    "start": bool,  # go on after a pause; begin
+    "pause": bool,
+    "stop": bool,  # the e-stop; false releases it
+    "success": bool,
+    "failure": bool,
+    "discard": bool,
+    "restart": bool,
+    "quit": bool,
+    "undo": bool,  # back to the last pause, or the beginning
+    "practice": bool,
+    "mode": str,
+    "mask": list,  # of channels that the operator wants to own, whatever the mode says
+    "focus": str,
+    "frame": str,
+    "speed": float,
+    "lock": list,
+}
+
+
+@dataclass(frozen=True)
+class Ask:
+    """What is asked for once: one of `ASKS`, and how much of it."""
+
+    what: str
+    value: Any = True

@@ -1,0 +1,130 @@
+"""What the operator's inputs mean: deflections and joint targets become an intent on the mode's channels."""
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from handrail.collect.operators.devices.input_map import StickMap
+from handrail.collect.operators.human.steering import Gains
+from handrail.collect.operators.modes import Focus, TeleopMode
+from handrail.collect.operators.person.inputs import Inputs
+from handrail.controllers.arrays import BoolArray, FloatArray
+from handrail.controllers.interface.channels import Channels
+from handrail.controllers.interface.controller import State
+from handrail.controllers.interface.frames import Frames
+from handrail.controllers.interface.intent import Intent, RawInput
+from handrail.controllers.numerics.rotation import turned
+from handrail.controllers.robot.model import RobotModel
+
+HandFrame = Literal["world", "base", "tool", "view"]
+HAND_FRAMES: tuple[HandFrame, ...] = ("world", "base", "tool", "view")
+_FOLLOW = 6.0  # of the joints towards their targets [1/s]
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What the operator has chosen.
+
+    Attributes:
+        mode: teleop mode.
+        focus: what they attend to, in a mode that makes a difference.
+        frame: in which the hand's deflections are meant; `view` is as the person looks.
+        speed: share of full stick.
+        locked: joints that shall stand still, by index.
+        axis: the one that is steered, in a mode of one axis at a time; −1 before the first.
+        switches: how often mode, focus, locks or that axis have changed in this episode.
+    """
+
+    mode: TeleopMode
+    focus: Focus = "hand"
+    frame: HandFrame = "view"
+    speed: float = 0.6
+    locked: tuple[int, ...] = ()
+    axis: int = -1
+    switches: int = 0
+
+    @property
+    def is_single(self) -> bool:
+        """Whether only one axis is steered at a time."""
+        return self.mode.device == "single_axis"
+
+    def switched(self, **changes: object) -> "Setting":
+        """Return it with changes that count as a switch."""
+        return replace(self, **changes, switches=self.switches + 1)  # pyright: ignore[reportArgumentType]
+
+
+class InputMeaning:
+    """Turns deflections into intents.
+
+    Args:
+        model: of the robot.
+        mode: any of the modes.
+    """
+
+    def __init__(self, model: RobotModel, mode: TeleopMode) -> None:
+        self.channels = Channels.of(model.description)
+        self._base = len(self.channels.base)
+        self._arm = slice(self.channels.joint_slice.start + self._base, self.channels.size)
+        self._full = StickMap(model, mode, Gains()).full
+
+    def fits(self, inputs: Inputs) -> bool:
+        """Whether inputs are those of this robot."""
+        arm = len(self.channels.joints) - self._base
+        return len(inputs.axes) == self.channels.size and len(inputs.targets) in (0, arm)
+
+    def mask(self, setting: Setting) -> BoolArray:
+        """Return the channels that the operator owns, (m,)."""
+        mask = self.channels.mask(*setting.mode.groups(setting.focus))
+        mask[[self.channels.joint_slice.start + joint for joint in setting.locked]] = True
+        return mask
+
+    def intent(
+        self, inputs: Inputs, setting: Setting, state: State, age: float = 0.0, round_trip: float = 0.0
+    ) -> Intent:
+        """Return what is asked for: on every channel of the mode, deflection × full stick × speed.
+
+        In a mode of one axis at a time only that of the setting counts, and the mask says which.
+        Targets of the arm's joints are followed within that, `q̇ = k (q_target − q)`. Deflections of the base
+        count in every mode that has the base in it, also where that means its joints.
+
+        Args:
+            inputs: where they are.
+            setting: what the operator has chosen.
+            state: of the robot.
+            age: of the inputs [s].
+            round_trip: of the frame that they answer [s].
+        """
+        mask, raw = self.mask(setting), np.array(inputs.axes)
+        if setting.is_single:
+            alone = np.arange(mask.size) == setting.axis
+            mask, raw = mask & alone, np.where(alone, raw, 0.0)
+        values = setting.speed * self._full * raw
+        tool, joints = self.channels.tool_slice, self.channels.joint_slice
+        values[tool] = self._hand(values[tool], inputs, setting, state)
+        if self._base and mask[joints][: self._base].all() and not mask[self.channels.base_slice].any():
+            values[joints.start : joints.start + self._base] += turned(
+                values[self.channels.base_slice], state.q[2]
+            )
+        if inputs.targets and not setting.is_single:
+            full = setting.speed * self._full[self._arm]
+            toward = _FOLLOW * (np.array(inputs.targets) - state.q[self._base :])
+            values[self._arm] = np.clip(toward, -full, full)
+            raw[self._arm] = inputs.targets
+        values[[joints.start + joint for joint in setting.locked]] = 0.0
+        return Intent(
+            np.where(mask, values, 0.0),
+            mask,
+            gripper=float(inputs.grip),
+            mode=setting.mode.name,
+            time=state.time,
+            frames=Frames(tool="tool" if setting.frame == "tool" else "world"),
+            raw=RawInput(raw, int(np.count_nonzero(raw)), setting.switches, inputs.device, age, round_trip),
+        )
+
+    def _hand(self, twist: FloatArray, inputs: Inputs, setting: Setting, state: State) -> FloatArray:
+        """Return the hand's twist in the world, or in the tool where it is meant there, (6,)."""
+        if setting.frame in ("world", "tool"):
+            return twist
+        angle = inputs.view if setting.frame == "view" else state.q[2] if self._base else 0.0
+        return np.concatenate([turned(twist[:3], angle), turned(twist[3:], angle)])

@@ -1,0 +1,185 @@
+"""A person, as an operator: the newest input steers; anything doubtful brakes and pauses.
+
+```
+ready ─ start ─▶ driving ◀─ start ─ paused        stopped: the e-stop, until it is released
+                   │  ▲                      ▲
+   input old, dead-│  │ everything was       │ the device is gone, or drives no more
+     man let go    ▼  │ let go once ─────────┘
+                   lost
+```
+In every state but `driving` the robot brakes to rest and nothing is recorded.
+"""
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from enum import StrEnum
+from typing import Any
+
+import numpy as np
+
+from handrail.collect.operators.modes import TeleopMode, mode_of_mask
+from handrail.collect.operators.operator import EpisodeEvent, View
+from handrail.collect.operators.person.inputs import Ask, Inputs
+from handrail.collect.operators.person.meaning import HAND_FRAMES, InputMeaning, Setting
+from handrail.controllers.interface.intent import Intent
+from handrail.controllers.robot.model import RobotModel
+
+MOST_AGE = 0.25  # of an input that steers [s]
+_EVENTS = {
+    "success": EpisodeEvent.SUCCESS,
+    "failure": EpisodeEvent.FAILURE,
+    "discard": EpisodeEvent.DISCARD,
+    "restart": EpisodeEvent.RESTART,
+    "quit": EpisodeEvent.QUIT,
+    "undo": EpisodeEvent.UNDO,
+}
+
+
+class Phase(StrEnum):
+    """Where an episode stands."""
+
+    READY = "ready"
+    DRIVING = "driving"
+    PAUSED = "paused"
+    LOST = "lost"
+    STOPPED = "stopped"
+
+
+class Person:
+    """Steers by what a device says: a page, a gamepad, a leader arm.
+
+    Args:
+        model: of the robot.
+        modes: that one can change to, by name.
+        first: the mode at the beginning.
+        clock: of inputs [s].
+
+    Attributes:
+        setting: what the operator has chosen.
+        phase: where the episode stands.
+        practises: whether the episode is not to be saved.
+        inputs: the newest.
+        received: when they came [s].
+        round_trip: of the frame that they answer [s].
+    """
+
+    def __init__(
+        self,
+        model: RobotModel,
+        modes: Mapping[str, TeleopMode],
+        first: str,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self.meaning = InputMeaning(model, modes[first])
+        self.modes, self._clock = modes, clock
+        self.setting, self.phase = Setting(modes[first]), Phase.READY
+        self.inputs: Inputs | None = None
+        self.received = self.round_trip = 0.0
+        self.practises = False
+        self._event: EpisodeEvent | None = None
+        self._armed = False  # everything was let go once since the robot had to brake
+
+    def reset(self, view: View, rng: np.random.Generator) -> None:
+        """Begin an episode: the robot waits for the operator."""
+        self.setting = replace(self.setting, axis=-1, switches=0)
+        self.phase = Phase.STOPPED if self.phase is Phase.STOPPED else Phase.READY
+        self._event, self._armed = None, False
+
+    def take(self, inputs: Inputs, received: float, round_trip: float = 0.0) -> None:
+        """Take where the inputs are now.
+
+        Args:
+            inputs: of the device that drives.
+            received: when they came, on the operator's clock [s].
+            round_trip: of the frame that they answer [s].
+        """
+        if not self.meaning.fits(inputs):
+            return
+        self.inputs, self.received, self.round_trip = inputs, received, round_trip
+        self._armed |= inputs.on and inputs.is_let_go
+
+    def lose(self) -> None:
+        """Take note that nobody drives any more: whoever comes next has to press Start."""
+        self.inputs = None
+        if self.phase in (Phase.DRIVING, Phase.LOST):
+            self.phase = Phase.PAUSED
+
+    def ask(self, ask: Ask) -> None:
+        """Do what the operator asks for; what makes no sense now is left undone."""
+        what, value = ask.what, ask.value
+        if what in _EVENTS:
+            self._judge(_EVENTS[what])
+        elif what == "stop":
+            self.phase, self._armed = (Phase.STOPPED if value else Phase.PAUSED), False
+        elif what == "start" and self.phase in (Phase.READY, Phase.PAUSED):
+            self.phase, self._armed = Phase.DRIVING, False
+        elif what == "pause" and self.phase in (Phase.DRIVING, Phase.LOST):
+            self.phase = Phase.PAUSED
+        elif what == "practice" and self.phase is Phase.READY:
+            self.practises = value
+        else:
+            self._choose(what, value)
+
+    def act(self, view: View) -> Intent | EpisodeEvent:
+        """Return the intent now, or what becomes of the episode."""
+        if self._event is not None:
+            event, self._event = self._event, None
+            return event
+        driven = self._is_driven()
+        if self.phase is Phase.DRIVING and not driven:
+            self.phase, self._armed = Phase.LOST, False
+        elif self.phase is Phase.LOST and driven and self._armed:
+            self.phase = Phase.DRIVING
+        if self.phase is not Phase.DRIVING or self.inputs is None:
+            return EpisodeEvent.PAUSE
+        inputs = self.inputs if self._armed else self.inputs.let_go()
+        if self.setting.is_single:
+            self._pick_axis(inputs)
+        return self.meaning.intent(inputs, self.setting, view.state, self.age, self.round_trip)
+
+    @property
+    def age(self) -> float:
+        """Of the newest input [s]."""
+        return self._clock() - self.received if self.inputs else np.inf
+
+    def _is_driven(self) -> bool:
+        return self.inputs is not None and self.inputs.on and self.age <= MOST_AGE
+
+    def _pick_axis(self, inputs: Inputs) -> None:
+        """Take the axis that is moved most, once the one before was let go; another one is a switch."""
+        owned = np.abs(inputs.axes) * self.meaning.mask(self.setting)
+        if (self.setting.axis >= 0 and owned[self.setting.axis]) or not owned.any():
+            return
+        axis, first = int(np.argmax(owned)), self.setting.axis < 0
+        if axis != self.setting.axis:
+            changed = replace if first else Setting.switched
+            self.setting = changed(self.setting, axis=axis)
+
+    def _judge(self, event: EpisodeEvent) -> None:
+        """End the episode; one that has not begun cannot be judged."""
+        if self.phase is not Phase.READY or event.drops:
+            self._event = event
+            self.phase = Phase.STOPPED if self.phase is Phase.STOPPED else Phase.PAUSED
+
+    def _choose(self, what: str, value: Any) -> None:
+        setting = self.setting
+        if what == "mode" and value in self.modes and value != setting.mode.name:
+            self.setting = setting.switched(mode=self.modes[value])
+        elif what == "mask" and isinstance(value, tuple):
+            mode = mode_of_mask(self._bits(value), self.meaning.channels)
+            self.setting = setting if mode.name == setting.mode.name else setting.switched(mode=mode)
+        elif what == "focus" and value in ("hand", "base") and value != setting.focus:
+            self.setting = setting.switched(focus=value)
+        elif what == "frame" and value in HAND_FRAMES:
+            self.setting = replace(setting, frame=value)
+        elif what == "speed":
+            self.setting = replace(setting, speed=max(value, 0.05))
+        elif what == "lock" and isinstance(value, tuple):
+            joints = tuple(
+                sorted({joint for joint in value if 0 <= joint < len(self.meaning.channels.joints)})
+            )
+            self.setting = setting.switched(locked=joints)
+
+    def _bits(self, indices: tuple[int, ...]) -> str:
+        return "".join("01"[index in indices] for index in range(self.meaning.channels.size))

@@ -1,0 +1,92 @@
+"""Laws: after an undo all goes on from the last pause as if nothing had been since, and the data say so."""
+
+import numpy as np
+import pytest
+
+from handrail.collect.envs.env import HandrailEnv
+from handrail.collect.operators.operator import EpisodeEvent
+from handrail.collect.session.build import session_features
+from handrail.collect.session.recorder import Recorder
+from handrail.collect.session.session import Session
+from handrail.collect.simulation.ideal_robot import IdealRobot
+from handrail.collect.simulation.simulation import Simulation
+from handrail.collect.tasks.reach import Reach
+from handrail.controllers.interface.channels import Channels
+from handrail.controllers.interface.intent import Intent
+from handrail.controllers.mpc.masked_mpc import MaskedMpc
+from handrail.controllers.robot.model import load_model
+from handrail.datasets.format.manifest import Manifest
+from handrail.datasets.reading.reader import read_frames
+from handrail.datasets.recording.writer import EpisodeWriter
+
+FPS, MODEL = 20, load_model()
+PAUSE, UNDO, SUCCESS = EpisodeEvent.PAUSE, EpisodeEvent.UNDO, EpisodeEvent.SUCCESS
+
+
+class Person:
+    """Steers the hand by a plan: pairs of what, an event or a direction, and for how many calls."""
+
+    def __init__(self, plan):
+        self._plan = [what for what, count in plan for _ in range(count)]
+        self._channels = Channels.of(MODEL.description)
+
+    def reset(self, view, rng):
+        self._left = iter(self._plan)
+
+    def act(self, view):
+        what = next(self._left)
+        if isinstance(what, EpisodeEvent):
+            return what
+        values = np.zeros(self._channels.size)
+        values[self._channels.tool_slice][:3] = what
+        return Intent(values, self._channels.mask("ee"), mode="ee", time=view.state.time)
+
+
+FORTH, LEFT, RIGHT = (0.2, 0.0, 0.0), (0.0, 0.2, 0.0), (0.0, -0.2, 0.0)
+UNDONE = [(FORTH, 10), (PAUSE, 30), (LEFT, 12), (UNDO, 1), (RIGHT, 8), (SUCCESS, 1)]
+PLAIN = [(FORTH, 10), (PAUSE, 30), (RIGHT, 8), (SUCCESS, 1)]
+
+
+def recorded(root, plan, plant, robot_fps=FPS):
+    """Return the frames of an episode, and how it went."""
+    env = HandrailEnv(Reach(moving_obstacles=1), MODEL, fps=robot_fps, plant=plant)
+    with EpisodeWriter.create(root, Manifest("x/undo", FPS, "r", session_features(env), {})) as writer:
+        recorder = Recorder(writer, "t", {})
+        periods = {"control_period": 1 / FPS, "record_period": 1 / FPS}
+        outcome = Session(env, MaskedMpc(MODEL), Person(plan), [recorder], undoes=True, **periods).run(3)
+        recorder.end(outcome)
+    return read_frames(root, 0), outcome
+
+
+@pytest.mark.parametrize("plant", [Simulation, IdealRobot])
+@pytest.mark.parametrize("robot_fps", [FPS, 3 * FPS])
+def test_what_was_undone_never_was(tmp_path, plant, robot_fps):
+    frames, outcome = recorded(tmp_path / "undone", UNDONE, plant, robot_fps)
+    plain, _ = recorded(tmp_path / "plain", PLAIN, plant, robot_fps)
+    assert outcome.undos == 1
+    assert len(frames["action"]) == len(plain["action"])
+    for column in ("action", "observation.state", "teleop.values", "next.done"):
+        got, wanted = (np.array(table[column].tolist()) for table in (frames, plain))
+        assert np.allclose(got, wanted, rtol=0, atol=1e-6), column
+    assert set(frames["teleop.undos"]) == {0, 1}
+    assert sorted(frames["teleop.undos"]) == list(frames["teleop.undos"])
+
+
+def test_the_commands_replay_to_the_same_states(tmp_path):
+    frames, _ = recorded(tmp_path / "undone", UNDONE, Simulation)
+    env = HandrailEnv(Reach(moving_obstacles=1), MODEL, fps=FPS)
+    seen, _ = env.reset(seed=3)
+    for state, action in zip(frames["observation.state"], frames["action"], strict=True):
+        assert np.array_equal(np.asarray(state, np.float32), seen["agent_pos"])
+        seen, *_ = env.step(np.asarray(action))
+
+
+def test_without_a_pause_an_undo_goes_to_the_beginning(tmp_path):
+    frames, outcome = recorded(tmp_path / "d", [(FORTH, 6), (UNDO, 1), (RIGHT, 4), (SUCCESS, 1)], IdealRobot)
+    assert outcome.frames == len(frames["action"]) == 5
+    assert set(frames["teleop.undos"]) == {1}
+
+
+def test_an_undo_of_nothing_is_none(tmp_path):
+    _, outcome = recorded(tmp_path / "d", [(UNDO, 3), (RIGHT, 4), (SUCCESS, 1)], IdealRobot)
+    assert outcome.undos == 0
