@@ -1,0 +1,42 @@
+"""Cards that cover the page, with something to read and questions: a channel beside the driving."""
+
+import json
+import select
+import time
+from collections.abc import Mapping
+from typing import Any
+
+from handrail.collect.cockpit.messages import Answer
+from handrail.collect.cockpit.pipe import ANSWER, CARD
+from handrail.collect.cockpit.process import ServerProcess
+
+_AGAIN = 0.5  # after which a card is shown again: the web server may have been started anew [s]
+
+
+class Cards:
+    """Shows cards on the page of whoever drives, and hears what they answer.
+
+    Only between episodes: the robot stands still then, and what devices say is not listened to.
+
+    Args:
+        server: of the page.
+    """
+
+    def __init__(self, server: ServerProcess) -> None:
+        self._server, self._shown, self._at = server, b"", 0.0
+
+    def show(self, card: Mapping[str, Any]) -> None:
+        """Show a card instead of the one before; without an `id` it covers nothing."""
+        data = json.dumps(card).encode()
+        if data != self._shown or time.monotonic() > self._at + _AGAIN:
+            self._server.send_surely(CARD, data, (CARD,))
+            self._shown, self._at = data, time.monotonic()
+
+    def hear(self, patience: float = 0.1) -> list[Answer]:
+        """Return what was answered, waiting a little for it.
+
+        Args:
+            patience: how long [s].
+        """
+        select.select([self._server.pipe], [], [], patience)
+        return [Answer(**json.loads(data)) for kind, data in self._server.receive() if kind == ANSWER]

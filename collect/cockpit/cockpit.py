@@ -1,0 +1,271 @@
+"""The cockpit as the recording sees it: an operator that steers, an observer that shows.
+
+The page's server is a process of its own. The recording takes the newest input when it needs one, and never
+waits: what the server does not take at once is dropped. When the loop is late, pictures come less often.
+"""
+
+import io
+import json
+import math
+import time
+import webbrowser
+from collections.abc import Callable, Collection, Mapping, Sequence
+from contextlib import suppress
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from PIL import Image
+
+from handrail.collect.cockpit import stage
+from handrail.collect.cockpit.disk import DiskWatch
+from handrail.collect.cockpit.pipe import ASK, DRIVE, DROPPED, FRAME, LOST, NOTE, OVER, PICTURE, STAGE, STOP
+from handrail.collect.cockpit.played import EpisodePoses, PlayedFiles
+from handrail.collect.cockpit.process import ServerProcess
+from handrail.collect.cockpit.snapshot import Counts, Snapshots
+from handrail.collect.cockpit.strain import Strain
+from handrail.collect.config import RecordConfig
+from handrail.collect.envs.env import HandrailEnv
+from handrail.collect.operators.modes import TeleopMode
+from handrail.collect.operators.operator import EpisodeEvent, View
+from handrail.collect.operators.person.inputs import Ask, Inputs
+from handrail.collect.operators.person.person import Person
+from handrail.collect.session.build import build_modes
+from handrail.collect.session.outcome import Outcome
+from handrail.controllers.errors import HandrailError, not_installed
+from handrail.controllers.interface.intent import Intent
+from handrail.controllers.robot.model import RobotModel
+from handrail.datasets.recording.frames import Frame
+
+_NEEDED = ("uvicorn", "starlette", "websockets", "nicegui", "cryptography")  # of the extra 'cockpit'
+_JPEG_QUALITY = 70
+_PICTURE_SIDE = 320  # of a live picture at most; the recorded one is as large as it is [px]
+
+
+class Cockpit:
+    """A person at a browser; an operator and an observer.
+
+    Args:
+        model: of the robot.
+        modes: that one can change to, by name.
+        first: the mode at the beginning.
+        server: the page's.
+        refuses: what the page may not ask for, of `ASKS`.
+        folder: that the episodes go to.
+        wanted: how many episodes; 0 where nobody said.
+        next: what one can do with them afterwards, a command a line.
+        say: is told at the end what was dropped.
+    """
+
+    def __init__(
+        self,
+        model: RobotModel,
+        modes: Mapping[str, TeleopMode],
+        first: str,
+        server: ServerProcess,
+        refuses: Collection[str] = (),
+        folder: str = "",
+        wanted: int = 0,
+        next: Sequence[str] = (),
+        say: Callable[[str], None] = lambda words: None,
+    ) -> None:
+        self._model, self._server, self._folder, self._say = model, server, folder, say
+        self._wanted, self._next = wanted, next
+        self._played = PlayedFiles(server.keep, server.drop)
+        self._disk = DiskWatch(Path(folder).absolute()) if folder else None
+        self._person = Person(model, modes, first)
+        self._counts, self._refuses, self._strain = Counts(), refuses, Strain()
+        self._dropped: dict[str, int] = {}
+        self._pictured = self._acted = -math.inf
+        self._delay = 0.0  # of the last command, from when it was asked for [s]
+
+    @property
+    def practises(self) -> bool:
+        """Whether the episode is not to be saved."""
+        return self._person.practises
+
+    def practise(self, practises: bool) -> None:
+        """Say whether the episodes to come are practice, not to be saved."""
+        self._person.practises = practises
+
+    def begin(self, env: HandrailEnv, seed: int) -> None:
+        """Show the scene of a new episode."""
+        self._env, self._snapshots = env, Snapshots(env)
+        self._acted, self._delay = -math.inf, 0.0
+        self._poses = EpisodePoses(env.simulation.mujoco_model)
+        self._send_stage()
+
+    def reset(self, view: View, rng: np.random.Generator) -> None:
+        """Begin an episode: the robot waits for the operator."""
+        self._person.reset(view, rng)
+
+    def act(self, view: View) -> Intent | EpisodeEvent:
+        """Return the intent now, or what becomes of the episode."""
+        now = time.monotonic()
+        if now < self._acted + 1.0:  # else an undo, or a new episode
+            self._strain.note(now - self._acted - self._env.period)
+        self._listen()
+        answer = self._person.act(view)
+        self._show(view, now)
+        self._acted, self._delay = now, 0.0
+        return answer
+
+    def _show(self, view: View, now: float) -> None:
+        """Let the page have this moment."""
+        moment = self._snapshots.now(view, self._person, now)
+        moment["saved"], moment["succeeded"] = self._counts.saved, self._counts.succeeded
+        moment["commanded"] = round(self._acted + self._delay, 4) if self._delay else 0.0
+        moment["dropped"] = self._all_dropped
+        moment["disk"] = self._disk.left if self._disk else (-1, -1)
+        self._server.send(FRAME, json.dumps(moment, separators=(",", ":")).encode())
+
+    def see(self, frame: Frame) -> None:
+        """Show how the controller fared, and what the cameras see."""
+        self._snapshots.see(frame)
+        self._delay = frame.commanded - frame.wall_clock
+        self._poses.see(frame.number, self._env.simulation.data)
+        if frame.images and time.monotonic() > self._pictured + 0.9 * self._strain.picture_period:
+            self._pictured = time.monotonic()
+            for index, name in enumerate(frame.images):
+                self._server.send(PICTURE, bytes([index]) + _jpeg(frame.images[name]))
+
+    def end(self, outcome: Outcome) -> None:
+        """Count an episode; keep its poses, if it is kept."""
+        self._counts.add(outcome, self._played.add(self._poses.file()) if outcome.kept else "")
+        if self._disk:
+            self._disk.saved(self._counts.saved)
+        self._send_stage()
+
+    def close(self) -> None:
+        """Say on the page that it is over, and here what was dropped; end the server."""
+        with suppress(HandrailError):
+            self._listen()
+        if self._all_dropped:
+            counts = ", ".join(f"{count} {why}" for why, count in self._all_dropped.items())
+            self._say(f"dropped or refused by the page's server: {counts}")
+        if self._disk:
+            self._disk.close()
+        counts = self._counts
+        said = {"saved": counts.saved, "succeeded": counts.succeeded, "folder": self._folder}
+        self._server.send_surely(OVER, json.dumps(said | {"next": list(self._next)}).encode())
+        self._server.close()
+
+    @property
+    def _all_dropped(self) -> dict[str, int]:
+        """What was dropped or refused on the way to pages and back, by why."""
+        ours = self._server.pipe.dropped
+        room = {"frames without room": ours[FRAME], "pictures without room": ours[PICTURE]}
+        return self._dropped | {why: count for why, count in room.items() if count}
+
+    def _listen(self) -> None:
+        """Take what the server has passed on.
+
+        Raises:
+            HandrailError: it has died too often.
+        """
+        for kind, data in self._server.receive():
+            if kind == LOST:
+                self._person.lose()
+            elif kind == STOP:
+                self._person.ask(Ask("stop"))
+            elif kind == NOTE:
+                self._send_stage()
+            elif kind == DROPPED:
+                self._dropped = json.loads(data)
+            elif kind == DRIVE:
+                said = json.loads(data)
+                lists = {name: tuple(said["inputs"][name]) for name in ("axes", "targets")}
+                inputs = Inputs(**(said["inputs"] | lists))
+                self._person.take(inputs, said["received"], said["round_trip"])
+            elif kind == ASK:
+                said = json.loads(data)
+                if said["what"] in self._refuses:
+                    continue
+                value = said["value"]
+                self._person.ask(Ask(said["what"], tuple(value) if isinstance(value, list) else value))
+
+    def _send_stage(self) -> None:
+        """Say what there is to draw and to choose from."""
+        compiled = self._env.simulation.mujoco_model
+        digest, data = stage.meshes(compiled)
+        self._server.keep(f"{digest}.bin", data)
+        limits = self._model.description.limits
+        channels = self._person.meaning.channels
+        said = json.dumps(self._stage(compiled, digest, limits, channels)).encode()
+        self._server.send_surely(STAGE, said, (STAGE,))
+
+    def _stage(self, compiled: Any, digest: str, limits: Any, channels: Any) -> dict[str, Any]:
+        modes = self._person.modes
+        return {
+            "shapes": stage.shapes(compiled),
+            "meshes": digest,
+            "task": self._env.task_description,
+            "horizon": self._env.task.horizon,
+            "robot": self._model.description.name,
+            "channels": channels.names,
+            "joints": self._model.joints,
+            "lower": [_known(x) for x in limits.position_lower],
+            "upper": [_known(x) for x in limits.position_upper],
+            "base": len(channels.base),
+            "modes": [
+                {"name": mode.name, "help": mode.help, "focus": mode.by_focus} for mode in modes.values()
+            ],
+            "refuses": sorted(self._refuses),
+            "cameras": self._env.cameras,
+            "gripper": self._model.description.gripper is not None,
+            "episodes": [each | {"played": self._there(each["played"])} for each in self._counts.episodes],
+            "folder": self._folder,
+            "wanted": self._wanted,
+            "hand": stage.hand(compiled),
+            "base_size": self._model.description.base_size if len(channels.base) else (),
+        }
+
+    def _there(self, played: str) -> str:
+        return played if played in self._played else ""
+
+
+def open_cockpit(config: RecordConfig, env: HandrailEnv, say: Callable[[str], None]) -> Cockpit:
+    """Return a cockpit, and say where it is.
+
+    Args:
+        config: of the recording.
+        env: of the recording.
+        say: is told the address.
+
+    Raises:
+        HandrailError: what the server needs is not installed, or it does not start.
+    """
+    _check_installed()
+    modes = build_modes(config, env)
+    server = ServerProcess(config.cockpit, say)
+    say(f"Drive at {server.address}")
+    say(f"Episodes go to {config.dataset.folder}. To end: Esc on the page, or Ctrl-C here.")
+    if config.cockpit.open and config.cockpit.is_private:
+        webbrowser.open(server.address)
+    folder, wanted = str(config.dataset.folder), config.dataset.num_episodes
+    then = [
+        f"handrail-inspect {folder}",
+        f"handrail-replay {folder}",
+        f"handrail-train {folder} --output outputs/policy",
+    ]
+    return Cockpit(
+        env.model, modes, config.mode_name, server, folder=folder, wanted=wanted, next=then, say=say
+    )
+
+
+def _check_installed() -> None:
+    for module in _NEEDED:
+        if find_spec(module) is None:
+            raise not_installed("the cockpit", module, "cockpit")
+
+
+def _known(limit: float) -> float | None:
+    return round(float(limit), 3) if math.isfinite(limit) and abs(limit) < 100.0 else None
+
+
+def _jpeg(picture: np.ndarray) -> bytes:
+    step = -(-max(picture.shape) // _PICTURE_SIDE)
+    picture, stream = np.ascontiguousarray(picture[::step, ::step]), io.BytesIO()
+    Image.fromarray(picture).save(stream, format="jpeg", quality=_JPEG_QUALITY)
+    return stream.getvalue()

@@ -1,0 +1,243 @@
+"""The pages that are connected: each gets what is newest, none makes another wait."""
+
+import asyncio
+import contextlib
+import json
+import time
+from collections import Counter, deque
+from dataclasses import asdict
+from typing import Any
+
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from handrail.collect.cockpit.lease import Lease
+from handrail.collect.cockpit.messages import LEASE, Answer, Drive, parse
+from handrail.collect.cockpit.page_socket import REPLACED, PageSocket
+from handrail.collect.cockpit.pipe import (
+    ANSWER,
+    ASK,
+    CARD,
+    DRIVE,
+    DROPPED,
+    FRAME,
+    LOST,
+    OVER,
+    PICTURE,
+    STAGE,
+    STOP,
+    Pipe,
+)
+from handrail.collect.cockpit.strain import Strain
+from handrail.collect.operators.person.inputs import Ask
+from handrail.controllers.errors import HandrailError
+
+MOST_PAGES = 32
+MOST_LATE = 0.3  # for how long there may have been a newer picture than the one that an input answers [s]
+_MOST_MESSAGES = 150.0  # from a page [1/s]
+_MOST_BAD = 50  # messages before a page is cut off
+
+
+class Hub:
+    """Passes frames to the pages, and the driver's input to the recording.
+
+    Args:
+        pipe: to the recording.
+
+    Attributes:
+        counts: what was dropped or refused, by why.
+    """
+
+    def __init__(self, pipe: Pipe) -> None:
+        self._pipe, self._lease, self._strain = pipe, Lease(), Strain()
+        self._pages: set[PageSocket] = set()
+        self._stage = self._card = ""
+        self._stamps: deque[float] = deque(maxlen=64)  # of the frames that pages have got
+        self._was_free = True
+        self.counts: Counter[str] = Counter()
+
+    def hear(self) -> None:
+        """Pass on what the recording has sent.
+
+        Raises:
+            HandrailError: the recording is gone.
+        """
+        newest: dict[Any, bytes] = {}
+        for kind, data in self._pipe.receive():
+            newest[kind if kind != PICTURE else (PICTURE, data[:1])] = data
+        now = time.monotonic()
+        for kind, data in newest.items():
+            if kind == STAGE:
+                self._stage = f'{{"kind":"stage","stage":{data.decode()}}}'
+                for page in self._pages:
+                    page.offer(STAGE, self._stage)
+            elif kind == OVER:
+                for page in self._pages:
+                    page.offer(OVER, f'{{"kind":"over","over":{data.decode()}}}')
+            elif kind == CARD:
+                self._card = f'{{"kind":"card","card":{data.decode()}}}'
+                self._deal()
+            elif kind == FRAME:
+                self._stamps.append(json.loads(data)["stamp"])
+                self._show(f'{{"kind":"frame","frame":{data.decode()}}}', now)
+            else:
+                for page in self._pages:
+                    page.offer_each(kind, data, now, 0.9 * self._strain.picture_period)
+
+    def note_lag(self, lag: float) -> None:
+        """Take by how much this server's loop was late [s]."""
+        self._strain.note(lag)
+
+    def keep_up(self) -> None:
+        """Send what waits for the recording; tell the pages when the lease has become free.
+
+        Raises:
+            HandrailError: the recording is gone.
+        """
+        self._pipe.flush()
+        if self._lease.is_free_for("") != self._was_free:
+            self._was_free = not self._was_free
+            self._tell_all()
+
+    def report(self, refused: int) -> None:
+        """Tell the recording what was dropped, and how many were turned away.
+
+        Raises:
+            HandrailError: the recording is gone.
+        """
+        self.counts["refused at the door"] = refused
+        self.counts["input without room"] = self._pipe.dropped[DRIVE] + self._pipe.dropped[ASK]
+        self._pipe.send(DROPPED, json.dumps({why: n for why, n in self.counts.items() if n}).encode())
+
+    async def serve(self, socket: WebSocket, name: str) -> None:
+        """Serve a page until it goes."""
+        if len(self._pages) >= MOST_PAGES:
+            self.counts["more pages than allowed"] += 1
+            await socket.close(1013)
+            return
+        await socket.accept()
+        page = PageSocket(socket, name)
+        await self._replace(page)
+        self._pages.add(page)
+        delivery = asyncio.create_task(page.deliver())
+        try:
+            if self._lease.is_free_for(name):
+                self._lease.take(name)
+            if self._stage:
+                page.offer(STAGE, self._stage)
+            self._tell_all()
+            await self._listen(page, delivery)
+        except (WebSocketDisconnect, RuntimeError, TimeoutError):
+            pass  # it is gone, or takes nothing
+        finally:
+            delivery.cancel()
+            self._part(page)
+
+    async def _replace(self, page: PageSocket) -> None:
+        """Let go of a page of the same name: a reload, or a copy of the tab; one of them drives at most."""
+        for other in [other for other in self._pages if other.name == page.name]:
+            self._part(other)
+            with contextlib.suppress(WebSocketDisconnect, RuntimeError):
+                await other.socket.close(REPLACED)
+
+    def _part(self, page: PageSocket) -> None:
+        """Take note that a page is gone."""
+        if page not in self._pages:
+            return
+        self._pages.discard(page)
+        if self._lease.drives(page.name):
+            self._lose()
+        self._lease.leave(page.name)
+        self._tell_all()
+
+    async def _listen(self, page: PageSocket, delivery: "asyncio.Task[None]") -> None:
+        """Take a page's messages: a few of them bad, not too many a second."""
+        bad, allowance, before = 0, _MOST_MESSAGES, time.monotonic()
+        while bad < _MOST_BAD and not delivery.done() and page in self._pages:
+            message = await page.socket.receive()
+            if message["type"] == "websocket.disconnect":
+                return
+            now = time.monotonic()
+            allowance = min(_MOST_MESSAGES, allowance + _MOST_MESSAGES * (now - before)) - 1.0
+            before = now
+            if allowance < 0.0:
+                self.counts["messages too fast"] += 1
+                await asyncio.sleep(1.0 / _MOST_MESSAGES)
+                continue
+            try:
+                self._take(page, parse(message.get("text") or message.get("bytes") or ""), now)
+            except HandrailError as error:
+                bad += 1
+                self.counts["messages that make no sense"] += 1
+                if self._lease.drives(page.name):
+                    self._lose()
+                page.say("error", error=str(error))
+        await page.socket.close(1008)
+
+    def _deal(self) -> None:
+        """Show the card to the page that drives: what a person answers is for nobody else."""
+        for page in self._pages:
+            if self._card and self._lease.drives(page.name):
+                page.offer(CARD, self._card)
+
+    def _take(self, page: PageSocket, said: Drive | Ask | Answer, now: float) -> None:
+        if isinstance(said, Ask) and said.what in LEASE:
+            drove = self._lease.holder
+            (self._lease.take if said.what == "take" else self._lease.give)(page.name)
+            if self._lease.holder != drove:
+                self._lose()
+            self._tell_all()
+        elif isinstance(said, Ask) and said.what == "stop" and said.value:
+            self._pipe.send_surely(STOP, b"", (STOP, ASK))  # anyone who sees danger may stop it
+        elif not self._lease.drives(page.name):
+            self.counts["input of who does not drive"] += 1
+        elif isinstance(said, Answer):
+            self._pipe.send_surely(ANSWER, json.dumps(asdict(said)).encode())
+        elif isinstance(said, Drive):
+            self._drive(page, said, now)
+        elif self._stage:
+            self._pipe.send_surely(ASK, json.dumps(asdict(said)).encode())
+
+    def _drive(self, page: PageSocket, said: Drive, now: float) -> None:
+        """Pass an input on, unless it comes too late: who answers an old picture cannot steer."""
+        if said.echo > now or said.sequence <= page.sequence:
+            raise HandrailError("drive: expected a time that this server has said, and seq to count up")
+        page.sequence = said.sequence
+        page.answered(said.echo, now)
+        newer = next((stamp for stamp in self._stamps if stamp > said.echo), now)
+        is_late = now - newer > MOST_LATE
+        if is_late != page.is_late:
+            page.is_late = is_late
+            self._tell(page)
+        if is_late:
+            self.counts["input that came too late"] += 1
+            return
+        forward = {"inputs": asdict(said.inputs), "received": now, "round_trip": page.round_trip}
+        self._pipe.send(DRIVE, json.dumps(forward).encode())
+
+    def _lose(self) -> None:
+        """Tell the recording that nobody drives now: who does next has to begin anew."""
+        self._pipe.send_surely(LOST, b"", (LOST, ASK))
+
+    def _show(self, frame: str, now: float) -> None:
+        """Let the driver have every frame, the others some."""
+        for page in self._pages:
+            driving = self._lease.drives(page.name)
+            page.offer_each(FRAME, frame, now, 0.0 if driving else self._strain.spectator_period)
+
+    def _tell_all(self) -> None:
+        for page in self._pages:
+            self._tell(page)
+        self._deal()
+
+    def _tell(self, page: PageSocket) -> None:
+        """Tell a page whether it drives, and who else is there."""
+        driving = self._lease.drives(page.name)
+        page.say(
+            "you",
+            driving=driving,
+            free=self._lease.is_free_for(page.name),
+            pages=len(self._pages),
+            asked=bool(driving and self._lease.asking),
+            asking=self._lease.asking == page.name,
+            late=driving and page.is_late,
+        )

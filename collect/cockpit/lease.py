@@ -1,0 +1,55 @@
+"""Who drives: one page at a time; the others watch, and may ask for it."""
+
+import time
+from collections.abc import Callable
+
+_RESERVED = 5.0  # how long a page that was cut off may come back to its lease [s]
+
+
+class Lease:
+    """Says which page drives.
+
+    Args:
+        clock: [s].
+
+    Attributes:
+        holder: the page that drives, by its own name; empty for none.
+        asking: the page that asked for it last; empty for none.
+    """
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        self.holder = self.asking = ""
+        self._clock, self._left_at = clock, -1e9
+        self._is_there = False
+
+    def take(self, page: str) -> bool:
+        """Let a page drive if nobody does, or it drove a moment ago; else take note that it asks."""
+        if not self.is_free_for(page):
+            self.asking = page
+            return False
+        self.holder, self._is_there = page, True
+        self.asking = "" if self.asking == page else self.asking
+        return True
+
+    def is_free_for(self, page: str) -> bool:
+        """Whether a page may drive at once."""
+        if page == self.holder or not self.holder:
+            return True
+        return not self._is_there and self._clock() > self._left_at + _RESERVED
+
+    def give(self, page: str) -> None:
+        """Let whoever asks drive instead of a page, or nobody."""
+        if page == self.holder:
+            self.holder, self.asking = self.asking, ""
+            self._is_there = bool(self.holder)
+
+    def leave(self, page: str) -> None:
+        """Take note that a page is gone; for a moment it may come back."""
+        if page == self.holder:
+            self._is_there, self._left_at = False, self._clock()
+        if page == self.asking:
+            self.asking = ""
+
+    def drives(self, page: str) -> bool:
+        """Whether it is this page that drives."""
+        return self._is_there and page == self.holder

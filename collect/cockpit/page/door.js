@@ -1,0 +1,34 @@
+// Lets a person in: with the token after # in the address, which is never sent in one, or typed.
+const door = document.getElementById("door");
+
+async function enter(token) {
+  const answer = await fetch("/login", { method: "POST", body: token });
+  return answer.ok;
+}
+
+async function isOpen() {
+  return (await fetch("/link.js", { method: "HEAD" })).ok;
+}
+
+async function begin() {
+  const token = location.hash.slice(1);
+  if (token) {
+    history.replaceState(null, "", location.pathname);
+    await enter(token);
+  }
+  if (!(await isOpen())) {
+    door.hidden = false;
+    return;
+  }
+  door.hidden = true;
+  document.getElementById("cockpit").hidden = false;
+  await import("./main.js");
+}
+
+door.addEventListener("submit", async (event) => {
+  event.preventDefault();
+  if (await enter(document.getElementById("token").value)) begin();
+  else document.getElementById("door-error").textContent = "That is not the token. The terminal says the address with it.";
+});
+
+begin();

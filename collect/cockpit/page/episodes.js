@@ -1,0 +1,91 @@
+// Episodes: start (after a countdown, for who wants it), how far they are, what was recorded.
+import { playButton } from "./playback.js";
+import { keep, recall } from "./store.js";
+
+const byId = (id) => document.getElementById(id);
+const COUNTS = 3; // before the start [s]
+
+function set(id, words) {
+  if (byId(id).textContent !== words) byId(id).textContent = words;
+}
+
+const share = (part, whole) => (whole ? `${Math.round(100 * part / whole)} %` : "–");
+
+// disk: free [bytes], and about how many episodes that is; -1 for what nobody knows
+function room([bytes, episodes] = [-1, -1]) {
+  if (bytes < 0) return "";
+  return `disk: ${(bytes / 1e9).toFixed(bytes < 1e10 ? 1 : 0)} GB free${episodes < 0 ? "" : `, about ${episodes} episodes`}`;
+}
+
+function checkpoint({ undo_takes: ago, undos }) {
+  const count = undos === 1 ? "1 undo" : undos ? `${undos} undos` : "";
+  return [ago === undefined ? "" : `checkpoint ${ago.toFixed(1)} s ago`, count].filter(Boolean).join(", ");
+}
+
+export class Episodes {
+  constructor(link) {
+    this.link = link;
+    this.timer = null;
+    byId("countdown-wanted").checked = recall("countdown", (value) => typeof value === "boolean", false);
+    byId("countdown-wanted").addEventListener("change", (event) => keep("countdown", event.target.checked));
+  }
+
+  stage(stage) {
+    this.horizon = stage.horizon;
+    this.wanted = stage.wanted;
+    set("task", stage.task);
+    byId("task").title = stage.task;
+    set("place", stage.folder ? `in ${stage.folder}` : "");
+    byId("place").title = stage.folder ?? "";
+    this.list(stage.episodes);
+  }
+
+  list(episodes) {
+    byId("episodes-empty").hidden = episodes.length > 0;
+    byId("episodes").replaceChildren(...episodes.map((episode, index) => {
+      const item = document.createElement("li"), mark = document.createElement("b");
+      mark.textContent = episode.kept ? (episode.success ? "✓" : "✗") : "–";
+      mark.className = episode.kept ? (episode.success ? "good" : "bad") : "dim";
+      item.append(mark, ` ${episode.said}, ${episode.seconds.toFixed(1)} s${episode.kept ? "" : ", not saved"}`);
+      if (episode.played) item.append(playButton(episode, index + 1));
+      return item;
+    }));
+    byId("episodes").lastElementChild?.scrollIntoView({ block: "nearest" });
+  }
+
+  // Begin, or go on; a countdown only before the beginning.
+  start(phase) {
+    if (phase === "stopped") return this.link.ask("stop", false);
+    if (phase !== "ready" || !byId("countdown-wanted").checked) return this.link.ask("start");
+    if (!this.timer) this.count(COUNTS);
+    return undefined;
+  }
+
+  count(left) {
+    byId("countdown").hidden = left === 0;
+    set("countdown", String(left));
+    this.timer = left ? setTimeout(() => this.count(left - 1), 1000) : null;
+    if (!left) this.link.ask("start");
+  }
+
+  // Whatever else happens: the countdown is off.
+  cancel() {
+    clearTimeout(this.timer);
+    this.timer = null;
+    byId("countdown").hidden = true;
+  }
+
+  frame(frame) {
+    if (frame.phase !== "ready") this.cancel();
+    const left = frame.phase === "ready" ? this.horizon : Math.max(0, frame.left);
+    set("clock", frame.phase === "ready" ? `${this.horizon} s` : `${left.toFixed(0)} s left`);
+    byId("bar").style.transform = `scaleX(${Math.min(1, 1 - left / this.horizon)})`;
+    set("saved", `${frame.saved} saved, ${frame.succeeded} succeeded`);
+    set("progress", this.wanted ? `${frame.saved} of ${this.wanted}` : "");
+    byId("progress-bar").hidden = !this.wanted;
+    if (this.wanted) Object.assign(byId("progress-bar"), { max: this.wanted, value: frame.saved });
+    set("rate", `success ${share(frame.succeeded, frame.saved)}`);
+    set("disk", room(frame.disk));
+    set("checkpoint", frame.phase === "ready" ? "" : checkpoint(frame));
+  }
+}

@@ -1,0 +1,121 @@
+// All inputs together: deflections of every device are added up and clipped to a full stick.
+// Sliders say where the arm's joints shall go; that wins over the joints' deflections.
+import { inForce, sticksInForce } from "./keymap.js";
+import { STOP } from "./mapping.js";
+
+const DEAD = 0.12; // of a stick
+const CURVE = 1.7; // exponent: fine near the middle
+const NATIVE = ["ArrowUp", "ArrowDown", "ArrowLeft", "ArrowRight", "Home", "End", "PageUp", "PageDown"];
+const SCROLLS = ["Space", "ArrowLeft", "ArrowRight", "ArrowDown", "ArrowUp", "Backspace"];
+
+export function shaped(value) {
+  const size = Math.abs(value);
+  if (!(size >= DEAD)) return 0; // also where it is no number
+  return Math.sign(value) * Math.min(1, (size - DEAD) / (1 - DEAD)) ** CURVE;
+}
+
+const isTyping = (element) => element.matches("textarea, input:not([type=range], [type=checkbox], [type=radio])");
+
+// What a key does by itself in the control that has the focus: it must stay so for those who use no mouse.
+function isNative(element, code) {
+  if (element.matches("select, input[type=range], [role=slider]")) return NATIVE.includes(code);
+  return code === "Enter" && element.matches("button, summary, a, input");
+}
+
+export class Inputs {
+  // act(name): an action is asked for
+  constructor(act) {
+    this.act = act;
+    this.held = new Set();
+    this.owned = new Set();
+    const keyboard = { device: "keyboard", moves: () => this.keyed(), letGo: () => this.held.clear() };
+    this.sources = [keyboard]; // each {device, moves(), letGo(), targets where it has some}
+    this.mapping = null;
+    this.device = "keyboard";
+    this.grip = false;
+    this.turns = false; // whether sticks turn the hand
+    this.bank = 0; // which of what they can move the sticks move
+    this.hasFocus = document.hasFocus();
+    this.listen();
+  }
+
+  listen() {
+    addEventListener("keydown", (event) => this.press(event), true);
+    addEventListener("keyup", (event) => this.held.delete(event.code), true);
+    addEventListener("blur", () => this.release(false));
+    addEventListener("focus", () => { this.hasFocus = true; });
+    document.addEventListener("visibilitychange", () => { if (document.hidden) this.release(this.hasFocus); });
+    addEventListener("pagehide", () => this.release(false));
+  }
+
+  get entries() {
+    return this.mapping?.keys ?? [];
+  }
+
+  release(hasFocus) {
+    for (const source of this.sources) source.letGo();
+    this.hasFocus = hasFocus;
+  }
+
+  press(event) {
+    if (!this.mapping || isTyping(event.target) || event.ctrlKey || event.metaKey || event.altKey) return;
+    if (this.capture && event.code !== STOP) {
+      event.preventDefault();
+      event.stopPropagation();
+      const taken = this.capture;
+      this.capture = null;
+      taken(event.code);
+      return;
+    }
+    if (isNative(event.target, event.code)) return;
+    const driving = this.entriesInForce().some(([code]) => code === event.code);
+    const action = this.mapping.action(event.code);
+    const acted = !driving && action && !event.repeat && this.act(action) !== false;
+    if (driving || acted || SCROLLS.includes(event.code)) {
+      event.preventDefault();
+      if (!event.target.matches("body, [role=slider]")) document.activeElement.blur();
+    }
+    if (driving) this.held.add(event.code);
+  }
+
+  entriesInForce() {
+    return inForce(this.entries, this.owned);
+  }
+
+  // Deflections of the keys, [[axis, value], …].
+  keyed() {
+    return this.entriesInForce().filter(([code]) => this.held.has(code)).map(([, axis, sign]) => [axis, sign]);
+  }
+
+  // Which axes two sticks move now.
+  sticks() {
+    return this.bankOf().sticks;
+  }
+
+  nextBank() {
+    this.bank = (this.bank + 1) % this.bankOf().count;
+  }
+
+  bankOf() {
+    return sticksInForce(this.owned, this.turns || Boolean(this.gamepad?.turns), this.bank);
+  }
+
+  get isHere() {
+    return this.hasFocus && !document.hidden;
+  }
+
+  // Returns {axes, device, on, grip, targets}; `channels` names the axes.
+  read(channels) {
+    const sums = new Map();
+    let targets = [];
+    for (const source of this.sources) {
+      const moves = source.moves().filter(([, value]) => value);
+      const wanted = source.targets ?? [];
+      if (moves.length || wanted.length) this.device = source.device;
+      for (const [axis, value] of moves) sums.set(axis, (sums.get(axis) ?? 0) + value);
+      if (wanted.length) targets = [...wanted];
+    }
+    const axes = channels.map((name) => (this.isHere ? Math.max(-1, Math.min(1, sums.get(name) ?? 0)) : 0));
+    return { axes, device: this.device, on: this.isHere, grip: this.grip, targets: this.isHere ? targets : [] };
+  }
+}

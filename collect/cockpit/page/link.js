@@ -1,0 +1,68 @@
+// The connection to the server: says where the inputs are, hears what happens; comes back by itself.
+const RETRY = 700; // [ms]
+const REPLACED = 4001; // this page is open elsewhere too, a copy of the tab: that one drives
+
+function pageName() {
+  let name = sessionStorage.getItem("page");
+  if (!name) {
+    name = Array.from(crypto.getRandomValues(new Uint8Array(12)), (b) => b.toString(16).padStart(2, "0")).join("");
+    sessionStorage.setItem("page", name);
+  }
+  return name;
+}
+
+export class Link {
+  // handlers: {stage, frame, you, error, picture, connected, over}
+  constructor(handlers) {
+    this.handlers = handlers;
+    this.sequence = 0;
+    this.stamp = 0;
+    this.open();
+  }
+
+  open() {
+    const scheme = location.protocol === "https:" ? "wss" : "ws";
+    this.socket = new WebSocket(`${scheme}://${location.host}/drive?page=${pageName()}`);
+    this.socket.binaryType = "arraybuffer";
+    this.sequence = 0;
+    this.socket.onopen = () => this.handlers.connected(true);
+    this.socket.onclose = (event) => {
+      if (event.code === REPLACED) sessionStorage.removeItem("page");
+      if (this.isOver) return;
+      this.handlers.connected(false);
+      setTimeout(() => this.open(), RETRY);
+    };
+    this.socket.onmessage = (event) => this.hear(event.data);
+  }
+
+  hear(data) {
+    if (data instanceof ArrayBuffer) {
+      const bytes = new Uint8Array(data);
+      this.handlers.picture(bytes[0], new Blob([bytes.subarray(1)], { type: "image/jpeg" }));
+      return;
+    }
+    const said = JSON.parse(data);
+    if (said.kind === "over") this.isOver = true; // nothing to come back to
+    if (said.kind === "frame") this.stamp = said.frame.stamp;
+    this.handlers[said.kind](said[said.kind] ?? said);
+  }
+
+  get isOpen() {
+    return this.socket.readyState === WebSocket.OPEN;
+  }
+
+  say(message) {
+    if (this.isOpen) this.socket.send(JSON.stringify(message));
+  }
+
+  // Where the inputs are; left out while what was said before is not gone yet: only the newest counts.
+  drive(input) {
+    if (this.isOpen && this.socket.bufferedAmount > 4096) return;
+    this.sequence += 1;
+    this.say({ kind: "drive", seq: this.sequence, echo: this.stamp, ...input });
+  }
+
+  ask(what, value = true) {
+    this.say({ kind: "ask", what, value });
+  }
+}

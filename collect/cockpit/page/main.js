@@ -1,0 +1,146 @@
+// Puts the page together: inputs up many times a second, the newest picture down.
+import { Episodes } from "./episodes.js";
+import { Gamepad } from "./gamepad.js";
+import { Help } from "./help.js";
+import { Inputs } from "./inputs.js";
+import { Mapping } from "./mapping.js";
+import { BY_JOINTS, inForce, keyName } from "./keymap.js";
+import { Link } from "./link.js";
+import { Masks } from "./masks.js";
+import { Notices } from "./notices.js";
+import { Panels } from "./panels.js";
+import { Sliders } from "./sliders.js";
+import { TouchSticks } from "./sticks.js";
+import { Study } from "./study.js";
+import { View } from "./view.js";
+import { XrHand } from "./xr.js";
+import { foldPanels } from "./folds.js";
+
+const PERIOD = 25; // between two messages [ms]
+const byId = (id) => document.getElementById(id);
+const view = new View(byId("view"));
+let stage = null, frame = null, told = null, drawn = null;
+
+const ask = (what, value) => { episodes.cancel(); link.ask(what, value); };
+const DO = {
+  start: () => (frame?.phase === "driving" ? ask("pause") : episodes.start(frame?.phase)), stop: () => ask("stop"), grip: () => { inputs.grip = !inputs.grip; },
+  pause: () => ask("pause"), success: () => ask("success"), failure: () => ask("failure"), restart: () => ask("restart"),
+  discard: () => ask("discard"), undo: () => ask("undo"), quit: () => ask("quit"), help: () => help.toggle(),
+  focus: () => otherFocus(), slower: () => faster(-0.2), faster: () => faster(0.2), mode: () => next("mode"), frame: () => next("frame"),
+  joint: () => masks.nextJoint(), camera: () => view.nextCamera(),
+};
+const act = (name) => DO[name]();
+
+const notices = new Notices();
+const inputs = new Inputs(act);
+const gamepad = inputs.gamepad = new Gamepad(inputs, act, (words) => notices.say(words));
+const touch = new TouchSticks(byId("sticks"), inputs, act);
+const sliders = new Sliders(byId("sliders"));
+const link = new Link({
+  connected: (isConnected) => { if (!isConnected) episodes.cancel(); panels.connected(isConnected); },
+  you: (you) => { panels.told(you); study.told(you); },
+  card: (card) => study.show(card),
+  error: (said) => notices.say(`The robot's side says: ${said.error}`),
+  over: (said) => panels.ended(said),
+  picture: (index, blob) => panels.picture(index, blob),
+  stage: async (said) => {
+    stage = said;
+    inputs.mapping = new Mapping(stage);
+    for (const each of [panels, masks, sliders, episodes, study]) each.stage(stage);
+    notices.hint(inputs.entriesInForce(), inputs.mapping.actions, matchMedia("(pointer: coarse)").matches);
+    label();
+    await view.stage(stage);
+  },
+  frame: (said) => { frame = said; say(); }, // answered at once: so the server knows how long that takes
+});
+const panels = new Panels(link);
+const masks = new Masks(link);
+const episodes = new Episodes(link);
+const help = new Help(inputs, gamepad, label);
+const study = new Study(link, (owned) => inForce(inputs.entries, owned));
+const xr = new XrHand(byId("xr"), inputs, (what, value) => link.ask(what, value), (words) => notices.say(words));
+inputs.sources.push(gamepad, touch, sliders, xr);
+foldPanels();
+
+function faster(change) {
+  if (frame) link.ask("speed", Math.min(1, Math.max(0.2, Number((frame.speed + change).toFixed(1)))));
+}
+
+function otherFocus() {
+  if (!frame?.focus) return false;
+  link.ask("focus", frame.focus === "hand" ? "base" : "hand");
+  return true;
+}
+
+// The next one that there is to choose.
+function next(id) {
+  const values = [...byId(id).options].filter((option) => !option.hidden).map((option) => option.value);
+  link.ask(id, values[(values.indexOf(byId(id).value) + 1) % values.length]);
+}
+
+// Each button says its key, as it is now.
+function label() {
+  for (const key of document.querySelectorAll("[data-key]")) key.textContent = keyName(inputs.mapping.actions[key.dataset.key]);
+}
+
+for (const name of ["start", "pause", "undo", "success", "failure", "restart", "discard", "quit", "stop"]) byId(name).addEventListener("click", () => act(name));
+for (const id of ["help-open", "help-close"]) byId(id).addEventListener("click", () => act("help"));
+document.addEventListener("click", (event) => { // the mouse leaves no focus behind: the next key is for the robot
+  if (event.detail > 0) event.target.closest("button, summary, input[type=checkbox], input[type=range]")?.blur();
+});
+
+function ownedBodies() {
+  const has = (prefix) => [...inputs.owned].some((name) => name.startsWith(prefix));
+  const bodies = stage.shapes.bodies, lit = new Set();
+  if (has("base")) lit.add("planar_base"); // by its twist or its joints
+  if (has("ee.")) for (const name of bodies) if (name === "gripper" || name.startsWith("finger")) lit.add(name);
+  for (const name of inputs.owned) if (name.startsWith("joint.")) lit.add(`${name.slice(6)}_body`);
+  return lit;
+}
+
+// The channels that the operator owns; and, where they own all joints of the base, that its keys and sticks mean these.
+function owned() {
+  const names = new Set(frame.mask.map((index) => stage.channels[index]));
+  const base = stage.joints.slice(0, stage.base).map((name) => `joint.${name}`);
+  return base.length && !names.has("base.vx") && base.every((name) => names.has(name)) ? names.add(BY_JOINTS) : names;
+}
+
+function own(owned) {
+  if ([...owned].join() === [...inputs.owned].join()) return;
+  inputs.owned = owned;
+  inputs.bank = 0;
+  inputs.turns = false;
+  view.light_up(ownedBodies());
+  help.draw();
+  notices.hint(inputs.entriesInForce(), inputs.mapping.actions, matchMedia("(pointer: coarse)").matches);
+}
+
+function step() {
+  requestAnimationFrame(step);
+  if (stage && frame && frame !== drawn && view.bodies.length * 7 === frame.poses.length) {
+    view.frame(frame);
+    drawn = frame;
+  }
+  view.render();
+}
+
+// Says how it stands, also while a slow machine draws less often.
+function tell() {
+  told = frame;
+  own(owned());
+  for (const each of [masks, panels, episodes, xr]) each.frame(frame);
+  sliders.frame(frame, inputs.owned);
+  touch.label();
+}
+
+function say() {
+  if (!stage) return;
+  if (frame && frame !== told) tell();
+  const input = inputs.read(stage.channels);
+  if (byId("pad").textContent !== gamepad.says) byId("pad").textContent = gamepad.says;
+  if (panels.you.driving) link.drive({ ...input, view: view.azimuth });
+}
+
+for (const event of ["keydown", "keyup", "blur"]) addEventListener(event, say); // after what inputs make of it
+setInterval(say, PERIOD); // also while a slow machine draws less often than that
+requestAnimationFrame(step);

@@ -1,0 +1,143 @@
+// What is asked and what is made of it, drawn into the scene: ghosts, the plan, the nearest pair. Each has a line of
+// its own kind, so that nobody needs the colours: the ghosts are hollow, the plan is solid, the nearest pair is dotted.
+import { THREE } from "/lib/three.js";
+import { place } from "./scene.js";
+
+export const ASKED = 0xffa000, PLAN = 0x2f7df6, NEAR = 0xe5484d;
+const ON_FLOOR = 0.006; // [m]
+
+function line(scene, colour, dash) {
+  const look = { color: colour, depthTest: false, transparent: true };
+  const material = dash
+    ? new THREE.LineDashedMaterial({ ...look, dashSize: dash, gapSize: 0.7 * dash }) : new THREE.LineBasicMaterial(look);
+  const made = new THREE.Line(new THREE.BufferGeometry(), material);
+  made.renderOrder = 4;
+  made.frustumCulled = false;
+  scene.add(made);
+  return made;
+}
+
+function draw(made, points) {
+  made.visible = points.length > 1;
+  if (!made.visible) return;
+  made.geometry.dispose();
+  made.geometry = new THREE.BufferGeometry().setFromPoints(points);
+  made.computeLineDistances();
+}
+
+// A plan as a tube: a line of WebGL is one pixel wide on most computers.
+function tube(scene, colour, radius) {
+  const made = new THREE.Mesh(new THREE.BufferGeometry(), new THREE.MeshBasicMaterial({ color: colour, depthTest: false, transparent: true }));
+  made.renderOrder = 3;
+  made.frustumCulled = false;
+  made.radius = radius;
+  scene.add(made);
+  return made;
+}
+
+function drawTube(made, points) {
+  const length = points.slice(1).reduce((sum, point, index) => sum + point.distanceTo(points[index]), 0);
+  made.visible = length > 0.01;
+  if (!made.visible) return;
+  made.geometry.dispose();
+  made.geometry = new THREE.TubeGeometry(new THREE.CatmullRomCurve3(points), 24, made.radius, 6);
+}
+
+export class Marks {
+  // label: an element beside the nearest pair
+  constructor(scene, label) {
+    this.scene = scene;
+    this.label = label;
+    this.path = tube(scene, PLAN, 0.006);
+    this.track = tube(scene, PLAN, 0.012);
+    this.asked = line(scene, ASKED, 0.03);
+    this.near = line(scene, NEAR, 0.008);
+    this.outline = line(scene, ASKED, 0.06);
+    this.ends = [0, 1].map(() => new THREE.Mesh(
+      new THREE.SphereGeometry(0.012, 12, 8), new THREE.MeshBasicMaterial({ color: NEAR, depthTest: false, transparent: true }),
+    ));
+    for (const end of this.ends) end.renderOrder = 4;
+    this.ghost = new THREE.Group();
+    scene.add(this.ghost, ...this.ends);
+  }
+
+  // The ghost of the hand looks like the hand.
+  stage(stage, bodies) {
+    this.bodies = bodies;
+    this.hand = stage.hand;
+    this.baseSize = stage.base_size;
+    this.ghost.clear();
+    for (const index of stage.hand) {
+      const copy = new THREE.Group();
+      for (const part of bodies[index].children) copy.add(...this.hollow(part));
+      this.ghost.add(copy);
+    }
+  }
+
+  hollow(part) {
+    const skin = new THREE.Mesh(part.geometry, new THREE.MeshBasicMaterial({ color: ASKED, transparent: true, opacity: 0.3, depthWrite: false }));
+    const edges = new THREE.LineSegments(new THREE.EdgesGeometry(part.geometry, 30), new THREE.LineBasicMaterial({ color: ASKED, depthTest: false, transparent: true }));
+    for (const each of [skin, edges]) {
+      each.position.copy(part.position);
+      each.quaternion.copy(part.quaternion);
+      each.renderOrder = 3;
+    }
+    return [skin, edges];
+  }
+
+  frame(frame) {
+    drawTube(this.path, frame.path.map((point) => new THREE.Vector3(...point)));
+    drawTube(this.track, frame.track.map(([x, y]) => new THREE.Vector3(x, y, ON_FLOOR)));
+    this.leadHand(frame);
+    this.leadBase(frame);
+    const points = frame.nearest?.points ?? [];
+    const ends = points.length ? [new THREE.Vector3(...points.slice(0, 3)), new THREE.Vector3(...points.slice(3))] : [];
+    draw(this.near, ends);
+    this.ends.forEach((end, index) => { end.visible = ends.length > 0; if (end.visible) end.position.copy(ends[index]); });
+    this.said = frame.nearest ? `${(100 * frame.nearest.distance).toFixed(0)} cm` : "";
+  }
+
+  // Every part of the hand stands to the ghost as it stands to the hand now.
+  leadHand(frame) {
+    this.ghost.visible = frame.ghost.length > 0;
+    draw(this.asked, this.ghost.visible ? [frame.tool, frame.ghost].map((pose) => new THREE.Vector3(...pose.slice(0, 3))) : []);
+    if (!this.ghost.visible) return;
+    const now = new THREE.Group(), ahead = new THREE.Group();
+    place(now, frame.tool);
+    place(ahead, frame.ghost);
+    for (const each of [now, ahead]) each.updateMatrix();
+    const moved = ahead.matrix.multiply(now.matrix.invert());
+    this.hand.forEach((body, index) => {
+      const part = this.ghost.children[index];
+      place(part, frame.poses, 7 * body);
+      part.updateMatrix();
+      moved.clone().multiply(part.matrix).decompose(part.position, part.quaternion, part.scale);
+    });
+  }
+
+  // The outline of the base on the floor, with a nose that says where its front is.
+  leadBase(frame) {
+    const [x, y, yaw] = frame.ghost_base;
+    if (!frame.ghost_base.length) return draw(this.outline, []);
+    const [a, b] = this.baseSize.map((side) => side / 2);
+    const corners = [[a, -b], [a, b], [-a, b], [-a, -b], [a, -b], [a + 0.15, 0], [a, b]];
+    draw(this.outline, corners.map(([p, q]) => new THREE.Vector3(
+      x + Math.cos(yaw) * p - Math.sin(yaw) * q, y + Math.sin(yaw) * p + Math.cos(yaw) * q, ON_FLOOR,
+    )));
+  }
+
+  // Puts the distance beside its line; called when the camera is where it will draw from.
+  letter(camera, width, height) {
+    const middle = this.ends[0].position.clone().add(this.ends[1].position).multiplyScalar(0.5).project(camera);
+    const seen = this.said && this.near.visible && Math.abs(middle.z) < 1;
+    this.label.hidden = !seen;
+    if (!seen) return;
+    this.label.textContent = this.said;
+    this.label.style.transform = `translate(${((middle.x + 1) / 2 * width + 10).toFixed(0)}px, ${((1 - middle.y) / 2 * height - 10).toFixed(0)}px)`;
+  }
+
+  hide() {
+    for (const each of [this.path, this.track, this.asked, this.near, this.outline, this.ghost, ...this.ends]) each.visible = false;
+    this.said = "";
+  }
+}

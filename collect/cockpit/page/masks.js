@@ -1,0 +1,73 @@
+// Any mask: which parts the person owns, by group, joint or single channel; choosing a mode goes back.
+import { AXES, jointName } from "./keymap.js";
+
+const GROUPS = { base: "base.", hand: "ee.", joints: "joint." };
+const byId = (id) => document.getElementById(id);
+const SHORT = { "base.vx": "drive", "base.vy": "sideways", "base.wz": "turn", "ee.vx": "forward", "ee.vy": "sideways", "ee.vz": "up", "ee.wx": "roll", "ee.wy": "tip", "ee.wz": "turn" };
+
+function toggle(words, label, act) {
+  const made = document.createElement("button");
+  made.type = "button";
+  made.textContent = words;
+  made.setAttribute("aria-label", label);
+  made.addEventListener("click", act);
+  return made;
+}
+
+export class Masks {
+  constructor(link) {
+    this.link = link;
+    this.mine = new Set();
+    this.channels = [];
+    byId("one-joint").addEventListener("change", (event) => {
+      if (event.target.value) this.link.ask("mask", [Number(event.target.value)]);
+      event.target.blur();
+    });
+  }
+
+  stage(stage) {
+    this.channels = stage.channels;
+    this.joints = stage.joints.map((name) => stage.channels.indexOf(`joint.${name}`));
+    this.groups = Object.entries(GROUPS).map(([name, prefix]) => ({
+      name, channels: stage.channels.flatMap((channel, index) => (channel.startsWith(prefix) ? [index] : [])),
+    })).filter(({ channels }) => channels.length);
+    this.parts = this.groups.map(({ name, channels }) => toggle("", `you own the ${name}`, () => this.flip(channels)));
+    byId("owned").replaceChildren(...this.parts);
+    this.single = stage.channels.map((name, index) => toggle(SHORT[name] ?? jointName(name), AXES[name]?.join(", ") ?? jointName(name), () => this.flip([index])));
+    byId("channels").replaceChildren(...this.groups.map(({ name, channels }) => {
+      const group = document.createElement("div"), title = document.createElement("b");
+      title.textContent = name;
+      group.append(title, ...channels.map((index) => this.single[index]));
+      return group;
+    }));
+    byId("one-joint").replaceChildren(new Option("one joint alone …", ""), ...this.joints.map((channel) => new Option(jointName(stage.channels[channel]), channel)));
+  }
+
+  // Own all of these, or none of them where they are all owned.
+  flip(channels) {
+    const next = new Set(this.mine), isAll = channels.every((each) => next.has(each));
+    for (const channel of channels) if (isAll) next.delete(channel); else next.add(channel);
+    this.link.ask("mask", [...next].sort((a, b) => a - b));
+  }
+
+  // The next joint, alone.
+  nextJoint() {
+    const alone = this.mine.size === 1 ? this.joints.indexOf([...this.mine][0]) : -1;
+    this.link.ask("mask", [this.joints[(alone + 1) % this.joints.length]]);
+  }
+
+  frame(frame) {
+    const locked = frame.locked.map((joint) => this.joints[joint]); // they are owned by standing still
+    this.mine = new Set(frame.mask.filter((channel) => !locked.includes(channel)));
+    this.groups.forEach(({ name, channels }, index) => {
+      const count = channels.filter((each) => this.mine.has(each)).length;
+      const [mark, who, pressed] = count === channels.length ? ["●", "you", "true"] : count ? ["◐", "some", "mixed"] : ["○", "robot", "false"];
+      const words = `${mark} ${name}: ${who}`;
+      if (this.parts[index].textContent !== words) this.parts[index].textContent = words;
+      this.parts[index].setAttribute("aria-pressed", pressed);
+    });
+    this.single.forEach((button, index) => button.setAttribute("aria-pressed", String(this.mine.has(index))));
+    const alone = this.mine.size === 1 && this.joints.includes([...this.mine][0]) ? String([...this.mine][0]) : "";
+    if (document.activeElement !== byId("one-joint")) byId("one-joint").value = alone;
+  }
+}

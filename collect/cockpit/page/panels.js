@@ -1,0 +1,165 @@
+// Words and buttons: what the page says besides the picture. Everything comes from the newest frame.
+import { jointName } from "./keymap.js";
+import { stateOf } from "./states.js";
+import { turnTo } from "./turn.js";
+
+const byId = (id) => document.getElementById(id);
+const STARTS = { ready: "Start", paused: "Go on", stopped: "Release" };
+const NEEDS = {
+  begun: ["pause", "undo", "success", "failure"], driver: ["restart", "discard", "quit"],
+  choices: ["mode", "frame", "speed", "one-joint"],
+};
+
+function set(id, text) {
+  const element = byId(id);
+  if (element.textContent !== text) element.textContent = text;
+}
+
+function button(text, act) {
+  const made = document.createElement("button");
+  made.textContent = text;
+  made.addEventListener("click", act);
+  return made;
+}
+
+export class Panels {
+  constructor(link) {
+    this.link = link;
+    this.you = { driving: false, free: true, pages: 1 };
+    this.isConnected = true;
+    this.over = this.newest = null;
+    const chosen = (id, value) => byId(id).addEventListener("change", (event) => { link.ask(id, value(event.target)); event.target.blur(); });
+    chosen("mode", (select) => select.value);
+    chosen("frame", (select) => select.value);
+    chosen("practice", (box) => box.checked);
+    byId("speed").addEventListener("input", (event) => link.ask("speed", Number(event.target.value)));
+    for (const each of document.querySelectorAll("[data-focus]")) each.addEventListener("click", () => link.ask("focus", each.dataset.focus));
+    this.state();
+  }
+
+  stage(stage) {
+    this.stageNow = stage;
+    this.modes = Object.fromEntries(stage.modes.map((mode) => [mode.name, mode]));
+    const own = new Option("a mask of your own", "");
+    own.hidden = true;
+    byId("mode").replaceChildren(...stage.modes.map((mode) => new Option(mode.name, mode.name)), own);
+    this.locks(stage);
+    this.pictures(stage.cameras);
+  }
+
+  locks(stage) {
+    byId("locks").replaceChildren(...stage.joints.map((name, index) => {
+      const label = document.createElement("label"), box = document.createElement("input");
+      box.type = "checkbox";
+      box.dataset.joint = index;
+      box.addEventListener("change", () => {
+        const chosen = [...byId("locks").querySelectorAll("input:checked")].map((each) => Number(each.dataset.joint));
+        this.link.ask("lock", chosen);
+      });
+      label.append(box, ` ${jointName(name)}`);
+      return label;
+    }));
+  }
+
+  pictures(cameras) {
+    this.images = cameras.map((name) => {
+      const figure = document.createElement("figure"), image = document.createElement("img"), caption = document.createElement("figcaption");
+      image.alt = `camera: ${name}`;
+      image.hidden = true;
+      caption.textContent = name;
+      figure.append(image, caption);
+      return figure;
+    });
+    byId("pictures").replaceChildren(...this.images);
+  }
+
+  picture(index, blob) {
+    const image = this.images?.[index]?.querySelector("img");
+    if (!image) return;
+    URL.revokeObjectURL(image.src);
+    image.src = URL.createObjectURL(blob);
+    image.hidden = false;
+  }
+
+  connected(isConnected) {
+    this.isConnected = isConnected;
+    this.over = null;
+    this.state();
+  }
+
+  ended(said) {
+    this.over = said;
+    this.state();
+  }
+
+  told(you) {
+    this.you = you;
+    const drives = byId("drives");
+    drives.hidden = you.driving && !you.asked;
+    drives.replaceChildren();
+    if (you.asked) {
+      drives.append("Someone asks to drive. ", button("Let them", () => this.link.ask("give")));
+    } else if (!you.driving) {
+      const asks = button(you.asking ? "Asked; waiting" : you.free ? "Drive" : "Ask to drive", () => this.link.ask("take"));
+      asks.disabled = you.asking;
+      drives.append(you.free ? "Nobody drives. " : "Someone else drives. You watch. ", asks);
+    }
+    set("watchers", you.pages > 1 ? `${you.pages} pages open` : "");
+    this.state();
+  }
+
+  // Say in which state the page is; what the driver may do depends on it.
+  state() {
+    const { isConnected, over, newest: frame, you } = this;
+    const { name, chip, banner } = stateOf({ isConnected, over, frame, isDriver: you.driving, isLate: you.late });
+    document.body.dataset.phase = name;
+    document.body.classList.toggle("spectator", !you.driving);
+    set("phase", chip);
+    set("banner", banner);
+    byId("banner").hidden = !banner;
+    const isDriver = you.driving && isConnected && !over && Boolean(frame);
+    byId("start").disabled = !isDriver || !(frame.phase in STARTS);
+    byId("practice").disabled = !isDriver || frame.phase !== "ready";
+    for (const id of NEEDS.begun) byId(id).disabled = !isDriver || frame.phase === "ready";
+    for (const id of [...NEEDS.driver, ...NEEDS.choices]) byId(id).disabled = !isDriver;
+    for (const each of document.querySelectorAll("#owned button, #channels button, #locks input, [data-focus]")) each.disabled = !isDriver;
+    byId("stop").disabled = !isConnected || Boolean(over);
+  }
+
+  frame(frame) {
+    this.newest = frame;
+    this.state();
+    set("start-words", STARTS[frame.phase] ?? "Start");
+    this.choices(frame);
+    this.words(frame);
+  }
+
+  choices(frame) {
+    const mode = this.modes[frame.mode];
+    if (document.activeElement !== byId("mode")) byId("mode").value = mode ? frame.mode : "";
+    set("mode-help", mode?.help ?? "Your own mask: you steer what is lit, the robot the rest. Choose a mode to go back.");
+    byId("focus").hidden = !frame.focus;
+    for (const each of document.querySelectorAll("[data-focus]")) each.setAttribute("aria-pressed", String(each.dataset.focus === frame.focus));
+    if (document.activeElement !== byId("frame")) byId("frame").value = frame.frame;
+    if (document.activeElement !== byId("speed")) byId("speed").value = frame.speed;
+    set("speed-said", `${Math.round(100 * frame.speed)} %`);
+    byId("practice").checked = frame.practice;
+    for (const box of byId("locks").querySelectorAll("input")) box.checked = frame.locked.includes(Number(box.dataset.joint));
+    set("locked", frame.locked.length ? `${frame.locked.length} held` : "");
+  }
+
+  words(frame) {
+    const distance = frame.nearest ? `nearest ${(100 * frame.nearest.distance).toFixed(0)} cm` : "nothing near";
+    set("said", [frame.phase === "driving" ? frame.reason : "", distance].filter(Boolean).join(" · "));
+    byId("said").classList.toggle("brakes", frame.phase === "driving" && Boolean(frame.reason));
+    const said = (numbers) => numbers.map((x) => x.toFixed(3)).join(" ");
+    const hand = frame.tool.slice(3);
+    const things = this.stageNow.shapes.bodies.map((name, index) => [name, frame.poses.slice(7 * index, 7 * index + 7)])
+      .filter(([name], index) => index > 0 && !name.endsWith("_body") && name !== "gripper")
+      .map(([name, at]) => `${name} ${said(at.slice(0, 3))} turn ${said(turnTo(hand, at.slice(3)))}`);
+    const input = `input ${Math.round(1000 * frame.age)} ms old, there and back ${Math.round(1000 * frame.round_trip)} ms`;
+    const grip = `gripper ${Math.round(100 * frame.opening)} % open`;
+    const counts = Object.entries(frame.dropped ?? {}).map(([why, count]) => `${count} ${why}`).join(", ");
+    set("numbers", [`hand ${said(frame.tool.slice(0, 3))}`, grip, ...things, input, counts && `dropped: ${counts}`].filter(Boolean).join(" · "));
+  }
+}

@@ -1,0 +1,32 @@
+// In which state the page is: a name for its look, the words of the chip, and what to do about it.
+const STATES = {
+  preparing: ["getting ready …", "Getting ready. The first time, the controller is compiled: about a minute, once."],
+  ready: ["ready: press Start", ""],
+  driving: ["recording", ""],
+  practice: ["practice: not recorded", ""],
+  paused: ["paused", ""],
+  watching: ["watching", ""],
+  lost: ["no input: let go of everything", "Let go of everything. The robot stands still. Once all is let go, drive on."],
+  stopped: ["STOPPED", "The robot is stopped. Look at it first. Then press Release."],
+  offline: ["no connection", "No connection. The robot brakes. Trying again …"],
+};
+const LATE = "Too slow a connection to drive: what you see is older than 0.3 s.";
+
+function nameOf({ isConnected, isDriver, frame }) {
+  if (!isConnected) return "offline";
+  if (!frame) return "preparing";
+  if (frame.phase !== "driving") return frame.phase;
+  return !isDriver ? "watching" : frame.practice ? "practice" : "driving";
+}
+
+function overWords({ saved, folder, next }) {
+  const what = `Recording is over: ${saved} ${saved === 1 ? "episode" : "episodes"}${folder ? ` in ${folder}` : ""}.`;
+  return next.length ? `${what}\nNext:\n${next.join("\n")}` : what;
+}
+
+// Returns {name, chip, banner}; `frame` is the newest one and `over` what the recording said at its end, if they are there.
+export function stateOf(now) {
+  if (now.over) return { name: "over", chip: "no connection: recording is over", banner: overWords(now.over) };
+  const name = nameOf(now), [chip, banner] = STATES[name];
+  return { name, chip, banner: banner || (now.isLate ? LATE : "") };
+}

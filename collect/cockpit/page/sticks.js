@@ -1,0 +1,75 @@
+// Two sticks for thumbs, or the mouse: where a finger is on them, they are. Each finger has its own.
+import { shaped } from "./inputs.js";
+import { AXES, jointName } from "./keymap.js";
+
+const ENDS = ["pointerup", "pointercancel", "lostpointercapture"];
+const SHORT = { "ee.vx": "forward", "ee.vy": "sideways", "ee.vz": "up", "ee.wx": "roll", "ee.wy": "tip", "ee.wz": "turn", "base.vx": "drive", "base.vy": "sideways", "base.wz": "turn" };
+
+export class TouchSticks {
+  constructor(box, inputs, act) {
+    Object.assign(this, { box, inputs, device: "touch", lift: 0, deflected: { left: [0, 0], right: [0, 0] } });
+    this.knobs = [...box.querySelectorAll(".stick")];
+    for (const stick of this.knobs) this.stick(stick);
+    for (const lever of box.querySelectorAll("[data-lever]")) this.lever(lever, act);
+  }
+
+  stick(stick) {
+    const side = stick.dataset.axes;
+    const move = (event) => {
+      const area = stick.getBoundingClientRect();
+      const x = (event.clientX - area.left) / area.width * 2 - 1, y = (event.clientY - area.top) / area.height * 2 - 1;
+      const length = Math.max(1, Math.hypot(x, y));
+      this.deflect(side, [x / length, y / length]);
+    };
+    stick.addEventListener("pointerdown", (event) => { event.preventDefault(); stick.setPointerCapture(event.pointerId); move(event); });
+    stick.addEventListener("pointermove", (event) => { if (stick.hasPointerCapture(event.pointerId)) move(event); });
+    for (const end of ENDS) stick.addEventListener(end, () => this.deflect(side, [0, 0]));
+  }
+
+  deflect(side, [x, y]) {
+    this.deflected[side] = [x, y];
+    const stick = this.knobs.find((each) => each.dataset.axes === side), size = stick.clientWidth / 3;
+    stick.querySelector("i").style.transform = x || y ? `translate(${x * size}px, ${y * size}px)` : "";
+  }
+
+  lever(lever, act) {
+    const name = lever.dataset.lever;
+    if (name === "grip") lever.addEventListener("click", () => act("grip"));
+    if (name === "turn") lever.addEventListener("click", () => this.turn(lever));
+    if (name !== "up" && name !== "down") return;
+    lever.addEventListener("pointerdown", (event) => { lever.setPointerCapture(event.pointerId); this.lift = name === "up" ? 1 : -1; });
+    for (const end of ENDS) lever.addEventListener(end, () => { this.lift = 0; });
+  }
+
+  // The other thing that the sticks can do: turn the hand, or move the next joints.
+  turn(lever) {
+    if ([...this.inputs.owned].some((name) => name.startsWith("ee."))) this.inputs.turns = !this.inputs.turns;
+    else this.inputs.nextBank();
+    lever.setAttribute("aria-pressed", String(this.inputs.turns));
+  }
+
+  letGo() {
+    this.lift = 0;
+    for (const side of ["left", "right"]) this.deflect(side, [0, 0]);
+  }
+
+  moves() {
+    const values = [...this.deflected.left, ...this.deflected.right].map(shaped);
+    const moves = this.inputs.sticks().map(([index, axis, sign]) => [axis, sign * values[index]]);
+    return this.lift && this.inputs.owned.has("ee.vz") ? [...moves, ["ee.vz", this.lift]] : moves;
+  }
+
+  // Say on each stick what it does now.
+  label() {
+    const sticks = this.inputs.sticks();
+    const said = (from) => sticks.filter(([index]) => index === from || index === from + 1)
+      .map(([, axis]) => (axis in AXES ? SHORT[axis] : jointName(axis))).join(" · ");
+    this.knobs.forEach((stick, index) => {
+      const part = sticks.find(([each]) => each >> 1 === index)?.[1] ?? "";
+      const words = `${part.startsWith("base") ? "base" : part.startsWith("ee") ? "hand" : "joints"}: ${said(2 * index)}`;
+      const label = stick.querySelector("span");
+      if (label.textContent !== words) label.textContent = words;
+    });
+    for (const name of ["up", "down"]) this.box.querySelector(`[data-lever=${name}]`).hidden = !this.inputs.owned.has("ee.vz");
+  }
+}

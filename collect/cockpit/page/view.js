@@ -1,0 +1,145 @@
+// The picture: the robot and things as they look, what is asked, what the plan makes of it; live, or played again.
+import { THREE } from "/lib/three.js";
+import { Cameras } from "./cameras.js";
+import { Marks } from "./marks.js";
+import { Playback } from "./playback.js";
+import { Ground, forgetBodies, makeBodies, place } from "./scene.js";
+import { build } from "./tools.js";
+
+const OWNED = 0xffb000;
+const SLOW = 45, QUICK = 14; // to draw a frame [ms]
+
+// Whether the processor has to draw: then it does so coarsely from the start, and has time for the robot.
+function drawsInSoftware() {
+  const gl = document.createElement("canvas").getContext("webgl2"), names = gl?.getExtension("WEBGL_debug_renderer_info");
+  const name = names ? gl.getParameter(names.UNMASKED_RENDERER_WEBGL) : "";
+  gl?.getExtension("WEBGL_lose_context")?.loseContext();
+  return /swiftshader|llvmpipe|software/i.test(name);
+}
+
+export class View {
+  constructor(canvas) {
+    this.canvas = canvas;
+    const isSoftware = drawsInSoftware();
+    this.tools = build(canvas, (camera) => this.choose(camera));
+    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: !isSoftware, powerPreference: "high-performance" });
+    this.renderer.shadowMap.enabled = !isSoftware;
+    this.renderer.shadowMap.type = THREE.PCFShadowMap;
+    this.ratio = isSoftware ? 0.75 : Math.min(devicePixelRatio, 2);
+    this.scene = new THREE.Scene();
+    this.cameras = new Cameras(canvas);
+    this.ground = new Ground(this.scene, () => { this.stale = true; });
+    this.marks = new Marks(this.scene, this.tools.label);
+    this.playback = new Playback(this, this.tools.playback);
+    this.choose(this.cameras.choice);
+    this.bodies = [];
+    this.owned = new Set();
+    new ResizeObserver(() => this.fit()).observe(canvas);
+    this.fit();
+  }
+
+  async stage(stage) {
+    const bodies = await makeBodies(stage.shapes, stage.meshes);
+    forgetBodies(this.scene, this.bodies);
+    this.bodies = bodies;
+    this.marks.stage(stage, bodies);
+    this.light_up(this.owned);
+    if (!this.played) this.scene.add(...bodies);
+  }
+
+  // Lights the bodies that the operator owns.
+  light_up(owned) {
+    this.owned = owned;
+    for (const body of this.bodies) {
+      for (const { material } of body.children) {
+        material.emissive.set(owned.has(body.name) ? OWNED : 0);
+        material.emissiveIntensity = 0.22;
+      }
+    }
+    this.stale = true;
+  }
+
+  frame(frame) {
+    if (frame.phase === "driving") this.playback.close(); // who drives sees what is, not what was
+    if (this.played) return;
+    this.pose(this.bodies, frame.poses, 0);
+    this.marks.frame(frame);
+    const tool = new THREE.Group();
+    place(tool, frame.tool);
+    this.look(this.bodies, tool);
+  }
+
+  pose(bodies, numbers, start) {
+    bodies.forEach((body, index) => place(body, numbers, start + 7 * index));
+    this.stale = true;
+  }
+
+  look(bodies, tool) {
+    this.cameras.frame(bodies[1], tool);
+    this.ground.follow(bodies[1].position.clone().setZ(0));
+  }
+
+  // Shows an episode that was, instead of what is; without one, what is again.
+  play(bodies) {
+    if (this.played) forgetBodies(this.scene, this.played);
+    this.scene.remove(...this.bodies);
+    this.scene.add(...(bodies ?? this.bodies));
+    this.played = bodies;
+    this.marks.hide();
+    this.stale = true;
+  }
+
+  playRow(numbers, start) {
+    this.pose(this.played, numbers, start);
+    this.look(this.played, this.played[this.played.findIndex(({ name }) => name === "gripper")] ?? this.played.at(-1));
+  }
+
+  choose(camera) {
+    this.cameras.choose(camera);
+    this.tools.camera.value = this.cameras.choice;
+    this.stale = true;
+  }
+
+  nextCamera() {
+    this.choose(this.cameras.next);
+  }
+
+  get azimuth() {
+    return this.cameras.azimuth;
+  }
+
+  fit() {
+    const { clientWidth: width, clientHeight: height } = this.canvas;
+    if (!width || !height) return;
+    this.renderer.setPixelRatio(this.ratio);
+    this.renderer.setSize(width, height, false);
+    this.cameras.camera.aspect = width / height;
+    this.cameras.camera.updateProjectionMatrix();
+    this.stale = true;
+  }
+
+  // Draws if anything has changed: a computer without a graphics card has better things to do.
+  render() {
+    this.playback.step();
+    if (!this.cameras.update() && !this.stale) return;
+    this.stale = false;
+    const began = performance.now();
+    this.renderer.render(this.scene, this.cameras.camera);
+    this.marks.letter(this.cameras.camera, this.canvas.clientWidth, this.canvas.clientHeight);
+    this.adapt(performance.now() - began);
+  }
+
+  // Draws fewer pixels, then no shadows, where drawing is slow.
+  adapt(took) {
+    this.usual = 0.9 * (this.usual ?? took) + 0.1 * took;
+    this.drawn = (this.drawn ?? 0) + 1;
+    if (this.drawn < 20 || this.usual < SLOW) return;
+    if (this.ratio > 0.6) this.ratio = Math.max(0.6, 0.75 * this.ratio);
+    else if (this.renderer.shadowMap.enabled) {
+      this.renderer.shadowMap.enabled = false;
+      this.ground.sun.castShadow = false;
+    }
+    this.drawn = 0;
+    this.fit();
+  }
+}

@@ -1,0 +1,162 @@
+"""The pipe between the recording and the web server: whole messages, never a wait.
+
+The recording must not wait for a page, nor the server for the robot. What comes many times a second (frames,
+pictures, inputs) is dropped where there is no room; what is said once (a scene, a stop) waits until there is.
+"""
+
+import socket
+from collections import Counter, deque
+from collections.abc import Collection
+
+from handrail.controllers.errors import HandrailError
+
+LARGEST = 2**23  # message [bytes]
+_PACKET = 2**16  # [bytes]
+_BUFFER = 2**20  # asked for; the system may give less [bytes]
+_MOST_WAITING = 64  # messages
+_MORE, _LAST = b"+", b"."
+
+SETTINGS, FRAME, PICTURE, STAGE, CARD, OVER = (
+    b"C",
+    b"F",
+    b"P",
+    b"S",
+    b"Q",
+    b"O",
+)  # what the recording sends
+NOTE, DRIVE, ASK, STOP, LOST, DROPPED, ANSWER = (
+    b"N",
+    b"D",
+    b"A",
+    b"!",
+    b"L",
+    b"-",
+    b"R",
+)  # what the server sends
+
+
+class Pipe:
+    """One end.
+
+    Args:
+        end: of a connected socket pair that keeps packets apart.
+
+    Attributes:
+        dropped: messages for which there was no room, by kind.
+    """
+
+    def __init__(self, end: socket.socket) -> None:
+        end.setblocking(False)
+        for option in (socket.SO_SNDBUF, socket.SO_RCVBUF):
+            end.setsockopt(socket.SOL_SOCKET, option, _BUFFER)
+        self._socket = end
+        self.dropped: Counter[bytes] = Counter()
+        self._begun: deque[bytes] = deque()  # packets of a message whose first one is gone
+        self._waiting: deque[tuple[bytes, bytes]] = deque()
+        self._parts: list[bytes] = []  # of a message that comes in
+
+    @staticmethod
+    def pair() -> tuple[socket.socket, socket.socket]:
+        """Return two connected ends."""
+        return socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+
+    def fileno(self) -> int:
+        """Return the file descriptor, for a loop that waits."""
+        return self._socket.fileno()
+
+    def send(self, kind: bytes, data: bytes) -> bool:
+        """Send a message if there is room for it now; return whether there was.
+
+        Raises:
+            HandrailError: the other end is gone.
+        """
+        went = self.flush() and len(data) <= LARGEST and self._begin(kind, data)
+        self.dropped[kind] += not went
+        return went
+
+    def send_surely(self, kind: bytes, data: bytes, instead_of: Collection[bytes] = ()) -> None:
+        """Send a message, later if there is no room now; of too many that wait the last ones are dropped.
+
+        Args:
+            kind: of the message.
+            data: what it says.
+            instead_of: kinds that are out of date with it: what waits of them is dropped.
+
+        Raises:
+            HandrailError: the other end is gone.
+        """
+        stale = [each for each in self._waiting if each[0] in instead_of]
+        for each in stale:
+            self._waiting.remove(each)
+        if len(self._waiting) >= _MOST_WAITING or len(data) > LARGEST:
+            self.dropped[kind] += 1
+            return
+        self._waiting.append((kind, data))
+        self.flush()
+
+    def flush(self) -> bool:
+        """Send what waits, as far as there is room; return whether nothing waits any more.
+
+        Raises:
+            HandrailError: the other end is gone.
+        """
+        while self._begun:
+            if not self._push(self._begun[0]):
+                return False
+            self._begun.popleft()
+        while self._waiting:
+            if not self._begin(*self._waiting[0]):
+                return False
+            self._waiting.popleft()
+            if self._begun:
+                return self.flush()
+        return True
+
+    def receive(self) -> list[tuple[bytes, bytes]]:
+        """Return all messages that have come, the oldest first.
+
+        Raises:
+            HandrailError: the other end is gone.
+        """
+        messages: list[tuple[bytes, bytes]] = []
+        try:
+            while packet := self._socket.recv(2 * _PACKET):
+                self._parts.append(packet[2:])
+                if packet[1:2] == _LAST:
+                    messages.append((packet[:1], b"".join(self._parts)))
+                    self._parts.clear()
+        except BlockingIOError:
+            return messages
+        except OSError as error:
+            raise _gone() from error
+        if messages:
+            return messages
+        raise _gone()
+
+    def close(self) -> None:
+        """Close it."""
+        self._socket.close()
+
+    def _begin(self, kind: bytes, data: bytes) -> bool:
+        """Send a message's first packet, and the others as far as there is room."""
+        parts = [data[start : start + _PACKET] for start in range(0, len(data), _PACKET)] or [b""]
+        packets = [kind + _MORE + part for part in parts[:-1]] + [kind + _LAST + parts[-1]]
+        if not self._push(packets[0]):
+            return False
+        while (packets := packets[1:]) and self._push(packets[0]):
+            pass
+        self._begun.extend(packets)
+        return True
+
+    def _push(self, packet: bytes) -> bool:
+        try:
+            self._socket.send(packet)
+        except BlockingIOError:
+            return False
+        except OSError as error:
+            raise _gone() from error
+        return True
+
+
+def _gone() -> HandrailError:
+    return HandrailError("cockpit: the other end of the pipe is gone")

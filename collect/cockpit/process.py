@@ -1,0 +1,167 @@
+"""The web server's process: started, told where to listen, started again when it dies, ended."""
+
+import json
+import secrets
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections import deque
+from collections.abc import Callable, Collection
+from dataclasses import asdict
+from pathlib import Path
+
+from handrail.collect.cockpit.pipe import LOST, NOTE, SETTINGS, Pipe
+from handrail.collect.cockpit_config import CockpitConfig
+from handrail.controllers.errors import HandrailError
+
+_BEGIN, _END = 30.0, 3.0  # patience [s]
+MOST_DEATHS, _WITHIN = 3, 60.0  # of the server, in a time [s]
+
+
+class ServerProcess:
+    """Serves the page in a process of its own.
+
+    If it dies, whoever drives is lost (the robot brakes), and another one begins at the same address with the
+    same token; the recording never waits for it.
+
+    Args:
+        config: where it listens.
+        say: is told when it dies.
+
+    Attributes:
+        process: it.
+        pipe: to it.
+        address: of the page; with the token after `#` where one is asked for.
+
+    Raises:
+        HandrailError: it does not start.
+    """
+
+    def __init__(self, config: CockpitConfig, say: Callable[[str], None] = lambda words: None) -> None:
+        config.check()
+        self._folder = tempfile.TemporaryDirectory(prefix="handrail-cockpit-", ignore_cleanup_errors=True)
+        self._settings = asdict(config) | {"folder": self._folder.name, "secret": secrets.token_urlsafe(32)}
+        self._say, self._deaths = say, deque[float](maxlen=MOST_DEATHS)
+        self._start()
+        try:
+            self.address = self._wait()
+        except BaseException:
+            self.close()
+            raise
+
+    def keep(self, name: str, data: bytes) -> None:
+        """Let the server have a file, once."""
+        path = Path(self._folder.name) / name
+        if not path.exists():
+            path.write_bytes(data)
+
+    def send(self, kind: bytes, data: bytes) -> bool:
+        """Send a message if there is room for it, and a server; return whether there was."""
+        try:
+            return self.pipe.send(kind, data)
+        except HandrailError:
+            return False  # `receive` finds out
+
+    def send_surely(self, kind: bytes, data: bytes, instead_of: Collection[bytes] = ()) -> None:
+        """Send a message, later if there is no room now; a server that has died hears it no more."""
+        try:
+            self.pipe.send_surely(kind, data, instead_of)
+        except HandrailError:
+            return
+
+    def receive(self) -> list[tuple[bytes, bytes]]:
+        """Return what the server has passed on: `LOST` when it died, `NOTE` when another one has begun.
+
+        Raises:
+            HandrailError: it has died too often.
+        """
+        try:
+            messages = self.pipe.receive()
+            self.pipe.flush()
+        except HandrailError:
+            self._start_again()
+            return [(LOST, b"")]
+        for kind, data in messages:
+            if kind == NOTE:
+                self._take(data)
+        return messages
+
+    def drop(self, name: str) -> None:
+        """Take a file away from the server."""
+        (Path(self._folder.name) / name).unlink(missing_ok=True)
+
+    def close(self) -> None:
+        """End the server."""
+        self.pipe.close()
+        self.process.terminate()
+        try:
+            self.process.wait(_END)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.wait()
+        self._folder.cleanup()
+
+    def _start(self) -> None:
+        ours, theirs = Pipe.pair()
+        self.process = subprocess.Popen(
+            [sys.executable, "-m", "handrail.collect.cockpit.server", str(theirs.fileno())],
+            pass_fds=[theirs.fileno()],
+            start_new_session=True,  # Ctrl-C ends the recording, which ends the server
+            stdin=subprocess.DEVNULL,
+        )
+        theirs.close()
+        self.pipe = Pipe(ours)
+        self.pipe.send_surely(SETTINGS, json.dumps(self._settings).encode())
+
+    def _start_again(self) -> None:
+        """Start another server instead of one that has died.
+
+        Raises:
+            HandrailError: that has happened too often.
+        """
+        self.pipe.close()
+        how = self._ended()
+        now = time.monotonic()
+        if len(self._deaths) == MOST_DEATHS and now < self._deaths[0] + _WITHIN:
+            raise HandrailError(
+                f"cockpit: the web server ended {MOST_DEATHS + 1} times within {_WITHIN:.0f} s, "
+                f"at last {how}; the saved episodes are whole"
+            )
+        self._deaths.append(now)
+        self._say(f"The page's web server ended ({how}). The robot brakes; a new server starts.")
+        self._start()
+
+    def _ended(self) -> str:
+        """Return how the server ended."""
+        try:
+            code = self.process.wait(0.1)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            code = self.process.wait()
+        return signal.Signals(-code).name if code < 0 else f"exit code {code}"
+
+    def _take(self, note: bytes) -> None:
+        """Take where the server listens.
+
+        Raises:
+            HandrailError: it cannot.
+        """
+        said = json.loads(note)
+        if "error" in said:
+            raise HandrailError(said["error"])
+        before, self.address = getattr(self, "address", said["address"]), str(said["address"])
+        self._settings["port"] = said["port"]
+        if self.address != before:
+            self._say(f"Drive at {self.address}")
+
+    def _wait(self) -> str:
+        until = time.monotonic() + _BEGIN
+        while time.monotonic() < until:
+            for kind, data in self.pipe.receive():
+                if kind == NOTE:
+                    self._take(data)
+                    return self.address
+            time.sleep(0.02)
+        raise HandrailError(f"cockpit: the web server did not start within {_BEGIN:.0f} s")

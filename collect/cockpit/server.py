@@ -1,0 +1,286 @@
+"""The web server of the cockpit, a process of its own: it gets a pipe to the recording, and settings there.
+
+Its one socket to pages is `/drive`; everything else is files.
+"""
+
+import asyncio
+import contextlib
+import gc
+import itertools
+import json
+import os
+import select
+import shutil
+import socket
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import uvicorn
+from starlette.applications import Starlette
+from starlette.requests import Request
+from starlette.responses import FileResponse, JSONResponse, Response
+from starlette.routing import Route, WebSocketRoute
+from starlette.websockets import WebSocket
+
+from handrail.collect.cockpit.certificate import certificate
+from handrail.collect.cockpit.guard import COOKIE, Guard
+from handrail.collect.cockpit.http import Http
+from handrail.collect.cockpit.hub import Hub
+from handrail.collect.cockpit.messages import LARGEST
+from handrail.collect.cockpit.pipe import NOTE, SETTINGS, Pipe
+from handrail.collect.cockpit_config import CockpitConfig
+from handrail.controllers.errors import HandrailError
+
+_PAGE = Path(__file__).parent / "page"
+_TRIES = 20  # ports after the one that is wanted
+_PATIENCE = 5.0  # with a form that is sent [s]
+_LONGEST = 200  # token [bytes]
+_PAUSE, _MOST_PAUSES = 1.0, 32  # before another wrong token is answered [s], and how many wait so
+_NOTES = 0.02  # between two looks at how late the loop is [s]
+_REPORTS, _COLLECTIONS = 25, 250  # so many looks to a report, to a collection of garbage
+_HEADERS = {
+    "Content-Security-Policy": "default-src 'self'; img-src 'self' blob: data:; frame-ancestors 'none'; "
+    "base-uri 'none'; form-action 'self'",
+    "X-Content-Type-Options": "nosniff",
+    "Referrer-Policy": "no-referrer",
+    "Cache-Control": "no-cache",
+}
+_DOOR = ("", "index.html", "style.css", "door.js", "main.js")  # what anyone may see: nothing of the robot
+
+
+class Site:
+    """The pages and the socket.
+
+    Args:
+        hub: of the pages.
+        guard: checks who may come in.
+        folder: of files that the recording lets pages have.
+    """
+
+    def __init__(self, hub: Hub, guard: Guard, folder: Path) -> None:
+        self._hub, self._guard, self._folder = hub, guard, folder
+        self._files = {
+            path.relative_to(_PAGE).as_posix(): path for path in _PAGE.rglob("*") if path.is_file()
+        }
+        self._pauses = 0
+        self.app = Starlette(
+            routes=[
+                Route("/login", self._log_in, methods=["POST"]),
+                Route("/lib/three.js", self._three),
+                Route("/meshes/{name}", self._kept),
+                Route("/played/{name}", self._kept),
+                Route("/{name:path}", self._file),
+                WebSocketRoute("/drive", self._drive),
+            ]
+        )
+
+    async def _file(self, request: Request) -> Response:
+        name = request.path_params["name"] or "index.html"
+        if not self._guard.is_ours(request.headers) or not (name in _DOOR or self._admits(request)):
+            return _refused()
+        if name not in self._files:
+            return Response("not found", 404, headers=_HEADERS)
+        return FileResponse(self._files[name], headers=_HEADERS)
+
+    async def _three(self, request: Request) -> Response:
+        import nicegui.elements.scene as scene
+
+        path = Path(scene.__file__).parent / "dist" / "index.js"
+        return FileResponse(path, headers=_HEADERS) if self._admits(request) else _refused()
+
+    async def _kept(self, request: Request) -> Response:
+        files = {path.name: path for path in self._folder.iterdir()}
+        name = request.path_params["name"]
+        if not self._admits(request) or name not in files:
+            return _refused()
+        return FileResponse(files[name], headers=_HEADERS | {"Cache-Control": "max-age=86400, immutable"})
+
+    async def _log_in(self, request: Request) -> Response:
+        if not self._guard.is_ours(request.headers, origin=True):
+            return _refused()
+        session = self._guard.log_in(await _short_body(request), _address(request))
+        if not session:
+            return await self._refused_slowly(_address(request))
+        answer = JSONResponse({}, headers=_HEADERS)
+        answer.set_cookie(
+            COOKIE, session, httponly=True, samesite="strict", secure=request.url.scheme == "https"
+        )
+        return answer
+
+    async def _refused_slowly(self, address: str) -> Response:
+        """Let whoever guesses wait; of too many at once nobody."""
+        if self._guard.guesses(address):
+            if self._pauses >= _MOST_PAUSES:
+                return Response("too many wrong tokens", 429, headers=_HEADERS)
+            self._pauses += 1
+            try:
+                await asyncio.sleep(_PAUSE)
+            finally:
+                self._pauses -= 1
+        return _refused()
+
+    async def _drive(self, page: WebSocket) -> None:
+        name = page.query_params.get("page", "")
+        fine = self._guard.is_ours(page.headers, origin=True) and self._admits(page)
+        if not fine or not 8 <= len(name) <= 40:
+            await page.close(1008)
+            return
+        await self._hub.serve(page, name)
+
+    def _admits(self, request: Request | WebSocket) -> bool:
+        return self._guard.admits(request.headers, request.cookies, _address(request))
+
+
+async def _short_body(request: Request) -> str:
+    """Return what a form says; nothing if it is long or slow."""
+    body = b""
+    with contextlib.suppress(TimeoutError):
+        async with asyncio.timeout(_PATIENCE):
+            async for chunk in request.stream():
+                body += chunk
+                if len(body) > _LONGEST:
+                    return ""
+            return body.decode(errors="replace")
+    return ""
+
+
+def _address(request: Request | WebSocket) -> str:
+    return request.client.host if request.client else ""
+
+
+def _refused() -> Response:
+    return Response("not for you", 403, headers=_HEADERS)
+
+
+def _listening(host: str, port: int) -> socket.socket:
+    """Return a socket that listens at a port, or one of the next ones.
+
+    Raises:
+        HandrailError: none can be had.
+    """
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    trouble: OSError | None = None
+    for trial in range(port, port + _TRIES if port else 1):
+        listener = socket.socket(family, socket.SOCK_STREAM)
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            listener.bind(("127.0.0.1" if host == "localhost" else host, trial))
+            listener.listen(64)
+        except OSError as error:
+            trouble = error
+            listener.close()
+            continue
+        return listener
+    raise HandrailError(f"cockpit: cannot listen at {host}, port {port}: {trouble and trouble.strerror}")
+
+
+async def serve(pipe: Pipe, settings: dict[str, Any]) -> None:
+    """Serve until the recording is gone."""
+    folder, secret = Path(settings.pop("folder")), settings.pop("secret")
+    config = CockpitConfig(**settings)
+    listener = _listening(config.host, config.port)
+    scheme = "http" if config.is_private else "https"
+    guard, hub = Guard(config.is_private, scheme, secret), Hub(pipe)
+    server = uvicorn.Server(_uvicorn(Site(hub, guard, folder), config))
+    host, port = listener.getsockname()[:2]
+    door = "" if config.is_private else f"#{guard.token}"
+    shown = f"[{host}]" if ":" in host else host
+    pipe.send_surely(
+        NOTE, json.dumps({"address": f"{scheme}://{shown}:{port}/{door}", "port": port}).encode()
+    )
+    loop = asyncio.get_running_loop()
+    loop.add_reader(pipe.fileno(), _ending(server, pipe, hub.hear))
+    noting = asyncio.create_task(_note(server, pipe, hub, guard))
+    await server.serve(sockets=[listener])
+    noting.cancel()
+
+
+def _uvicorn(site: Site, config: CockpitConfig) -> uvicorn.Config:
+    cert, key = (None, None) if config.is_private else _certificate(config)
+    return uvicorn.Config(
+        site.app,
+        http=Http,
+        log_level="critical",
+        access_log=False,
+        ws_max_size=2 * LARGEST,
+        ws_per_message_deflate=False,
+        h11_max_incomplete_event_size=2**14,
+        timeout_graceful_shutdown=1,
+        server_header=False,
+        ssl_certfile=cert,
+        ssl_keyfile=key and str(key),
+    )
+
+
+def _ending(server: uvicorn.Server, pipe: Pipe, act: Callable[[], None]) -> Callable[[], None]:
+    """Return what acts, and ends the server when the recording is gone."""
+
+    def acting() -> None:
+        try:
+            act()
+        except HandrailError:
+            server.should_exit = True
+            asyncio.get_running_loop().remove_reader(pipe.fileno())
+
+    return acting
+
+
+async def _note(server: uvicorn.Server, pipe: Pipe, hub: Hub, guard: Guard) -> None:
+    """Look again and again how late the loop is; send what waits for the recording; give memory back.
+
+    A TLS connection that is gone is 256 KiB of garbage in a cycle: too few objects for Python to look soon.
+    """
+    gc.freeze()
+    for turn in itertools.count(1):
+        before = time.monotonic()
+        await asyncio.sleep(_NOTES)
+        hub.note_lag(time.monotonic() - before - _NOTES)
+        _ending(server, pipe, hub.keep_up)()
+        if turn % _REPORTS == 0:
+            _ending(server, pipe, lambda: hub.report(guard.refused))()
+        if turn % _COLLECTIONS == 0:
+            gc.collect()
+
+
+def _certificate(config: CockpitConfig) -> tuple[Path, Path]:
+    if config.certificate:
+        folder = Path(config.certificate).expanduser()
+        return folder / "cert.pem", folder / "key.pem"
+    place = Path(os.environ.get("XDG_CONFIG_HOME", "~/.config")).expanduser() / "handrail" / "cockpit"
+    return certificate(config.host, place)
+
+
+def main() -> None:
+    """Run the process."""
+    pipe = Pipe(socket.socket(fileno=int(sys.argv[1])))
+    try:
+        settings = _settings(pipe)
+        folder = settings["folder"]
+        asyncio.run(serve(pipe, settings))
+        with contextlib.suppress(HandrailError):
+            pipe.receive()
+            return  # the recording is still there
+        shutil.rmtree(folder, ignore_errors=True)
+    except HandrailError as error:
+        with contextlib.suppress(HandrailError):
+            pipe.send_surely(NOTE, json.dumps({"error": str(error)}).encode())
+
+
+def _settings(pipe: Pipe) -> dict[str, Any]:
+    """Return what the recording says first.
+
+    Raises:
+        HandrailError: it says nothing.
+    """
+    select.select([pipe], [], [], _PATIENCE)
+    for kind, data in pipe.receive():
+        if kind == SETTINGS:
+            return json.loads(data)
+    raise HandrailError("cockpit: the web server got no settings")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,74 @@
+"""What a browser needs to draw an episode: shapes once, and where each body is, many times a second."""
+
+import hashlib
+from typing import Any
+
+import numpy as np
+
+from handrail.collect.simulation.geometry import VISIBLE_GROUP
+from handrail.collect.simulation.gl import MjData, MjModel, mujoco
+from handrail.controllers.arrays import FloatArray
+
+_KINDS = {
+    mujoco.mjtGeom.mjGEOM_BOX: "box",
+    mujoco.mjtGeom.mjGEOM_CAPSULE: "capsule",
+    mujoco.mjtGeom.mjGEOM_SPHERE: "sphere",
+    mujoco.mjtGeom.mjGEOM_CYLINDER: "cylinder",
+    mujoco.mjtGeom.mjGEOM_ELLIPSOID: "ellipsoid",
+    mujoco.mjtGeom.mjGEOM_MESH: "mesh",
+}
+_DIGITS = 4  # of a pose: a tenth of a millimetre
+
+
+def shapes(model: MjModel) -> dict[str, Any]:
+    """Return the visible geoms of a model: on which body and where, what shape, what colour, which mesh."""
+    geoms = []
+    for index in np.flatnonzero(model.geom_group == VISIBLE_GROUP).tolist():
+        kind = _KINDS.get(mujoco.mjtGeom(model.geom_type[index]))
+        if kind is None:
+            continue
+        geoms.append(
+            {
+                "body": int(model.geom_bodyid[index]),
+                "at": _rounded(np.concatenate([model.geom_pos[index], model.geom_quat[index]])),
+                "kind": kind,
+                "size": _rounded(model.geom_size[index]),
+                "rgba": _rounded(model.geom_rgba[index]),
+                "mesh": int(model.geom_dataid[index]),
+            }
+        )
+    names = [model.body(index).name for index in range(model.nbody)]
+    return {"bodies": names, "geoms": geoms, "meshes": _table(model)}
+
+
+def hand(model: MjModel) -> list[int]:
+    """Return the bodies that are the robot's hand: the gripper and what hangs on it, or the last link."""
+    names = {model.body(index).name: index for index in range(model.nbody)}
+    tool = int(model.site_bodyid[model.site("tool").id])
+    first = names.get("gripper", tool)
+    within = [first]
+    for index in range(first + 1, model.nbody):  # a body comes after the one that it hangs on
+        if int(model.body_parentid[index]) in within:
+            within.append(index)
+    return within
+
+
+def meshes(model: MjModel) -> tuple[str, bytes]:
+    """Return all meshes of a model as bytes, and their digest: vertices (float32), then faces (uint32)."""
+    data = model.mesh_vert.astype("<f4").tobytes() + model.mesh_face.astype("<u4").tobytes()
+    return hashlib.sha256(data).hexdigest()[:16], data
+
+
+def poses(data: MjData) -> list[float]:
+    """Return where every body is: position [m] and quaternion (wxyz), one after the other."""
+    return _rounded(np.hstack([data.xpos, data.xquat]).ravel())
+
+
+def _table(model: MjModel) -> dict[str, Any]:
+    """Return where each mesh begins and how long it is: vertices, faces."""
+    rows = [model.mesh_vertadr, model.mesh_vertnum, model.mesh_faceadr, model.mesh_facenum]
+    return {"rows": np.stack(rows, axis=1).tolist(), "vertices": len(model.mesh_vert)}
+
+
+def _rounded(values: FloatArray) -> list[float]:
+    return np.round(values, _DIGITS).tolist()

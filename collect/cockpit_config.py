@@ -1,0 +1,48 @@
+"""Where the cockpit listens, as typed settings; light to import."""
+
+import ipaddress
+from dataclasses import dataclass
+from pathlib import Path
+
+from handrail.controllers.errors import HandrailError
+
+
+@dataclass(frozen=True)
+class CockpitConfig:
+    """Where browsers find the cockpit."""
+
+    host: str = "127.0.0.1"
+    """Address to listen at; any other than 127.0.0.1 asks for a token, by HTTPS."""
+    port: int = 8765
+    """Port to listen at; the next free one where it is taken; 0 for any."""
+    open: bool = True
+    """Open the page in this computer's browser."""
+    certificate: str = ""
+    """Folder of a certificate of your own, cert.pem and key.pem; without, one is made on this machine."""
+
+    @property
+    def is_private(self) -> bool:
+        """Whether only this computer, as itself, can come in."""
+        return self.host in ("127.0.0.1", "::1", "localhost")
+
+    def check(self) -> None:
+        """Check the settings.
+
+        Raises:
+            HandrailError: one is wrong.
+        """
+        if self.host != "localhost":
+            try:
+                ipaddress.ip_address(self.host)
+            except ValueError:
+                raise HandrailError(
+                    f"--cockpit.host {self.host}: expected an address of this computer, "
+                    "such as 192.168.1.20, or 0.0.0.0 for all"
+                ) from None
+        if not 0 <= self.port < 65536:
+            raise HandrailError(f"--cockpit.port {self.port}: expected 0 to 65535")
+        folder = Path(self.certificate).expanduser()
+        if self.certificate and not all((folder / name).is_file() for name in ("cert.pem", "key.pem")):
+            raise HandrailError(
+                f"--cockpit.certificate {self.certificate}: expected a folder with cert.pem and key.pem"
+            )

@@ -1,0 +1,39 @@
+"""What the tests of the real page share: Chromium, and pages that may not have an error."""
+
+from pathlib import Path
+
+import pytest
+
+try:
+    from page_driver import CHROMIUM, browser
+except ImportError:  # Playwright comes with the extra 'dev'
+    CHROMIUM, browser = (), None
+
+
+@pytest.fixture(scope="session")
+def chromium():
+    program = next((path for path in CHROMIUM if Path(path).exists()), None)
+    if browser is None or program is None:
+        pytest.skip("needs Playwright (extra 'dev') and Chromium: " + " or ".join(CHROMIUM))
+    with browser(program) as made:
+        yield made
+
+
+@pytest.fixture
+def new_page(chromium):
+    """Make pages, each as if in a browser of its own."""
+    contexts, errors = [], []
+
+    def make(script="", **options):
+        context = chromium.new_context(**({"viewport": {"width": 960, "height": 540}} | options))
+        contexts.append(context)
+        page = context.new_page()
+        page.on("pageerror", lambda error: errors.append(str(error)))
+        if script:
+            page.add_init_script(script)
+        return page
+
+    yield make
+    for context in contexts:
+        context.close()
+    assert not errors

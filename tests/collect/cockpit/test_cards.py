@@ -1,0 +1,96 @@
+"""Laws of cards: only who drives sees them and answers, also after a reload; answers are small values."""
+
+import json
+import time
+
+import pytest
+from cockpit_helpers import drive, heard, page, server, stage, told
+
+from handrail.collect.cockpit.cards import Cards
+from handrail.collect.cockpit.messages import Answer, parse
+from handrail.collect.cockpit.pipe import ANSWER
+from handrail.controllers.errors import HandrailError
+
+CARD = {"id": "ee/tlx", "title": "How was it?", "answers": {"mental": 40}}
+
+
+@pytest.fixture(scope="module")
+def served():
+    with server() as made:
+        stage(made)
+        yield made
+
+
+def said(**changes):
+    return json.dumps({"kind": "answer", "card": "ee/tlx", "item": "mental", "value": 45} | changes)
+
+
+@pytest.mark.parametrize("value", [45, 4.5, "a text\nof two lines", True, None, ""])
+def test_an_answer_is_one_value(value):
+    assert parse(said(value=value)) == Answer("ee/tlx", "mental", value)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"value": []}, {"value": {}}, {"value": float("nan")}, {"value": 1e12}, {"value": 2**70}, {"card": 3},
+        {"item": None}, {"item": "x" * 300}, {"more": 1}, {"value": "x" * 5000},
+    ],
+)  # fmt: skip
+def test_what_is_no_answer_is_refused_in_one_line(changes):
+    with pytest.raises(HandrailError) as error:
+        parse(said(**changes))
+    assert "\n" not in str(error.value)
+    assert len(str(error.value)) < 300
+
+
+def quiet(socket, kind, patience=0.5):
+    """Whether a page hears nothing of a kind for a while."""
+    try:
+        until = time.monotonic() + patience
+        while time.monotonic() < until:
+            if json.loads(socket.recv(timeout=patience))["kind"] == kind:
+                return False
+    except TimeoutError:
+        pass
+    return True
+
+
+def test_only_the_page_that_drives_sees_a_card_and_answers(served):
+    cards = Cards(served)
+    with page(served, "page-number-one") as first, page(served, "page-number-two") as second:
+        assert told(first, "you")["driving"]
+        cards.show(CARD)
+        assert told(first, "card")["card"] == CARD
+        assert quiet(second, "card")
+        second.send(said(value=99))
+        first.send(said(value=45))
+        assert [json.loads(data)["value"] for _, data in heard(served, {ANSWER})] == [45]
+        assert not heard(served, {ANSWER}, patience=0.3)
+        first.send(json.dumps({"kind": "ask", "what": "give", "value": True}))
+    with page(served, "page-number-one") as again:
+        assert told(again, "card")["card"] == CARD
+
+
+def test_cards_hear_answers_and_leave_out_what_devices_say(served):
+    cards = Cards(served)
+    with page(served, "page-number-one") as socket:
+        told(socket, "you")
+        socket.send(drive(1))
+        socket.send(said())
+        socket.send(json.dumps({"kind": "ask", "what": "start", "value": True}))
+        found, until = [], time.monotonic() + 10.0
+        while not found and time.monotonic() < until:
+            found += cards.hear()
+        assert found == [Answer("ee/tlx", "mental", 45)]
+
+
+def test_a_card_that_nobody_acknowledges_is_shown_again(served):
+    cards = Cards(served)
+    with page(served, "page-number-one") as socket:
+        told(socket, "you")
+        for _ in range(2):
+            cards.show(CARD)
+            told(socket, "card")
+            cards.show(CARD)  # at once: not again
+            time.sleep(0.6)

@@ -1,0 +1,22 @@
+"""Law: where the cockpit's extra is not installed, one line says how it is, and nothing is written."""
+
+import importlib.util
+import sys
+
+import pytest
+from command_helpers import command
+
+
+@pytest.mark.parametrize("missing", ["uvicorn", "nicegui"])
+def test_what_is_missing_is_named(tmp_path, monkeypatch, missing):
+    found = importlib.util.find_spec
+    with monkeypatch.context() as patch:
+        patch.setattr(importlib.util, "find_spec", lambda name: None if name == missing else found(name))
+        for module in [name for name in sys.modules if name == "handrail.collect.cockpit.cockpit"]:
+            patch.delitem(sys.modules, module)
+        done = command(tmp_path / "d", "--no_physics", "--cockpit.no_open", name="cockpit")
+    assert done.returncode == 2
+    assert done.stderr.count("\n") == 1
+    assert f"expected {missing}, found none" in done.stderr
+    assert ".[cockpit]" in done.stderr
+    assert not (tmp_path / "d").exists()

@@ -1,0 +1,61 @@
+"""Laws: a page's message is a small object of known kinds, or it is refused in one line."""
+
+import contextlib
+import json
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from handrail.collect.cockpit.messages import LARGEST, Drive, parse
+from handrail.collect.operators.person.inputs import Ask, Inputs
+from handrail.controllers.errors import HandrailError
+
+GOOD = {
+    "kind": "drive",
+    "seq": 3,
+    "echo": 1.5,
+    "on": True,
+    "device": "keyboard",
+    "grip": False,
+    "axes": [0, 1.0],
+}
+GOOD |= {"view": 0.3, "targets": [3.0]}
+
+
+def said(**changes):
+    return json.dumps({**GOOD, **changes})
+
+
+def test_a_drive_and_an_ask():
+    assert parse(said()) == Drive(3, 1.5, Inputs(True, "keyboard", False, (0.0, 1.0), 0.3, (3.0,)))
+    assert parse('{"kind": "ask", "what": "mode", "value": "ee"}') == Ask("mode", "ee")
+    assert parse('{"kind": "ask", "what": "lock", "value": [1, 2]}') == Ask("lock", (1, 2))
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "", "{", "[]", "null", "1e999", "NaN", '"x"', "[" * 100_000, '{"kind": []}', b"\xff\xfe",
+        '{"kind": "ask", "what": ["mode"], "value": 1}', '{"kind": "ask", "what": "fly", "value": true}',
+        '{"kind": "ask", "what": "mode", "value": 3}', '{"kind": "ask", "what": "speed", "value": 2.0}',
+        '{"kind": "ask", "what": "start", "value": 1}', '{"kind": "ask", "what": "lock", "value": [1.5]}',
+        '{"kind": "ask", "what": "mode", "value": "' + "x" * 200 + '"}',
+        said(axes=[float("nan")]), said(axes=[2.0]), said(axes=["1"]), said(axes=[True]), said(axes=[0] * 65),
+        said(axes={}), said(seq=-1), said(seq=1.0), said(seq=True), said(seq=2**60), said(echo=-1),
+        said(on=1), said(device="mouse"), said(device=[]), said(view=1e9), said(grip=None), said(extra=1),
+        said(targets=[100.0]), said(targets=None),
+        " " * (LARGEST + 1),
+    ],
+)  # fmt: skip
+def test_anything_else_is_refused(text):
+    with pytest.raises(HandrailError) as error:
+        parse(text)
+    assert "\n" not in str(error.value)
+    assert len(str(error.value)) < 300
+
+
+@given(st.one_of(st.text(max_size=200), st.binary(max_size=200)))
+def test_whatever_comes_gives_an_error_of_ours(text):
+    with contextlib.suppress(HandrailError):
+        parse(text)

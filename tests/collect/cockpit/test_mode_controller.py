@@ -1,0 +1,61 @@
+"""Laws: a mode can change while the robot moves, and what is sent stays within the limits of acceleration."""
+
+import numpy as np
+import pytest
+
+from handrail.collect.config import SessionConfig
+from handrail.collect.operators.modes import MODES
+from handrail.collect.session.build import build_controller, build_env, build_modes
+from handrail.collect.session.mode_controller import ModeController
+from handrail.controllers.interface.channels import Channels
+from handrail.controllers.interface.intent import Intent
+
+PERIOD = 0.05
+
+
+@pytest.fixture(scope="module")
+def env():
+    made = build_env(SessionConfig(task="reach", physics=False), 20)
+    made.reset(seed=0)
+    return made
+
+
+def test_no_change_of_mode_jolts(env):
+    model = env.model
+    modes = build_modes(SessionConfig(task="reach", physics=False), env)
+    controller = ModeController(modes, lambda mode: build_controller(mode, model, 20, "reach"), modes["ee"])
+    channels, limits = Channels.of(model.description), model.description.limits
+    rng = np.random.default_rng(0)
+    controller.reset(env.obstacles())
+    names, before, fastest = list(MODES), np.zeros(model.size), 0.0
+    for step in range(66):
+        mode = modes[names[step // 3 % len(names)]]
+        mask = channels.mask(*mode.groups("hand"))
+        values = np.where(mask, rng.uniform(-0.3, 0.3, channels.size), 0.0)
+        state = env.state()
+        command = controller.update(state, Intent(values, mask, mode=mode.name, time=state.time))
+        v = command.velocity(PERIOD)
+        assert np.all(np.abs(v - before) <= limits.acceleration * PERIOD * (1 + 1e-6))
+        before, fastest = v, max(fastest, float(np.abs(v).max()))
+        env.robot.send(np.append(v, 0.0))
+    assert fastest > 0.1
+
+
+def test_an_intent_without_a_mode_keeps_the_last(env):
+    built = []
+
+    class Fake:
+        def __init__(self, mode):
+            built.append(mode.controller)
+
+        def reset(self, obstacles=()):
+            pass
+
+        def update(self, state, intent):
+            return intent.mode
+
+    controller = ModeController(dict(MODES), Fake, MODES["direct"])
+    channels = Channels.of(env.model.description)
+    idle = Intent.idle(channels)
+    assert controller.update(env.state(), idle) == ""
+    assert built == ["direct"]

@@ -1,0 +1,115 @@
+"""Laws of the real page: what becomes of an episode is what the person said, and the data have no more."""
+
+import numpy as np
+import pytest
+
+pytest.importorskip("playwright.sync_api", reason="the extra 'dev' is not installed")
+from page_driver import PageDriver
+from page_recording import hand_columns, is_smooth, is_whole, recording, rows, saved
+from playwright.sync_api import expect
+
+pytestmark = pytest.mark.slow
+
+
+def test_what_is_not_wanted_is_not_saved(new_page, tmp_path):
+    """Thrown away: another scene. Again: the same one. Practice: as if it had not been."""
+    with recording(tmp_path / "d", "--task", "reach") as (process, address):
+        driver = PageDriver(new_page(), address)
+        driver.begin()
+        first = driver.place("goal")
+        driver.push("KeyW", 0.5)
+        driver.press("Backspace")
+        driver.expect_phase("ready: press Start")
+        assert driver.wait(lambda: np.any(driver.place("goal") != first))
+        second = driver.place("goal")
+        driver.begin()
+        driver.push("KeyW", 0.5)
+        moved = driver.place()
+        driver.press("ArrowLeft")
+        driver.expect_phase("ready: press Start")
+        assert driver.wait(lambda: np.abs(driver.place() - moved).max() > 0.01)
+        assert np.array_equal(driver.place("goal"), second)
+        driver.at("practice").check()
+        driver.begin("practice: not recorded")
+        driver.push("KeyW", 0.5)
+        driver.press("ArrowRight")
+        driver.expect_phase("ready: press Start")
+        assert driver.text("saved").startswith("0 saved")
+        assert driver.at("episodes").locator("li").count() == 3
+        driver.press("Escape")
+        assert process.wait(60) == 0
+    assert saved(tmp_path / "d") == []
+
+
+def test_the_person_s_word_is_kept(new_page, tmp_path):
+    with recording(tmp_path / "d", "--task", "reach", "--dataset.num_episodes", 2) as (process, address):
+        driver = PageDriver(new_page(), address)
+        for key in ("ArrowDown", "ArrowRight"):
+            driver.begin()
+            driver.push("KeyS", 0.6)
+            driver.press(key)
+            driver.wait(lambda: driver.phase.startswith(("ready", "no connection")))
+        assert process.wait(60) == 0
+    assert [row["success"] for row in rows(tmp_path / "d")] == [False, True]
+    assert [row["failure_reason"] for row in rows(tmp_path / "d")] == ["operator: failure", ""]
+    assert [each["next.success"][-1] for each in saved(tmp_path / "d")] == [False, True]
+
+
+def test_undo_goes_back_to_the_pause(new_page, tmp_path):
+    """What came after it never was, but for its mark; the path that is recorded has no gap."""
+    with recording(tmp_path / "d", "--task", "reach", "--dataset.num_episodes", 1) as (process, address):
+        driver = PageDriver(new_page(), address)
+        driver.begin()
+        driver.push("KeyS", 0.8)
+        driver.press("KeyP")
+        driver.expect_phase("paused")
+        driver.page.wait_for_timeout(1500)  # the robot brakes to rest first: that is what one goes back to
+        paused = driver.settled("goal")[0]
+        driver.press("Enter")
+        driver.expect_phase("recording")
+        driver.push("KeyF", 0.8)
+        wrong = driver.settled("goal")[0]
+        assert np.abs(wrong - paused).max() > 0.03
+        driver.press("Backquote")
+        assert driver.wait(lambda: np.abs(driver.place() - paused).max() < 0.003)
+        driver.expect_phase("paused")
+        driver.press("Enter")
+        driver.expect_phase("recording")
+        driver.push("KeyS", 0.5)
+        driver.press("ArrowRight")
+        assert process.wait(60) == 0
+    (frames,) = saved(tmp_path / "d")
+    assert [row["undos"] for row in rows(tmp_path / "d")] == [1]
+    assert sorted(set(frames["teleop.undos"])) == [0, 1]
+    assert is_whole(frames)
+    assert is_smooth(frames)
+    hand = np.array(frames["observation.state"])[:, hand_columns(tmp_path / "d")]
+    assert np.linalg.norm(np.diff(hand, axis=0), axis=1).max() < 0.05
+    assert hand[:, 2].min() > paused[2] - 0.02  # it was never where the undone part went
+
+
+def test_the_mode_changes_in_motion_without_a_jolt(new_page, tmp_path):
+    """Through every kind of controller, while keys stay held; nothing is let go of."""
+    modes = ("base+ee", "direct", "switching", "joints", "decoupled", "direct_cbf", "direct_filtered", "ee")
+    with recording(tmp_path / "d", "--task", "reach", "--dataset.num_episodes", 1) as (process, address):
+        driver = PageDriver(new_page(), address)
+        driver.begin()
+        for key in ("KeyS", "KeyI"):
+            driver.page.keyboard.down(key)
+        for mode in modes:
+            driver.page.wait_for_timeout(500)
+            driver.choose("mode", mode)
+            expect(driver.at("mode-help")).not_to_be_empty()
+        driver.page.wait_for_timeout(500)
+        for key in ("KeyS", "KeyI"):
+            driver.page.keyboard.up(key)
+        driver.press("ArrowDown")
+        assert process.wait(90) == 0
+    (frames,) = saved(tmp_path / "d")
+    said = frames["teleop.mode"]
+    assert set(said) == {"ee", *modes}
+    changes = [index for index in range(1, len(said)) if said[index] != said[index - 1]]
+    speed = np.abs(np.array(frames["action"])[:, :-1]).max(axis=1)
+    assert sum(speed[index - 1] > 0.02 for index in changes) >= 5  # it did move
+    assert is_smooth(frames)
+    assert is_whole(frames)

@@ -1,0 +1,79 @@
+"""Laws of the real page: who comes back goes on; who comes second watches, until they are given the wheel."""
+
+import numpy as np
+import pytest
+
+pytest.importorskip("playwright.sync_api", reason="the extra 'dev' is not installed")
+from page_driver import PageDriver
+from page_recording import is_smooth, is_whole, recording, saved
+from playwright.sync_api import expect
+
+pytestmark = pytest.mark.slow
+
+
+def test_a_reload_in_the_middle_loses_nothing(new_page, tmp_path):
+    with recording(tmp_path / "d", "--task", "reach", "--dataset.num_episodes", 1) as (process, address):
+        driver = PageDriver(new_page(), address)
+        driver.begin()
+        start = driver.place()
+        driver.push("KeyS", 1.0)
+        driver.page.keyboard.down("KeyS")
+        driver.page.reload()
+        driver.page.keyboard.up("KeyS")
+        driver = PageDriver(driver.page)
+        driver.expect_phase("paused")
+        expect(driver.at("start")).to_contain_text("Go on")
+        driver.page.wait_for_timeout(1000)
+        before = driver.settled("goal")[0]
+        assert np.abs(before - start).max() > 0.05
+        driver.push("KeyS", 0.6)  # before they go on, nothing moves
+        assert np.abs(driver.settled("goal")[0] - before).max() < 0.003
+        driver.press("Enter")
+        driver.expect_phase("recording")
+        driver.push("KeyS", 0.8)
+        assert np.abs(driver.settled("goal")[0] - before).max() > 0.03
+        driver.press("ArrowRight")
+        assert process.wait(60) == 0
+    (frames,) = saved(tmp_path / "d")
+    assert is_whole(frames)
+    assert is_smooth(frames)
+    assert frames["next.success"][-1]
+
+
+def test_the_second_who_comes_watches_and_may_be_given_the_wheel(new_page, tmp_path):
+    with recording(tmp_path / "d", "--task", "reach") as (process, address):
+        first = PageDriver(new_page(), address)
+        first.begin()
+        second = PageDriver(new_page(), address)
+        assert "You watch" in second.text("drives")
+        start = second.settled("goal")[0]
+        second.push("KeyS", 0.6)
+        second.press("ArrowRight")
+        assert np.abs(second.settled("goal")[0] - start).max() < 0.003
+        assert second.text("saved").startswith("0 saved")
+        second.page.get_by_role("button", name="Ask to drive").click()
+        first.page.get_by_role("button", name="Let them").click()
+        second.expect_phase("paused")
+        second.press("Enter")
+        second.expect_phase("recording")
+        first.push("KeyF", 0.6)  # it is no longer theirs
+        assert np.abs(second.settled("goal")[0] - start).max() < 0.003
+        second.push("KeyS", 0.8)
+        assert np.abs(second.settled("goal")[0] - start).max() > 0.03
+        second.press("Escape")
+        assert process.wait(60) == 0
+
+
+def test_anyone_who_sees_danger_may_stop_it(new_page, tmp_path):
+    """The e-stop of who watches counts; only who drives releases it."""
+    with recording(tmp_path / "d", "--task", "reach") as (process, address):
+        first, second = PageDriver(new_page(), address), PageDriver(new_page(), address)
+        first.begin()
+        second.press("Space")
+        first.expect_phase("STOPPED")
+        second.press("Enter")
+        assert not first.wait(lambda: first.phase != "STOPPED", 1.0)
+        first.press("Enter")
+        first.expect_phase("paused")
+        first.press("Escape")
+        assert process.wait(60) == 0

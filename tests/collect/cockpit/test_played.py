@@ -1,0 +1,84 @@
+"""Laws of the poses that are kept of an episode: what a page plays is what was; old ones make room."""
+
+import json
+
+import numpy as np
+import pytest
+from cockpit_helpers import ask, server
+
+from handrail.collect.cockpit import stage
+from handrail.collect.cockpit.played import EpisodePoses, PlayedFiles
+from handrail.collect.config import DatasetConfig, RecordConfig
+from handrail.collect.session.build import build_env
+
+
+@pytest.fixture
+def env():
+    made = build_env(RecordConfig(task="reach", dataset=DatasetConfig(place="somewhere")), 20)
+    made.reset(seed=3)
+    yield made
+    made.close()
+
+
+def read(data, bodies):
+    """Return a file's header, and its times and poses."""
+    length = int.from_bytes(data[:4], "little")
+    rows = np.frombuffer(data[4 + length :], "<f4").reshape(-1, 1 + 7 * bodies)
+    return json.loads(data[4 : 4 + length]), rows[:, 0], rows[:, 1:]
+
+
+def drive(env, poses, numbers):
+    """Move the robot; return the poses at each frame, by number."""
+    seen = {}
+    for number in numbers:
+        env.step(np.append(np.full(env.model.size, 0.1), 0.0))
+        data = env.simulation.data
+        poses.see(number, data)
+        seen[number] = np.hstack([data.xpos, data.xquat]).ravel().astype("f4")
+    return seen
+
+
+def test_what_is_played_is_what_was_every_tenth_of_a_second(env):
+    model = env.simulation.mujoco_model
+    poses = EpisodePoses(model)
+    seen = drive(env, poses, range(9))
+    header, times, rows = read(poses.file(), model.nbody)
+    assert header["shapes"] == json.loads(json.dumps(stage.shapes(model)))
+    assert header["meshes"] == stage.meshes(model)[0]
+    np.testing.assert_allclose(np.diff(times), 0.1, atol=1e-5)
+    np.testing.assert_array_equal(rows, [seen[number] for number in range(0, 9, 2)])
+
+
+def test_what_was_undone_is_not_played(env):
+    model, poses = env.simulation.mujoco_model, EpisodePoses(env.simulation.mujoco_model)
+    drive(env, poses, range(4))
+    mark = env.checkpoint()
+    gone = drive(env, poses, range(4, 12))
+    env.restore(mark)
+    drive(env, poses, range(4, 6))
+    _, times, rows = read(poses.file(), model.nbody)
+    assert np.all(np.diff(times) > 0.0)
+    assert times[-1] == pytest.approx(0.05 * 5, abs=0.051)
+    assert not any(np.array_equal(row, gone[number]) for row in rows for number in range(6, 12))
+
+
+def test_old_ones_make_room():
+    files = {}
+    played = PlayedFiles(files.__setitem__, files.__delitem__)
+    names = [played.add(bytes([number]) * 100) for number in range(60)]
+    assert len(set(names)) == 60
+    assert list(files) == names[-50:]
+    assert names[-1] in played
+    assert names[0] not in played
+    large = [played.add(bytes([number]) * (30 * 2**20)) for number in range(4)]
+    assert list(files) == large[-2:]
+
+
+def test_pages_get_them_as_they_get_meshes():
+    with server() as served:
+        served.keep("an-episode.bin", b"poses")
+        assert ask(served, "/played/an-episode.bin")[0] == 200
+        assert ask(served, "/played/an-episode.bin", Origin="http://elsewhere")[0] == 403
+        assert ask(served, "/played/nothing.bin")[0] == 403
+        served.drop("an-episode.bin")
+        assert ask(served, "/played/an-episode.bin")[0] == 403

@@ -1,0 +1,285 @@
+"""Laws: input of the page that drives reaches the recording, and nobody else's, whatever they send."""
+
+import json
+import socket as sockets
+import time
+from contextlib import suppress
+from urllib.parse import urlsplit
+
+import pytest
+from cockpit_helpers import ask, drive, heard, heard_by, page, seen, server, show, stage, told
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+
+from handrail.collect.cockpit.hub import MOST_LATE
+from handrail.collect.cockpit.page_socket import REPLACED
+from handrail.collect.cockpit.pipe import ASK, DRIVE, DROPPED, LOST, NOTE, STOP
+from handrail.collect.cockpit.process import MOST_DEATHS
+from handrail.controllers.errors import HandrailError
+
+
+@pytest.fixture(scope="module")
+def served():
+    with server() as made:
+        stage(made)
+        yield made
+
+
+@pytest.fixture(scope="module")
+def guarded(tmp_path_factory):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_CONFIG_HOME", str(tmp_path_factory.mktemp("config")))
+        with server(host="127.0.0.2") as made:
+            yield made
+
+
+@pytest.fixture(autouse=True)
+def quiet(request):
+    if "served" in request.fixturenames:
+        request.getfixturevalue("served").pipe.receive()
+    yield
+    time.sleep(0.05)
+
+
+def test_a_page_drives_with_one_clock(served):
+    with page(served, "page-number-one") as socket:
+        told(socket, "stage")
+        stamp = seen(served, socket, 1)
+        socket.send(drive(7, stamp, axes=[0.5] * 18))
+        ((_, data),) = heard(served, {DRIVE})
+        said = json.loads(data)
+        assert said["inputs"]["axes"] == [0.5] * 18
+        assert 0.0 < said["round_trip"] < 5.0
+        assert said["received"] == pytest.approx(stamp + said["round_trip"], abs=1e-6)
+    assert heard(served, {LOST})
+
+
+def test_a_page_that_watches_moves_nothing_but_may_stop(served):
+    with page(served, "page-number-one") as first, page(served, "page-number-two") as second:
+        assert told(first, "you")["driving"]
+        assert not told(second, "you")["driving"]
+        second.send(drive(1, axes=[1.0] * 18))
+        second.send(json.dumps({"kind": "ask", "what": "mode", "value": "direct"}))
+        second.send(json.dumps({"kind": "ask", "what": "stop", "value": False}))
+        second.send(json.dumps({"kind": "ask", "what": "stop", "value": True}))
+        assert [kind for kind, _ in heard(served, {ASK, DRIVE, STOP})] == [STOP]
+        second.send(json.dumps({"kind": "ask", "what": "take", "value": True}))
+        while not told(first, "you")["asked"]:
+            pass
+        first.send(json.dumps({"kind": "ask", "what": "give", "value": True}))
+        while not told(second, "you")["driving"]:
+            pass
+        assert heard(served, {LOST})  # whoever drives anew lets go first
+
+
+def test_a_slow_page_gets_what_is_newest(served):
+    with page(served, "page-number-one", max_queue=1) as socket:
+        told(socket, "stage")
+        for number in range(60):
+            show(served, n=number, filling="x" * 200_000)
+            time.sleep(0.005)
+        got = []
+        while not got or got[-1] != 1000:
+            show(served, n=1000, filling="")  # until there is room in the pipe
+            with suppress(TimeoutError):
+                got.append(told(socket, "frame", 0.5)["frame"]["n"])
+        assert got == sorted(got)
+        assert len(set(got)) < 60
+
+
+def steered(served, socket, sequence, patience=60.0):
+    """Take the lease, answer frames until one is answered in time to steer; return its time and number."""
+    until = time.monotonic() + patience
+    while time.monotonic() < until:
+        sequence += 1
+        socket.send(json.dumps({"kind": "ask", "what": "take", "value": True}))
+        stamp = seen(served, socket, sequence)
+        socket.send(drive(sequence, stamp, axes=[0.5] * 18))
+        if heard(served, {DRIVE}, patience=1.0):
+            return stamp, sequence
+    raise TimeoutError
+
+
+def test_who_answers_an_old_picture_does_not_steer(served):
+    with page(served, "page-number-one") as socket:
+        old, sequence = steered(served, socket, 0)
+        seen(served, socket, sequence + 1)
+        time.sleep(MOST_LATE + 0.1)
+        for number in range(1, 4):
+            socket.send(drive(sequence + number, old, axes=[1.0] * 18))
+        while not told(socket, "you")["late"]:
+            pass
+        late = heard(served, {DRIVE}, 3, patience=0.5)
+        assert all(json.loads(data)["inputs"]["axes"][0] != 1.0 for _, data in late)
+        steered(served, socket, sequence + 3)
+        while told(socket, "you")["late"]:
+            pass
+
+
+def test_a_round_trip_is_the_first_answer_to_a_frame(served):
+    with page(served, "page-number-one") as socket:
+        stamp = seen(served, socket, 1)
+        time.sleep(0.1)
+        for sequence in (1, 2):
+            socket.send(drive(sequence, stamp))
+            time.sleep(0.05)
+        first, second = (json.loads(data) for _, data in heard(served, {DRIVE}, 2))
+        assert first["round_trip"] == second["round_trip"] == pytest.approx(first["received"] - stamp)
+        assert second["received"] > first["received"]
+
+
+def test_what_was_sent_before_is_refused(served):
+    with page(served, "page-number-one") as socket:
+        told(socket, "stage")
+        socket.send(drive(5))
+        assert heard(served, {DRIVE})
+        socket.send(drive(5, axes=[1.0] * 18))
+        assert "seq" in told(socket, "error")["error"]
+        assert [kind for kind, _ in heard(served, {DRIVE, LOST})] == [LOST]
+
+
+def test_a_copy_of_the_tab_takes_its_place(served):
+    """Two pages of one name would both drive; the older one is let go, and who drives now begins anew."""
+    with page(served, "page-number-one") as first, page(served, "page-number-one") as second:
+        assert told(second, "you")["driving"]
+        with pytest.raises(ConnectionClosed) as closed:
+            told(first, "no such thing")
+        assert closed.value.rcvd.code == REPLACED
+        assert heard(served, {LOST})
+        second.send(drive(1))
+        assert heard(served, {DRIVE})
+
+
+@pytest.mark.slow
+def test_the_lease_is_free_again_some_seconds_after_its_page_went(served):
+    with page(served, "page-number-two") as second:
+        with page(served, "page-number-one-b"):
+            pass
+        while not told(second, "you")["driving"]:
+            second.send(json.dumps({"kind": "ask", "what": "take", "value": True}))
+
+
+def test_what_was_dropped_is_told(served):
+    with page(served, "page-number-one") as socket:
+        told(socket, "stage")
+        socket.send("nonsense")
+        why = "messages that make no sense"
+        while why not in json.loads(heard(served, {DROPPED})[0][1]):
+            pass
+
+
+def test_a_form_that_never_ends_is_not_read(guarded):
+    """Nor one that is long: the token is short."""
+    with suppress(OSError):  # it does not even take it
+        assert ask(guarded, "/login", b"x" * 10_000_000)[0] == 403
+    assert ask(guarded, "/login", b"x" * 201)[0] == 403
+    assert ask(guarded, "/login", guarded.address.split("#")[1].encode())[0] == 200
+
+
+@pytest.mark.slow
+def test_a_connection_that_asks_nothing_is_cut(served):
+    with sockets.create_connection(("127.0.0.1", urlsplit(served.address).port), timeout=30) as silent:
+        silent.send(b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\nX-Slow: ")
+        assert silent.recv(100) == b""
+
+
+@pytest.mark.parametrize(
+    "path",
+    ["/%00", "/" + "a" * 5000, "/..%2f..%2fserver.py", "/meshes/..%2f..", "/meshes/%00", "/%ff", "/x?%%"],
+)
+def test_strange_paths_are_refused_quietly(served, path):
+    assert ask(served, path)[0] in (400, 403, 404)
+
+
+def test_huge_headers_are_refused(served):
+    with suppress(OSError):
+        assert ask(served, "/", Cookie="x" * 5_000_000)[0] == 400
+    assert ask(served, "/")[0] == 200
+
+
+def test_too_large_a_message_ends_the_connection(served):
+    with page(served, "page-number-one") as socket:
+        socket.send("x" * 100_000)
+        with pytest.raises(ConnectionClosed):
+            told(socket, "no such thing")
+
+
+def test_the_door_is_closed_without_the_token(guarded):
+    token = guarded.address.split("#")[1]
+    for name in ("link.js", "view.js", "meshes/x.bin", "lib/three.js"):
+        assert ask(guarded, f"/{name}")[0] == 403
+    assert ask(guarded, "/index.html")[0] == 200
+    with pytest.raises(InvalidStatus):
+        page(guarded)
+    assert ask(guarded, "/login", b"not the token")[0] == 403
+    assert ask(guarded, "/login", token.encode(), Origin="https://evil.example")[0] == 403
+    status, headers = ask(guarded, "/login", token.encode())
+    cookie = headers["set-cookie"].split(";")[0]
+    assert status == 200
+    assert {"HttpOnly", "Secure", "SameSite=strict"} <= set(headers["set-cookie"].split("; "))
+    assert ask(guarded, "/link.js", Cookie=cookie)[0] == 200
+    assert ask(guarded, "/../server.py", Cookie=cookie)[0] in (403, 404)
+    assert ask(guarded, "/%2e%2e/server.py", Cookie=cookie)[0] in (403, 404)
+    with pytest.raises(InvalidStatus):
+        page(guarded, cookie=cookie, origin="https://evil.example")
+    with page(guarded, cookie=cookie) as socket:
+        assert told(socket, "you")["driving"]
+
+
+@pytest.mark.slow
+def test_a_session_of_another_server_is_refused(guarded, tmp_path, monkeypatch):
+    status, headers = ask(guarded, "/login", guarded.address.split("#")[1].encode())
+    assert status == 200
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
+    with server(host="127.0.0.2") as other, pytest.raises(InvalidStatus):
+        page(other, cookie=headers["set-cookie"].split(";")[0])
+
+
+def test_the_server_ends_with_the_recording():
+    with server() as made:
+        process = made.process
+        made.pipe.close()
+        assert process.wait(10) == 0
+
+
+def test_a_server_that_dies_is_started_again_at_its_address():
+    said = []
+    with server(say=said.append) as made:
+        stage(made)
+        address, before = made.address, made.process.pid
+        made.process.kill()
+        made.process.wait()
+        kinds = heard_by(made, {LOST, NOTE}, 2)
+        assert kinds == [LOST, NOTE]
+        assert (made.address, len(said)) == (address, 1)
+        assert made.process.pid != before
+        stage(made)
+        with page(made) as socket:
+            told(socket, "stage")
+
+
+@pytest.mark.slow
+def test_a_server_that_dies_again_and_again_ends_the_recording():
+    def die():
+        made.process.kill()
+        made.process.wait()
+        made.receive()
+
+    with server() as made:
+        for _ in range(MOST_DEATHS):
+            die()
+        with pytest.raises(HandrailError, match=r"ended 4 times .* SIGKILL; the saved episodes are whole"):
+            die()
+
+
+@pytest.mark.slow
+def test_a_session_outlives_the_server(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
+    with server(host="127.0.0.2") as made:
+        token = made.address.split("#")[1]
+        cookie = ask(made, "/login", token.encode())[1]["set-cookie"].split(";")[0]
+        made.process.kill()
+        made.process.wait()
+        heard_by(made, {NOTE})
+        assert made.address.endswith(token)
+        with page(made, cookie=cookie) as socket:
+            told(socket, "you")

@@ -1,0 +1,217 @@
+"""Laws of what the page shows of a moment: in words, where the intent leads, what is near, what is left."""
+
+import json
+import math
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from handrail.collect.cockpit import stage
+from handrail.collect.cockpit.disk import DiskWatch
+from handrail.collect.cockpit.lead import AHEAD, Leads
+from handrail.collect.cockpit.nearest import NearestPair
+from handrail.collect.cockpit.reasons import STATUS, reason
+from handrail.collect.cockpit.snapshot import Snapshots
+from handrail.collect.config import DatasetConfig, RecordConfig
+from handrail.collect.operators.operator import View
+from handrail.collect.operators.person.inputs import Ask
+from handrail.collect.operators.person.person import Person
+from handrail.collect.session.build import build_env, build_modes
+from handrail.collect.simulation.gl import mujoco
+from handrail.controllers.interface.channels import Channels
+from handrail.controllers.interface.command import Diagnostics, Status
+from handrail.controllers.interface.frames import Frames
+from handrail.controllers.interface.intent import Intent
+from handrail.controllers.interface.trajectory import Trajectory
+from handrail.controllers.numerics.rotation import rotation_vector
+from handrail.datasets.recording.frames import Frame
+
+CONFIG = RecordConfig(task="pick_place", mode="ee", dataset=DatasetConfig(place="somewhere"))
+
+
+@pytest.fixture(scope="module")
+def env():
+    made = build_env(CONFIG, 20)
+    made.reset(seed=3)
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def person(env):
+    return Person(env.model, build_modes(CONFIG, env), "ee")
+
+
+def view(env):
+    return View(env.robot.state(), env.task_state())
+
+
+def asked(env, frames=Frames(), **values):  # noqa: B008
+    channels = Channels.of(env.model.description)
+    names = [name.replace("__", ".") for name in values]
+    intent = Intent.idle(channels)
+    numbers, mask = np.zeros(channels.size), channels.mask(*names)
+    for name, value in zip(names, values.values(), strict=True):
+        numbers[channels.names.index(name)] = value
+    return replace(intent, values=numbers, mask=mask, frames=frames)
+
+
+def frame(env):
+    """Return a frame of a hand that is led, and a plan."""
+    plan = Trajectory(np.full((21, env.model.size), 0.1), 0.1)
+    nothing = np.zeros(env.model.size + 1)
+    return Frame(
+        state=nothing,
+        environment=nothing,
+        images={},
+        intent=asked(env, ee__vx=0.1),
+        action=nothing,
+        command=nothing,
+        diagnostics=Diagnostics(),
+        contacts=0,
+        success=False,
+        done=False,
+        wall_clock=0.0,
+        number=0,
+        safe=0,
+        plan=plan,
+    )
+
+
+@pytest.mark.parametrize("status", list(Status))
+def test_whatever_brakes_says_why(env, status):
+    words = reason(status, (), env.model.description.home, env.model.description)
+    assert words == STATUS[status]
+    assert words.startswith("braking: ") == status.brakes
+
+
+def test_contacts_and_joints_at_their_limits_are_named(env):
+    limits, q = env.model.description.limits, np.array(env.model.description.home)
+    elbow = int(np.flatnonzero(np.isfinite(limits.position_lower))[-1])
+    q[elbow] = limits.position_lower[elbow]
+    words = reason(Status.BACKUP, ["bin_table – forearm"], q, env.model.description)
+    assert words.startswith(STATUS[Status.BACKUP])
+    assert "touching: bin table – forearm" in words
+    assert "edge" not in words
+    q[0] = limits.position_lower[0]
+    assert "base at the edge" in reason(Status.OK, (), q, env.model.description)
+    assert env.model.joints[elbow].removesuffix("_joint").replace("_", " ") + " at its limit" in words
+
+
+def test_the_hand_leads_where_it_is_asked_to_go_and_turn(env):
+    leads, now = Leads(env.model), view(env)
+    lead = leads.find(asked(env, ee__vz=0.2, ee__wz=0.5), now.tool, now.state.q)
+    assert lead.base is None
+    np.testing.assert_allclose(lead.hand.position - now.tool.position, [0, 0, 0.2 * AHEAD])
+    turn = rotation_vector(lead.hand.rotation @ now.tool.rotation.T)
+    np.testing.assert_allclose(turn, [0, 0, 0.5 * AHEAD], atol=1e-9)
+    own = leads.find(asked(env, Frames(tool="tool"), ee__vz=0.2), now.tool, now.state.q)
+    np.testing.assert_allclose(
+        own.hand.position, now.tool.position + 0.2 * AHEAD * now.tool.rotation[:, 2], atol=1e-12
+    )
+
+
+def test_joints_lead_the_hand_and_a_base_leads_as_it_is_turned(env):
+    leads, now = Leads(env.model), view(env)
+    joint = f"joint__{env.model.joints[-1]}"
+    q = np.array(now.state.q)
+    q[-1] += 0.5 * AHEAD
+    lead = leads.find(asked(env, **{joint: 0.5}), now.tool, now.state.q)
+    np.testing.assert_allclose(lead.hand.rotation, env.model.pose(q).rotation, atol=1e-12)
+    turned = np.array(now.state.q)
+    turned[2] = math.pi / 2
+    lead = leads.find(asked(env, base__vx=0.5), now.tool, turned)
+    assert lead.hand is None
+    assert lead.base is not None
+    np.testing.assert_allclose(lead.base - turned[:3], [0, 0.5 * AHEAD, 0], atol=1e-12)
+
+
+def test_at_rest_nothing_leads_anywhere(env):
+    now = view(env)
+    lead = Leads(env.model).find(asked(env, ee__vx=0.0, base__vx=0.0), now.tool, now.state.q)
+    assert lead.hand is None
+    assert lead.base is None
+
+
+def test_the_nearest_pair_is_the_nearest_of_all(env):
+    """Measured against a search that leaves nothing out."""
+    model, data = env.simulation.mujoco_model, env.simulation.data
+    found = NearestPair(model).find(data)
+    own = list(zip(model.pair_geom1.tolist(), model.pair_geom2.tolist(), strict=True))
+    robot = sorted({geom for pair in own for geom in pair})
+    roots = {int(model.body_rootid[model.geom_bodyid[geom]]) for geom in robot}
+    solid = (model.geom_contype | model.geom_conaffinity) > 0
+    scene = [
+        geom
+        for geom in np.flatnonzero(solid & (model.geom_bodyid > 0)).tolist()
+        if int(model.body_rootid[model.geom_bodyid[geom]]) not in roots
+    ]
+    line = np.zeros(6)
+    pairs = own + [(first, second) for first in robot for second in scene]
+    best = min(mujoco.mj_geomDistance(model, data, *pair, 0.5, line) for pair in pairs)
+    assert found is not None
+    assert found.distance == pytest.approx(best, abs=1e-4)
+    assert np.linalg.norm(np.subtract(found.points[:3], found.points[3:])) == pytest.approx(best, abs=3e-3)
+    assert all(found.names)
+
+
+def test_a_moment_is_small_and_finite(env, person):
+    """`pytest -s` prints how small it is, and how long it takes to make."""
+    snapshots, now, rounds = Snapshots(env), view(env), 50
+    snapshots.see(frame(env))
+    snapshots.now(now, person, 1.0)  # what is compiled once is not counted
+    began = time.process_time()
+    for _ in range(rounds):
+        text = json.dumps(snapshots.now(now, person, 1.0), allow_nan=False)
+    took = (time.process_time() - began) / rounds
+    print(f"a moment: {len(text)} bytes, {1e3 * took:.2f} ms of the processor")
+    said = json.loads(text)
+    assert len(said["ghost"]) == 7
+    assert len(said["path"]) == len(said["track"]) > 5
+    assert len(text) < 6000
+
+
+def test_an_undo_takes_what_came_after_the_last_rest(env, person):
+    snapshots, now = Snapshots(env), view(env)
+    at = lambda time, moving: replace(  # noqa: E731
+        now, state=replace(now.state, time=time, commanded=np.full(env.model.size, float(moving)))
+    )
+    assert snapshots.now(at(0.0, False), person, 0.0)["undo_takes"] == 0.0
+    person.ask(Ask("start"))
+    assert snapshots.now(at(3.0, True), person, 0.0)["undo_takes"] == 3.0
+    person.ask(Ask("pause"))
+    assert snapshots.now(at(4.0, True), person, 0.0)["undo_takes"] == 4.0  # still braking
+    assert snapshots.now(at(4.5, False), person, 0.0)["undo_takes"] == 0.0
+    person.ask(Ask("start"))
+    assert snapshots.now(at(6.0, True), person, 0.0)["undo_takes"] == 1.5
+
+
+def test_the_hand_is_the_gripper_with_its_fingers(env):
+    model = env.simulation.mujoco_model
+    names = {model.body(index).name for index in stage.hand(model)}
+    assert names == {"gripper", "finger_left_body", "finger_right_body"}
+
+
+def test_the_disk_says_how_many_episodes_fit(tmp_path):
+    watch = DiskWatch(tmp_path / "to" / "come")
+    try:
+        assert _soon(lambda: watch.left[0] > 0)
+        assert watch.left[1] == -1
+        folder = tmp_path / "to" / "come"
+        folder.mkdir(parents=True)
+        (folder / "data").write_bytes(bytes(2_000_000))
+        watch.saved(2)
+        assert _soon(lambda: watch.left[1] > 0)
+        free, episodes = watch.left
+        assert episodes == pytest.approx(free / 1_000_000, rel=0.1)
+    finally:
+        watch.close()
+
+
+def _soon(come, patience=10.0):
+    until = time.monotonic() + patience
+    while not come() and time.monotonic() < until:
+        time.sleep(0.01)
+    return come()

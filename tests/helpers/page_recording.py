@@ -1,0 +1,62 @@
+"""Runs `handrail-cockpit` for a test, and reads what it saved."""
+
+import contextlib
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet as pq
+
+from handrail.controllers.robot.model import load_model
+from handrail.datasets.reading.reader import read_episodes, read_info
+
+_PERIOD = 0.05  # of a frame [s]
+
+
+@contextlib.contextmanager
+def recording(folder, *flags, cwd=None):
+    """Run `handrail-cockpit` for a folder, or with none; give its process and address."""
+    command = [sys.executable, "-m", "handrail.scripts.cockpit", *([str(folder)] if folder else [])]
+    command += ["--cockpit.no_open", "--cockpit.port", "0", *map(str, flags)]
+    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, cwd=cwd)
+    try:
+        said = []
+        while "Drive at" not in (line := process.stderr.readline()):
+            said.append(line)
+            assert line, "".join(said)
+        yield process, line.split("Drive at ")[1].strip()
+    finally:
+        if process.poll() is None:
+            process.send_signal(signal.SIGTERM)
+        with contextlib.suppress(ValueError):  # a test has read it all
+            process.communicate(timeout=60)
+
+
+def saved(folder):
+    """Return the columns of the data that was saved, by episode."""
+    files = sorted((Path(folder) / "data").rglob("*.parquet"))
+    return [pq.read_table(file).to_pydict() for file in files]
+
+
+def rows(folder):
+    """Return what the dataset says of each episode that was saved."""
+    return read_episodes(Path(folder))
+
+
+def is_smooth(frames):
+    """Whether consecutive commands, from rest on, are within what the robot may accelerate."""
+    sent, limits = np.array(frames["action"])[:, :-1], load_model().description.limits
+    return bool(np.all(np.abs(np.diff(sent, axis=0, prepend=0.0)) <= _PERIOD * limits.acceleration * 1.00001))
+
+
+def is_whole(frames):
+    """Whether no frame is missing."""
+    return frames["frame_index"] == list(range(len(frames["action"])))
+
+
+def hand_columns(folder):
+    """Return where the hand is in the observed state."""
+    names = read_info(folder).features["observation.state"].names
+    return [names.index(f"tool.{axis}") for axis in "xyz"]
