@@ -1,0 +1,120 @@
+"""The keys of a terminal, also over ssh: held while they are down, or while the terminal repeats them."""
+
+import _thread
+import time
+from collections.abc import Callable
+
+from handrail.collect.devices.key_bytes import (
+    FOCUS_IN,
+    FOCUS_OUT,
+    INTERRUPT,
+    SIGNALS,
+    TELLS_RELEASES,
+    Key,
+    KeyBytes,
+)
+from handrail.collect.devices.reading import Reading
+from handrail.collect.devices.terminal import ARE_YOU_THERE, Terminal
+
+HELD = 0.2  # after its last character, a key of a terminal that does not tell releases counts as let go [s]
+_AGAIN = 0.7  # what comes earlier is a repetition, whose first one comes after 0.25 to 0.66 s [s]
+_ASKS = 0.05  # while keys are held, a terminal is asked that often whether it is there [s]
+_SILENCE = 0.15  # without an answer, nobody is there [s]
+_WAIT = 0.008  # for keys [s]
+
+
+class Keyboard:
+    """The keys of a terminal; a device.
+
+    Most terminals tell only characters: a key that is held comes again and again, the first time after about
+    half a second. A key counts as held for 0.2 s after each. Terminals with kitty's keyboard protocol tell
+    when keys go up; these are asked 20 times a second whether they are still there, so that a connection that
+    hangs is no key that is held.
+
+    Args:
+        terminal: the one to read.
+        clock: of readings [s].
+    """
+
+    name = "keyboard"
+
+    def __init__(self, terminal: Terminal | None = None, clock: Callable[[], float] = time.monotonic) -> None:
+        self._terminal, self._clock = terminal or Terminal(), clock
+        self._begin()
+
+    def open(self) -> None:
+        """Take the terminal.
+
+        Raises:
+            DeviceGoneError: there is none, or it belongs to another program now.
+        """
+        self._begin()
+        self._terminal.open()
+
+    def read(self) -> Reading:
+        """Return the keys that are held.
+
+        Raises:
+            DeviceGoneError: the terminal was closed.
+        """
+        data = self._terminal.read(_WAIT)
+        now = self._clock()
+        if data:
+            self._answered(now)
+        presses = [key.name for key in self._bytes.take(data, now) if self._takes(key, now)]
+        if not self._tells_releases:
+            self._held = {name: since for name, since in self._held.items() if now - since <= HELD}
+        silent = self._tells_releases and bool(self._held) and self._is_silent(now)
+        return Reading(
+            self._heard if silent else now,
+            dict.fromkeys(self._held, 1.0),
+            tuple(presses),
+            attended=self._in_focus and not silent,
+            round_trip=self._round_trip,
+        )
+
+    def close(self) -> None:
+        """Put the terminal back as it was."""
+        self._terminal.close()
+
+    def _begin(self) -> None:
+        self._bytes = KeyBytes()
+        self._held: dict[str, float] = {}
+        self._last: dict[str, float] = {}
+        self._tells_releases, self._in_focus = False, True
+        self._heard = self._asked = self._round_trip = 0.0
+        self._waits = False  # for an answer
+
+    def _takes(self, key: Key, now: float) -> bool:
+        """Take a key; return whether it was pressed now."""
+        if key.name in SIGNALS:
+            self._take_signal(key.name)
+            return False
+        if key.change == "up":
+            self._held.pop(key.name, None)
+            return False
+        before = self._last.get(key.name, -_AGAIN)
+        self._last[key.name] = self._held[key.name] = now
+        return key.change == "down" and (self._tells_releases or now - before >= _AGAIN)
+
+    def _take_signal(self, name: str) -> None:
+        if name == INTERRUPT:
+            _thread.interrupt_main()
+        elif name == TELLS_RELEASES:
+            self._tells_releases = True
+            self._terminal.tell_releases()
+        elif name in (FOCUS_IN, FOCUS_OUT):
+            self._in_focus = name == FOCUS_IN
+            self._held.clear()
+
+    def _is_silent(self, now: float) -> bool:
+        """Whether the terminal does not answer any more; ask it."""
+        if not self._waits and now - self._asked >= _ASKS:
+            self._asked, self._waits = now, True
+            self._terminal.write(ARE_YOU_THERE)
+        return now - self._heard > _SILENCE
+
+    def _answered(self, now: float) -> None:
+        if self._waits:
+            self._round_trip, self._waits = now - self._asked, False
+        self._heard = now

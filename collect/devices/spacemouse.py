@@ -1,0 +1,142 @@
+"""A SpaceMouse (3Dconnexion), through hidapi: six axes that spring back, and buttons."""
+
+import struct
+import time
+from collections.abc import Callable
+from typing import Any
+
+from handrail.collect.devices.reading import DeviceGoneError, Reading
+from handrail.collect.devices.stick import StickShape
+from handrail.controllers.errors import message_of, not_installed
+
+AXES = ("x", "y", "z", "roll", "pitch", "yaw")
+CONTROLS = (*AXES, *(f"button_{number}" for number in range(1, 33)))
+_OF_DEVICE = (1, 0, 2, 4, 3, 5)  # forward, left, up, and the turns about them: among right, backward, down
+_FULL = 350.0  # of an axis, as the device counts
+_MOST = 2.0  # times that no device says
+_SILENCE = 0.15  # a cap that is deflected speaks more often than that [s]
+_TRANSLATION, _ROTATION, _BUTTONS = 1, 2, 3  # the kinds of reports
+_VENDOR, _FORMER_VENDOR = 0x256F, 0x046D  # 3Dconnexion; Logitech, which sold the older ones
+_FORMER = range(0xC603, 0xC62C)  # products
+_RULE = 'KERNEL=="hidraw*", ATTRS{idVendor}=="256f", MODE="0660", TAG+="uaccess"'
+_WAIT = 8  # for a report [ms]
+_MOST_REPORTS = 32  # taken at once
+
+
+class SpaceMouse:
+    """A SpaceMouse; a device. Its cap springs back when let go, and says so: that is its dead-man.
+
+    The device counts to the right, backward and down; its axes here are forward, left and up, as the
+    robot's, and the turns about them. A cap that is deflected speaks all the time: one that falls silent
+    counts as left alone.
+
+    Args:
+        shape: of its axes.
+        clock: of readings [s].
+
+    Attributes:
+        dropped: reports that made no sense.
+    """
+
+    name = "spacemouse"
+
+    def __init__(self, shape: StickShape | None = None, clock: Callable[[], float] = time.monotonic) -> None:
+        self._shape, self._clock = shape or StickShape(), clock
+        self._hid: Any = None
+        self.dropped = 0
+        self._forget()
+
+    def open(self) -> None:
+        """Find a SpaceMouse.
+
+        Raises:
+            DeviceGoneError: there is none, or it may not be read.
+            HandrailError: hidapi is not installed.
+        """
+        try:
+            import hid
+        except ImportError as error:
+            raise not_installed("--operator spacemouse", "hidapi", "devices") from error
+        found = next((each for each in hid.enumerate() if _is_one(each)), None)
+        if found is None:
+            raise DeviceGoneError("SpaceMouse: expected one, found none; plug it in, then try again")
+        self._forget()
+        self._hid = hid.device()
+        try:
+            self._hid.open_path(found["path"])
+        except OSError as error:
+            where = found["path"].decode(errors="replace")
+            raise DeviceGoneError(
+                f"SpaceMouse: {where} may not be read; put the line {_RULE} "
+                "into /etc/udev/rules.d/70-spacemouse.rules, plug it in again"
+            ) from error
+
+    def read(self) -> Reading:
+        """Return its axes and buttons.
+
+        Raises:
+            DeviceGoneError: it was unplugged.
+        """
+        presses: list[str] = []
+        try:
+            report = self._hid.read(64, _WAIT)
+            for _ in range(_MOST_REPORTS):
+                if not report:
+                    break
+                presses += self._take(bytes(report))
+                report = self._hid.read(64, 0)
+        except (OSError, ValueError) as error:
+            raise DeviceGoneError(
+                f"SpaceMouse: unplugged ({message_of(error)}); plug it in again, then press start"
+            ) from error
+        now = self._clock()
+        deflected = any(self._axes.values())
+        silent = deflected and now - self._heard > _SILENCE
+        held = {name: value for name, value in self._axes.items() if value} | dict.fromkeys(self._down, 1.0)
+        return Reading(self._heard if silent else now, held, tuple(presses), attended=not silent)
+
+    def close(self) -> None:
+        """Give it back."""
+        if self._hid is not None:
+            self._hid.close()
+            self._hid = None
+
+    def _forget(self) -> None:
+        self._axes: dict[str, float] = dict.fromkeys(AXES, 0.0)
+        self._down: frozenset[str] = frozenset()
+        self._heard = 0.0
+
+    def _take(self, report: bytes) -> list[str]:
+        """Take a report; return the buttons that it says went down."""
+        kind, data = report[0], report[1:]
+        if kind == _BUTTONS and data:
+            return self._take_buttons(int.from_bytes(data[:4], "little"))
+        if kind == _TRANSLATION and len(data) >= 12:
+            self._take_axes(AXES, data[:12])
+        elif kind in (_TRANSLATION, _ROTATION) and len(data) >= 6:
+            self._take_axes(AXES[:3] if kind == _TRANSLATION else AXES[3:], data[:6])
+        else:
+            self.dropped += 1
+        return []
+
+    def _take_axes(self, names: tuple[str, ...], data: bytes) -> None:
+        counts = struct.unpack(f"<{len(names)}h", data)
+        if max(map(abs, counts)) > _MOST * _FULL:
+            self.dropped += 1
+            return
+        for name, at in zip(names, _OF_DEVICE, strict=False):
+            self._axes[name] = self._shape(-counts[at] / _FULL)
+        self._heard = self._clock()
+
+    def _take_buttons(self, bits: int) -> list[str]:
+        down = frozenset(f"button_{index + 1}" for index in range(32) if bits >> index & 1)
+        before, self._down = self._down, down
+        return sorted(down - before)
+
+
+def _is_one(device: dict[str, Any]) -> bool:
+    """Whether a HID device is a SpaceMouse's axes and buttons, which are a 'multi-axis controller'."""
+    vendor, product = device["vendor_id"], device["product_id"]
+    page = device.get("usage_page", 0), device.get("usage", 0)
+    ours = vendor == _VENDOR or (vendor == _FORMER_VENDOR and product in _FORMER)
+    return ours and page in ((1, 8), (0, 0))

@@ -1,0 +1,140 @@
+"""Which joint of a leader arm drives which joint of the robot's arm, which way, and how far."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from handrail.controllers.arrays import FloatArray
+from handrail.controllers.entries import Entry, check_entries, is_number, is_table, is_text
+from handrail.controllers.errors import HandrailError
+from handrail.datasets.storage.atomic import explained, make_folder, write_whole
+
+_OPEN, _CLOSED = 0.6, 0.4  # of the gripper's way: where it counts as open, and as closed
+
+
+@dataclass(frozen=True)
+class LeaderJoint:
+    """A joint of the leader that drives one of the arm's: `q = scale · l + offset`.
+
+    Attributes:
+        source: LeRobot's name of its position.
+        scale: [rad per unit of the leader]; negative where it turns the other way.
+        offset: [rad].
+    """
+
+    source: str
+    scale: float
+    offset: float = 0.0
+
+
+@dataclass(frozen=True)
+class LeaderGripper:
+    """The leader's handle, that closes and opens the gripper.
+
+    Attributes:
+        source: LeRobot's name of its position.
+        closed: where it is closed, in the leader's units.
+        opened: where it is open.
+    """
+
+    source: str
+    closed: float
+    opened: float
+
+    def grips(self, reading: Mapping[str, float], before: bool) -> bool:
+        """Return whether it is closed; in between, what it was before."""
+        share = (reading[self.source] - self.closed) / (self.opened - self.closed)
+        return before if _CLOSED < share < _OPEN else share <= _CLOSED
+
+
+@dataclass(frozen=True)
+class LeaderCalibration:
+    """How a leader drives an arm; arm joints that no leader joint drives stand still.
+
+    Attributes:
+        joints: by the name of the arm's joint.
+        gripper: its handle, if it has one.
+    """
+
+    joints: Mapping[str, LeaderJoint]
+    gripper: LeaderGripper | None = None
+
+    def angles(self, reading: Mapping[str, float], arm: tuple[str, ...]) -> FloatArray:
+        """Return the leader's joints in the arm's terms [rad], (n,); 0 where none drives."""
+        angles = np.zeros(len(arm))
+        for index, name in enumerate(arm):
+            if joint := self.joints.get(name):
+                angles[index] = joint.scale * reading[joint.source] + joint.offset
+        return angles
+
+    @property
+    def sources(self) -> tuple[str, ...]:
+        """What a reading has to have."""
+        handle = (self.gripper.source,) if self.gripper else ()
+        return (*(joint.source for joint in self.joints.values()), *handle)
+
+
+_JOINT = {
+    "source": Entry("LeRobot's name of a position", is_text),
+    "scale": Entry("a finite number, not 0", lambda value: is_number(value) and value != 0),
+    "offset": Entry("a finite number [rad]", is_number, needed=False),
+}
+_GRIPPER = {
+    "source": Entry("LeRobot's name of a position", is_text),
+    "closed": Entry("a finite number", is_number),
+    "opened": Entry("a finite number", is_number),
+}
+_TABLE = {
+    "joints": Entry("a table of the arm's joints", is_table),
+    "gripper": Entry("a table, or nothing", lambda value: value is None or is_table(value), needed=False),
+}
+
+
+def load_calibration(path: Path, arm: tuple[str, ...], advice: str) -> LeaderCalibration:
+    """Return what a file says.
+
+    Args:
+        path: of the file.
+        arm: names of the arm's joints.
+        advice: how to make the file.
+
+    Raises:
+        HandrailError: there is none, or it is no calibration of this arm.
+    """
+    if not path.is_file():
+        raise HandrailError(f"leader arm: no calibration for this robot yet; make it once: {advice}")
+    where = f"calibration {path}"
+    try:
+        content: Any = json.loads(path.read_text())
+    except (OSError, ValueError, RecursionError) as error:
+        raise HandrailError(f"{where}: expected JSON; make it anew: {advice}") from error
+    check_entries(content, _TABLE, where)
+    check_entries(
+        content["joints"],
+        {name: Entry("a table", is_table, needed=False) for name in arm},
+        f"{where}: joints",
+    )
+    for name, joint in content["joints"].items():
+        check_entries(joint, _JOINT, f"{where}: {name}")
+    gripper = content.get("gripper")
+    if gripper is not None:
+        check_entries(gripper, _GRIPPER, f"{where}: gripper")
+        if gripper["closed"] == gripper["opened"]:
+            raise HandrailError(f"{where}: gripper: expected closed and opened to differ")
+    joints = {name: LeaderJoint(**joint) for name, joint in content["joints"].items()}
+    return LeaderCalibration(joints, LeaderGripper(**gripper) if gripper else None)
+
+
+def save_calibration(calibration: LeaderCalibration, path: Path) -> None:
+    """Write a calibration; a crash leaves the one before.
+
+    Raises:
+        HandrailError: it cannot be written.
+    """
+    with explained(f"calibration {path}"):
+        make_folder(path.parent)
+        write_whole(path, (json.dumps(asdict(calibration), indent=2) + "\n").encode())

@@ -1,0 +1,133 @@
+"""A leader arm, or any LeRobot teleoperator that says joint positions."""
+
+import math
+import time
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any
+
+from handrail.collect.devices.reading import DeviceGoneError, Reading
+from handrail.controllers.errors import message_of, shown
+
+if TYPE_CHECKING:
+    from lerobot.teleoperators.teleoperator import Teleoperator
+
+_PERIOD = 0.004  # between two readings [s]
+_GONE = 1.0  # without a good reading, it is gone [s]
+_MOST_STEP = 0.25  # of a joint between two readings, as a share of half a turn
+_HALF_TURN = 180.0  # in degrees; a range of −100 to 100 is about as much
+
+
+class LeaderArm:
+    """Reads the joint positions of a LeRobot teleoperator; a device.
+
+    A reading that is not whole, not finite, or a jump that no hand makes is dropped: the one before gets
+    older instead, and whoever is too old does not steer.
+
+    Args:
+        make: makes LeRobot's teleoperator, not connected.
+        name: what the data call it: LeRobot's type.
+        sources: names of the positions that are needed.
+        clock: of readings [s].
+
+    Attributes:
+        dropped: readings that made no sense.
+    """
+
+    def __init__(
+        self,
+        make: "Callable[[], Teleoperator]",
+        name: str,
+        sources: tuple[str, ...],
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self.name, self._make, self._sources, self._clock = name, make, sources, clock
+        self._teleoperator: Teleoperator | None = None
+        self._last = Reading(-math.inf)
+        self.dropped = 0
+
+    def open(self) -> None:
+        """Connect it.
+
+        Raises:
+            DeviceGoneError: it does not answer, may not be opened, or is not calibrated.
+        """
+        self._teleoperator = connected(self._make(), self.name)
+        self._last = Reading(self._clock(), attended=False)
+
+    def read(self) -> Reading:
+        """Return its joint positions.
+
+        Raises:
+            DeviceGoneError: it was unplugged, or says nothing that makes sense for a second.
+        """
+        assert self._teleoperator is not None
+        time.sleep(_PERIOD)
+        trouble = "what it says makes no sense"
+        try:
+            joints = self._checked(self._teleoperator.get_action())
+        except Exception as error:  # whatever a driver's code raises
+            joints, trouble = None, message_of(error)
+        now = self._clock()
+        if joints is not None and self._follows(joints, now):
+            self._last = Reading(now, joints=joints)
+            return self._last
+        self.dropped += 1
+        if now - self._last.time > _GONE or not self._teleoperator.is_connected:
+            raise DeviceGoneError(f"{self.name}: {trouble}; check its cable and its power, then press start")
+        return self._last
+
+    def close(self) -> None:
+        """Let it go."""
+        teleoperator, self._teleoperator = self._teleoperator, None
+        if teleoperator is not None and teleoperator.is_connected:
+            teleoperator.disconnect()
+
+    def _checked(self, action: Any) -> Mapping[str, float] | None:
+        """Return the positions that are needed; None where one is missing or no finite number."""
+        if not isinstance(action, Mapping):
+            return None
+        joints = {name: float(action[name]) for name in self._sources}
+        return joints if all(map(math.isfinite, joints.values())) else None
+
+    def _follows(self, joints: Mapping[str, float], now: float) -> bool:
+        """Whether a hand can have moved it so since the last good reading; after a long time, it can."""
+        before = self._last.joints
+        if not before or now - self._last.time > _GONE / 2:
+            return True
+        return all(abs(joints[name] - before[name]) < _MOST_STEP * _HALF_TURN for name in joints)
+
+
+def connected(teleoperator: "Teleoperator", name: str, calibrate: bool = False) -> "Teleoperator":
+    """Return a teleoperator that is connected and calibrated.
+
+    Args:
+        teleoperator: LeRobot's.
+        name: its type.
+        calibrate: let LeRobot calibrate it where it is not: it asks in the terminal.
+
+    Raises:
+        DeviceGoneError: it does not answer, may not be opened, or is not calibrated.
+    """
+    try:
+        teleoperator.connect(calibrate=calibrate)
+        calibrated = teleoperator.is_calibrated
+    except Exception as error:  # whatever a driver's code raises
+        raise DeviceGoneError(_why_not(name, error)) from error
+    if not calibrated:
+        teleoperator.disconnect()
+        raise DeviceGoneError(
+            f"{name}: not calibrated; run lerobot-calibrate with the same --teleop.type, "
+            "--teleop.port and --teleop.id once"
+        )
+    return teleoperator
+
+
+def _why_not(name: str, error: Exception) -> str:
+    """Return what to do where a leader cannot be connected."""
+    words = message_of(error)
+    if "ermission" in words or isinstance(error, PermissionError):
+        return (
+            f"{name}: its port may not be opened; add yourself to its group "
+            f"(sudo usermod -aG dialout $USER), log in again ({shown(words)})"
+        )
+    return f"{name}: cannot be connected: {words}; check --teleop.port (lerobot-find-port), cable and power"

@@ -1,0 +1,97 @@
+"""The device in a person's hand, as typed settings; light to import."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated
+
+from handrail.collect.flags import one_of
+from handrail.controllers.errors import HandrailError
+from handrail.controllers.robot.catalogue import ROBOTS
+
+LEADER = "leader_arm"
+BESIDE = ("keyboard", "gamepad")
+UNITS = ("degrees", "radians", "other")
+_EXAMPLE = "--teleop.type=so101_leader --teleop.port=/dev/ttyACM0 --teleop.id=mine"
+
+
+@dataclass(frozen=True)
+class LeaderConfig:
+    """Which leader arm; the flags are LeRobot's."""
+
+    type: str = ""
+    """LeRobot's name of the leader arm, such as so101_leader or koch_leader."""
+    port: str = ""
+    """Its port, such as /dev/ttyACM0 (lerobot-find-port finds it)."""
+    id: str = ""
+    """Your name for it, as you gave it to lerobot-calibrate."""
+    options: str = ""
+    """Other settings of that type, as use_degrees=true, with commas between."""
+
+    def check_type(self, wanted_by: str) -> None:
+        """Check that it is said which one.
+
+        Raises:
+            HandrailError: it is not.
+        """
+        if not self.type:
+            raise HandrailError(f"{wanted_by}: expected --teleop.type, such as {_EXAMPLE}")
+
+
+@dataclass(frozen=True)
+class TeleopConfig(LeaderConfig):
+    """The device in your hand, with --operator gamepad, spacemouse, keyboard or leader_arm."""
+
+    beside: str = "keyboard"
+    """What moves the base beside a leader arm, and has its clutch: keyboard or gamepad."""
+    map: str = ""
+    """File (.toml) that gives controls another meaning; what it does not name stays as it is."""
+    dead_zone: float = 0.12
+    """Deflection of a stick that counts as none, 0 to 0.5."""
+    exponent: float = 1.7
+    """Curve of a stick, 1 (straight) to 3 (fine near the middle)."""
+
+    def check(self, operator: str) -> None:
+        """Check the settings.
+
+        Args:
+            operator: whose device it is.
+
+        Raises:
+            HandrailError: one is wrong.
+        """
+        if operator == LEADER:
+            self.check_type(f"--operator {LEADER}")
+        elif self.type:
+            raise HandrailError(f"--teleop.type {self.type}: expected --operator {LEADER}, got {operator}")
+        shape = (
+            ("--teleop.dead_zone", self.dead_zone, 0.0, 0.5),
+            ("--teleop.exponent", self.exponent, 1.0, 3.0),
+        )
+        for flag, value, low, high in shape:
+            if not low <= value <= high:
+                raise HandrailError(f"{flag} {value}: expected a number from {low} to {high}")
+        if self.map and not Path(self.map).expanduser().is_file():
+            raise HandrailError(f"--teleop.map {self.map}: expected a .toml file, found none there")
+        if self.beside not in BESIDE:
+            raise HandrailError(f"--teleop.beside {self.beside}: expected {' or '.join(BESIDE)}")
+
+
+@dataclass(frozen=True)
+class CalibrateConfig:
+    """Say which joint of a leader arm drives which joint of a robot's arm; needed once for each robot."""
+
+    teleop: LeaderConfig = field(default_factory=LeaderConfig)
+    robot: Annotated[str, one_of(ROBOTS)] = "ridgeback_ur10"
+    """A robot, or a description file (.toml)."""
+    unit: str = "degrees"
+    """Of the leader's joints: degrees, radians, or other (measured from the quarter turns that you make)."""
+
+    def check(self) -> None:
+        """Check the settings.
+
+        Raises:
+            HandrailError: one is wrong.
+        """
+        self.teleop.check_type("handrail-calibrate")
+        if self.unit not in UNITS:
+            raise HandrailError(f"--unit {self.unit}: expected {', '.join(UNITS[:-1])} or {UNITS[-1]}")

@@ -1,0 +1,94 @@
+"""Laws of the gamepad, on one that SDL itself makes: what it says, that it is gone, why there is none."""
+
+import sys
+
+import pytest
+from device_players import Clock, VirtualPad, recorded
+
+from handrail.collect.devices import gamepad
+from handrail.collect.devices.gamepad import Gamepad
+from handrail.collect.devices.reading import DeviceGoneError
+from handrail.controllers.errors import HandrailError
+
+
+@pytest.fixture(scope="module")
+def sdl():
+    pad = VirtualPad()
+    with pytest.raises(DeviceGoneError):  # also begins SDL, without which there is nothing to plug in
+        Gamepad().open()
+    return pad
+
+
+@pytest.fixture
+def plugged(sdl):
+    sdl.plug_in()
+    yield sdl
+    sdl.unplug()
+
+
+@pytest.fixture
+def pad(plugged):
+    made = Gamepad(clock=Clock())
+    made.open()
+    made.read()
+    yield made
+    made.close()
+
+
+def test_recorded_events_come_out_as_deflections_and_presses(plugged, pad):
+    seen = []
+    for event in recorded("gamepad.json"):
+        plugged.move(event["control"], event["value"])
+        reading = pad.read()
+        seen.append(
+            (event["time"], {k: round(v, 2) for k, v in reading.deflections.items()}, reading.presses)
+        )
+    at = {time: (held, presses) for time, held, presses in seen}
+    assert at[0.0] == ({}, ())  # a worn stick
+    assert at[0.2] == ({"left_shoulder": 1.0}, ("left_shoulder",))
+    assert at[0.35][0] == {"left_shoulder": 1.0}
+    assert at[0.5][0] == {"left_shoulder": 1.0, "left_y": -1.0}
+    assert -1.0 < at[0.45][0]["left_y"] < at[0.4][0]["left_y"] < 0.0
+    assert at[1.05][0]["right_trigger"] == 1.0
+    assert at[1.3][0] == {"left_shoulder": 1.0}
+    assert at[1.4][1] == ("a",)
+    assert at[1.48][1] == ()
+    assert at[1.7][0].keys() == {"right_x"}
+    assert at[2.0][1] == ("start",)
+    assert at[2.1][1] == ("b",)
+
+
+def test_unplugged_it_is_gone_and_says_what_to_do(plugged, pad):
+    plugged.move("left_y", -1.0)
+    assert pad.read().deflections
+    plugged.unplug()
+    with pytest.raises(DeviceGoneError, match="plug it in again"):
+        pad.read()
+    plugged.plug_in()
+    pad.close()
+    pad.open()
+    assert not pad.read().deflections
+
+
+def test_without_one_it_says_what_to_do(sdl):
+    with pytest.raises(DeviceGoneError, match="expected one, found none; plug it in"):
+        Gamepad().open()
+
+
+def test_one_that_may_not_be_read_says_which_group(sdl, tmp_path, monkeypatch):
+    class Closed:
+        def __init__(self, path):
+            pass
+
+        def glob(self, pattern):
+            return [tmp_path / "js0"]
+
+    monkeypatch.setattr(gamepad, "Path", Closed)
+    with pytest.raises(DeviceGoneError, match=r"js0 may not be read; .* usermod -aG input"):
+        Gamepad().open()
+
+
+def test_without_pygame_it_says_what_to_install(monkeypatch):
+    monkeypatch.setitem(sys.modules, "pygame", None)
+    with pytest.raises(HandrailError, match=r"expected pygame, found none; .*\[devices\]"):
+        Gamepad().open()

@@ -1,0 +1,168 @@
+"""Laws of a terminal's keys: bytes in pieces, keys that repeat or go up, a terminal that is left or hangs."""
+
+import numpy as np
+import pytest
+from device_players import Clock, PlayedTerminal, recorded
+from hypothesis import given
+from hypothesis import strategies as st
+
+from handrail.collect.devices.key_bytes import NAMES, SIGNALS, Key, KeyBytes
+from handrail.collect.devices.keyboard import HELD, Keyboard
+
+LONG_AGO = 1e9  # [s]
+
+
+@pytest.fixture
+def clock():
+    return Clock()
+
+
+@pytest.fixture
+def terminal():
+    return PlayedTerminal()
+
+
+@pytest.fixture
+def keys(terminal, clock):
+    made = Keyboard(terminal, clock)
+    made.open()
+    return made
+
+
+def play(keys, terminal, clock, name, step=0.01, more=1.0):
+    """Return the readings of every hundredth of a second, by the time since the first."""
+    events, start, readings = recorded(name), clock.now, {}
+    for index in range(round((events[-1]["time"] + more) / step)):
+        now = round(index * step, 3)
+        clock.now = start + now
+        while events and events[0]["time"] <= now + 1e-9:
+            terminal.bytes.append(events.pop(0)["bytes"].encode())
+        reading = keys.read()
+        while terminal.bytes:
+            reading = keys.read()
+        readings[now] = reading
+    return readings
+
+
+def held(readings, key):
+    """Return from when to when a key was held, as pairs of times, to 0.1 s."""
+    spans, before = [], False
+    for time, reading in readings.items():
+        if (key in reading.deflections) and not before:
+            spans.append([time, time])
+        elif key in reading.deflections:
+            spans[-1][1] = time
+        before = key in reading.deflections
+    return np.round(spans, 1).tolist()
+
+
+def pressed(readings):
+    return [(time, key) for time, reading in readings.items() for key in reading.presses]
+
+
+def test_a_plain_terminal(keys, terminal, clock):
+    readings = play(keys, terminal, clock, "terminal_xterm.json")
+    assert held(readings, "w") == [
+        [0.3, 0.5],
+        [0.8, 1.1],
+        [3.4, 3.6],
+    ]  # let go 0.2 s after its last character
+    assert pressed(readings) == [
+        (0.3, "w"),  # and what the terminal repeats is not pressed again
+        (1.31, "right"),
+        (1.5, "left"),
+        (1.7, "down"),
+        (1.7, "backspace"),
+        (1.96, "escape"),  # once nothing has followed
+        (2.2, "enter"),
+        (2.4, "tab"),
+        (2.6, "space"),
+        (3.4, "w"),
+    ]
+    assert not readings[3.1].attended  # another window has the focus
+    assert readings[3.2].attended
+    assert not terminal.tells
+    assert not terminal.written
+
+
+def test_a_terminal_that_tells_releases(keys, terminal, clock):
+    readings = play(keys, terminal, clock, "terminal_kitty.json")
+    assert terminal.tells
+    assert held(readings, "w") == [[0.3, 0.7]]
+    assert held(readings, "r") == [[0.6, 0.8]]  # two at once
+    assert pressed(readings) == [(0.3, "w"), (0.55, "r"), (0.9, "right"), (1.1, "escape")]
+    assert all(reading.attended for reading in readings.values())
+    assert b"\x1b[5n" in terminal.written
+
+
+def test_a_terminal_that_hangs_is_no_key_that_is_held(keys, terminal, clock):
+    terminal.bytes = [b"\x1b[?0u", b"\x1b[119u"]
+    keys.read()
+    assert keys.read().attended
+    for _ in range(3):  # it answers
+        clock.now += 0.06
+        keys.read()
+        clock.now += 0.02
+        terminal.bytes = [b"\x1b[0n"]
+        answered = keys.read()
+        assert answered.attended
+        assert answered.round_trip == pytest.approx(0.08)  # since it was asked
+    heard = clock.now
+    for _ in range(17):
+        clock.now += 0.01
+        reading = keys.read()
+    assert reading.deflections == {"w": 1.0}
+    assert not reading.attended
+    assert reading.time == heard
+
+
+def test_the_release_of_a_plain_terminal_is_seen_well_before_the_brake_is_due():
+    assert HELD + 0.05 < 0.3
+
+
+def test_leaving_the_window_lets_everything_go(keys, terminal, clock):
+    terminal.bytes = [b"\x1b[?0u", b"\x1b[119u", b"\x1b[O", b"\x1b[I"]
+    for wanted in ({}, {"w": 1.0}, {}, {}):
+        assert keys.read().deflections == wanted
+
+
+def test_ctrl_c_interrupts_where_the_terminal_does_not_do_it_itself(keys, terminal, monkeypatch):
+    interrupts = []
+    monkeypatch.setattr("_thread.interrupt_main", lambda: interrupts.append(1))
+    terminal.bytes = [b"\x1b[?0u", b"\x1b[99;5u", b"\x1b[99;5:3u", b"\x1b[99;1u"]
+    for _ in range(4):
+        keys.read()
+    assert interrupts == [1]
+
+
+def all_keys(pieces):
+    taken, found = KeyBytes(), []
+    for index, piece in enumerate(pieces):
+        found += taken.take(piece, 1e-3 * index)
+    return found + taken.take(b"", LONG_AGO)
+
+
+@given(
+    st.lists(
+        st.sampled_from([b"w", b"\x1b[A", b"\x1bOC", b"\x1b[119;1:3u", b"\x1b[I", b"\r", b"\x1b[27;1:1u"]),
+        max_size=6,
+    ),
+    st.data(),
+)
+def test_keys_do_not_depend_on_where_the_bytes_are_split(parts, data):
+    whole = b"".join(parts)
+    cuts = sorted(data.draw(st.sets(st.integers(1, max(1, len(whole) - 1)))))
+    pieces = [whole[a:b] for a, b in zip([0, *cuts], [*cuts, len(whole)], strict=True)]
+    assert all_keys(pieces) == all_keys([whole])
+
+
+@given(st.lists(st.binary(max_size=80), max_size=5))
+def test_garbage_is_some_keys_or_none_and_never_an_error(pieces):
+    assert all(key.name in NAMES or key.name in SIGNALS for key in all_keys(pieces))
+
+
+def test_what_is_pasted_is_not_typed():
+    taken = KeyBytes()
+    assert taken.take(b"wwwwwwwwwwwwwwwww", 0.0) == []
+    assert taken.dropped == 17
+    assert taken.take(b"w", 1.0) == [Key("w")]

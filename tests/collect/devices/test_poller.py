@@ -1,0 +1,108 @@
+"""Laws of the thread that reads a device: the newest wins, no press is lost, one that is gone is found."""
+
+import threading
+import time
+
+import pytest
+
+from handrail.collect.devices.poller import Poller
+from handrail.collect.devices.reading import DeviceGoneError, Reading
+from handrail.controllers.errors import HandrailError
+
+PATIENCE = 10.0  # [s]
+
+
+class Scripted:
+    """A device that says what a test puts there."""
+
+    name = "lever"
+
+    def __init__(self):
+        self.readings, self.trouble, self.opened, self.closed = [], None, 0, 0
+        self.hangs = threading.Event()
+
+    def open(self):
+        if self.trouble:
+            raise self.trouble
+        self.opened += 1
+
+    def read(self):
+        time.sleep(0.001)
+        if self.trouble:
+            raise self.trouble
+        return self.readings.pop(0) if self.readings else Reading(0.0)
+
+    def close(self):
+        self.closed += 1
+
+
+@pytest.fixture
+def device():
+    return Scripted()
+
+
+@pytest.fixture
+def poller(device):
+    made = Poller(device, retry=0.01)
+    yield made
+    made.close()
+
+
+def eventually(check):
+    end = time.monotonic() + PATIENCE
+    while not check():
+        assert time.monotonic() < end
+        time.sleep(0.002)
+
+
+def test_the_newest_wins_and_no_press_is_lost(device, poller):
+    device.readings = [Reading(float(index), presses=(str(index),)) for index in range(5)]
+    poller.start()
+    seen = []
+    eventually(lambda: seen.extend(poller.take()[1]) or len(seen) == 5)
+    assert seen == list("01234")
+    assert poller.take()[1] == ()
+
+
+@pytest.mark.parametrize(
+    "error",
+    [DeviceGoneError("lever: unplugged; plug it in"), OSError(19, "No such device"), ZeroDivisionError()],
+)
+def test_one_that_is_gone_is_none_until_it_is_there_again(device, poller, error):
+    poller.start()
+    eventually(lambda: poller.take()[0] is not None)
+    device.trouble = error
+    eventually(lambda: poller.take()[0] is None)
+    assert "lever: " in poller.trouble
+    time.sleep(0.05)
+    assert poller.take()[0] is None
+    device.trouble = None
+    eventually(lambda: poller.take()[0] is not None)
+    assert device.opened == 2
+    assert device.closed >= 1
+    assert poller.trouble == ""
+
+
+def test_what_was_pressed_before_it_was_gone_is_forgotten(device, poller):
+    device.readings = [Reading(0.0, presses=("success",))]
+    poller.start()
+    eventually(lambda: not device.readings)
+    device.trouble = DeviceGoneError("lever: unplugged")
+    eventually(lambda: poller.trouble)
+    assert poller.take() == (None, ())
+
+
+@pytest.mark.parametrize(
+    "error", [DeviceGoneError("lever: expected one, found none"), OSError("no such port")]
+)
+def test_one_that_cannot_be_opened_at_first_is_refused_in_one_line(device, poller, error):
+    device.trouble = error
+    with pytest.raises(HandrailError, match=r"lever: (expected one|no such port)"):
+        poller.start()
+    poller.close()
+
+
+def test_closed_it_gives_the_device_back(device, poller):
+    poller.start()
+    poller.close()
+    assert device.closed == 1

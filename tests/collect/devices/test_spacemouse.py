@@ -1,0 +1,109 @@
+"""Laws of the SpaceMouse: its axes as the robot's, silence and garbage move nothing, why there is none."""
+
+import sys
+
+import pytest
+from device_players import Clock, PlayedHid, recorded
+
+from handrail.collect.devices.reading import DeviceGoneError
+from handrail.collect.devices.spacemouse import SpaceMouse
+from handrail.controllers.errors import HandrailError
+
+FORWARD = bytes.fromhex("010000a2fe0000")  # y = −350, and it counts backward
+
+
+@pytest.fixture
+def clock():
+    return Clock()
+
+
+@pytest.fixture
+def played(monkeypatch):
+    made = PlayedHid()
+    monkeypatch.setitem(sys.modules, "hid", made)
+    return made
+
+
+@pytest.fixture
+def mouse(played, clock):
+    made = SpaceMouse(clock=clock)
+    made.open()
+    return made
+
+
+def test_recorded_reports_come_out_on_the_robots_axes(played, clock, mouse):
+    at, start = {}, clock.now
+    for event in recorded("spacemouse.json"):
+        clock.now = start + event["time"]
+        played.reports = [bytes.fromhex(event["report"])]
+        at[event["time"]] = mouse.read()
+    assert at[0.064].deflections["x"] == 1.0
+    assert "y" not in at[0.064].deflections  # the small ones are within the dead zone
+    assert at[0.156].deflections.keys() == {"x", "yaw"}
+    assert 0.3 < at[0.156].deflections["yaw"] < 0.6  # to the left is positive
+    assert at[0.208].deflections == {}
+    assert at[0.25].presses == ("button_1",)
+    assert at[0.3].presses == ()
+    assert at[0.35].presses == ("button_2",)
+    assert at[0.5].deflections == {}
+    assert at[0.6].deflections == {"y": 1.0}
+    assert mouse.dropped == 3  # the battery, the torn one, the empty one
+
+
+def test_one_that_falls_silent_while_it_is_deflected_is_left_alone(played, clock, mouse):
+    played.reports = [FORWARD]
+    assert mouse.read().attended
+    began = clock.now
+    clock.now += 0.14
+    assert mouse.read().attended
+    clock.now += 0.02
+    silent = mouse.read()
+    assert not silent.attended
+    assert silent.time == began
+    played.reports = [bytes(7)[:0] + bytes.fromhex("01000000000000")]
+    assert mouse.read().attended
+    clock.now += 100.0  # at rest it has nothing to say
+    assert mouse.read().attended
+    assert mouse.read().time == clock.now
+
+
+def test_garbage_alone_is_silence(played, clock, mouse):
+    played.reports = [FORWARD]
+    mouse.read()
+    for _ in range(20):
+        clock.now += 0.01
+        played.reports = [b"\x01\xff\x7f\xff\x7f\xff\x7f", b"\xfe" * 40, b"\x02\x00"]
+        reading = mouse.read()
+    assert not reading.attended
+    assert mouse.dropped == 60
+
+
+def test_unplugged_it_is_gone_and_says_what_to_do(played, mouse):
+    played.plugged = False
+    with pytest.raises(DeviceGoneError, match="unplugged"):
+        mouse.read()
+    with pytest.raises(DeviceGoneError, match="expected one, found none; plug it in"):
+        mouse.open()
+
+
+def test_one_that_may_not_be_read_says_the_rule(played):
+    played.allowed = False
+    with pytest.raises(DeviceGoneError) as error:
+        SpaceMouse().open()
+    for words in ("/dev/hidraw3 may not be read", "/etc/udev/rules.d/", 'ATTRS{idVendor}=="256f"', "uaccess"):
+        assert words in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def test_an_older_one_of_another_vendor_is_known_and_its_mice_are_not(played):
+    played.vendor, played.product = 0x046D, 0xC626
+    SpaceMouse().open()
+    played.product = 0xC077
+    with pytest.raises(DeviceGoneError):
+        SpaceMouse().open()
+
+
+def test_without_hidapi_it_says_what_to_install(monkeypatch):
+    monkeypatch.setitem(sys.modules, "hid", None)
+    with pytest.raises(HandrailError, match=r"expected hidapi, found none; .*\[devices\]"):
+        SpaceMouse().open()
