@@ -8,16 +8,19 @@ from typing import Annotated
 
 import tyro
 
+from handrail.collect.cockpit_config import CockpitConfig
 from handrail.collect.flags import one_of, only_one
 from handrail.collect.operators.catalogue import OPERATORS
 from handrail.collect.operators.human.human import HumanSettings
 from handrail.collect.operators.modes import MODES
 from handrail.collect.tasks.catalogue import TASKS
+from handrail.collect.teleop_config import TeleopConfig
 from handrail.controllers.errors import HandrailError, unknown_name
 from handrail.controllers.robot.catalogue import ROBOTS
 from handrail.datasets.lists import Names
 
 REPO_ID = "handrail/demo"  # of a dataset whose name nobody says
+FOUND = Path("outputs/cockpit")  # of datasets whose folders nobody says
 CAMERAS = ("wrist", "scene")
 FPS_RANGE = (10, 100)
 MOST_MOVING = 4
@@ -165,6 +168,29 @@ class DatasetConfig(StoredConfig):
         if self.num_episodes < 1:
             raise HandrailError(f"--dataset.num_episodes {self.num_episodes}: expected 1 or more")
 
+    @property
+    def is_found(self) -> bool:
+        """Whether the folder is to be found: the first of `found_folders` that fits."""
+        return False
+
+
+@dataclass(frozen=True)
+class FoundDatasetConfig(DatasetConfig):
+    """Where the episodes go, how many, how fast; without a folder, one is found."""
+
+    place: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="FOLDER")] = ""
+    """Folder of the dataset; by default outputs/cockpit/TASK: goes on if it fits, else one beside it."""
+
+    @property
+    def is_found(self) -> bool:
+        """Whether nobody said the folder."""
+        return not (self.place or self.root or self.repo_id)
+
+    @property
+    def folder(self) -> Path:
+        """The folder of the dataset, or that of all whose folders nobody said."""
+        return FOUND if self.is_found else super().folder
+
 
 @dataclass(frozen=True)
 class RecordConfig(SessionConfig):
@@ -177,6 +203,8 @@ class RecordConfig(SessionConfig):
     """With --resume: read every file anew, not only those that have changed since they were checked."""
     overwrite: bool = False
     """Remove the dataset that is there, if Handrail recorded it."""
+    cockpit: CockpitConfig = field(default_factory=CockpitConfig)
+    teleop: TeleopConfig = field(default_factory=TeleopConfig)
     display_data: bool = False
     """Show robot, cameras, intent and distances in rerun's viewer (needs a screen)."""
     display_web: bool = False
@@ -192,6 +220,8 @@ class RecordConfig(SessionConfig):
         """
         super().check()
         self.dataset.check()
+        self.cockpit.check()
+        self.teleop.check(self.operator)
         self._check_rates()
         if self.resume and self.overwrite:
             raise HandrailError("--resume and --overwrite: expected one of them, got both")
@@ -211,6 +241,17 @@ class RecordConfig(SessionConfig):
             )
         if self.control_fps and not 1 <= self.control_fps <= robot:
             raise HandrailError(f"--control_fps {self.control_fps}: expected 1 to {robot}, the robot's rate")
+
+
+@dataclass(frozen=True)
+class DriveConfig(RecordConfig):
+    """Drive a robot in a browser, and record demonstrations as a LeRobot dataset."""
+
+    task: Annotated[str, one_of(TASKS)] = "reach"
+    """What to do."""
+    operator: Annotated[str, one_of(OPERATORS)] = "browser"
+    """Who steers."""
+    dataset: FoundDatasetConfig = field(default_factory=FoundDatasetConfig)
 
 
 def check_fps(fps: int) -> None:

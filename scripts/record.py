@@ -4,15 +4,20 @@ from handrail.collect.config import RecordConfig
 from handrail.scripts import cli
 
 
-@cli.command("handrail-record", RecordConfig)
-def main(config: RecordConfig) -> int:
-    """Run the command."""
+def recorded(config: RecordConfig) -> int:
+    """Record as configured; return the exit code."""
     config.check()
     from handrail.collect.commands.record import (
         record,  # loads the simulator: only once the settings are right
     )
 
     return record(config)
+
+
+@cli.command("handrail-record", RecordConfig)
+def main(config: RecordConfig) -> int:
+    """Run the command."""
+    return recorded(config)
 
 
 if __name__ == "__main__":

@@ -1,22 +1,20 @@
 """The demo: a few demonstrations, a table, a picture, and what to try next."""
 
-import shutil
-import sys
-from pathlib import Path
-
 from rich.console import Console
 
 from handrail.collect.commands.config import DemoConfig
 from handrail.collect.commands.record import PLAIN, record
 from handrail.collect.commands.replay import replay_episode
 from handrail.collect.commands.tables import summary_table
+from handrail.collect.commands.target import command_prefix
 from handrail.collect.config import DatasetConfig, RecordConfig
 from handrail.collect.session.contact_sheet import save_sheet
 from handrail.collect.simulation.gl import graphics_trouble
 from handrail.controllers.errors import HandrailError
 
 _REPO = "handrail/demo"
-_NEXT = """Next:
+NEXT = """Next:
+  {bin}handrail-cockpit    # drive yourself, in the browser
   {bin}handrail-inspect {root}
   {bin}handrail-replay {root}
   {bin}handrail-record {root} --resume --dataset.num_episodes 5 --mode switching{cameras}
@@ -52,16 +50,7 @@ def demo(config: DemoConfig) -> int:
     console.print(f"Dataset: {root}", **PLAIN)
     flags = f" --cameras {cameras}" if cameras else ""
     console.print(
-        _NEXT.format(root=root, folder=config.folder, repo=_REPO, cameras=flags, bin=_command_prefix()),
+        NEXT.format(root=root, folder=config.folder, repo=_REPO, cameras=flags, bin=command_prefix()),
         **PLAIN,
     )
     return 0
-
-
-def _command_prefix() -> str:
-    """Return what to write before a command: nothing where the shell finds it, else the folder it is in."""
-    if shutil.which("handrail-record"):
-        return ""
-    folder = Path(sys.executable).parent
-    here = Path.cwd()
-    return f"{folder.relative_to(here) if folder.is_relative_to(here) else folder}/"

@@ -1,44 +1,37 @@
 """Records episodes into a dataset, with a progress bar, and says what came of it."""
 
-import contextlib
-import signal
 from collections import Counter
-from collections.abc import Iterator
 from dataclasses import dataclass, field
-from types import FrameType
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 from rich.console import Console
-from rich.progress import (
-    BarColumn,
-    MofNCompleteColumn,
-    Progress,
-    TextColumn,
-    TimeElapsedColumn,
-    TimeRemainingColumn,
-)
 from rich.table import Table
 
+from handrail.collect.commands.interrupts import Interrupts
+from handrail.collect.commands.progress import recording_bar
+from handrail.collect.commands.recording import Recording, open_writer
+from handrail.collect.commands.target import located, next_commands
 from handrail.collect.config import RecordConfig
 from handrail.collect.envs.env import HandrailEnv
+from handrail.collect.operators.catalogue import OPERATORS
 from handrail.collect.operators.operator import EpisodeEvent
-from handrail.collect.session.build import build_env, build_session, session_features, software_versions
+from handrail.collect.session.build import build_env, build_modes, build_session
 from handrail.collect.session.display import Display
 from handrail.collect.session.outcome import Outcome
-from handrail.collect.session.recorded_settings import COLUMN as SETTINGS
-from handrail.collect.session.recorded_settings import settings_json
-from handrail.collect.session.recorder import Recorder
-from handrail.collect.session.session import Session
 from handrail.controllers.errors import HandrailError
-from handrail.datasets.format.manifest import Manifest
+from handrail.controllers.registry import resolved
+from handrail.datasets.format.layout import Layout
+from handrail.datasets.recording.folder import check_target
 from handrail.datasets.recording.writer import EpisodeWriter
 
 INTERRUPTED = 130
 FAILED = 1
 _DROPPED: dict[EpisodeEvent | None, str] = {
+    None: "practice",
     EpisodeEvent.DISCARD: "thrown away",
     EpisodeEvent.RESTART: "begun again",
+    EpisodeEvent.QUIT: "not finished",
 }
 PLAIN: dict[str, Any] = {"highlight": False, "markup": False, "soft_wrap": True}
 
@@ -56,13 +49,14 @@ class _Log:
     def add(self, outcome: Outcome) -> None:
         """Count an episode; one thrown away is tried again elsewhere, one begun again is not."""
         (self.outcomes if outcome.kept else self.dropped).append(outcome)
-        self.attempt = 0 if outcome.kept else self.attempt + (outcome.ended_by is EpisodeEvent.DISCARD)
+        another = outcome.practice or outcome.ended_by is EpisodeEvent.DISCARD
+        self.attempt = 0 if outcome.kept else self.attempt + another
 
     @property
     def words(self) -> str:
         """How it stands."""
         successes = sum(outcome.success for outcome in self.outcomes)
-        counts = Counter(outcome.ended_by for outcome in self.dropped)
+        counts = Counter(None if outcome.practice else outcome.ended_by for outcome in self.dropped)
         dropped = (f", {counts[event]} {word}" for event, word in _DROPPED.items() if counts[event])
         return f"{successes}/{len(self.outcomes)} succeeded" + "".join(dropped)
 
@@ -77,23 +71,32 @@ def record(config: RecordConfig) -> int:
         HandrailError: a setting is wrong; nothing has been written then.
     """
     console = Console(stderr=True)
-    env = build_env(config, config.dataset.fps)
+    interactive = OPERATORS.find(config.operator).interactive
+    env = build_env(config, config.dataset.fps, render=interactive)
     displays: list[Display] = []
+    people: list[Any] = []
     try:
         displays = _displays(config, console)
-        build_session(config, env)  # a wrong mask, or cameras without GL, show before anything is written
+        try_out = build_modes if interactive else build_session
+        try_out(config, env)  # a wrong mask, or cameras without GL, show before anything is written
         env.reset(seed=config.seed)
-        with _open_writer(config, env) as writer:
+        config = located(config, env)
+        if interactive and not config.resume:  # before a person's page is opened, or their device
+            check_target(Layout(config.dataset.folder.absolute()), config.overwrite)
+        people = _people(config, env, console)
+        with open_writer(config, env) as writer:
             if writer.repaired and not writer.repaired.clean:
                 console.print(str(writer.repaired), **PLAIN)
-            task = config.dataset.single_task or env.task_description
-            recorder = Recorder(writer, task, _session_columns(config))
-            session = build_session(config, env, [*displays, recorder], config.dataset.fps)
+            recording = Recording(config, env, writer, people, displays)
+            if interactive:
+                console.print("Getting ready; the first time on a computer takes about a minute.", **PLAIN)
+                recording.warm_up(config.seed)
+                console.print("Ready.", **PLAIN)
             log = _Log()
-            _record_all(config, session, recorder, writer, log, console)
+            _record_all(config, recording, writer, log, console)
             _report(config, writer, log, console)
     finally:
-        for display in displays:
+        for display in [*displays, *people]:
             display.close()
         env.close()
     return log.exit_code
@@ -110,39 +113,11 @@ def episode_seed(seed: int, episode: int, attempt: int = 0) -> int:
     return int(np.random.SeedSequence([seed, episode, attempt]).generate_state(1)[0])
 
 
-def _session_columns(config: RecordConfig) -> dict[str, str | float]:
-    """Return what every episode's metadata says of the session: what one asks for most, and all settings."""
-    return {
-        "environment": config.task,
-        "robot": config.robot,
-        "operator": config.operator,
-        "mode": config.mode_name,
-        "noise": config.noise,
-        "person": config.person,
-        SETTINGS: settings_json(config),
-    }
-
-
-def _open_writer(config: RecordConfig, env: HandrailEnv) -> EpisodeWriter:
-    dataset = config.dataset
-    manifest = Manifest(
-        dataset.name, dataset.fps, env.model.description.name, session_features(env), software_versions()
-    )
-    if config.resume:
-        return EpisodeWriter.resume(dataset.folder, manifest, config.verify)
-    return EpisodeWriter.create(dataset.folder, manifest, config.overwrite)
-
-
 def _record_all(
-    config: RecordConfig,
-    session: Session,
-    recorder: Recorder,
-    writer: EpisodeWriter,
-    log: _Log,
-    console: Console,
+    config: RecordConfig, recording: Recording, writer: EpisodeWriter, log: _Log, console: Console
 ) -> None:
     """Record until the number is reached, the operator interrupts, or the disk or an encoder fails."""
-    with _progress(console) as progress, _Interrupts() as interrupts:
+    with recording_bar(console, recording.people) as progress, Interrupts() as interrupts:
         bar = progress.add_task("recording", total=config.dataset.num_episodes, success="–")
 
         def tell_paused(paused: bool) -> None:
@@ -151,10 +126,9 @@ def _record_all(
         try:
             while len(log.outcomes) < config.dataset.num_episodes:
                 seed = episode_seed(config.seed, writer.num_episodes, log.attempt)
-                outcome = session.run(seed, tell_paused)
-                with interrupts.deferred():
-                    recorder.save(outcome)
-                    log.add(outcome)
+                outcome = recording.episode(seed, interrupts, tell_paused, log.add)
+                if outcome.ended_by is EpisodeEvent.QUIT:
+                    break
                 progress.update(bar, completed=len(log.outcomes), description="recording", success=log.words)
         except KeyboardInterrupt:
             log.trouble, log.exit_code = (
@@ -171,12 +145,15 @@ def _report(config: RecordConfig, writer: EpisodeWriter, log: _Log, console: Con
     if log.outcomes:
         console.print(_summary(config, log))
     for outcome in log.dropped:
-        console.print(f"not saved: {_DROPPED[outcome.ended_by]}, seed {outcome.seed}", **PLAIN)
+        why = _DROPPED[None if outcome.practice else outcome.ended_by]
+        console.print(f"not saved: {why}, seed {outcome.seed}", **PLAIN)
     console.print(
         f"{writer.num_episodes} episodes, {writer.num_frames} frames in {writer.root}",
         highlight=False,
         soft_wrap=True,
     )
+    if OPERATORS.find(config.operator).interactive and writer.num_episodes:
+        console.print(next_commands(writer.root), **PLAIN)
 
 
 def _summary(config: RecordConfig, log: _Log) -> Table:
@@ -210,45 +187,9 @@ def _displays(config: RecordConfig, console: Console) -> list[Display]:
     return [Display(spawn, web, save, say=lambda words: console.print(words, **PLAIN))]
 
 
-def _progress(console: Console) -> Progress:
-    return Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn("{task.fields[success]}"),
-        TimeElapsedColumn(),
-        TextColumn("left"),
-        TimeRemainingColumn(),
-        console=console,
-    )
-
-
-class _Interrupts:
-    """Ends a recording on Ctrl-C or SIGTERM: at once between saves, after it during one."""
-
-    _SIGNALS = (signal.SIGINT, signal.SIGTERM)
-
-    def __enter__(self) -> Self:
-        self._deferring = self._asked = False
-        self._previous = {number: signal.signal(number, self._interrupt) for number in self._SIGNALS}
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        for number, handler in self._previous.items():
-            signal.signal(number, handler)
-
-    @contextlib.contextmanager
-    def deferred(self) -> Iterator[None]:
-        """Let the block finish before an interrupt takes effect."""
-        self._deferring = True
-        try:
-            yield
-        finally:
-            self._deferring = False
-        if self._asked:
-            raise KeyboardInterrupt
-
-    def _interrupt(self, number: int, frame: FrameType | None) -> None:
-        self._asked = True
-        if not self._deferring:
-            raise KeyboardInterrupt
+def _people(config: RecordConfig, env: HandrailEnv, console: Console) -> list[Any]:
+    """Return whoever steers now at this computer, if the settings say so."""
+    spec = OPERATORS.find(config.operator)
+    if not spec.interactive:
+        return []
+    return [resolved(spec.build)(config, env, lambda words: console.print(words, **PLAIN))]

@@ -12,16 +12,14 @@ from numpy.typing import NDArray
 from handrail.collect.envs.env import HandrailEnv
 from handrail.collect.operators.operator import View
 from handrail.collect.session.build import build_env
+from handrail.collect.session.recorded_commands import RecordedCommands
 from handrail.collect.session.recorded_settings import recorded_settings
 from handrail.collect.session.session import Session
 from handrail.collect.session.video_file import VideoFile
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.entries import is_count
 from handrail.controllers.errors import HandrailError
-from handrail.controllers.interface.command import Command
-from handrail.controllers.interface.controller import State
 from handrail.controllers.interface.intent import Intent
-from handrail.controllers.robot.shape import Obstacle
 from handrail.datasets.reading.reader import read_episodes, read_frames, read_info
 from handrail.datasets.recording.frames import Frame
 
@@ -89,7 +87,7 @@ def replay_episode(
         _check_state(frames["observation.state"], env, f"episode {episode} of {root}")
         film = stack.enter_context(VideoFile(video, env.render_size, info.fps)) if video else None
         camera, period = _Camera(_moments(length, pictures), film), 1.0 / info.fps
-        recorded = _Recorded(frames["action"], period)
+        recorded = RecordedCommands(frames["action"], period)
         session = Session(env, recorded, _Nobody(), [camera], control_period=period, record_period=period)
         outcome = session.run(row["seed"])
     difference = np.abs(camera.states - frames["observation.state"][: len(camera.states)])
@@ -123,32 +121,6 @@ def _check_state(states: np.ndarray, env: HandrailEnv, where: str) -> None:
             f"{where}: expected {numbers} numbers as observation.state of {env.model.description.name}, "
             f"got {size} of {states.dtype}"
         )
-
-
-class _Recorded:
-    """Says what was said in an episode, frame by frame, whatever is asked; a controller.
-
-    Args:
-        actions: velocities at the ends of the periods, and gripper, (T, n + 1).
-        period: of a frame [s].
-    """
-
-    def __init__(self, actions: np.ndarray, period: float) -> None:
-        self._actions, self._period = actions, period
-
-    def reset(self, obstacles: tuple[Obstacle, ...] = ()) -> None:
-        """Begin with the first frame."""
-        self._frame = 0
-
-    def update_scene(self, obstacles: tuple[Obstacle, ...]) -> None:
-        """Take no note of the scene."""
-
-    def update(self, state: State, intent: Intent) -> Command:
-        """Return the way to the next frame's velocities."""
-        action, before = self._actions[self._frame].astype(np.float64), np.array(state.commanded)
-        self._frame += 1
-        velocities = np.stack([before, action[:-1], np.zeros(len(before))])
-        return Command(velocities, self._period, gripper=float(action[-1]))
 
 
 class _Nobody:

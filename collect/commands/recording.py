@@ -1,0 +1,123 @@
+"""A session whose episodes become a dataset: what `handrail-record` and a user study share."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any, Protocol
+
+from handrail.collect.commands.interrupts import Interrupts
+from handrail.collect.config import RecordConfig
+from handrail.collect.envs.env import HandrailEnv
+from handrail.collect.session.build import build_modes, build_session, session_features, software_versions
+from handrail.collect.session.outcome import Outcome
+from handrail.collect.session.recorded_settings import COLUMN as SETTINGS
+from handrail.collect.session.recorded_settings import settings_json
+from handrail.collect.session.recorder import Recorder
+from handrail.collect.session.rehearsal import Rehearsal
+from handrail.collect.session.session import Observer
+from handrail.datasets.format.columns import Scalar
+from handrail.datasets.format.manifest import Manifest
+from handrail.datasets.recording.writer import EpisodeWriter
+
+
+class EpisodeObserver(Observer, Protocol):
+    """An observer of a session that also hears how episodes went."""
+
+    def end(self, outcome: Outcome) -> None:
+        """Take note of how the episode went."""
+        ...
+
+
+class Recording:
+    """Runs episodes and saves those that are to be kept.
+
+    Args:
+        config: of the recording.
+        env: of the recording.
+        writer: of the dataset.
+        people: whoever steers now at this computer; none where a script does.
+        displays: what else watches.
+
+    Attributes:
+        people: whoever steers.
+        columns: what the metadata of the episodes to come says of the session; may change between two.
+    """
+
+    def __init__(
+        self,
+        config: RecordConfig,
+        env: HandrailEnv,
+        writer: EpisodeWriter,
+        people: Sequence[Any] = (),
+        displays: Sequence[EpisodeObserver] = (),
+    ) -> None:
+        self.columns = session_columns(config)
+        task = config.dataset.single_task or env.task_description
+        recorder = Recorder(writer, task, self.columns)
+        self.people = people
+        self._observers: list[EpisodeObserver] = [recorder, *displays, *people]
+        self._session = build_session(config, env, self._observers, config.dataset.fps, *people)
+        self._rehearsal = Rehearsal(env.model, build_modes(config, env))
+
+    def warm_up(self, seed: int) -> None:
+        """Compile what an update needs, before somebody waits for it in real time."""
+        self._session.warm_up(seed, self._rehearsal)
+
+    def episode(
+        self,
+        seed: int,
+        interrupts: Interrupts,
+        tell_paused: Callable[[bool], None] = lambda paused: None,
+        note: Callable[[Outcome], None] = lambda outcome: None,
+    ) -> Outcome:
+        """Run one episode and save it, if it is to be kept.
+
+        Args:
+            seed: of the episode.
+            interrupts: that wait until it is saved.
+            tell_paused: is told when the operator pauses, and when they go on.
+            note: is told how it went, before an interrupt takes effect.
+
+        Raises:
+            HandrailError: the disk or an encoder failed; the saved episodes are whole.
+        """
+        outcome = self._session.run(seed, tell_paused)
+        outcome = replace(outcome, practice=any(each.practises for each in self.people))
+        with interrupts.deferred():
+            for observer in self._observers:
+                observer.end(outcome)
+            note(outcome)
+        return outcome
+
+
+def session_columns(config: RecordConfig) -> dict[str, Scalar]:
+    """Return what every episode's metadata says of the session: what one asks for most, and all settings."""
+    return {
+        "environment": config.task,
+        "robot": config.robot,
+        "operator": config.operator,
+        "mode": config.mode_name,
+        "noise": config.noise,
+        "person": config.person,
+        "participant": "",  # of a user study
+        SETTINGS: settings_json(config),
+    }
+
+
+def open_writer(config: RecordConfig, env: HandrailEnv) -> EpisodeWriter:
+    """Return the writer of a recording's dataset, new or resumed.
+
+    Raises:
+        HandrailError: the folder is taken, cannot be written, or holds another recording.
+    """
+    dataset, manifest = config.dataset, manifest_of(config, env)
+    if config.resume:
+        return EpisodeWriter.resume(dataset.folder, manifest, config.verify)
+    return EpisodeWriter.create(dataset.folder, manifest, config.overwrite)
+
+
+def manifest_of(config: RecordConfig, env: HandrailEnv) -> Manifest:
+    """Return the schema of a recording's dataset."""
+    dataset = config.dataset
+    return Manifest(
+        dataset.name, dataset.fps, env.model.description.name, session_features(env), software_versions()
+    )

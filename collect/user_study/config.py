@@ -1,0 +1,46 @@
+"""Settings of `handrail-study-session`; light to import."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tyro
+
+from handrail.collect.cockpit_config import CockpitConfig
+from handrail.controllers.errors import HandrailError
+
+Verb = Literal["new", "run", "status", "export", "erase"]
+_OF_SOMEBODY = ("run", "erase")
+
+
+@dataclass(frozen=True)
+class StudySessionConfig:
+    """Lead people through a user study: consent, practice, trials in the cockpit, forms such as NASA-TLX."""
+
+    verb: tyro.conf.Positional[Verb]
+    """new: write a study's file to begin with. run: lead a participant through what is left of their session.
+    status: who is where. export: write the tables. erase: remove a participant and all that is theirs."""
+    place: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="FOLDER")]
+    """Folder of the study."""
+    participant: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="PARTICIPANT")] = ""
+    """Who, for run and erase: an id that says nothing of the person, such as P001."""
+    cockpit: CockpitConfig = field(default_factory=CockpitConfig)
+
+    @property
+    def folder(self) -> Path:
+        """The study's folder."""
+        return Path(self.place).expanduser()
+
+    def check(self) -> None:
+        """Check the settings.
+
+        Raises:
+            HandrailError: one is wrong.
+        """
+        self.cockpit.check()
+        if self.verb in _OF_SOMEBODY and not self.participant:
+            raise HandrailError(f"{self.verb}: expected a participant, such as P001, after the folder")
+        if self.verb not in _OF_SOMEBODY and self.participant:
+            raise HandrailError(f"{self.verb}: expected a folder alone, got {self.participant} too")
+        if self.folder.exists() and not self.folder.is_dir():
+            raise HandrailError(f"{self.place}: expected a folder, found a file")

@@ -1,0 +1,166 @@
+"""Reading a user study from its TOML file, or from the JSON in which it is frozen, and checking it whole."""
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from handrail.collect.operators.modes import MODES
+from handrail.collect.tasks.catalogue import TASKS
+from handrail.collect.user_study.design import ALLOWED, FORMS, KINDS, WHEN, Practice, Question, UserStudy
+from handrail.controllers.entries import (
+    Entry,
+    check_entries,
+    is_count,
+    is_name,
+    is_number,
+    is_table,
+    is_text,
+    lists,
+)
+from handrail.controllers.errors import HandrailError, shown, unknown_name
+from handrail.controllers.robot.catalogue import ROBOTS
+from handrail.controllers.strict_toml import read_toml
+
+_MOST_TRIALS, _MOST_POINTS, _LONGEST_PAGE = 100, 21, 20_000
+
+
+def _is_page(value: Any) -> bool:
+    """Return whether a value is a text in some lines."""
+    fine = isinstance(value, str) and bool(value.strip()) and len(value) <= _LONGEST_PAGE
+    return fine and all(line.isprintable() for line in value.split("\n"))
+
+
+def _whole(least: int, most: int) -> Callable[[Any], bool]:
+    return lambda value: is_count(value) and least <= value <= most
+
+
+def _some(fits: Callable[[Any], bool]) -> Callable[[Any], bool]:
+    return lambda value: value == [] or lists(fits)(value)
+
+
+_FLAG = Entry("true or false", lambda value: isinstance(value, bool), needed=False)
+_NAMES = Entry("a list of names", _some(is_name), needed=False)
+_STUDY: Mapping[str, Entry] = {
+    "title": Entry("a text in one line", is_text),
+    "consent": Entry(f"a text of at most {_LONGEST_PAGE} characters", _is_page),
+    "modes": Entry("a list of modes", lists(is_name)),
+    "tasks": Entry("a list of tasks", lists(is_name)),
+    "trials": Entry(f"1 to {_MOST_TRIALS}", _whole(1, _MOST_TRIALS), needed=False),
+    "practice": Entry("a table", is_table, needed=False),
+    "forms": _NAMES,
+    "questions": Entry("tables [[questions]]", _some(is_table), needed=False),
+    "instructions": Entry(
+        "texts by mode", lambda value: is_table(value) and all(map(_is_page, value.values())), needed=False
+    ),
+    "allow": _NAMES,
+    "thanks": Entry("a text", _is_page, needed=False),
+    "robot": Entry("a robot", is_name, needed=False),
+    "fps": Entry("a whole number [Hz]", is_count, needed=False),
+    "cameras": _NAMES,
+    "image_size": Entry("a whole number [pixels]", is_count, needed=False),
+    "time_limit": Entry("a number [s]", is_number, needed=False),
+    "seed": Entry("a whole number, 0 or more", is_count, needed=False),
+    "demo": _FLAG,
+}
+_PRACTICE: Mapping[str, Entry] = {
+    "successes": Entry(f"1 to {_MOST_TRIALS}", _whole(1, _MOST_TRIALS), needed=False),
+    "most": Entry(f"0 (none) to {_MOST_TRIALS}", _whole(0, _MOST_TRIALS), needed=False),
+}
+_QUESTION: Mapping[str, Entry] = {
+    "name": Entry("a name of letters, digits and _", lambda value: is_name(value) and value.isidentifier()),
+    "text": Entry("a text in one line", is_text),
+    "kind": Entry("a kind of answer", is_name),
+    "when": Entry("a moment", is_name, needed=False),
+}
+_OF_KIND: Mapping[str, Mapping[str, Entry]] = {
+    "likert": {
+        "points": Entry(f"2 to {_MOST_POINTS}", _whole(2, _MOST_POINTS), needed=False),
+        "low": Entry("a text in one line", is_text, needed=False),
+        "high": Entry("a text in one line", is_text, needed=False),
+    },
+    "number": {
+        "least": Entry("a number", is_number, needed=False),
+        "most": Entry("a number", is_number, needed=False),
+    },
+    "choice": {"choices": Entry("a list of two texts or more", lists(is_text))},
+    "text": {},
+}
+
+
+def load_study(path: Path) -> UserStudy:
+    """Return the study of a TOML file.
+
+    Raises:
+        HandrailError: it cannot be read, or something in it is wrong; one line.
+    """
+    return parse_study(read_toml(path, "study"), f"study {path}")
+
+
+def parse_study(content: Any, where: str) -> UserStudy:
+    """Return the study that a table says.
+
+    Args:
+        content: the table.
+        where: it is, for the error.
+
+    Raises:
+        HandrailError: something in it is wrong; one line.
+    """
+    check_entries(content, _STUDY, where)
+    practice = content.get("practice", {})
+    check_entries(practice, _PRACTICE, f"{where}: [practice]")
+    questions = tuple(_question(each, where) for each in content.get("questions", []))
+    plain: dict[str, Any] = {
+        name: tuple(value) if isinstance(value, list) else value for name, value in content.items()
+    }
+    study = UserStudy(**plain | {"practice": Practice(**practice), "questions": questions})
+    _check(study, where)
+    return study
+
+
+def _question(content: Any, where: str) -> Question:
+    name = content.get("name") if is_table(content) else None
+    where = f"{where}: question {shown(name)}"
+    kind = content.get("kind")
+    if kind not in KINDS:
+        raise unknown_name(f"kind of {where}", kind, KINDS)
+    check_entries(content, {**_QUESTION, **_OF_KIND[kind]}, where)
+    question = Question(**content | {"choices": tuple(content.get("choices", ()))})
+    if question.when not in WHEN:
+        raise unknown_name(f"when of {where}", question.when, WHEN)
+    if not question.least < question.most:
+        raise HandrailError(f"{where}: expected least < most, got {question.least} and {question.most}")
+    if kind == "choice" and (len(question.choices) < 2 or len(set(question.choices)) < len(question.choices)):
+        raise HandrailError(f"{where}: choices: expected two or more, each once, got {question.choices}")
+    return question
+
+
+def _check(study: UserStudy, where: str) -> None:
+    chosen = {"mode": study.modes, "task": study.tasks, "form": study.forms, "allow": study.allow}
+    chosen |= {"question": tuple(question.name for question in study.questions), "camera": study.cameras}
+    for thing, names in chosen.items():
+        if len(set(names)) < len(names):
+            raise HandrailError(f"{where}: {thing}: expected each once, got {', '.join(names)}")
+    chosen |= {"robot": (study.robot,)}
+    known = {"mode": MODES, "task": TASKS, "form": FORMS, "allow": ALLOWED, "robot": ROBOTS}
+    for thing, choices in known.items():
+        for name in chosen[thing]:
+            if name not in choices:
+                raise unknown_name(f"{thing} of {where}", name, choices)
+    for mode in study.instructions:
+        if mode not in study.modes:
+            raise unknown_name(f"mode in [instructions] of {where}", mode, study.modes)
+    if {"tlx", "tlx_raw"} <= set(study.forms):
+        raise HandrailError(f"{where}: forms: expected tlx or tlx_raw (which has no comparisons), got both")
+    asked = any(question.when == "condition" for question in study.questions)
+    if asked != ("questions" in study.forms):
+        raise HandrailError(
+            f"{where}: forms: expected 'questions' among them exactly if a [[questions]] is asked after each"
+            f" condition, got {', '.join(study.forms) or 'none'}"
+        )
+    for mode in study.modes:
+        for task in study.tasks:
+            try:
+                study.recording(mode, task, Path("data")).check()
+            except HandrailError as error:
+                raise HandrailError(f"{where}: {error}") from error

@@ -1,0 +1,134 @@
+"""What a participant does, step by step, and what of it is left.
+
+```
+consent ─ questions at the start ─▶ for each mode, in the participant's order:
+                                      for each task: practice to criterion ─ trials
+                                      forms
+                                  ─▶ questions at the end
+```
+Tasks are blocks within a mode: a form is about the mode, and nobody learns a mode anew for every task. Both
+orders are rows of Williams designs.
+"""
+
+import math
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from handrail.collect.user_study.balance import order, williams
+from handrail.collect.user_study.design import Practice, UserStudy
+from handrail.collect.user_study.forms import CONSENT, END, START, form_names
+
+_ORDER, _TRIAL, _PRACTICE, _PAIRS = range(4)  # what a seed is for
+
+
+@dataclass(frozen=True)
+class Step:
+    """One thing to do.
+
+    Attributes:
+        kind: of it.
+        condition: the mode; empty before and after all conditions.
+        task: of practice and trials.
+        trial: its number, from 1.
+        form: its name.
+    """
+
+    kind: Literal["form", "practice", "trial"]
+    condition: str = ""
+    task: str = ""
+    trial: int = 0
+    form: str = ""
+
+    @property
+    def key(self) -> str:
+        """A name that no other step of a participant has."""
+        if self.kind == "form":
+            return f"{self.condition}/{self.form}" if self.condition else self.form
+        return f"{self.condition}/{self.task}/{self.trial or 'practice'}"
+
+    def __str__(self) -> str:
+        if self.kind == "form":
+            return f"{self.condition}, form {self.form}" if self.condition else f"form {self.form}"
+        what = f"trial {self.trial}" if self.trial else "practice"
+        return f"{self.condition}, {self.task}, {what}"
+
+
+def orders(study: UserStudy, slot: int) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return the orders of modes and of tasks; every pair of rows comes up equally often.
+
+    Args:
+        study: to take part in.
+        slot: of the participant, from 0.
+    """
+    modes, tasks = len(williams(len(study.modes))), len(williams(len(study.tasks)))
+    row = slot + slot // math.lcm(modes, tasks) % math.gcd(modes, tasks)
+    rng = np.random.default_rng([study.seed, _ORDER])
+    return order(study.modes, slot, rng), order(study.tasks, row, rng)
+
+
+def plan(study: UserStudy, slot: int) -> tuple[Step, ...]:
+    """Return all that a participant does."""
+    return tuple(_steps(study, *orders(study, slot)))
+
+
+def _steps(study: UserStudy, modes: tuple[str, ...], tasks: tuple[str, ...]) -> Iterator[Step]:
+    yield Step("form", form=CONSENT)
+    if any(question.when == "start" for question in study.questions):
+        yield Step("form", form=START)
+    for mode in modes:
+        for task in tasks:
+            if study.practice.most:
+                yield Step("practice", mode, task)
+            yield from (Step("trial", mode, task, number + 1) for number in range(study.trials))
+        yield from (Step("form", mode, form=name) for name in form_names(study))
+    if any(question.when == "end" for question in study.questions):
+        yield Step("form", form=END)
+
+
+def remaining(steps: tuple[Step, ...], done: Collection[str]) -> list[Step]:
+    """Return what is left; practice is over once a trial of its task and mode is done.
+
+    Args:
+        steps: of the participant.
+        done: keys of what is done.
+    """
+    begun = {(step.condition, step.task) for step in steps if step.kind == "trial" and step.key in done}
+    return [
+        step
+        for step in steps
+        if step.key not in done and not (step.kind == "practice" and (step.condition, step.task) in begun)
+    ]
+
+
+def practice_is_over(practice: Practice, successes: Sequence[bool]) -> bool:
+    """Return whether the criterion is met, or was tried for long enough.
+
+    Args:
+        practice: the criterion.
+        successes: of the trials of practice so far.
+    """
+    last = successes[-practice.successes :]
+    return len(successes) >= practice.most or (len(last) == practice.successes and all(last))
+
+
+def trial_seed(study: UserStudy, task: str, trial: int) -> int:
+    """Return the seed of a trial: the same scene in every mode and for every participant."""
+    return _seed(study.seed, _TRIAL, study.tasks.index(task), trial)
+
+
+def practice_seed(study: UserStudy, mode: str, task: str, attempt: int) -> int:
+    """Return the seed of a trial of practice: a scene that no trial has."""
+    return _seed(study.seed, _PRACTICE, study.tasks.index(task), study.modes.index(mode), attempt)
+
+
+def pairs_rng(study: UserStudy, slot: int, condition: str) -> np.random.Generator:
+    """Return what draws the order of a participant's comparisons after a condition: the same every time."""
+    place = study.modes.index(condition) if condition else len(study.modes)
+    return np.random.default_rng([study.seed, _PAIRS, slot, place])
+
+
+def _seed(*entropy: int) -> int:
+    return int(np.random.SeedSequence(entropy).generate_state(1)[0])

@@ -1,0 +1,74 @@
+"""Laws of a folder that nobody said: a dataset that fits goes on, another one is left alone."""
+
+from dataclasses import replace
+
+import pytest
+
+from handrail.collect.commands.recording import open_writer
+from handrail.collect.commands.target import located, next_commands
+from handrail.collect.config import DriveConfig, FoundDatasetConfig
+from handrail.collect.session.build import build_env
+from handrail.controllers.errors import HandrailError
+
+PLAIN = DriveConfig(physics=False)
+
+
+def opened(config=PLAIN):
+    """Return the folder that is chosen, and what the settings say then."""
+    config.check()
+    env = build_env(config, config.dataset.fps)
+    there = located(config, env)
+    with open_writer(there, env) as writer:
+        return writer.root, there
+
+
+@pytest.fixture(autouse=True)
+def _elsewhere(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
+
+def test_the_first_time_it_is_new_and_then_it_goes_on(tmp_path):
+    root, config = opened()
+    assert root == tmp_path / "outputs" / "cockpit" / "reach"
+    assert config.dataset.folder.absolute() == root
+    assert opened()[0] == root
+
+
+def test_one_of_another_rate_or_robot_is_left_alone():
+    first, _ = opened()
+    before = {path: path.read_bytes() for path in first.rglob("*") if path.is_file()}
+    faster = replace(PLAIN, dataset=FoundDatasetConfig(fps=30))
+    assert opened(faster)[0].name == "reach-2"
+    assert opened(replace(PLAIN, robot="ridgeback_panda"))[0].name == "reach-3"
+    assert opened(faster)[0].name == "reach-2"
+    assert {path: path.read_bytes() for path in first.rglob("*") if path.is_file()} == before
+
+
+def test_one_that_is_being_written_is_left_alone():
+    env = build_env(PLAIN, PLAIN.dataset.fps)
+    with open_writer(located(PLAIN, env), env) as writer:
+        assert opened()[0].name == f"{writer.root.name}-2"
+
+
+def test_what_is_no_dataset_is_left_alone(tmp_path):
+    (tmp_path / "outputs" / "cockpit" / "reach").mkdir(parents=True)
+    (tmp_path / "outputs" / "cockpit" / "reach" / "notes.txt").write_text("mine")
+    assert opened()[0].name == "reach-2"
+
+
+def test_a_folder_that_is_said_is_never_another(tmp_path):
+    said = replace(PLAIN, dataset=FoundDatasetConfig(place=str(tmp_path / "mine")))
+    assert opened(said)[0] == tmp_path / "mine"
+    with pytest.raises(HandrailError, match="exists already"):
+        opened(said)
+
+
+def test_where_nothing_can_be_written_it_says_so(tmp_path):
+    (tmp_path / "outputs").write_text("a file")
+    with pytest.raises(HandrailError, match="is a file"):
+        opened()
+
+
+def test_what_to_try_next_names_the_folder():
+    root, _ = opened()
+    assert "handrail-inspect outputs/cockpit/reach" in next_commands(root)

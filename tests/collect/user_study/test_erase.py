@@ -1,0 +1,121 @@
+"""Laws of what comes of a study: erased is erased, tables explain themselves, nobody is made up."""
+
+import json
+import random
+import shutil
+
+import pytest
+from datasets_guillotine import Guillotine
+from user_study_helpers import erased, session, study_folder, table, trials, wanted
+
+from handrail.collect.user_study.design import DEMO_NOTE
+from handrail.collect.user_study.exports import COLUMNS
+from handrail.controllers.errors import HandrailError
+from handrail.datasets.reading.check import check_report
+
+GUILLOTINE = Guillotine()
+
+
+@pytest.fixture
+def quick_disk(monkeypatch):
+    monkeypatch.setattr("os.fsync", lambda descriptor: None)
+
+
+@pytest.fixture(scope="module")
+def two(tmp_path_factory):
+    folder = study_folder(tmp_path_factory.mktemp("two"), forms=["sus", "questions"])
+    for name in ("P001", "P002"):
+        session(folder, name)
+    return folder
+
+
+def texts(root):
+    return {path: path.read_bytes() for path in root.rglob("*") if path.is_file()}
+
+
+def check_only_the_other_is_left(folder):
+    assert trials(folder) == wanted(folder, "P002")
+    assert [each.name for each in folder.participants()] == ["P002"]
+    for path, content in texts(folder.root).items():
+        assert b"P001" not in content, path
+        assert "P001" not in str(path.relative_to(folder.root))
+    for mode in folder.study().modes:
+        assert not check_report(folder.dataset(mode, "reach"))
+    assert {row["participant"] for name in COLUMNS for row in table(folder, name)} == {"P002"}
+
+
+def test_erasing_leaves_nothing_of_a_participant_and_all_of_the_others(two, tmp_path):
+    shutil.copytree(two.root, tmp_path / "study")
+    folder = type(two)(tmp_path / "study")
+    answers = json.loads((folder.place("P002") / "answers.json").read_text())
+    said = str(erased(folder, "P001"))
+    assert "erased P001: 25 answers, 2 trials of practice" in said
+    assert "1 of data/reach/ee" in said
+    check_only_the_other_is_left(folder)
+    assert json.loads((folder.place("P002") / "answers.json").read_text()) == answers
+    with pytest.raises(HandrailError, match="unknown participant 'P001': expected one of P002"):
+        erased(folder, "P001")
+    erased(folder, "P002")
+    assert not list(folder.root.rglob("*.parquet"))
+
+
+def erased_in_two_goes(two, root, k):
+    shutil.copytree(two.root, root)
+    folder = type(two)(root)
+    lived = GUILLOTINE.run(root, k, lambda: erased(folder, "P001"))
+    if any(each.name == "P001" for each in folder.participants()):
+        if folder.participant("P001").erasing:
+            with pytest.raises(HandrailError, match="is being erased"):
+                session(folder, "P001")
+        erased(folder, "P001")
+    session(folder, "P002")
+    check_only_the_other_is_left(folder)
+    return lived
+
+
+def test_an_erasure_that_is_killed_is_finished_by_the_next(two, tmp_path, quick_disk):
+    for k in random.Random(1).sample(range(1, 100), 3):
+        erased_in_two_goes(two, tmp_path / str(k), k)
+
+
+@pytest.mark.slow
+def test_an_erasure_that_is_killed_anywhere_is_finished_by_the_next(two, tmp_path, quick_disk):
+    k = 1
+    while not erased_in_two_goes(two, tmp_path / str(k), k):
+        shutil.rmtree(tmp_path / str(k))
+        k += 1
+    assert k > 50
+
+
+def test_every_table_explains_its_columns_and_says_that_nobody_took_part(two):
+    readme = (two.exports / "README.txt").read_text()
+    assert DEMO_NOTE in readme
+    for name, columns in COLUMNS.items():
+        rows = table(two, name)
+        assert rows
+        assert all(list(row) == list(columns) and row["source"] == DEMO_NOTE for row in rows)
+        assert json.loads((two.exports / f"{name}.json").read_text())["demo"] is True
+        assert f"\n{name}\n" in readme
+        assert all(f"  {column} " in readme for column in columns)
+    for name in ("P001", "P002"):
+        for file in ("session.json", "answers.json"):
+            assert json.loads((two.place(name) / file).read_text())["source"] == DEMO_NOTE
+    assert json.loads((two.root / "study.json").read_text())["demo"] is True
+
+
+def test_no_table_holds_a_formula_and_trials_lead_to_their_episodes(two):
+    remarks = [row["value"] for row in table(two, "answers") if row["item"] == "remarks"]
+    assert remarks
+    assert all(value.startswith("'=said") for value in remarks)
+    for row in table(two, "trials"):
+        episode = two.episodes(row["condition"], row["task"])[int(row["episode_index"])]
+        assert (episode["participant"], episode["trial"]) == (row["participant"], int(row["trial"]))
+        assert two.root / row["dataset"] == two.dataset(row["condition"], row["task"])
+
+
+def test_tables_without_anybody_have_their_headings(tmp_path):
+    folder = study_folder(tmp_path)
+    session(folder, "P001")
+    erased(folder, "P001")
+    for name, columns in COLUMNS.items():
+        assert (folder.exports / f"{name}.csv").read_text() == ",".join(columns) + "\n"

@@ -1,0 +1,170 @@
+"""A study through the real page: synthetic participants steer by keys and answer forms; one is killed."""
+
+import json
+import subprocess
+import sys
+from contextlib import contextmanager
+from itertools import combinations
+from pathlib import Path
+
+import pytest
+from command_helpers import command
+from user_study_helpers import study_folder
+
+pytest.importorskip("playwright.sync_api", reason="the extra 'dev' is not installed")
+from page_driver import CHROMIUM, browser
+from participant_driver import REMARK, ParticipantDriver
+from playwright.sync_api import expect
+
+from handrail.collect.user_study.design import DEMO_NOTE
+
+PROGRAM = next((path for path in CHROMIUM if Path(path).exists()), None)
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(PROGRAM is None, reason=f"no Chromium at {', '.join(CHROMIUM)}"),
+]
+MODES, TASKS = ("ee", "base+ee", "direct"), ("reach", "pick_place")
+SCALES = ("mental", "physical", "temporal", "performance", "effort", "frustration")
+QUESTIONS = """
+[[questions]]
+name = "age"
+text = "How old are you?"
+kind = "number"
+least = 18
+most = 120
+when = "start"
+[[questions]]
+name = "remarks"
+text = "What else?"
+kind = "text"
+when = "end"
+"""
+
+
+@contextmanager
+def running(root, name):
+    """Run a participant's session; give its process and address."""
+    words = [sys.executable, "-m", "handrail.scripts.study_session", "run", str(root), name]
+    words += ["--cockpit.no_open", "--cockpit.port", "0"]
+    process = subprocess.Popen(words, stderr=subprocess.PIPE, text=True)
+    try:
+        said = []
+        while "Drive at" not in (line := process.stderr.readline()):
+            said.append(line)
+            assert line, "".join(said)
+        assert DEMO_NOTE in "".join(said)
+        yield process, line.split("Drive at ")[1].strip()
+    finally:
+        if process.poll() is None:
+            process.terminate()
+        process.communicate(timeout=60)
+
+
+@pytest.fixture(scope="module")
+def chromium():
+    with browser(PROGRAM) as made:
+        yield made
+
+
+@pytest.fixture
+def page(chromium):
+    made = chromium.new_page(viewport={"width": 1280, "height": 720})
+    errors = []
+    made.on("pageerror", lambda error: errors.append(str(error)))
+    yield made
+    made.close()
+    assert not errors
+
+
+def half_a_form(driver):
+    """Go on until NASA-TLX, and answer half of its scales."""
+    driver.go_on(lambda each: each.title.startswith("How was it?"))
+    driver.fill_in(most=3)
+    expect(driver.page.locator("#study-state")).to_have_text("3 to answer", timeout=60_000)
+
+
+def killed_and_resumed(page, root):
+    with running(root, "P001") as (process, address):
+        before = ParticipantDriver(page, address, 1)
+        half_a_form(before)
+        process.kill()
+    with running(root, "P001") as (process, address):
+        driver = ParticipantDriver(page, address, 2, answers=before.answers)
+        assert driver.go_on() == "Done"
+        assert process.wait(60) == 0
+    return driver.answers, before.trials + driver.trials
+
+
+def reloaded(page, root):
+    with running(root, "P002") as (process, address):
+        before = ParticipantDriver(page, address, 3)
+        half_a_form(before)
+        driver = ParticipantDriver(page, address, 4, ("frustration", "q7"), before.answers)
+        assert driver.go_on() == "Done"
+        assert process.wait(60) == 0
+    return driver.answers, before.trials + driver.trials
+
+
+def by_hand(answers, mode):
+    """Return the scores of a participant's answers, computed as on paper."""
+    scales, pairs = answers[f"{mode}/tlx"], answers[f"{mode}/tlx_pairs"]
+    assert len(pairs) == 15
+    assert set(pairs) == {f"{a}_{b}" for a, b in combinations(SCALES, 2)}
+    weights = {name: sum(winner == name for winner in pairs.values()) for name in SCALES}
+    sus = answers[f"{mode}/sus"]
+    known = None not in scales.values()
+    odd, even = ([sus[f"q{number}"] for number in range(first, 11, 2)] for first in (1, 2))
+    return {
+        "tlx_raw": sum(scales.values()) / 6 if known else None,
+        "tlx_weighted": sum(scales[name] * weights[name] for name in SCALES) / 15 if known else None,
+        "sus": None if None in odd + even else 2.5 * (sum(odd) - 5 + 25 - sum(even)),
+    }
+
+
+def test_a_study_of_two_through_the_page_killed_and_resumed(page, tmp_path):
+    root = tmp_path / "study"
+    folder = study_folder(root, QUESTIONS, modes=MODES, tasks=TASKS, forms=["tlx", "sus"])
+    said, driven = {}, {}
+    said["P001"], driven["P001"] = killed_and_resumed(page, root)
+    said["P002"], driven["P002"] = reloaded(page, root)
+    assert driven == {"P001": 12, "P002": 12}  # one of practice and one that counts, of 2 tasks in 3 modes
+
+    pandas = pytest.importorskip("pandas")
+    tables = {
+        name: pandas.read_csv(root / "exports" / f"{name}.csv") for name in ("answers", "scores", "trials")
+    }
+    assert all(set(table["source"]) == {DEMO_NOTE} for table in tables.values())
+    for row in tables["scores"].itertuples():
+        hand = by_hand(said[row.participant], row.condition)[row.score]
+        assert pandas.isna(row.value) if hand is None else row.value == pytest.approx(hand), row
+    assert len(tables["scores"]) == 2 * 3 * 3
+    assert tables["scores"]["value"].notna().any()
+    assert tables["scores"]["value"].isna().any()  # P002 declined two questions
+
+    kept = json_answers(root)
+    for name, cards in said.items():
+        for card, items in cards.items():
+            if items:
+                assert kept[name][card] == items
+    assert set(tables["answers"].query("item == 'remarks'")["value"]) == {"'" + REMARK}
+
+    trials = tables["trials"]
+    assert len(trials) == 2 * 3 * 2
+    assert trials.groupby("task")["seed"].nunique().eq(1).all()
+    assert trials[(trials.task == "reach") & (trials.condition == "ee")]["success"].all()
+    for row in trials.itertuples():
+        episode = folder.episodes(row.condition, row.task)[row.episode_index]
+        assert (episode["participant"], episode["seed"]) == (row.participant, row.seed)
+
+    done = command("--study", root, "--output", tmp_path / "report", name="compare")
+    assert done.returncode == 0, done.stderr
+    assert "demo" in done.stdout
+
+
+def json_answers(root):
+    """Return the answers on the disk by participant and form."""
+    files = sorted(root.glob("participants/*/answers.json"))
+    content = [json.loads(file.read_text()) for file in files]
+    return {
+        each["participant"]: {form: said["items"] for form, said in each["forms"].items()} for each in content
+    }
