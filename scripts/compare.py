@@ -1,7 +1,12 @@
 """`handrail-compare`: compare datasets, or teleop modes in one, and write a report."""
 
+from typing import TYPE_CHECKING
+
 from handrail.datasets.comparison.config import CompareConfig
 from handrail.scripts import cli
+
+if TYPE_CHECKING:
+    from rich.console import Console
 
 
 @cli.command("handrail-compare", CompareConfig)
@@ -10,17 +15,34 @@ def main(config: CompareConfig) -> int:
     config.check()
     from rich.console import Console
 
+    console = Console(highlight=False, markup=False, soft_wrap=True)
+    if config.study:
+        return _people(config, console)
     from handrail.datasets.comparison.compare import compare
     from handrail.datasets.comparison.findings import findings
     from handrail.datasets.comparison.report.report import write_report
 
     comparison = compare(config)
     files = write_report(comparison)
-    console = Console(highlight=False, markup=False, soft_wrap=True)
     for finding in findings(comparison):
         console.print(
             f"{'!' if finding.kind == 'caution' else '●' if finding.detected else '·'} {finding.text}"
         )
+    console.print("\nWritten: " + ", ".join(map(str, files)))
+    return 0
+
+
+def _people(config: CompareConfig, console: "Console") -> int:
+    from handrail.datasets.comparison.people.people import compare_people
+    from handrail.datasets.comparison.people.report import write_people_report
+    from handrail.datasets.comparison.people.tables import people_tables
+
+    comparison = compare_people(config)
+    for table in people_tables(comparison):
+        console.print(table)
+    for text in comparison.cautions:
+        console.print(f"! {text}")
+    files = write_people_report(comparison)
     console.print("\nWritten: " + ", ".join(map(str, files)))
     return 0
 

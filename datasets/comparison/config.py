@@ -16,8 +16,8 @@ from handrail.datasets.quality.columns import ColumnNames
 class CompareConfig:
     """Compare LeRobot datasets, or the teleop modes in one, and write a report."""
 
-    datasets: Annotated[tyro.conf.Positional[Words], tyro.conf.arg(metavar="FOLDER [FOLDER …]")]
-    """Folders of LeRobot v3.0 datasets, whoever recorded them."""
+    datasets: Annotated[tyro.conf.Positional[Words], tyro.conf.arg(metavar="FOLDER [FOLDER …]")] = ()
+    """Folders of LeRobot v3.0 datasets, whoever recorded them; with --study, of scripted operators."""
     output: str = "outputs/compare"
     """Folder for report.html, report.json, episodes.csv and differences.csv."""
     by: str = ""
@@ -38,6 +38,8 @@ class CompareConfig:
     """Of the resampling: the same seed gives the same report."""
     verify: bool = False
     """Read every file of the datasets anew, not only those that have changed since they were checked."""
+    study: str = ""
+    """The folder of a user study: its conditions are compared, paired by participant."""
     columns: ColumnNames = field(default_factory=ColumnNames)
 
     @property
@@ -51,7 +53,9 @@ class CompareConfig:
         Raises:
             HandrailError: One setting is wrong.
         """
-        if not self.datasets:
+        if self.study:
+            self._check_study()
+        elif not self.datasets:
             raise HandrailError("dataset: expected one folder or more, before the flags; got none")
         if not (math.isfinite(self.margin) and self.margin > 0.0):
             raise HandrailError(f"--margin {self.margin}: expected a positive distance [m]")
@@ -59,3 +63,9 @@ class CompareConfig:
             raise HandrailError(f"--seed {self.seed}: expected a whole number >= 0")
         if self.folder.exists() and not self.folder.is_dir():
             raise HandrailError(f"--output {self.output}: expected a folder, found a file")
+
+    def _check_study(self) -> None:
+        """Check that nothing is asked for that a comparison of people does not have."""
+        for name in ("by", "labels", "evaluations", "success_only"):
+            if getattr(self, name):
+                raise HandrailError(f"--{name}: expected it without --study, got both")

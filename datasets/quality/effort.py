@@ -54,6 +54,14 @@ def active_axes(episode: Demonstration, pool: Pool) -> float:
     return float((np.abs(_deflection(episode, pool)) >= DEAD_BAND).sum(axis=1).mean())
 
 
+@metric(
+    "input_idle", "", "lower", "share of time with no input axis in use", "pool", title="hands off the input"
+)
+def input_idle(episode: Demonstration, pool: Pool) -> float:
+    """Return the share of frames in which no axis is above 5 % of full deflection, 0 to 1."""
+    return float((np.abs(_deflection(episode, pool)) < DEAD_BAND).all(axis=1).mean())
+
+
 def _changes(values: np.ndarray) -> np.ndarray:
     rows = values.reshape(len(values), -1)
     return (rows[1:] != rows[:-1]).any(axis=1)

@@ -54,7 +54,8 @@ def test_two_datasets_that_handrail_did_not_make(foreign, tmp_path):
     metrics = content["views"]["all episodes"]["metrics"]
     applies = {name for name, groups in metrics.items() if groups["calm"]["mean"] is not None}
     never = {"contacts", "impulse", "smallest_distance", "time_within_margin", "slack_used", "input_effort"}
-    never |= {"input_reversals", "active_axes", "mode_switches"}
+    never |= {"input_reversals", "active_axes", "mode_switches", "input_idle"}
+    never |= {"undos", "input_age", "round_trip"}
     assert applies == {metric.name for metric in METRICS} - never
     page = (tmp_path / "report.html").read_text()
     for name in never:

@@ -23,6 +23,7 @@ NAMES = ("a.pos", "b.pos", "c.pos")
 ARM = DatasetInfo(Path("one"), 20, "arm", {}, 6, 240, "", "", from_handrail=False)
 OURS = replace(ARM, robot_type="ridgeback", from_handrail=True)
 ABSOLUTE = {"length", "smallest_distance", "contacts", "impulse", "time_within_margin", "mode_switches"}
+ABSOLUTE |= {"undos", "input_age", "round_trip"}
 
 
 def group(source=ARM, names=NAMES, scale=1.0, fps=20, action=1.0, mode="", seed=0):

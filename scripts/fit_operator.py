@@ -1,0 +1,20 @@
+"""`handrail-fit-operator`: fit the scripted operator to recorded people."""
+
+from handrail.collect.experiments.operator_fit.config import FitOperatorConfig
+from handrail.scripts import cli
+
+
+@cli.command("handrail-fit-operator", FitOperatorConfig)
+def main(config: FitOperatorConfig) -> int:
+    """Run the command."""
+    config.check()
+    from rich.console import Console
+
+    from handrail.collect.experiments.operator_fit.run import run_fit
+
+    run_fit(config, Console(highlight=False, markup=False, soft_wrap=True))
+    return 0
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,213 @@
+"""People, compared: participants are paired and resampled; what is missing or made up is said."""
+
+import csv
+import itertools
+import json
+
+import numpy as np
+import pytest
+from command_helpers import command
+from people_helpers import FPS, dataset, people, study, write_scores
+
+from handrail.controllers.errors import HandrailError
+from handrail.datasets.comparison.config import CompareConfig
+from handrail.datasets.comparison.people.contrasts import adjusted, contrast, mean_of_people
+from handrail.datasets.comparison.people.people import FORMS, compare_people
+from handrail.datasets.comparison.people.scores import DEMO, SCORES, read_scores
+from handrail.datasets.statistics.proportions import holm
+from handrail.datasets.statistics.resampling import bootstrap_mean
+
+SLOWER = (12, 3, 9, 15, 6, 21)  # frames by which each participant is slower with `direct`
+
+
+def found(part, measure, label):
+    (each,) = [each for each in part.contrasts if (each.measure.name, each.label) == (measure, label)]
+    return each
+
+
+def rng():
+    return np.random.default_rng(0)
+
+
+@pytest.fixture(scope="module")
+def six(tmp_path_factory):
+    """Six participants, two modes, one task; the forms of five."""
+    data = {
+        ("reach", "direct"): people(6, lambda place: 40 + 5 * place + SLOWER[place]),
+        ("reach", "ee"): people(6, lambda place: 40 + 5 * place),
+    }
+    scores = [
+        f"P{n},{mode},sus,{value}" for n in range(1, 6) for mode, value in (("ee", 80 + n), ("direct", 50))
+    ]
+    root = study(tmp_path_factory.mktemp("study") / "six", data, scores)
+    return root, compare_people(CompareConfig(study=str(root), baseline="ee"))
+
+
+def test_a_difference_is_taken_within_participants(six):
+    task = six[1].parts[0]
+    times = found(task, "completion_time", "direct")
+    assert times.count == 6
+    assert times.estimate == pytest.approx(np.mean(SLOWER) / FPS)
+    low, high = times.interval
+    assert min(SLOWER) / FPS < low < times.estimate < high < max(SLOWER) / FPS
+
+
+def test_p_is_that_of_all_swaps_of_signs(six):
+    each = np.array(SLOWER) / FPS
+    swapped = [np.mean(each * signs) for signs in itertools.product((-1, 1), repeat=6)]
+    exact = np.mean(np.abs(swapped) >= each.mean() - 1e-12)
+    task = six[1].parts[0]
+    times = found(task, "completion_time", "direct")
+    assert times.p == pytest.approx(exact)
+    tested = [each for each in task.contrasts if each.p is not None]
+    assert [each.p_adjusted for each in tested] == pytest.approx(holm([each.p for each in tested]))
+
+
+def test_what_cannot_be_detected_is_said(six):
+    assert any("too few to detect a difference in reach" in text for text in six[1].cautions)
+    assert not any(each.detected for each in six[1].parts[0].contrasts)
+    nine = {f"P{n}": {None: [float(n)]} for n in range(9)}
+    more = {name: {None: [50.0 + value[None][0] ** 2]} for name, value in nine.items()}
+    (alone,) = adjusted([contrast(SCORES[0], "a", "b", more, nine, rng())])
+    assert alone.p == pytest.approx(2.0**-8)
+    assert alone.detected
+    same = contrast(SCORES[0], "a", "b", nine, nine, rng())
+    assert (same.estimate, same.interval, same.p) == (0.0, (0.0, 0.0), None)
+
+
+def test_participants_are_what_is_resampled():
+    many = {f"P{n}": {scene: [float(n)] for scene in range(20)} for n in range(5)}
+    means = mean_of_people("ee", many, 5, rng())
+    assert means.interval == pytest.approx(bootstrap_mean(np.arange(5.0), rng()))
+
+
+def test_scenes_that_only_one_condition_has_do_not_count(six):
+    one = {"P1": {1: [5.0], 2: [100.0]}}
+    other = {"P1": {1: [3.0], 3: [0.0]}}
+    assert contrast(SCORES[0], "a", "b", one, other, rng()).estimate == 2.0
+    apart = {"P1": {4: [1.0], 5: [3.0]}}
+    assert contrast(SCORES[0], "a", "b", one, apart, rng()).estimate == pytest.approx(52.5 - 2.0)
+
+
+def test_two_participants_have_no_interval_and_a_sentence(tmp_path):
+    data = {("reach", mode): people(2, lambda place: 40 + place) for mode in ("direct", "ee")}
+    root = study(tmp_path / "two", data)
+    comparison = compare_people(CompareConfig(study=str(root)))
+    numbers = [mean.interval for part in comparison.parts for means in part.means.values() for mean in means]
+    assert not any(numbers)
+    assert all(each.interval is each.p is each.p_adjusted is None for each in comparison.parts[0].contrasts)
+    assert "2 participants: intervals and tests need 5 or more, so there are none." in comparison.cautions
+
+
+def test_a_missing_score_is_missing_and_counted(six):
+    forms = six[1].parts[-1]
+    assert forms.title == FORMS
+    (sus,) = [mean for mean in forms.means["sus"] if mean.label == "ee"]
+    assert (sus.count, sus.total, sus.mean) == (5, 6, pytest.approx(83.0))
+    assert found(forms, "sus", "direct").estimate == pytest.approx(-33.0)
+    assert all(mean.mean is None and mean.count == 0 for mean in forms.means["tlx_raw"])
+    assert "missing" in command("--study", six[0], "--output", six[0] / "out", name="compare").stdout
+
+
+def test_scripted_operators_stand_beside_people_and_are_not_tested(six, tmp_path):
+    episodes = [("", scene, 30, True) for scene in range(5)]
+    beside = dataset(tmp_path / "scripts", "reach", "ee", episodes, operator="scripted")
+    comparison = compare_people(CompareConfig(datasets=(str(beside),), study=str(six[0]), baseline="ee"))
+    task = comparison.parts[0]
+    labels = [(mean.label, mean.scripted, mean.count) for mean in task.means["completion_time"]]
+    assert labels == [("direct", False, 6), ("ee", False, 6), ("ee", True, 5)]
+    before = [(each.label, each.estimate) for each in six[1].parts[0].contrasts]
+    assert [(each.label, each.estimate) for each in task.contrasts] == before
+    assert any(text.startswith("Scripted operators stand beside") for text in comparison.cautions)
+    assert task.means["undos"][2].mean is None  # nobody held a device
+    assert task.means["undos"][1].mean == 1.0
+
+
+def test_people_are_no_scripts(six):
+    beside = six[0] / "data" / "reach" / "ee"
+    with pytest.raises(HandrailError, match="expected a scripted operator, got participant 'P1'"):
+        compare_people(CompareConfig(datasets=(str(beside),), study=str(six[0])))
+
+
+def test_demo_data_say_so_above_every_table(tmp_path):
+    data = {
+        (task, mode): people(1, lambda place: 40) for task in ("reach", "tray") for mode in ("direct", "ee")
+    }
+    root = study(tmp_path / "demo", data, ["P1,ee,sus,80"], demo=True)
+    done = command("--study", root, "--output", tmp_path / "out", name="compare")
+    assert done.returncode == 0, done.stderr
+    tables = 6  # means and differences of two tasks and the forms
+    assert done.stdout.count(DEMO) == tables
+    assert (tmp_path / "out" / "report.html").read_text().count(f"<h3>{DEMO}") == tables
+    told = json.loads((tmp_path / "out" / "report.json").read_text())
+    assert told["source"] == DEMO
+    assert {table["source"] for table in told["tables"].values()} == {DEMO}
+    for name in ("trials.csv", "differences.csv"):
+        rows = list(csv.DictReader((tmp_path / "out" / name).read_text().splitlines()))
+        assert rows
+        assert {row["source"] for row in rows} == {DEMO}
+
+
+def test_scores_that_say_so_make_it_demo_data(tmp_path):
+    root = study(tmp_path / "study", {("reach", "ee"): people(1, lambda place: 40)})
+    write_scores(root, ["participant,condition,score,value,source", f"P1,ee,tlx_raw,,{DEMO}"])
+    comparison = compare_people(CompareConfig(study=str(root)))
+    assert comparison.study.demo
+    assert comparison.parts[-1].means["tlx_raw"][0].count == 0
+
+
+WRONG = {
+    "another column": (
+        ["participant,condition,score,value,mood", "P1,ee,sus,80,good"],
+        "expected the columns",
+    ),
+    "no column": (["participant,condition,value", "P1,ee,80"], "expected the columns"),
+    "nan": (["participant,condition,score,value", "P1,ee,sus,nan"], "line 2: expected a value from 0 to 100"),
+    "too much": (["participant,condition,score,value", "P1,ee,sus,100.5"], "expected a value from 0 to 100"),
+    "words": (["participant,condition,score,value", "P1,ee,sus,good"], "expected a value from 0 to 100"),
+    "twice": (["participant,condition,score,value", "P1,ee,sus,80", "P1,ee,sus,80"], "P1 ee sus twice"),
+    "score": (["participant,condition,score,value", "P1,ee,mood,80"], "unknown score 'mood'"),
+    "nobody": (["participant,condition,score,value", ",ee,sus,80"], "line 2: expected 4 values"),
+    "short": (["participant,condition,score,value", "P1,ee,sus"], "line 2: expected 4 values"),
+    "source": (["participant,condition,score,value,source", "P1,ee,sus,80,me"], "unknown source 'me'"),
+    "empty": ([""], "expected the columns"),
+}
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_a_wrong_score_is_refused(case, tmp_path):
+    lines, words = WRONG[case]
+    write_scores(tmp_path, lines)
+    with pytest.raises(HandrailError, match=words):
+        read_scores(tmp_path / "exports" / "scores.csv")
+
+
+def test_no_bytes_make_a_traceback(tmp_path):
+    path = tmp_path / "scores.csv"
+    for data in (b"\xff\xfe", b"\x00", b'"open', b"participant,condition,score,value\n\x00"):
+        path.write_bytes(data)
+        with pytest.raises(HandrailError, match=r"scores\.csv"):
+            read_scores(path)
+
+
+def refused(*arguments):
+    done = command(*arguments, name="compare")
+    assert done.returncode == 2, done.stderr
+    assert done.stderr.count("\n") == 1
+    return done.stderr
+
+
+def test_a_wrong_study_is_one_clear_line(tmp_path, six):
+    assert "expected the study.json" in refused("--study", tmp_path)
+    (tmp_path / "study.json").write_text('{"demo": "yes"}')
+    assert "expected demo to be true or false, got 'yes'" in refused("--study", tmp_path)
+    (tmp_path / "study.json").write_text("[]")
+    assert "expected demo to be true or false" in refused("--study", tmp_path)
+    (tmp_path / "study.json").write_text("{}")
+    assert "expected datasets in data/TASK/MODE" in refused("--study", tmp_path)
+    assert "unknown baseline 'joints': expected one of direct, ee" in refused(
+        "--study", six[0], "--baseline", "joints"
+    )
+    assert "--by: expected it without --study" in refused("--study", six[0], "--by", "mode")
+    root = study(tmp_path / "study", {("reach", "ee"): people(1, lambda place: 40)}, ["P1,joints,sus,80"])
+    assert "unknown condition 'joints': expected one of ee" in refused("--study", root)
