@@ -1,8 +1,9 @@
-# setup: a Python environment in .venv     demo: record five real episodes     test: the tests
+# setup: a Python environment in .venv     demo: record five real episodes     drive: a robot, in the browser
+# test: the tests
 # check: everything that CI checks          format: put the code in order      constraints: pin what is installed
 # Another Python than the one found: make setup PYTHON=/path/to/python3.12
 
-.PHONY: setup demo test check format constraints
+.PHONY: setup demo drive test check format constraints
 .DELETE_ON_ERROR:
 .DEFAULT_GOAL := setup
 
@@ -20,6 +21,9 @@ $(STAMP): pyproject.toml constraints.txt .ci/setup
 
 demo: $(STAMP)
 	$(BIN)/handrail-demo $(DEMO) --overwrite
+
+drive: $(STAMP)
+	$(BIN)/handrail-cockpit
 
 test: $(STAMP)
 	$(BIN)/python -m pytest -n auto --dist loadfile

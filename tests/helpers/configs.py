@@ -1,11 +1,15 @@
 """The configuration of every command."""
 
 from handrail.collect.commands.config import DemoConfig, InspectConfig, RepairConfig, ReplayConfig
-from handrail.collect.config import RecordConfig
+from handrail.collect.config import DriveConfig, RecordConfig
 from handrail.collect.experiments.benchmark.config import BenchmarkConfig
+from handrail.collect.experiments.latency.config import LatencyConfig
+from handrail.collect.experiments.operator_fit.config import FitOperatorConfig
 from handrail.collect.experiments.profiling.config import ProfileConfig
 from handrail.collect.experiments.showcase.config import ShowcaseConfig
 from handrail.collect.experiments.trials.config import TrialsConfig
+from handrail.collect.teleop_config import CalibrateConfig
+from handrail.collect.user_study.config import StudySessionConfig
 from handrail.datasets.comparison.config import CompareConfig
 from handrail.policies.imitation.config import TrainConfig
 from handrail.policies.imitation.evaluation.config import EvaluateConfig
@@ -14,17 +18,22 @@ from handrail.policies.study.config import StudyConfig
 
 CONFIGS = {
     "handrail-record": RecordConfig,
+    "handrail-cockpit": DriveConfig,
+    "handrail-calibrate": CalibrateConfig,
     "handrail-replay": ReplayConfig,
     "handrail-inspect": InspectConfig,
     "handrail-repair": RepairConfig,
     "handrail-demo": DemoConfig,
     "handrail-showcase": ShowcaseConfig,
     "handrail-profile": ProfileConfig,
+    "handrail-latency": LatencyConfig,
     "handrail-train": TrainConfig,
     "handrail-train-rl": TrainRlConfig,
     "handrail-benchmark": BenchmarkConfig,
     "handrail-compare": CompareConfig,
     "handrail-evaluate": EvaluateConfig,
     "handrail-study": StudyConfig,
+    "handrail-study-session": StudySessionConfig,
     "handrail-trials": TrialsConfig,
+    "handrail-fit-operator": FitOperatorConfig,
 }

@@ -42,7 +42,14 @@ NOT_RUN = {
     "apt-get": "needs the network and the administrator",
     "tensorboard": "runs until Ctrl-C",
 }
-MINUTES = ("lerobot-", "handrail-study", "handrail-profile", "handrail-train-rl", "handrail-benchmark")
+MINUTES = (
+    "lerobot-",
+    "handrail-study",
+    "handrail-profile",
+    "handrail-latency",
+    "handrail-train-rl",
+    "handrail-benchmark",
+)
 MINUTES_TOO = (
     "pick_place",
     "none,mpc",

@@ -20,6 +20,7 @@ OTHERS = {  # flags of other programs, by the word that the same text must say
     "accelerate launch": {"--multi_gpu"},
 }
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+FOREIGN = {ROOT / "collect/session/viewer.py", ROOT / "collect/experiments/latency/measure.py"}
 type Function = ast.FunctionDef | ast.AsyncFunctionDef | ast.Module
 
 
@@ -38,10 +39,10 @@ def known() -> set[str]:
 def texts() -> Iterator[tuple[str, ast.expr, Function]]:
     """Yield every text in the source, whole, with where it is and the function around it.
 
-    `collect/session/viewer.py` speaks to rerun's program, in that one's flags.
+    Two files speak to other programs, rerun's and Chromium, in the flags of those.
     """
     for floor in ("controllers", "datasets", "collect", "policies", "scripts"):
-        for path in sorted(set((ROOT / floor).rglob("*.py")) - {ROOT / "collect" / "session" / "viewer.py"}):
+        for path in sorted(set((ROOT / floor).rglob("*.py")) - FOREIGN):
             tree = ast.parse(path.read_text())
             parts = {id(part) for node in ast.walk(tree) for part in pieces(node)}
             for function, node in with_functions(tree, tree):
@@ -112,7 +113,11 @@ def names_a_setting(value: ast.expr, function: Function) -> bool:
 
 def flags_in(text: str) -> set[str]:
     styled = any(mark in text for mark in STYLE)
-    return set() if styled else {flag.rstrip(".") for flag in FLAG.findall(text)} - {"--human"}  # --human.*
+    return (
+        set()
+        if styled
+        else {flag.rstrip(".") for flag in FLAG.findall(text)} - {"--human", "--cockpit", "--teleop"}
+    )  # --human.*
 
 
 def foreign(text: str) -> set[str]:
