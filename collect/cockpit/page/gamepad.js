@@ -81,10 +81,13 @@ export class Gamepad {
   }
 
   // Someone changes what a button or stick does: the next one that moves is taken.
+  ask(kind, taken) {
+    const pad = this.look();
+    if (pad) this.capture = { kind, taken, before: pushed(pad) };
+  }
+
   choose(pad) {
-    const pressed = pad.buttons.map((each) => each.pressed), axes = pad.axes.map((x) => (Math.abs(x) > PUSHED ? Math.sign(x) : 0));
-    const before = this.capture.before ?? { pressed, axes };
-    this.capture.before = { pressed, axes };
+    const { before } = this.capture, { pressed, axes } = this.capture.before = pushed(pad);
     const button = pressed.findIndex((now, index) => now && !before.pressed[index]);
     const axis = axes.findIndex((now, index) => now && !before.axes[index]);
     const { kind, taken } = this.capture;
@@ -94,6 +97,10 @@ export class Gamepad {
     taken(kind === "button" ? button : [axis, axes[axis]], pad);
     return [];
   }
+}
+
+function pushed(pad) {
+  return { pressed: pad.buttons.map((each) => each.pressed), axes: pad.axes.map((x) => (Math.abs(x) > PUSHED ? Math.sign(x) : 0)) };
 }
 
 const NAMES = ["A", "B", "X", "Y", "L1", "R1", "L2", "R2", "Back", "Start", "left stick", "right stick", "up", "down", "left", "right", "Home"];

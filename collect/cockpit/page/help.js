@@ -88,7 +88,7 @@ export class Help {
 
   pad(button, kind, words, change) {
     this.draft(button, words);
-    this.gamepad.capture = { kind, taken: (...chosen) => { change(...chosen); this.redraw(); } };
+    this.gamepad.ask(kind, (...chosen) => { change(...chosen); this.redraw(); });
   }
 
   // One change at a time.

@@ -4,6 +4,7 @@ import { inverse, times, turnTo } from "./turn.js";
 
 const GAIN = 8; // deflection for a metre between the hand and where it shall be
 const TURN_GAIN = 2.5; // the same for a radian
+const DEAD = 0.02; // of a full deflection: 2.5 mm
 const MODES = ["immersive-ar", "immersive-vr"];
 const AXES = ["ee.vx", "ee.vy", "ee.vz", "ee.wx", "ee.wy", "ee.wz"];
 
@@ -83,6 +84,6 @@ export class XrHand {
     const way = now.at.map((x, index) => start.hand.at[index] + x - start.at[index] - hand.at[index]);
     const wanted = times(times(now.turned, inverse(start.turned)), start.hand.turned);
     const twist = [...way.map((x) => GAIN * x), ...turnTo(hand.turned, wanted).map((x) => TURN_GAIN * x)];
-    return AXES.map((axis, index) => [axis, Math.max(-1, Math.min(1, twist[index]))]).filter(([axis]) => this.inputs.owned.has(axis));
+    return AXES.map((axis, index) => [axis, Math.max(-1, Math.min(1, twist[index]))]).filter(([axis, value]) => Math.abs(value) > DEAD && this.inputs.owned.has(axis));
   }
 }

@@ -121,7 +121,7 @@ def test_sliders_take_the_arm_from_where_it_is(new_page):
             arm = made.arm
             page.mouse.move(box["x"] + 0.9 * box["width"], box["y"] + 4)  # far from where its knob is
             page.mouse.down()
-            held = made.wait(lambda intent: intent.raw.device == "sliders")
+            held = made.wait(lambda intent: intent.raw.device == "sliders" and intent.raw.axes)
             assert np.abs(held.raw.values[-len(arm) :] - arm).max() < 2e-3  # nothing jumps
             page.mouse.move(box["x"] + 0.8 * box["width"], box["y"] + 4)
             moved = made.wait(lambda intent, arm=arm: abs(intent.raw.values[-len(arm) + 1] - arm[1]) > 0.1)
