@@ -29,9 +29,9 @@ def test_from_the_demo_to_driving(new_page, tmp_path):
     with recording("", cwd=tmp_path) as (process, address):
         driver = PageDriver(new_page(), address)
         driver.expect_phase("ready: press Start", 180_000)
-        on_page = words(driver.page.evaluate(_READ))
+        on_page = words(driver.page.evaluate(_READ) + driver.text("hint"))
         driver.press("KeyH")
-        card = words(driver.text("help"))
+        card = words(driver.text("help-table"))
         driver.press("KeyH")
         driver.press("Enter")
         driver.expect_phase("recording")

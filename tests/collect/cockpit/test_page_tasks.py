@@ -37,7 +37,7 @@ def drive(new_page, folder, task, device, episodes, mode="ee", *flags):
             learner.begin()
             driver.set_speed(1.0)
             getattr(page_tasks, task)(learner)
-            assert driver.wait(lambda: page_tasks.over(driver), 100.0)
+            assert driver.wait(lambda: page_tasks.over(driver), 100.0), driver.text("numbers")
         assert process.wait(60) == 0
 
 
