@@ -39,6 +39,7 @@ _TRIES = 20  # ports after the one that is wanted
 _PATIENCE = 5.0  # with a form that is sent [s]
 _LONGEST = 200  # token [bytes]
 _PAUSE, _MOST_PAUSES = 1.0, 32  # before another wrong token is answered [s], and how many wait so
+_NICE = 5  # the loop of the robot comes first
 _NOTES = 0.02  # between two looks at how late the loop is [s]
 _REPORTS, _COLLECTIONS = 25, 250  # so many looks to a report, to a collection of garbage
 _HEADERS = {
@@ -256,6 +257,8 @@ def _certificate(config: CockpitConfig) -> tuple[Path, Path]:
 def main() -> None:
     """Run the process."""
     pipe = Pipe(socket.socket(fileno=int(sys.argv[1])))
+    if hasattr(os, "nice"):
+        os.nice(_NICE)
     try:
         settings = _settings(pipe)
         folder = settings["folder"]
