@@ -18,6 +18,7 @@ from handrail.datasets.format.metadata import EpisodeRecord, Totals
 from handrail.datasets.format.schema import video_keys
 from handrail.datasets.format.stats import Stats, column_stats
 
+TRIMMED = "trimmed_start"  # episode column: how many frames were cut off at the beginning
 _SUCCESS, _DONE = "next.success", "next.done"
 
 
