@@ -63,8 +63,8 @@ _QUALITY = (
     " a name for what it means, and at a dash for why there is nothing."
 )
 _WORST = (
-    "The three worst of each group by each metric of which one end is better, and the command that writes the"
-    " dataset without them. Look at them first: the slowest episode may be the one with the hardest scene."
+    "The three of each group at the wrong end of each metric, and the command that writes the dataset without"
+    " them. The slowest episode may be the one with the hardest scene: look before you leave it out."
 )
 _EFFECTS = (
     "Filled: detected; hollow: not. An arrow: beyond what is shown, or a difference where nothing varies."
@@ -86,7 +86,7 @@ def report_page(comparison: Comparison, found: list[Finding]) -> str:
         section("Trajectories", _drawn(trajectory_panels(comparison)), _pictures(comparison)),
     ]
     missing = tables.not_applicable_table(comparison)
-    parts.append(section("Worst episodes", paragraph(_WORST, "quiet"), worst_folds(comparison)))
+    parts.append(section("Episodes to look at first", paragraph(_WORST, "quiet"), worst_folds(comparison)))
     parts += [section("What does not apply, or is not comparable", missing)] if missing else []
     meanings = items(("quiet", f"{metric.title}: {metric.meaning}.") for metric in METRICS)
     how = paragraph(_HOW), paragraph(_families(comparison))

@@ -21,7 +21,7 @@ def worst_folds(comparison: Comparison) -> str:
 def worst_table(comparison: Comparison, group: Group) -> Table:
     """Return the worst episodes of a group by every metric of which one end is better."""
     rows = [row for metric in RANKING.values() if (row := _row(comparison, group, metric))]
-    return Table(("metric", "worst episodes", "without them"), rows)
+    return Table(("metric", "episodes (value)", "without them"), rows)
 
 
 def _row(comparison: Comparison, group: Group, metric: Metric) -> list[Cell | str]:
@@ -31,5 +31,8 @@ def _row(comparison: Comparison, group: Group, metric: Metric) -> list[Cell | st
         return []  # nothing is worse than anything else
     said = ", ".join(f"{each.episode.number} ({number(each.value)})" for each in worst)
     unit = f" [{metric.unit}]" if metric.unit else ""
-    name = Cell(metric.title + unit, "", metric.meaning, f"{metric.good} is better")
-    return [name, said, deletion(group.info, [each.episode.number for each in worst])]
+    return [
+        Cell(metric.title + unit, "", metric.meaning),
+        said,
+        deletion(group.info, [each.episode.number for each in worst]),
+    ]
