@@ -9,8 +9,10 @@ def main(config: InspectConfig) -> int:
     """Run the command."""
     from rich.console import Console
 
-    from handrail.collect.commands.tables import quality_table, summary_table
+    from handrail.collect.commands.tables import quality_table, summary_table, worst_table
+    from handrail.datasets.quality.worst import deletion, ranking_metric, worst_episodes
     from handrail.datasets.reading.check import check_report
+    from handrail.datasets.reading.reader import read_info
     from handrail.datasets.recording.repair import repair
 
     console = Console()
@@ -26,6 +28,13 @@ def main(config: InspectConfig) -> int:
         console.print(*said, sep="\n", highlight=False, markup=False, soft_wrap=True)
     if faults:
         return cli.FAILED
+    if config.worst:
+        metric = ranking_metric(config.worst)
+        worst = worst_episodes(config.dataset.folder, metric, config.count)
+        console.print(worst_table(config.dataset.folder, metric, worst))
+        leave_out = deletion(read_info(config.dataset.folder), [each.episode.number for each in worst])
+        console.print(f"Without them: {leave_out}", highlight=False, markup=False, soft_wrap=True)
+        return 0
     console.print(summary_table(config.dataset.folder))
     if config.quality:
         console.print(quality_table(config.dataset.folder))

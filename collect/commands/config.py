@@ -1,5 +1,6 @@
 """What the commands that look at datasets ask for."""
 
+import re
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated
@@ -72,6 +73,37 @@ class InspectConfig:
     """Read every byte and compare it with the checksums; exit code 1 if anything is not as it was saved."""
     quality: bool = False
     """Also print how smooth the motion was and how much the commands chattered."""
+    worst: str = ""
+    """Print the worst episodes by this quality metric instead, and the command that leaves them out."""
+    count: int = 5
+    """How many of the worst."""
+
+
+@dataclass(frozen=True)
+class PushConfig:
+    """Write a dataset's card and say what would be sent to the Hugging Face hub; --upload sends it."""
+
+    dataset: StoredConfig = field(default_factory=StoredConfig)
+    upload: bool = False
+    """Send it, with LeRobot's upload, as --dataset.repo_id; log in first (hf auth login)."""
+    private: bool = True
+    """Whether only you see it there."""
+    license: str = "cc-by-4.0"
+    """Its licence, as the hub writes it: cc-by-4.0, cc0-1.0, apache-2.0, …"""
+    verify: bool = False
+    """Read every file anew, not only those that have changed since they were checked."""
+
+    def check(self) -> None:
+        """Check the settings.
+
+        Raises:
+            HandrailError: one is wrong.
+        """
+        if not re.fullmatch(r"[\w-][\w.-]*/[\w-][\w.-]*", self.dataset.repo_id):
+            got = self.dataset.repo_id or "none"
+            raise HandrailError(f"--dataset.repo_id: expected its name on the hub, owner/name; got {got}")
+        if not re.fullmatch(r"[a-z0-9][a-z0-9.-]*", self.license):
+            raise HandrailError(f"--license: expected a name such as cc-by-4.0, got {self.license!r}")
 
 
 @dataclass(frozen=True)

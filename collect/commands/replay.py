@@ -22,6 +22,9 @@ from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.intent import Intent
 from handrail.datasets.reading.reader import read_episodes, read_frames, read_info
 from handrail.datasets.recording.frames import Frame
+from handrail.datasets.recording.piece import TRIMMED
+
+_MOST_TRIMMED = 100_000  # frames; more is a number made up
 
 
 @dataclass(frozen=True)
@@ -80,17 +83,23 @@ def replay_episode(
     row = _row(root, episode)
     frames = read_frames(root, episode, ["action", "observation.state"])
     length = len(frames["action"])
-    config = replace(recorded_settings(row, said), cameras="", time_limit=(length - 0.5) / info.fps)
+    skipped = _trimmed(row)  # the operator did nothing then, so the robot stands still
+    limit = (skipped + length - 0.5) / info.fps
+    config = replace(recorded_settings(row, said), cameras="", time_limit=limit)
     env = build_env(config, info.fps, render=bool(pictures or video))
     with contextlib.ExitStack() as stack:
         stack.callback(env.close)
         _check_state(frames["observation.state"], env, f"episode {episode} of {root}")
         film = stack.enter_context(VideoFile(video, env.render_size, info.fps)) if video else None
-        camera, period = _Camera(_moments(length, pictures), film), 1.0 / info.fps
-        recorded = RecordedCommands(frames["action"], period)
+        moments = {skipped + each for each in _moments(length, pictures)}
+        camera, period = _Camera(moments, film), 1.0 / info.fps
+        recorded = RecordedCommands(_from_the_start(frames["action"], skipped), period)
         session = Session(env, recorded, _Nobody(), [camera], control_period=period, record_period=period)
         outcome = session.run(row["seed"])
-    difference = np.abs(camera.states - frames["observation.state"][: len(camera.states)])
+    states = camera.states[skipped:]
+    if not states:
+        raise HandrailError(f"episode {episode} of {root}: the task ended before the first recorded frame")
+    difference = np.abs(states - frames["observation.state"][: len(states)])
     replay = Replay(
         episode=episode,
         names=env.agent_names,
@@ -111,6 +120,18 @@ def _row(root: Path, episode: int) -> dict[str, Any]:
     if not is_count(row.get("seed")):
         raise HandrailError(f"dataset {root}: expected one that handrail-record made, found no seed")
     return row
+
+
+def _trimmed(row: dict[str, Any]) -> int:
+    """Return how many frames `handrail-edit trim` has cut off at the beginning."""
+    cut = row.get(TRIMMED)
+    return cut if is_count(cut) and cut <= _MOST_TRIMMED else 0
+
+
+def _from_the_start(actions: np.ndarray, skipped: int) -> np.ndarray:
+    """Return actions, (T, n + 1), after some in which the robot stands still."""
+    still = np.append(np.zeros(actions.shape[1] - 1), actions[0, -1]).astype(actions.dtype)
+    return np.vstack([np.tile(still, (skipped, 1)), actions])
 
 
 def _check_state(states: np.ndarray, env: HandrailEnv, where: str) -> None:

@@ -1,9 +1,13 @@
 """Tables that the commands print."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from handrail.datasets.presentation.table import Table
-from handrail.datasets.quality.summary import CHATTERING, summarize
+from handrail.datasets.presentation.wording import number
+from handrail.datasets.quality.metric import Metric
+from handrail.datasets.quality.summary import CHATTERING, UNKNOWN, summarize
+from handrail.datasets.quality.worst import Ranked
 
 _QUALITY = ("episode", "mode", "length [s]", "smoothness", *CHATTERING)
 
@@ -37,3 +41,21 @@ def quality_table(root: Path) -> Table:
     )
     lines = [[row.cells()[name] for name in _QUALITY] for row in summarize(root)]
     return Table(_QUALITY, lines, caption=caption)
+
+
+def worst_table(root: Path, metric: Metric, worst: Sequence[Ranked]) -> Table:
+    """Return a table of the worst episodes, the worst first."""
+    name = f"{metric.title} [{metric.unit}]" if metric.unit else metric.title
+    said = {None: UNKNOWN, True: "yes", False: "no"}
+    rows = [
+        [
+            str(each.episode.number),
+            number(each.value),
+            said[each.episode.success],
+            str(each.episode.meta.get("failure_reason") or UNKNOWN),
+            f"{each.episode.seconds:.1f}",
+        ]
+        for each in worst
+    ]
+    caption = f"{metric.meaning}; {metric.good} is better"
+    return Table(("episode", name, "success", "why not", "length [s]"), rows, str(root), caption)

@@ -23,7 +23,7 @@ from handrail.controllers.entries import Entry, check_entries, is_table, is_text
 from handrail.controllers.errors import HandrailError, unknown_name
 from handrail.controllers.strict_toml import read_toml
 from handrail.datasets.reading.reader import read_episodes
-from handrail.datasets.recording.drop import settle_drop
+from handrail.datasets.recording.rewrite import settle
 from handrail.datasets.storage.atomic import explained, remove, sync_folder, write_whole
 from handrail.datasets.storage.lock import DatasetLock
 from handrail.datasets.storage.strict_json import load_json, write_json
@@ -183,7 +183,7 @@ class StudyFolder:
             remove(self._forgotten)
             for mode in study.modes:
                 for task in study.tasks:
-                    settle_drop(self.dataset(mode, task))
+                    settle(self.dataset(mode, task))
 
     def left(self, study: UserStudy, who: Participant) -> list[Step]:
         """Return what a participant has still to do."""

@@ -6,7 +6,7 @@ folder without it was not written by Handrail and is never written to.
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -36,6 +36,10 @@ class Manifest:
     robot_type: str
     features: Mapping[str, Feature]
     versions: Mapping[str, str] = field(default_factory=dict)
+
+    def named(self, repo_id: str) -> "Manifest":
+        """Return it with another name."""
+        return replace(self, repo_id=repo_id)
 
     def check(self) -> None:
         """Check everything that can be checked without a disk.

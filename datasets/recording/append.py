@@ -1,69 +1,73 @@
-"""Saving a copy of an episode, of this dataset or of one like it, under a dataset's next number."""
+"""Saving an episode of this dataset or of one like it, or a stretch of one, under a dataset's next number.
+
+This is the one way in which what was recorded once gets into a dataset again: when a repair puts it back,
+when others are dropped, and when datasets are edited and merged. One pass; videos are not encoded anew unless
+a stretch begins between two key frames.
+"""
 
 import os
 import shutil
 from dataclasses import replace as changed
 from pathlib import Path
-from typing import Any
 
-import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
-
-from handrail.datasets.format.arrow import numbers
-from handrail.datasets.format.columns import Scalar, fit_columns
+from handrail.datasets.format.columns import ColumnTypes, Scalar, fit_columns
+from handrail.datasets.format.cut import cut_video
 from handrail.datasets.format.layout import Layout
 from handrail.datasets.format.manifest import Manifest
-from handrail.datasets.format.metadata import (
-    EpisodeRecord,
-    FileSeal,
-    Totals,
-    read_column_types,
-    row_bytes,
-)
-from handrail.datasets.format.schema import video_keys
-from handrail.datasets.format.stats import column_stats
+from handrail.datasets.format.metadata import EpisodeRecord, FileSeal, Totals, row_bytes
+from handrail.datasets.format.schema import Feature
+from handrail.datasets.format.stats import Stats
 from handrail.datasets.format.tables import parquet_bytes
-from handrail.datasets.storage.atomic import move, remove, sync_file, write_synced
+from handrail.datasets.format.video import decoded_stats
+from handrail.datasets.recording.piece import Piece
+from handrail.datasets.storage.atomic import make_folder, move, remove, sync_file, write_synced
 
 
 def append_episode(
-    layout: Layout, folder: Layout, manifest: Manifest, old: EpisodeRecord, totals: Totals, origin: str
+    layout: Layout,
+    manifest: Manifest,
+    piece: Piece,
+    types: ColumnTypes,
+    totals: Totals,
+    origin: str = "",
+    share: bool = True,
 ) -> EpisodeRecord:
-    """Save a copy of an episode under the next number, in the order in which the writer saves one.
+    """Save a piece under the next number, in the order in which the writer saves an episode.
 
     Args:
         layout: Of the dataset, whose staging folder is there.
-        folder: Where the episode is, at the places of a dataset.
         manifest: The schema of both.
-        old: The episode's line of metadata, with statistics.
+        piece: What is saved.
+        types: Of the dataset's extra columns.
         totals: What the dataset's episodes add up to.
-        origin: What the new line says of the one that it had, or "".
+        origin: What the new line says of the one that the episode had, or "".
+        share: Whether a video that stays as it is may be the same file under a second name.
 
     Returns:
         The new line.
 
     Raises:
-        HandrailError, ValueError: It has columns that the dataset does not have, or tasks that do not add up.
+        HandrailError, ValueError: It has columns that the dataset does not have, tasks that do not add up, or
+            a video that cannot be cut.
     """
-    types = read_column_types(layout.row(totals.episodes - 1) if totals.episodes else folder.row(old.episode))
-    columns: dict[str, Scalar] = {name: value for name, value in old.columns.items() if value is not None}
-    extras = fit_columns(columns, types)
+    known: dict[str, Scalar] = {name: value for name, value in piece.columns.items() if value is not None}
+    extras = fit_columns(known, types)
     number, staging = totals.episodes, layout.staging
     streams = {layout.data(number): staging / "data.parquet"}
-    table, stats = _renumbered(folder.data(old.episode), old, totals)
+    table, tasks, stats = piece.rows(manifest.fps, totals)
     write_synced(staging / "data.parquet", parquet_bytes(table))
-    for key in video_keys(manifest.features):
-        streams[layout.video(key, number)] = staging / f"{key}.mp4"
-        _copy(folder.video(key, old.episode), staging / f"{key}.mp4")
-    seals = {layout.relative(path): FileSeal.of(staged) for path, staged in streams.items()}
+    for key, video in piece.videos.items():
+        streams[layout.video(key, number)] = staged = staging / f"{key}.mp4"
+        stats |= _pictures(piece, key, video, staged, manifest, share)
     record = changed(
-        old,
+        piece.record,
         episode=number,
         start=totals.frames,
-        stats={**(old.stats or {}), **stats},
+        length=piece.length,
+        tasks=tasks,
+        stats={**(piece.record.stats or {}), **stats},
         columns=extras,
-        files=seals,
+        files={layout.relative(path): FileSeal.of(staged) for path, staged in streams.items()},
     )
     write_synced(staging / "row.parquet", row_bytes(manifest, record, types, origin))
     for path, staged in streams.items():
@@ -72,28 +76,25 @@ def append_episode(
     return record
 
 
-def _renumbered(data: Path, old: EpisodeRecord, totals: Totals) -> tuple[pa.Table, dict[str, Any]]:
-    """Return an episode's rows with the counters of its new place, and the statistics of these."""
-    with pq.ParquetFile(data) as file:
-        table = file.read(use_threads=False)
-    tasks = table.column("task_index").to_pylist()
-    places = {task: place for place, task in enumerate(totals.with_tasks(old.tasks))}
-    new = {task: places[name] for task, name in zip(dict.fromkeys(tasks), old.tasks, strict=True)}
-    counters = {
-        "episode_index": np.full(old.length, totals.episodes),
-        "index": np.arange(old.length) + totals.frames,
-        "task_index": np.array([new[task] for task in tasks]),
-    }
-    for name, values in counters.items():
-        place = table.schema.get_field_index(name)
-        table = table.set_column(place, table.schema.field(place), numbers(values, pa.int64()))
-    return table, {name: column_stats(values) for name, values in counters.items()}
+def _pictures(piece: Piece, key: str, video: Path, staged: Path, manifest: Manifest, share: bool) -> Stats:
+    """Stage a camera's video; return its statistics if they are others than before."""
+    if not piece.is_cut:
+        copy_file(video, staged, share)
+        return {}
+    feature: Feature = manifest.features[key]
+    remove(staged)
+    cut_video(video, piece.first, piece.length, staged, manifest.fps, feature)
+    sync_file(staged)
+    return {key: decoded_stats(staged, piece.length, *feature.shape[:2])}
 
 
-def _copy(source: Path, target: Path) -> None:
-    """Give a file a second name, or copy it where the file system has no such thing."""
+def copy_file(source: Path, target: Path, share: bool) -> None:
+    """Give a file a second name, or copy it where that may not be or the file system has no such thing."""
+    make_folder(target.parent)
     remove(target)
     try:
+        if not share:
+            raise OSError
         os.link(source, target)
     except OSError:
         shutil.copyfile(source, target)

@@ -1,10 +1,5 @@
-"""Rewriting a dataset without some of its episodes, whole at every moment; the others move up.
+"""Rewriting a dataset without some of its episodes, whole at every moment; the others move up."""
 
-The new dataset is made beside the old one, `.NAME.partial`, and takes its name when it is finished and on the
-disk. Cut short before that, nothing has changed; after it, `settle_drop` finishes what is left.
-"""
-
-import os
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
@@ -12,20 +7,13 @@ from handrail.controllers.errors import HandrailError
 from handrail.datasets.format.columns import Scalar
 from handrail.datasets.format.layout import Layout
 from handrail.datasets.format.manifest import Manifest, read_manifest
-from handrail.datasets.format.metadata import Totals, info_bytes, read_encodings, read_record, stats_bytes
-from handrail.datasets.format.tables import tasks_bytes
-from handrail.datasets.recording.append import append_episode
+from handrail.datasets.format.metadata import read_column_types, read_encodings, read_record
 from handrail.datasets.recording.checksums import Checksums
 from handrail.datasets.recording.folder import check_folders
+from handrail.datasets.recording.piece import Piece
 from handrail.datasets.recording.repair import tidy_locked
-from handrail.datasets.storage.atomic import (
-    explained,
-    make_folder,
-    publish_folder,
-    remove,
-    replace,
-    sync_folder,
-)
+from handrail.datasets.recording.rewrite import remove_whole, settle, write_anew
+from handrail.datasets.storage.atomic import explained
 from handrail.datasets.storage.lock import DatasetLock
 
 Dropped = Callable[[Mapping[str, Scalar | None]], bool]
@@ -44,14 +32,10 @@ def drop_episodes(root: str | Path, dropped: Dropped) -> int:
     """
     layout = Layout(Path(root).expanduser().absolute())
     with explained(f"cannot remove episodes from dataset {str(layout.root)!r}"):
-        settle_drop(layout.root)
+        settle(layout.root)
         manifest = read_manifest(layout)
         check_folders(layout)
-        if layout.damaged.exists():
-            raise HandrailError(
-                f"dataset {str(layout.root)!r}: in {layout.damaged.name} are episodes that were set aside;"
-                " some may have to go too: put them back with handrail-repair, or remove that folder"
-            )
+        check_nothing_set_aside(layout)
         lock = DatasetLock(layout.staging)
         try:
             return _drop(layout, manifest, dropped)
@@ -59,49 +43,29 @@ def drop_episodes(root: str | Path, dropped: Dropped) -> int:
             lock.release()
 
 
-def settle_drop(root: Path) -> None:
-    """Finish a removal of episodes that was cut short, if there was one.
+def check_nothing_set_aside(layout: Layout) -> None:
+    """Check that a dataset that is written anew has no episodes in `.damaged/`.
 
     Raises:
-        OSError: Something cannot be renamed or removed.
+        HandrailError: It has.
     """
-    old, draft = _old(root), _draft(root)
-    if old.exists():
-        if not root.exists():
-            os.replace(draft if draft.exists() else old, root)
-            sync_folder(root.parent)
-        remove(old)
-    remove(draft)
+    if layout.damaged.exists():
+        raise HandrailError(
+            f"dataset {str(layout.root)!r}: in {layout.damaged.name} are episodes that were set aside;"
+            " some may have to go too: put them back with handrail-repair, or remove that folder"
+        )
 
 
 def _drop(layout: Layout, manifest: Manifest, dropped: Dropped) -> int:
     _, totals = tidy_locked(layout, manifest, Checksums(layout.root, anew=True))
-    records = [read_record(layout.row(number), with_stats=True) for number in range(totals.episodes)]
-    kept = [record for record in records if not dropped(record.columns)]
-    if len(kept) == len(records):
+    rows = [layout.row(number) for number in range(totals.episodes)]
+    kept = [row for row in rows if not dropped(read_record(row, with_stats=False).columns)]
+    if len(kept) == len(rows):
         return 0
     if not kept:
-        os.replace(layout.root, _old(layout.root))
-        sync_folder(layout.root.parent)
-        remove(_old(layout.root))
-        return len(records)
-    draft = Layout(_draft(layout.root))
-    make_folder(draft.staging)
-    replace(draft.manifest, manifest.to_bytes(), draft.staging)
-    left = Totals()
-    for record in kept:
-        left = left.grown(append_episode(draft, layout, manifest, record, left, ""))
-    replace(draft.tasks, tasks_bytes(left.tasks), draft.staging)
-    replace(draft.stats, stats_bytes(left.stats or {}), draft.staging)
-    replace(draft.info, info_bytes(manifest, left, read_encodings(layout.info, manifest)), draft.staging)
-    remove(draft.staging)
-    publish_folder(draft.root, layout.root)
-    return len(records) - len(kept)
-
-
-def _draft(root: Path) -> Path:
-    return root.with_name(f".{root.name}.partial")
-
-
-def _old(root: Path) -> Path:
-    return root.with_name(f".{root.name}.old")  # as `publish_folder` calls it
+        remove_whole(layout.root)
+        return len(rows)
+    pieces = (Piece.of(layout, manifest, read_record(row, with_stats=True)) for row in kept)
+    types, encodings = read_column_types(kept[0]), read_encodings(layout.info, manifest)
+    write_anew(layout.root, manifest, pieces, types, encodings, in_place=True)
+    return len(rows) - len(kept)

@@ -14,10 +14,12 @@ from handrail.datasets.format.metadata import (
     EpisodeRecord,
     FileSeal,
     Totals,
+    read_column_types,
     read_origin,
     read_record,
 )
 from handrail.datasets.recording.append import append_episode
+from handrail.datasets.recording.piece import Piece
 from handrail.datasets.recording.survey import UNREADABLE, EpisodeState, examine
 from handrail.datasets.storage.atomic import move, remove, sync_folder
 
@@ -79,8 +81,9 @@ def put_back(layout: Layout, manifest: Manifest, totals: Totals) -> tuple[Totals
             if origin not in known:
                 try:
                     assert state.record is not None
-                    record = append_episode(layout, folder, manifest, state.record, totals, origin)
-                    totals = totals.grown(record)
+                    last = layout.row(totals.episodes - 1) if totals.episodes else row
+                    piece, types = Piece.of(folder, manifest, state.record), read_column_types(last)
+                    totals = totals.grown(append_episode(layout, manifest, piece, types, totals, origin))
                 except (HandrailError, ValueError):
                     continue  # columns that this dataset does not have, or tasks that do not add up
                 known.add(origin)

@@ -1,6 +1,6 @@
 """The configuration of every command."""
 
-from handrail.collect.commands.config import DemoConfig, InspectConfig, RepairConfig, ReplayConfig
+from handrail.collect.commands.config import DemoConfig, InspectConfig, PushConfig, RepairConfig, ReplayConfig
 from handrail.collect.config import DriveConfig, RecordConfig
 from handrail.collect.experiments.benchmark.config import BenchmarkConfig
 from handrail.collect.experiments.latency.config import LatencyConfig
@@ -11,6 +11,7 @@ from handrail.collect.experiments.trials.config import TrialsConfig
 from handrail.collect.teleop_config import CalibrateConfig
 from handrail.collect.user_study.config import StudySessionConfig
 from handrail.datasets.comparison.config import CompareConfig
+from handrail.datasets.editing.config import EditConfig
 from handrail.policies.imitation.config import TrainConfig
 from handrail.policies.imitation.evaluation.config import EvaluateConfig
 from handrail.policies.rl.config import TrainRlConfig
@@ -23,6 +24,8 @@ CONFIGS = {
     "handrail-replay": ReplayConfig,
     "handrail-inspect": InspectConfig,
     "handrail-repair": RepairConfig,
+    "handrail-edit": EditConfig,
+    "handrail-push": PushConfig,
     "handrail-demo": DemoConfig,
     "handrail-showcase": ShowcaseConfig,
     "handrail-profile": ProfileConfig,

@@ -103,7 +103,7 @@ def test_there_are_lists_in_many_commands():
 
 @pytest.mark.parametrize(("name", "flag"), FLAGS)
 def test_a_list_is_written_with_commas_or_spaces(name, flag):
-    needed = ["x"] if name == "handrail-compare" else []
+    needed = {"handrail-compare": ["x"], "handrail-edit": ["delete", "x"]}.get(name, [])
     values = {
         str(cli.parse(CONFIGS[name], name, [*needed, f"--{flag}", *shlex.split(written)]))
         for written in ("1 2", "1,2", "1, 2", "'1,2'", "1,2,")

@@ -29,6 +29,7 @@ from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.intent import Intent
 from handrail.controllers.robot.model import RobotModel
 from handrail.datasets.reading.reader import read_episodes, read_frames, read_info
+from handrail.datasets.recording.piece import TRIMMED
 
 _COLUMNS = ("action", "teleop.values", "teleop.mask", "teleop.raw", "teleop.mode", "teleop.device")
 _SHORTEST = 1.5  # an episode that says anything [s]
@@ -118,6 +119,8 @@ def _unfit(row: dict[str, Any], frames: dict[str, np.ndarray], fps: int) -> str:
     """Return why nothing can be learned from an episode; "" if something can."""
     if not is_count(row.get("seed")):
         return "it has no seed, so what the operator saw is not known"
+    if row.get(TRIMMED):
+        return "its beginning was cut off, so when the operator saw what is not known"
     modes = sorted(set(frames["teleop.mode"].tolist()))
     if len(modes) > 1:
         return f"the mode was changed ({', '.join(modes)})"

@@ -18,6 +18,7 @@ from handrail.datasets.comparison.report.figures import (
     trajectory_panels,
 )
 from handrail.datasets.comparison.report.pictures import first_pictures
+from handrail.datasets.comparison.report.worst import worst_folds
 from handrail.datasets.presentation.drawing import Panel, svg
 from handrail.datasets.presentation.markup import (
     card,
@@ -61,6 +62,10 @@ _QUALITY = (
     "Each with its 95 % interval; bold: detected. These numbers describe data; they do not rank it. Point at"
     " a name for what it means, and at a dash for why there is nothing."
 )
+_WORST = (
+    "The three of each group at the wrong end of each metric, and the command that writes the dataset without"
+    " them. The slowest episode may be the one with the hardest scene: look before you leave it out."
+)
 _EFFECTS = (
     "Filled: detected; hollow: not. An arrow: beyond what is shown, or a difference where nothing varies."
 )
@@ -81,6 +86,7 @@ def report_page(comparison: Comparison, found: list[Finding]) -> str:
         section("Trajectories", _drawn(trajectory_panels(comparison)), _pictures(comparison)),
     ]
     missing = tables.not_applicable_table(comparison)
+    parts.append(section("Episodes to look at first", paragraph(_WORST, "quiet"), worst_folds(comparison)))
     parts += [section("What does not apply, or is not comparable", missing)] if missing else []
     meanings = items(("quiet", f"{metric.title}: {metric.meaning}.") for metric in METRICS)
     how = paragraph(_HOW), paragraph(_families(comparison))

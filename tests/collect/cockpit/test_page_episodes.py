@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 pytest.importorskip("playwright.sync_api", reason="the extra 'dev' is not installed")
+from judges import doctor_fails, lint_defects
 from page_driver import PageDriver
 from page_recording import hand_columns, is_smooth, is_whole, recording, rows, saved
 from playwright.sync_api import expect
@@ -118,3 +119,5 @@ def test_the_mode_changes_in_motion_without_a_jolt(new_page, tmp_path):
     assert sum(speed[index - 1] > 0.02 for index in changes) >= 5  # it did move
     assert is_smooth(frames)
     assert is_whole(frames)
+    assert not doctor_fails(tmp_path / "d")
+    assert not lint_defects(tmp_path / "d")

@@ -10,6 +10,7 @@ import pyarrow.parquet as pq
 import pytest
 from command_helpers import command
 from device_players import PlayedHid, VirtualPad, recorded
+from judges import doctor_fails, lint_defects
 from played_leader import CALIBRATION, PLAYED
 from terminal_player import TerminalPlayer
 
@@ -123,6 +124,8 @@ def test_a_recording_with_a_gamepad(tmp_path, pad, listens):
     assert driven[0] == 0.0
     assert len(driven) < 60  # two seconds of driving, not the third one
     assert seen["next.done"][-1]
+    assert not doctor_fails(folder)
+    assert not lint_defects(folder)
 
 
 @pytest.mark.slow

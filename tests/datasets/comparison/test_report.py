@@ -162,6 +162,15 @@ def test_figures_break_to_the_next_line_where_there_is_no_room(alike):
     assert page.count("<figcaption><strong>") == page.count('alt="') > 20
 
 
+def test_every_group_has_the_commands_that_leave_its_last_out(alike):
+    """By the length of an episode: the three longest of each."""
+    page = report_page(alike, findings(alike))
+    for group in alike.everything.groups:
+        longest = sorted(group.episodes, key=lambda each: (-each.count, each.number))[:3]
+        numbers = ",".join(str(each) for each in sorted(each.number for each in longest))
+        assert f"handrail-edit delete {group.info.root} --episodes {numbers} --output" in page
+
+
 def test_a_long_label_keeps_both_ends():
     assert short("reach_ee", 8) == "reach_ee"
     assert short("reach_ee_of_monday", 9) == "reac…nday"

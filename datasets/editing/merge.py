@@ -1,0 +1,73 @@
+"""What several datasets have in common, so that their episodes fit into one."""
+
+from collections.abc import Sequence
+
+import pyarrow as pa
+
+from handrail.controllers.errors import HandrailError
+from handrail.datasets.editing.source import Source
+from handrail.datasets.format.columns import ColumnTypes
+from handrail.datasets.recording.rewrite import Encodings
+
+_NEEDED = ("video.codec", "video.pix_fmt")  # in which all videos of a camera have to agree
+
+
+def check_alike(first: Source, other: Source) -> None:
+    """Check that frames of one dataset fit into another.
+
+    Raises:
+        HandrailError: Rate, robot or a column differ; the message names the first difference.
+    """
+    names = [source.layout.root for source in (other, first)]
+    one, two = first.manifest, other.manifest
+    for name in ("fps", "robot_type"):
+        if getattr(one, name) != getattr(two, name):
+            raise _unlike(names, name, getattr(two, name), getattr(one, name))
+    for key in (*one.features, *two.features):
+        mine, theirs = one.features.get(key), two.features.get(key)
+        if mine != theirs:
+            raise _unlike(
+                names, f"column {key!r}", *(each.described if each else "none" for each in (theirs, mine))
+            )
+
+
+def merged_types(sources: Sequence[Source]) -> ColumnTypes:
+    """Return the extra columns that any of them has.
+
+    Raises:
+        HandrailError: A column has values of another type in another one.
+    """
+    found: ColumnTypes = {}
+    for source in sources:
+        for name, kind in source.types.items():
+            before = found.setdefault(name, kind)
+            if before != kind and {before, kind} == {pa.int64(), pa.float64()}:
+                found[name] = pa.float64()
+            elif before != kind:
+                names = [source.layout.root, sources[0].layout.root]
+                raise _unlike(names, f"episode column {name!r}", kind, before)
+    return found
+
+
+def merged_encodings(sources: Sequence[Source]) -> Encodings:
+    """Return how all videos are encoded: what they agree in; nothing where Handrail alone encoded them.
+
+    Raises:
+        HandrailError: A camera has videos that are encoded in different ways.
+    """
+    found = {key: dict(encoding) for key, encoding in sources[0].encodings.items()}
+    for source in sources[1:]:
+        for key, encoding in source.encodings.items():
+            mine = found.setdefault(key, dict(encoding))
+            for name in _NEEDED:
+                if mine.get(name) != encoding.get(name):
+                    names = [source.layout.root, sources[0].layout.root]
+                    raise _unlike(names, f"{name} of {key!r}", encoding.get(name), mine.get(name))
+            found[key] = {name: value for name, value in mine.items() if encoding.get(name) == value}
+    return found
+
+
+def _unlike(names: Sequence[object], thing: str, theirs: object, mine: object) -> HandrailError:
+    return HandrailError(
+        f"merge: cannot add {str(names[0])!r} to {str(names[1])!r}: its {thing} is {theirs}, expected {mine}"
+    )

@@ -1,0 +1,93 @@
+"""The worst episodes of a dataset by a metric, and the command that leaves them out."""
+
+import shlex
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from handrail.controllers.arrays import FloatArray
+from handrail.controllers.errors import HandrailError, unknown_name
+from handrail.datasets.quality.catalogue import METRICS
+from handrail.datasets.quality.demonstration import Demonstration
+from handrail.datasets.quality.load import read_demonstrations
+from handrail.datasets.quality.measure import measure
+from handrail.datasets.quality.metric import Metric
+from handrail.datasets.reading.reader import DatasetInfo
+
+RANKING = {metric.name: metric for metric in METRICS if metric.good}
+"""The metrics of which one end is better, by name."""
+
+
+@dataclass(frozen=True)
+class Ranked:
+    """An episode and its value.
+
+    Attributes:
+        episode: Which.
+        value: Of the metric.
+    """
+
+    episode: Demonstration
+    value: float
+
+
+def ranking_metric(name: str) -> Metric:
+    """Return a metric by its name.
+
+    Raises:
+        HandrailError: There is none, or neither end of it is better.
+    """
+    if name not in RANKING:
+        raise unknown_name("metric", name, RANKING)
+    return RANKING[name]
+
+
+def worst_episodes(root: str | Path, metric: Metric, count: int) -> list[Ranked]:
+    """Return the worst episodes of any LeRobot v3.0 dataset, the worst first.
+
+    Raises:
+        HandrailError: The count is not positive, there is no dataset, it cannot be read, or the metric
+            applies to none of its episodes.
+    """
+    if count < 1:
+        raise HandrailError(f"--count {count}: expected 1 or more")
+    episodes = read_demonstrations(root)
+    if not episodes:
+        raise HandrailError(f"dataset {str(root)!r}: expected an episode or more, found none")
+    measured = measure({"": episodes}, np.random.default_rng(0), metrics=[metric]).values[metric.name][""]
+    if not measured.applies:
+        raise HandrailError(
+            f"--worst {metric.name}: expected a value of an episode, got none: {measured.reason}"
+        )
+    return ranked(episodes, metric, measured.values)[:count]
+
+
+def ranked(episodes: Sequence[Demonstration], metric: Metric, values: FloatArray) -> list[Ranked]:
+    """Return episodes from the worst to the best; those without a value are left out.
+
+    Args:
+        episodes: Of a dataset.
+        metric: One of which one end is better.
+        values: `(E,)`, NaN where it does not apply.
+    """
+    known = [
+        Ranked(episode, float(value))
+        for episode, value in zip(episodes, values, strict=True)
+        if np.isfinite(value)
+    ]
+    sign = 1.0 if metric.good == "higher" else -1.0
+    return sorted(known, key=lambda each: (sign * each.value, each.episode.number))
+
+
+def deletion(info: DatasetInfo, numbers: Sequence[int]) -> str:
+    """Return the command that writes a dataset without some of its episodes."""
+    numbers = sorted(numbers)
+    root, new = shlex.quote(str(info.root)), shlex.quote(f"{info.root}_kept")
+    if info.from_handrail:
+        return f"handrail-edit delete {root} --episodes {','.join(map(str, numbers))} --output {new}"
+    return (
+        f"lerobot-edit-dataset --repo_id {shlex.quote(info.root.name)} --root {root} --new_root {new}"
+        f" --operation.type delete_episodes --operation.episode_indices '{numbers}'"
+    )

@@ -1,0 +1,147 @@
+"""Writing a dataset anew from episodes of others, whole at every moment.
+
+It is made beside its place, in `.NAME.partial`, and takes its name when it is finished and on the disk. Cut
+short before that, nothing has changed; after it, `settle` finishes what is left.
+"""
+
+import os
+import shutil
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from handrail.controllers.errors import HandrailError
+from handrail.datasets.format.columns import ColumnTypes
+from handrail.datasets.format.layout import DAMAGED, STAGING, Layout
+from handrail.datasets.format.manifest import Manifest
+from handrail.datasets.format.metadata import Totals, info_bytes, stats_bytes
+from handrail.datasets.format.tables import tasks_bytes
+from handrail.datasets.recording.append import append_episode, copy_file
+from handrail.datasets.recording.piece import Piece
+from handrail.datasets.storage.atomic import publish_folder, remove, replace, sync_folder
+from handrail.datasets.storage.lock import LOCK_NAME, DatasetLock
+
+Encodings = Mapping[str, Mapping[str, Any]]
+_OURS = ("data", "videos", "meta", STAGING, DAMAGED)
+
+
+def write_anew(
+    root: Path,
+    manifest: Manifest,
+    pieces: Iterable[Piece],
+    types: ColumnTypes,
+    encodings: Encodings,
+    in_place: bool = False,
+) -> Totals:
+    """Write a dataset in one pass over its pieces.
+
+    Args:
+        root: Its folder; what is there is replaced.
+        manifest: Its schema.
+        pieces: Its episodes, in order.
+        types: Of its extra columns.
+        encodings: How its videos are encoded, where that is not as Handrail does it.
+        in_place: Whether the pieces are of the dataset that is replaced: what lies beside its files stays,
+            and videos are not copied.
+
+    Returns:
+        What the episodes add up to.
+
+    Raises:
+        HandrailError: There is no piece, one does not fit, or another process writes there. Nothing has been
+            changed then.
+        OSError: The disk does not take it.
+    """
+    draft = Layout(_draft(root))
+    lock = DatasetLock(draft.staging)
+    try:
+        _clear(draft)
+        totals = Totals()
+        for piece in pieces:
+            record = append_episode(draft, manifest, piece, types, totals, share=in_place)
+            totals = totals.grown(record)
+        if not totals.episodes:
+            raise HandrailError(
+                f"{str(root)!r}: expected at least one episode, got none; nothing was written"
+            )
+        replace(draft.manifest, manifest.to_bytes(), draft.staging)
+        replace(draft.tasks, tasks_bytes(totals.tasks), draft.staging)
+        replace(draft.stats, stats_bytes(totals.stats or {}), draft.staging)
+        replace(draft.info, info_bytes(manifest, totals, encodings), draft.staging)
+        if in_place:
+            _carry_over(root, draft.root)
+    except BaseException:
+        remove(draft.root)
+        raise
+    finally:
+        lock.release()
+    publish_folder(draft.root, root)
+    return totals
+
+
+def remove_whole(root: Path) -> None:
+    """Remove a dataset, at once: cut short, `settle` goes on."""
+    remove(_draft(root))
+    os.replace(root, _draft(root))
+    sync_folder(root.parent)
+    remove(_draft(root))
+
+
+def settle(root: Path) -> bool:
+    """Finish a writing anew that was cut short; return whether one was past the point of no return.
+
+    Raises:
+        OSError: Something cannot be renamed or removed.
+    """
+    old, draft = _old(root), _draft(root)
+    finished = old.exists()
+    if finished:
+        if not root.exists():
+            os.replace(draft if draft.exists() else old, root)
+            sync_folder(root.parent)
+        remove(old)
+    if not _in_use(draft):
+        remove(draft)
+    return finished
+
+
+def _in_use(draft: Path) -> bool:
+    """Return whether another process writes a draft."""
+    if not draft.is_dir():
+        return False
+    try:
+        DatasetLock(draft / STAGING).release()
+    except HandrailError:
+        return True
+    return False
+
+
+def _clear(draft: Layout) -> None:
+    """Remove what a writing that was cut short left in a draft."""
+    for path in draft.root.iterdir():
+        if path != draft.staging:
+            remove(path)
+    for path in draft.staging.iterdir():
+        if path.name != LOCK_NAME:
+            remove(path)
+
+
+def _carry_over(root: Path, draft: Path) -> None:
+    """Copy what lies in a dataset's folder and is not the dataset."""
+    for path in root.iterdir():
+        if path.name in _OURS:
+            continue
+        if path.is_dir() and not path.is_symlink():
+            shutil.copytree(path, draft / path.name, symlinks=True)
+        elif path.is_symlink():
+            os.symlink(os.readlink(path), draft / path.name)
+        else:
+            copy_file(path, draft / path.name, share=True)
+
+
+def _draft(root: Path) -> Path:
+    return root.with_name(f".{root.name}.partial")
+
+
+def _old(root: Path) -> Path:
+    return root.with_name(f".{root.name}.old")  # as `publish_folder` calls it

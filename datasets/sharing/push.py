@@ -1,0 +1,158 @@
+"""Sending a dataset to the hub with LeRobot's own upload: only when asked, and only what may leave.
+
+What goes is LeRobot's dataset and the card. `.damaged/`, `.handrail/` and whatever else lies in the folder
+stay, and episodes of a user study's participants are not sent at all.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fnmatch import fnmatch
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from huggingface_hub.errors import HfHubHTTPError
+
+from handrail.controllers.errors import HandrailError, message_of
+from handrail.datasets.reading.check import check_whole
+from handrail.datasets.reading.reader import DatasetInfo, read_episodes, read_info, read_rows_of
+from handrail.datasets.sharing.card import CARD, TAGS, write_card
+
+SENT = (
+    *("data/chunk-*/file-*.parquet", "videos/*/chunk-*/file-*.mp4", "meta/episodes/chunk-*/file-*.parquet"),
+    *("meta/info.json", "meta/stats.json", "meta/tasks.parquet", "meta/handrail.json"),
+    CARD,
+)
+_PARTICIPANT, _DEVICE = "participant", "teleop.device"
+_PEOPLE = "participants"  # the folder of a user study that has their answers
+
+
+@dataclass(frozen=True)
+class Push:
+    """What is sent, or would be.
+
+    Attributes:
+        repo_id: Where to.
+        root: The dataset.
+        files: Of it, relative to its folder.
+        stays: Names in its folder of which nothing is sent.
+        size: Of all files [byte].
+        private: Whether nobody else sees it.
+        license_id: Its licence.
+        description: What the card says of it.
+    """
+
+    repo_id: str
+    root: Path
+    files: tuple[str, ...]
+    stays: tuple[str, ...]
+    size: int
+    private: bool
+    license_id: str
+    description: str
+
+    def __str__(self) -> str:
+        stays = f"; these stay: {', '.join(self.stays)}" if self.stays else ""
+        seen = "private" if self.private else "public"
+        return (
+            f"{self.root} as {self.repo_id} ({seen}): {len(self.files)} files, {self.size / 1e6:.1f} MB"
+            f"{stays}"
+        )
+
+
+def prepare(root: Path, repo_id: str, license_id: str, private: bool, verify: bool = False) -> Push:
+    """Check a dataset, write its card, and return what would be sent.
+
+    Args:
+        root: Its folder.
+        repo_id: Its name on the hub, owner/name.
+        license_id: As the hub writes it, such as `cc-by-4.0`.
+        private: Whether nobody else is to see it.
+        verify: Read every byte anew.
+
+    Raises:
+        HandrailError: It is damaged, or has episodes of participants or links to other places.
+    """
+    root = root.absolute()
+    check_whole(root, verify)
+    check_nobody(root)
+    said = write_card(root, repo_id, license_id)
+    found = [path for path in sorted(root.rglob("*")) if path.is_file()]
+    files = [path for path in found if is_sent(path.relative_to(root).as_posix())]
+    linked = next((path for path in files if path.resolve() != root.resolve() / path.relative_to(root)), None)
+    if linked is not None:
+        raise HandrailError(f"{str(linked)!r}: expected a file of the dataset, found a link; nothing is sent")
+    tops, sent = ({path.relative_to(root).parts[0] for path in some} for some in (found, files))
+    names = tuple(path.relative_to(root).as_posix() for path in files)
+    size = sum(path.stat().st_size for path in files)
+    return Push(repo_id, root, names, tuple(sorted(tops - sent)), size, private, license_id, said)
+
+
+def upload(push: Push) -> None:
+    """Send a dataset with LeRobot's `push_to_hub`.
+
+    Raises:
+        HandrailError: The hub does not take it; one line says why.
+    """
+    from lerobot.datasets.lerobot_dataset import LeRobotDataset
+
+    try:
+        LeRobotDataset(push.repo_id, root=push.root).push_to_hub(
+            tags=list(TAGS),
+            license=push.license_id,
+            private=push.private,
+            allow_patterns=list(SENT),
+            dataset_description=push.description,
+        )
+    except (OSError, ValueError, RuntimeError, HfHubHTTPError) as error:
+        said = message_of(error).partition("\n")[0]
+        raise HandrailError(f"--upload: the hub did not take {push.repo_id}: {said}") from error
+
+
+def is_sent(name: str) -> bool:
+    """Return whether a file, by its path in the dataset, is one that goes to the hub."""
+    return any(fnmatch(name, pattern) for pattern in SENT) and not name.startswith(".")
+
+
+def check_nobody(root: Path) -> None:
+    """Check that no episode is a participant's: data of people do not leave by a flag.
+
+    Raises:
+        HandrailError: One is, or it is not known whether one is.
+    """
+    above = [folder for folder in root.parents[:4] if (folder / _PEOPLE).is_dir()]
+    if above:
+        raise HandrailError(f"dataset {str(root)!r}: part of the user study in {above[0]}; it is never sent")
+    info, rows = read_info(root), read_episodes(root)
+    people = [row["episode_index"] for row in rows if row.get(_PARTICIPANT)]
+    if people:
+        others = [row["episode_index"] for row in rows if not row.get(_PARTICIPANT)]
+        advice = f"handrail-edit keep --episodes {_few(others)} leaves them out" if others else "all are"
+        raise HandrailError(
+            f"dataset {str(root)!r}: episodes {_few(people)} are of participants of a user study, which are"
+            f" never sent; {advice}"
+        )
+    unknown = [row["episode_index"] for row in rows if _PARTICIPANT not in row and _driven(info, row)]
+    if unknown:
+        raise HandrailError(
+            f"dataset {str(root)!r}: people drove episodes {_few(unknown)}, and another tool has dropped who,"
+            " so they may be of participants of a user study; send the dataset that Handrail recorded"
+        )
+
+
+def _driven(info: DatasetInfo, row: dict[str, Any]) -> bool:
+    """Return whether a person drove an episode."""
+    if _DEVICE not in info.features:
+        return False
+    return bool(np.any(read_rows_of(info, row, [_DEVICE])[_DEVICE] != ""))
+
+
+def _few(numbers: Sequence[int]) -> str:
+    """Return numbers as a command line takes them, runs as ranges."""
+    runs: list[list[int]] = []
+    for each in numbers:
+        if runs and each == runs[-1][1] + 1:
+            runs[-1][1] = each
+        else:
+            runs.append([each, each])
+    return ",".join(str(first) if first == last else f"{first}-{last}" for first, last in runs)

@@ -1,0 +1,186 @@
+"""What goes to the hub when asked: the dataset and its card; nothing else that lies there, nobody."""
+
+import re
+
+import pytest
+import yaml
+from command_helpers import command
+from datasets_helpers import CAMERAS, tree
+from editing_helpers import record_episodes
+
+from handrail.datasets.format.layout import Layout
+from handrail.datasets.quality.catalogue import METRICS
+from handrail.datasets.reading.reader import read_episodes
+
+
+class Hub:
+    """Takes what LeRobot's upload hands to the hub's client, at the place where LeRobot imports it."""
+
+    def __init__(self):
+        self.sent, self.calls, self.repo = {}, [], {}
+
+    def __call__(self):
+        return self
+
+    def create_repo(self, **said):
+        self.repo = said
+
+    def upload_folder(self, folder_path, allow_patterns, ignore_patterns, **said):
+        from huggingface_hub.utils import filter_repo_objects
+
+        files = tree(folder_path)
+        chosen = filter_repo_objects(files, allow_patterns=allow_patterns, ignore_patterns=ignore_patterns)
+        self.calls.append(said)
+        self.sent |= {name: files[name] for name in chosen}
+
+    def delete_tag(self, *_, **__):
+        pass
+
+    create_tag = delete_tag
+
+    def push_card(self, card, repo_id, **_):
+        self.sent["README.md"] = str(card).encode()
+
+
+@pytest.fixture
+def hub(monkeypatch):
+    hub = Hub()
+    monkeypatch.setattr("lerobot.datasets.lerobot_dataset.HfApi", hub)
+    monkeypatch.setattr(
+        "huggingface_hub.DatasetCard.push_to_hub", lambda card, **said: hub.push_card(card, **said)
+    )
+    return hub
+
+
+@pytest.fixture
+def root(tmp_path):
+    return record_episodes(tmp_path / "set", 3, cameras=True, mode="ee")
+
+
+def push(root, *words, code=0):
+    done = command(root, "--dataset.repo_id", "me/reach", *words, name="push")
+    assert done.returncode == code, done.stderr
+    return done
+
+
+def litter(root):
+    """Leave what must not be sent where it could be taken for the dataset."""
+    for name in (
+        ".damaged/000/data/chunk-000/file-000.parquet",
+        ".damaged/000/meta/episodes/chunk-000/file-000.parquet",
+        ".handrail/data.parquet",
+        "data/notes.txt",
+        "meta/answers.json",
+        "exports/answers.csv",
+        "videos/face.mp4",
+    ):
+        (root / name).parent.mkdir(parents=True, exist_ok=True)
+        (root / name).write_text("private")
+
+
+def test_nothing_is_sent_unless_asked(root, hub):
+    said = push(root).stdout
+    assert (hub.sent, hub.repo) == ({}, {})
+    assert "nothing was sent; --upload sends it" in said
+    assert "me/reach (private): 17 files" in said
+
+
+def test_the_dataset_is_sent_and_nothing_else(root, hub):
+    litter(root)
+    said = push(root, "--upload").stdout
+    names = set(hub.sent)
+    layout = Layout(root)
+    expected = {f"meta/{name}" for name in ("info.json", "stats.json", "tasks.parquet", "handrail.json")}
+    for number in range(len(read_episodes(root))):
+        videos = [layout.video(key, number) for key in CAMERAS]
+        expected |= {layout.relative(path) for path in (layout.data(number), layout.row(number), *videos)}
+    assert names == expected | {"README.md"}
+    assert not [name for name, content in hub.sent.items() if content == b"private"]
+    assert "these stay: .damaged, .handrail, exports" in said
+    assert hub.repo["private"] is True
+    assert hub.sent["README.md"] == (root / "README.md").read_bytes()
+
+
+def test_the_card_says_what_was_recorded(root, hub):
+    push(root, "--license", "cc0-1.0", "--no_private", "--upload")
+    text = hub.sent["README.md"].decode()
+    head = yaml.safe_load(text.split("---")[1])
+    assert head["license"] == "cc0-1.0"
+    assert {"LeRobot", "handrail"} <= set(head["tags"])
+    assert hub.repo["private"] is False
+    for told in (
+        "- 3 episodes, 165 frames at 30 Hz",
+        "- operator: ada (3)",
+        "- mode: ee (3)",
+        "- task: lift the cup (2), put it down (1)",
+        "- success: 2 of 3 (67 %)",
+        "- failures: timeout (1)",
+    ):
+        assert told in text
+    shown = re.findall(r"^\| (.*?) \|", text, re.MULTILINE)
+    assert (
+        {"episode length", "smoothness (SPARC)"}
+        <= set(shown)
+        <= {m.title for m in METRICS} | {"metric", "---"}
+    )
+
+
+def test_a_card_is_renewed_but_not_somebody_else_s(root, hub):
+    push(root)
+    push(root)
+    (root / "README.md").write_text("# Mine")
+    assert "give it another name" in push(root, "--upload", code=2).stderr
+    assert (root / "README.md").read_text() == "# Mine"
+    assert not hub.sent
+
+
+def test_participants_are_not_sent(tmp_path, hub):
+    mixed, theirs = record_episodes(tmp_path / "a", 2, participant=""), tmp_path / "b"
+    record_episodes(theirs, 1, participant="P001")
+    command("merge", mixed, theirs, "--output", tmp_path / "all", name="edit")
+    said = push(tmp_path / "all", "--upload", code=2).stderr
+    assert "episodes 2 are of participants" in said
+    assert "handrail-edit keep --episodes 0-1" in said
+    assert "all are" in push(theirs, "--upload", code=2).stderr
+    (tmp_path / "participants").mkdir()
+    assert "part of the user study" in push(mixed, "--upload", code=2).stderr
+    assert (hub.sent, hub.repo) == ({}, {})
+
+
+def test_who_drove_is_not_known_so_nothing_is_sent(tmp_path, hub):
+    """LeRobot's `delete_episodes` drops the column that says whose an episode is."""
+    root = record_episodes(tmp_path / "set", 2, driven=True)
+    said = push(root, "--upload", code=2).stderr
+    assert "people drove episodes 0-1, and another tool has dropped who" in said
+    assert not hub.sent
+
+
+def test_a_refusal_of_the_hub_is_one_line(root, hub):
+    def refuse(**_):
+        raise OSError("401 Client Error\nlots of text")
+
+    hub.create_repo = refuse
+    said = push(root, "--upload", code=2).stderr
+    assert said.count("\n") == 1
+    assert "the hub did not take me/reach: 401 Client Error" in said
+
+
+def test_links_are_not_followed(root, hub, tmp_path):
+    (tmp_path / "secret").write_text("private")
+    stats = Layout(root).stats
+    stats.rename(tmp_path / "stats.json")
+    stats.symlink_to(tmp_path / "stats.json")
+    assert "found a link" in push(root, "--upload", code=2).stderr
+    assert not hub.sent
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [(("--dataset.repo_id", "reach"), "owner/name"), (("--license", "My licence"), "such as cc-by-4.0")],
+)
+def test_wrong_settings_are_one_line(root, words, told):
+    done = command(
+        root, *(("--dataset.repo_id", "me/x") if "--license" in words else ()), *words, name="push"
+    )
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
+    assert told in done.stderr
