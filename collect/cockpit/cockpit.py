@@ -219,6 +219,7 @@ class Cockpit:
             "folder": self._folder,
             "wanted": self._wanted,
             "hand": stage.hand(compiled),
+            "scale": self._model.description.world.scale,
             "base_size": self._model.description.base_size if len(channels.base) else (),
         }
 

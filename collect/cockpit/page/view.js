@@ -44,6 +44,7 @@ export class View {
     forgetBodies(this.scene, this.bodies);
     this.bodies = bodies;
     this.marks.stage(stage, bodies);
+    this.cameras.stage(stage);
     this.light_up(this.owned);
     if (this.played) return;
     this.scene.add(...bodies);
