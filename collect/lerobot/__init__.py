@@ -1,0 +1,1 @@
+"""Handrail in LeRobot's own terms: its robots, teleoperators, environments and processors."""
