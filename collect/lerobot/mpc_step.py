@@ -200,10 +200,10 @@ def load_pipeline(folder: str | Path, clock: Callable[[], float] = time.monotoni
     file = Path(folder) / f"{NAME}.json"
     content = load_json(file, "a processor that save_pretrained wrote")
     steps = content.get("steps") if isinstance(content, dict) else None
-    fits = isinstance(steps, list) and all(isinstance(step, dict) for step in steps)
-    if not fits or [step.get("registry_name") for step in steps] != [NAME]:
+    step = steps[0] if isinstance(steps, list) and len(steps) == 1 else None
+    if not isinstance(step, dict) or step.get("registry_name") != NAME:
         raise HandrailError(f"processor {file}: expected the step {NAME} alone")
-    config = steps[0].get("config")
+    config = step.get("config")
     if isinstance(config, dict) and isinstance(config.get("robot"), str):
         ROBOTS.admit(config["robot"])
     try:
