@@ -44,3 +44,5 @@ for _spec in TASKS.built_in:
         entry_point="handrail.collect.envs.env:HandrailEnv",
         kwargs={"task": _spec.task},
     )
+
+gymnasium.register("handrail/LeRobot-v0", entry_point="handrail.collect.lerobot.evaluated:EvaluatedEnv")

@@ -23,6 +23,7 @@ REPO_ID = "handrail/demo"  # of a dataset whose name nobody says
 FOUND = Path("outputs/cockpit")  # of datasets whose folders nobody says
 CAMERAS = ("wrist", "scene")
 FPS_RANGE = (10, 100)
+FIRST_SEED = 2**32  # of evaluations; recordings use the numbers below it
 MOST_MOVING = 4
 MOST_TIME = 3600.0  # [s]
 _SIZES = "an even number from 16 to 1024"

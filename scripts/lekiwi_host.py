@@ -1,6 +1,6 @@
 """`handrail-lekiwi-host`: simulate a LeKiwi on the network, in LeRobot's own protocol."""
 
-from handrail.collect.lerobot.host_config import HostConfig
+from handrail.collect.lekiwi.host_config import HostConfig
 from handrail.scripts import cli
 
 
@@ -8,7 +8,7 @@ from handrail.scripts import cli
 def main(config: HostConfig) -> int:
     """Run the command."""
     config.check()
-    from handrail.collect.lerobot.lekiwi_host import serve  # loads the simulator
+    from handrail.collect.lekiwi.host import serve  # loads the simulator
 
     return serve(config)
 

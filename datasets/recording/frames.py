@@ -136,8 +136,8 @@ def frame_row(frame: Frame) -> dict[str, Any]:
         "controller.solve_time": diagnostics.solve_time,
         "controller.status": diagnostics.status.value,
         "controller.slack": _finite(diagnostics.slack),
-        "controller.smallest_distance": _distance(diagnostics.smallest_distance),
-        "controller.work_distance": _distance(diagnostics.work_distance),
+        "controller.smallest_distance": finite_distance(diagnostics.smallest_distance),
+        "controller.work_distance": finite_distance(diagnostics.work_distance),
         "safety.contacts": frame.contacts,
         "next.success": frame.success,
         "next.done": frame.done,
@@ -150,6 +150,6 @@ def _finite(numbers: FloatArray | float) -> FloatArray:
     return np.clip(np.nan_to_num(numbers, nan=0.0), -MOST, MOST)
 
 
-def _distance(distance: float) -> float:
+def finite_distance(distance: float) -> float:
     """Return a distance cut to `FARTHEST`, which also stands for one that nobody knows [m]."""
     return min(distance, FARTHEST) if np.isfinite(distance) else FARTHEST

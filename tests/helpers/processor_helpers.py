@@ -4,9 +4,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from handrail.collect.lerobot.mpc_step import MaskedMpcStep, mpc_pipeline
-from handrail.collect.lerobot.odometry import moved
-from handrail.collect.lerobot.units import RobotUnits, robot_units
+from handrail.collect.processor.mpc_step import MaskedMpcStep, mpc_pipeline
+from handrail.collect.processor.odometry import moved
+from handrail.collect.processor.units import RobotUnits, robot_units
 from handrail.controllers.robot.model import load_model
 
 PERIOD = 1.0 / 30.0

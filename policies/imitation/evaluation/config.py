@@ -6,7 +6,7 @@ from typing import Annotated
 
 import tyro
 
-from handrail.collect.config import FPS_RANGE, MOST_TIME
+from handrail.collect.config import FIRST_SEED, FPS_RANGE, MOST_TIME
 from handrail.collect.flags import one_of, only_one
 from handrail.collect.perturbations.perturbations import Perturbation
 from handrail.collect.tasks.catalogue import TASKS
@@ -16,7 +16,6 @@ from handrail.datasets.lists import Names, Words
 PROTECTIONS = ("own", "none", "mpc", "filter")
 MOST_WORKERS = 64
 MOST_EPISODES = 1_000_000
-FIRST_SEED = 2**32  # recordings use the numbers below it
 
 
 @dataclass(frozen=True)

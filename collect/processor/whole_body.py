@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from handrail.collect.lerobot.odometry import moved
-from handrail.collect.lerobot.units import Reading, RobotUnits
+from handrail.collect.processor.odometry import moved
+from handrail.collect.processor.units import Reading, RobotUnits
 from handrail.collect.simulation.gate import Gate
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import HandrailError, shown

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from handrail.collect.lerobot.units import RobotUnits, number
+from handrail.collect.processor.units import RobotUnits, number
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import HandrailError, shown, unknown_name
 from handrail.controllers.interface.channels import Channels

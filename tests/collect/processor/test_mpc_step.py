@@ -10,9 +10,9 @@ import pytest
 from places import ROOT
 from processor_helpers import PERIOD, Clock, Drive
 
-from handrail.collect.lerobot.mpc_step import NAME, MaskedMpcStep, load_pipeline
-from handrail.collect.lerobot.odometry import moved
-from handrail.collect.lerobot.units import robot_units
+from handrail.collect.processor.mpc_step import NAME, MaskedMpcStep, load_pipeline
+from handrail.collect.processor.odometry import moved
+from handrail.collect.processor.units import robot_units
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.robot.model import load_model
 
@@ -21,7 +21,7 @@ SCRIPT = """
 import json, sys
 sys.path.insert(0, {helpers!r})
 from processor_helpers import Clock
-from handrail.collect.lerobot.mpc_step import load_pipeline
+from handrail.collect.processor.mpc_step import load_pipeline
 clock = Clock()
 pipeline = load_pipeline(sys.argv[1], clock)
 answers = []

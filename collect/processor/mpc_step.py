@@ -25,10 +25,10 @@ from lerobot.processor.converters import (
     transition_to_robot_action,
 )
 
-from handrail.collect.lerobot.obstacles import parsed_obstacles
-from handrail.collect.lerobot.partial_intent import PartialIntent
-from handrail.collect.lerobot.units import robot_units
-from handrail.collect.lerobot.whole_body import WholeBody
+from handrail.collect.processor.obstacles import parsed_obstacles
+from handrail.collect.processor.partial_intent import PartialIntent
+from handrail.collect.processor.units import robot_units
+from handrail.collect.processor.whole_body import WholeBody
 from handrail.controllers.errors import HandrailError, message_of, shown
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.command import Diagnostics

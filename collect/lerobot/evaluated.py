@@ -1,0 +1,100 @@
+"""The environment that LeRobot's evaluation runs: a task, with or without a controller before the robot."""
+
+from typing import Any
+
+import gymnasium
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import ArrayLike, NDArray
+
+from handrail.collect.config import SessionConfig
+from handrail.collect.envs.env import Observation
+from handrail.collect.lerobot.mode_action import ModeAction
+from handrail.collect.session.build import build_controller, build_env, build_mode
+from handrail.collect.session.driver import Driver
+from handrail.controllers.baselines.direct import DirectController
+from handrail.controllers.interface.channels import Channels
+from handrail.controllers.interface.controller import Controller
+from handrail.controllers.interface.intent import Intent
+
+_HALF = 0.5  # a gripper command beyond it closes
+_MOST = 10.0  # of any channel [m/s, rad/s]
+
+
+class EvaluatedEnv(gymnasium.Wrapper[Observation, NDArray[np.float32], Observation, NDArray[np.float32]]):
+    """A task in which a policy's actions mean what they mean in `handrail-evaluate`.
+
+    An action of joint velocities is clipped to the limits; one of a mode's channels is completed by its
+    controller. A gripper beyond a half closes. An action that is not finite brakes.
+
+    Args:
+        config: of the session.
+        fps: actions a second [Hz].
+        mode: whether actions are the channels of the session's mode.
+        render_size: height and width of `render` [px].
+        first_seed: added to every seed.
+    """
+
+    def __init__(
+        self,
+        config: SessionConfig,
+        fps: int,
+        mode: bool = False,
+        render_size: tuple[int, int] = (128, 128),
+        first_seed: int = 0,
+    ) -> None:
+        env = build_env(config, fps, render_size)
+        super().__init__(env)
+        self._env, self._first_seed = env, first_seed
+        self._channels = Channels.of(env.model.description)
+        self._action, self._controller = self._steered(config, fps) if mode else (None, self._direct())
+        size = len(self._action.names) if self._action else env.model.size + 1
+        self.action_space = spaces.Box(-_MOST, _MOST, (size,), np.float32)
+        self._max_episode_steps = env._max_episode_steps  # LeRobot asks for it
+
+    @property
+    def task(self) -> str:
+        """One sentence: what is to be done; LeRobot's name for it."""
+        return self._env.task_description
+
+    @property
+    def task_description(self) -> str:
+        """One sentence: what is to be done."""
+        return self._env.task_description
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
+        """Begin an episode."""
+        observation, info = self._env.reset(seed=None if seed is None else seed + self._first_seed)
+        self._driver = Driver(self._controller, self._env, self._env.period)
+        self._steps = 0
+        return observation, _plain(info)
+
+    def step(self, action: ArrayLike) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
+        """Do what an action asks for, for one period."""
+        self._driver.drive(self._steps, self._env.state(), self._intent(np.asarray(action, np.float64)))
+        observation, reward, terminated, truncated, info = self._env.step(self._driver.action(self._steps))
+        self._steps += 1
+        return observation, reward, terminated, truncated, _plain(info)
+
+    def _intent(self, numbers: NDArray[np.float64]) -> Intent:
+        time, gripper = self._env.state().time, float(numbers[-1] > _HALF)
+        if self._action:
+            named = dict(zip(self._action.names, [*numbers[:-1], gripper], strict=True))
+            return self._action.intent(named, time)
+        values = np.zeros(self._channels.size)
+        values[self._channels.joint_slice] = numbers[:-1]
+        return Intent(values, self._channels.mask("joint"), gripper, time=time)
+
+    def _direct(self) -> Controller:
+        return DirectController(self._env.model, self._env.period)
+
+    def _steered(self, config: SessionConfig, fps: int) -> tuple[ModeAction, Controller]:
+        mode = build_mode(config, self._env.model)
+        return ModeAction(mode, self._channels), build_controller(mode, self._env.model, fps, config.task)
+
+
+def _plain(info: dict[str, Any]) -> dict[str, Any]:
+    """Return what can be stacked over several environments."""
+    return {"is_success": bool(info["is_success"])}

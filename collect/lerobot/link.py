@@ -1,0 +1,37 @@
+"""How a teleoperator finds the simulated robot that it steers: the one of this process.
+
+LeRobot shows a teleoperator nothing of the robot. A script must see the scene, and a page must draw it.
+"""
+
+import weakref
+from typing import TYPE_CHECKING
+
+from handrail.controllers.errors import HandrailError
+
+if TYPE_CHECKING:
+    from handrail.collect.lerobot.sim import HandrailSim
+
+_newest: list["weakref.ref[HandrailSim]"] = []
+
+
+def announce(robot: "HandrailSim") -> None:
+    """Take note of the robot that was made last."""
+    _newest[:] = [weakref.ref(robot)]
+
+
+def simulated_robot(wanted_by: str) -> "HandrailSim":
+    """Return the robot that was made last.
+
+    Args:
+        wanted_by: name of the teleoperator.
+
+    Raises:
+        HandrailError: there is none.
+    """
+    robot = _newest[0]() if _newest else None
+    if robot is None:
+        raise HandrailError(
+            f"--teleop.type={wanted_by}: expected --robot.type=handrail_sim, which it sees and steers; "
+            "there is no such robot in this process"
+        )
+    return robot

@@ -1,0 +1,91 @@
+"""What LeRobot's action is: the channels of a teleop mode as plain numbers, and back."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from handrail.collect.operators.modes import TeleopMode
+from handrail.controllers.arrays import FloatArray
+from handrail.controllers.errors import HandrailError
+from handrail.controllers.interface.channels import Channels
+from handrail.controllers.interface.intent import Intent
+
+FOCUS, GRIPPER = "focus", "gripper"
+# what a teleoperator presses: in its action beside the channels, and in no dataset
+NEXT, AGAIN, HOLD = "handrail.next", "handrail.again", "handrail.hold"
+BUTTONS = (NEXT, AGAIN, HOLD)
+_HALF = 0.5  # a focus beyond it is the base's, a gripper beyond it closes
+
+
+class ModeAction:
+    """The action of a mode: every channel that it owns with some focus, the focus, and the gripper.
+
+    Args:
+        mode: teleop mode.
+        channels: of the robot.
+
+    Attributes:
+        names: of the numbers; `focus` (0 hand, 1 base) only where the mode makes a difference.
+    """
+
+    def __init__(self, mode: TeleopMode, channels: Channels) -> None:
+        self._mode, self._channels = mode, channels
+        self._hand, self._base = (channels.mask(*mode.groups(focus)) for focus in ("hand", "base"))
+        self._owned = np.flatnonzero(self._hand | self._base)
+        focus = (FOCUS,) if mode.by_focus else ()
+        self.names = (*(channels.names[index] for index in self._owned), *focus, GRIPPER)
+
+    def intent(self, action: Mapping[str, float], time: float) -> Intent:
+        """Return what an action asks for; a number that is not finite becomes an intent that brakes.
+
+        Args:
+            action: by name.
+            time: on the robot's clock [s].
+
+        Raises:
+            HandrailError: one of the names is missing.
+        """
+        numbers = self.numbers(action)
+        values = np.zeros(self._channels.size)
+        values[self._owned] = numbers[: len(self._owned)]
+        mask = self._base if self._mode.by_focus and not numbers[-2] <= _HALF else self._hand
+        return Intent(values, mask, float(numbers[-1]), self._mode.name, time)
+
+    def numbers(self, action: Mapping[str, float]) -> FloatArray:
+        """Return the numbers of an action in the order of `names`, as exact as a dataset keeps them.
+
+        Raises:
+            HandrailError: one is missing.
+        """
+        missing = [name for name in self.names if name not in action]
+        if missing:
+            raise HandrailError(
+                f"action of handrail_sim: expected {', '.join(self.names)} for mode {self._mode.name};"
+                f" missing: {', '.join(missing)}; a teleoperator of Handrail says them all"
+            )
+        return np.array([float(action[name]) for name in self.names], np.float32).astype(np.float64)
+
+    def action(self, intent: Intent, rotation: FloatArray) -> dict[str, float]:
+        """Return an intent as an action, the hand's twist in the world's axes.
+
+        Args:
+            intent: what an operator asks for.
+            rotation: of the tool, (3, 3), for an intent that is meant in its axes.
+        """
+        values = np.where(intent.mask, intent.values, 0.0)
+        if intent.frames.tool == "tool":
+            twist = values[self._channels.tool_slice].reshape(2, 3)
+            values[self._channels.tool_slice] = (twist @ rotation.T).ravel()
+        numbers = [*values[self._owned]]
+        if self._mode.by_focus:
+            numbers.append(float(np.array_equal(intent.mask, self._base)))
+        return dict(zip(self.names, map(float, (*numbers, intent.gripper)), strict=True))
+
+    def still(self, gripper: float = 0.0) -> dict[str, float]:
+        """Return the action of who touches nothing, with the gripper as it is."""
+        return dict.fromkeys(self.names, 0.0) | {GRIPPER: gripper}
+
+
+def pressed(action: Mapping[str, float], buttons: Sequence[str] = BUTTONS) -> str:
+    """Return the button that an action presses; "" if none."""
+    return next((button for button in buttons if float(action.get(button, 0.0)) > _HALF), "")

@@ -1,0 +1,133 @@
+"""The simulated robot as LeRobot's `Robot`: an action is a part of the motion, a controller completes it."""
+
+from contextlib import ExitStack
+from functools import cached_property
+from typing import Any
+
+from lerobot.robots import Robot
+
+from handrail.collect.lerobot.config_sim import HandrailSimConfig
+from handrail.collect.lerobot.link import announce
+from handrail.collect.lerobot.mode_action import AGAIN, HOLD, NEXT, pressed
+from handrail.collect.lerobot.pace import Pace
+from handrail.collect.lerobot.stepwise import Stepwise
+from handrail.controllers.errors import HandrailError
+from handrail.controllers.interface.intent import Intent
+from handrail.controllers.numerics.threads import single_threaded
+
+_REHEARSED = 3  # periods before the first, in which what is compiled at first use is compiled
+
+
+class HandrailSim(Robot):
+    """A robot in MuJoCo with a task; `handrail_sim` in LeRobot's commands.
+
+    Every `send_action` moves it for one period. An action that is not finite brakes, and is counted.
+
+    Args:
+        config: its settings.
+
+    Raises:
+        HandrailError: one is wrong.
+
+    Attributes:
+        stepwise: the session behind it.
+    """
+
+    config_class = HandrailSimConfig
+    name = "handrail_sim"
+
+    def __init__(self, config: HandrailSimConfig) -> None:
+        self._connected = False
+        super().__init__(config)
+        self._config = config
+        self.stepwise = Stepwise(config.session(), config.fps, config.diagnostics)
+        self.cameras = dict.fromkeys(self.stepwise.env.cameras)  # LeRobot counts them
+        self._pace = Pace(1.0 / config.fps)
+        self._open = ExitStack()
+        announce(self)
+
+    @cached_property
+    def observation_features(self) -> dict[str, Any]:
+        """Names of what is observed: numbers, and pictures by camera."""
+        height, width = self.stepwise.env.image_size
+        return dict.fromkeys(self.stepwise.names, float) | dict.fromkeys(self.cameras, (height, width, 3))
+
+    @cached_property
+    def action_features(self) -> dict[str, type]:
+        """Names of the numbers of an action: the mode's channels and the gripper."""
+        return dict.fromkeys(self.stepwise.action.names, float)
+
+    @property
+    def is_connected(self) -> bool:
+        """Whether an episode has begun."""
+        return self._connected
+
+    @property
+    def is_calibrated(self) -> bool:
+        """Nothing is to be calibrated."""
+        return True
+
+    def calibrate(self) -> None:
+        """Do nothing."""
+
+    def configure(self) -> None:
+        """Do nothing."""
+
+    def connect(self, calibrate: bool = True) -> None:
+        """Begin the first episode, everything compiled.
+
+        Raises:
+            HandrailError: it is connected, or cameras are asked for and GL is missing.
+        """
+        if self._connected:
+            raise HandrailError("handrail_sim: expected to be connected once, is connected already")
+        self._open.enter_context(single_threaded())
+        self._open.callback(self.stepwise.close)
+        session = self.stepwise
+        session.begin(self._config.episode)
+        for _ in range(_REHEARSED):
+            session.step(session.action.intent(session.action.still(), session.view.state.time))
+        session.begin(self._config.episode)
+        self._connected = True
+
+    def get_observation(self) -> dict[str, Any]:
+        """Return the robot, the scene, what was sent and how the controller fared; and the pictures."""
+        self._check_connected()
+        return {**self.stepwise.numbers(), **self.stepwise.pictures}
+
+    def send_action(self, action: dict[str, Any]) -> dict[str, Any]:
+        """Do what an action asks for, for one period; return it as it was understood.
+
+        A button beside the channels begins another episode (`handrail.next`), the same one again
+        (`handrail.again`), or brakes and lets time stand still (`handrail.hold`).
+
+        Raises:
+            HandrailError: it is not connected, or the action lacks a channel.
+        """
+        self._check_connected()
+        session = self.stepwise
+        numbers = session.action.numbers(action)
+        if self._config.realtime:
+            self._pace.wait()
+        button = pressed(action)
+        if button in (NEXT, AGAIN):
+            session.begin(session.scene + (button == NEXT))
+        elif button == HOLD:
+            session.hold()
+        else:
+            session.step(self._intent(action))
+        return dict(zip(session.action.names, map(float, numbers), strict=True))
+
+    def _intent(self, action: dict[str, Any]) -> Intent:
+        return self.stepwise.action.intent(action, self.stepwise.view.state.time)
+
+    def disconnect(self) -> None:
+        """Stop the robot and close its world."""
+        self._check_connected()
+        self._connected = False
+        self.stepwise.env.robot.stop()
+        self._open.close()
+
+    def _check_connected(self) -> None:
+        if not self._connected:
+            raise HandrailError("handrail_sim: expected connect() before anything else")

@@ -1,0 +1,134 @@
+"""A session that somebody else's loop runs, one period at a time."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from handrail.collect.commands.record import episode_seed
+from handrail.collect.config import SessionConfig
+from handrail.collect.lerobot.mode_action import ModeAction
+from handrail.collect.operators.modes import MODES
+from handrail.collect.operators.operator import View
+from handrail.collect.session.build import build_controller, build_env, build_mode
+from handrail.collect.session.driver import Driver
+from handrail.controllers.interface.channels import Channels
+from handrail.controllers.interface.command import Diagnostics, Status
+from handrail.controllers.interface.intent import Intent
+from handrail.datasets.recording.frames import finite_distance
+
+_CREEP = 1e-3  # slower, a robot that is held is sent rest [m/s, rad/s]
+_LONG_AGO = -1e6  # when nobody who steers has asked last [s]
+_STATUSES = tuple(Status)
+
+
+class Stepwise:
+    """A robot in its world, a task and a controller; who asks has the loop.
+
+    Args:
+        config: of the session.
+        fps: periods a second [Hz].
+        diagnostics: whether `numbers` says what was sent and how the controller fared.
+
+    Attributes:
+        config: of the session.
+        env: a robot, its world and a task.
+        mode: teleop mode.
+        action: what is asked for every period.
+        scene: number of the episode's beginning.
+        view: what there is to see now.
+        success: whether the task succeeded in this episode.
+        done: whether it is over, as the task judges.
+    """
+
+    view: View
+
+    def __init__(self, config: SessionConfig, fps: int, diagnostics: bool = True) -> None:
+        self.config, self.fps, self._told = config, fps, diagnostics
+        self.env = build_env(config, fps)
+        self.mode = build_mode(config, self.env.model)
+        self.action = ModeAction(self.mode, Channels.of(self.env.model.description))
+        self._controller = build_controller(self.mode, self.env.model, fps, config.task)
+        self._steps = self.brakes = 0
+        self.scene, self.success, self.done = -1, False, False
+
+    def begin(self, scene: int) -> None:
+        """Begin an episode in a scene, by its number: the same number, the same beginning."""
+        self.scene, self._steps, self.brakes = scene, 0, 0
+        self._observation, self._info = self.env.reset(seed=self.seed)
+        self._driver = Driver(self._controller, self.env, self.env.period)
+        self._diagnostics = Diagnostics()
+        self.success = self.done = False
+        self._look()
+
+    @property
+    def seed(self) -> int:
+        """Of the episode."""
+        return episode_seed(self.config.seed, self.scene)
+
+    def step(self, intent: Intent) -> None:
+        """Let the controller complete an intent, and the robot move for a period."""
+        self._move(intent)
+
+    def hold(self) -> None:
+        """Brake; once the robot rests, time stands still."""
+        if np.any(self.view.state.commanded):
+            nothing = Intent.idle(Channels.of(self.env.model.description), _LONG_AGO)
+            self._move(replace(nothing, gripper=self.gripper, mode=self.mode.name), stops=True)
+
+    @property
+    def gripper(self) -> float:
+        """What the gripper was sent last, 0 open, 1 closed."""
+        return float(self._info["sent"][-1])
+
+    def _move(self, intent: Intent, stops: bool = False) -> None:
+        self._driver.drive(self._steps, self.view.state, intent)
+        self._diagnostics = self._driver.command.diagnostics
+        self.brakes += Status(self._diagnostics.status).brakes
+        sent = self._driver.action(self._steps)
+        if stops and np.abs(sent[:-1]).max() < _CREEP:
+            sent[:-1] = 0.0  # a controller may come ever nearer to rest
+        self._observation, _, terminated, truncated, self._info = self.env.step(sent)
+        self._steps += 1
+        self.success |= bool(self._info["is_success"])
+        self.done |= terminated or truncated
+        self._look()
+
+    def _look(self) -> None:
+        self.view = View(self.env.robot.state(), self.env.task_state(), self._observation)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of `numbers`."""
+        seen = (*self.env.agent_names, *self.env.state_names)
+        if not self._told:
+            return seen
+        sent = (f"sent.{name}" for name in (*self.env.model.joints, "gripper"))
+        return (*seen, *sent, "mode", "status", "distance", "contacts", "brakes", "success", "scene")
+
+    def numbers(self) -> dict[str, float]:
+        """Return the robot, the scene, what was sent in the last period, and how the controller fared.
+
+        The mode is its place in the list of modes, −1 for a mask of one's own; the status that of `Status`;
+        the distance the smallest one now, cut to 10 m.
+        """
+        seen = self._observation
+        numbers = [*seen["agent_pos"], *seen["environment_state"]]
+        if self._told:
+            modes = list(MODES)
+            mode = modes.index(self.mode.name) if self.mode.name in modes else -1
+            status = _STATUSES.index(Status(self._diagnostics.status))
+            distance = finite_distance(self._diagnostics.smallest_distance)
+            contacts = self._info["contacts"]
+            told = (mode, status, distance, contacts, self.brakes, self.success, self.scene)
+            numbers += [*self._info["sent"], *told]
+        return dict(zip(self.names, map(float, numbers), strict=True))
+
+    @property
+    def pictures(self) -> dict[str, Any]:
+        """What the cameras see, (height, width, 3) uint8 each."""
+        return dict(self._observation.get("pixels", {}))
+
+    def close(self) -> None:
+        """Give the pictures' contexts back."""
+        self.env.close()

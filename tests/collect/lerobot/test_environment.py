@@ -1,0 +1,60 @@
+"""LeRobot's evaluation runs our tasks: features are what there is to see, seeds are never a recording's."""
+
+import numpy as np
+import pytest
+from lerobot.envs.factory import make_env, make_env_config
+from lerobot.envs.utils import env_to_policy_features, preprocess_observation
+
+from handrail.collect.config import FIRST_SEED, SessionConfig
+from handrail.collect.session.build import build_env
+from handrail.collect.tasks.catalogue import TASKS
+from handrail.controllers.errors import HandrailError
+
+
+def made(**settings):
+    config = make_env_config("handrail", **settings)
+    return config, make_env(config, n_envs=1)["handrail"][0]
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_what_a_policy_reads_is_what_its_features_say(task):
+    config, env = made(task=task)
+    features = env_to_policy_features(config)
+    observation, _ = env.reset(seed=[3])
+    seen = preprocess_observation(observation)
+    assert {key: values.shape[1:] for key, values in seen.items()} == {
+        key: feature.shape for key, feature in features.items() if key != "action"
+    }
+    assert env.single_action_space.shape == features["action"].shape
+    assert env.call("_max_episode_steps")[0] > 0
+    with_nan, *_ = env.step(np.full(env.action_space.shape, np.nan, np.float32))
+    assert np.isfinite(with_nan["agent_pos"]).all()
+    env.close()
+
+
+def test_an_episode_is_that_of_handrail_evaluate():
+    _, env = made(task="reach")
+    observation, _ = env.reset(seed=[5])
+    ours = build_env(SessionConfig(task="reach"), 20)
+    expected, _ = ours.reset(seed=FIRST_SEED + 5)
+    np.testing.assert_array_equal(observation["environment_state"][0], expected["environment_state"])
+    env.close()
+
+
+def test_actions_of_a_mode_are_completed():
+    config, env = made(task="reach", mode="ee")
+    assert config.features["action"].shape == (7,)
+    observation, _ = env.reset(seed=[5])
+    for _ in range(20):
+        after, *_ = env.step(np.array([[0.2, 0, 0, 0, 0, 0, 0]], np.float32))
+    names = env.get_attr("unwrapped")[0].agent_names
+    moved = {name: after["agent_pos"][0][i] - observation["agent_pos"][0][i] for i, name in enumerate(names)}
+    assert moved["tool.x"] > 0.1
+    assert abs(moved["tool.y"]) < 0.01
+    env.close()
+
+
+@pytest.mark.parametrize("wrong", [{"task": "reech"}, {"mode": "hand"}, {"render_size": 17}])
+def test_a_wrong_setting_is_named(wrong):
+    with pytest.raises(HandrailError, match=str(*wrong.values())):
+        make_env_config("handrail", **wrong)
