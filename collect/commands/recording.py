@@ -1,5 +1,6 @@
 """A session whose episodes become a dataset: what `handrail-record` and a user study share."""
 
+import contextlib
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any, Protocol
@@ -7,7 +8,13 @@ from typing import Any, Protocol
 from handrail.collect.commands.interrupts import Interrupts
 from handrail.collect.config import RecordConfig
 from handrail.collect.envs.env import HandrailEnv
-from handrail.collect.session.build import build_modes, build_session, session_features, software_versions
+from handrail.collect.session.build import (
+    build_env,
+    build_modes,
+    build_session,
+    session_features,
+    software_versions,
+)
 from handrail.collect.session.outcome import Outcome
 from handrail.collect.session.recorded_settings import COLUMN as SETTINGS
 from handrail.collect.session.recorded_settings import settings_json
@@ -57,10 +64,16 @@ class Recording:
         self._observers: list[EpisodeObserver] = [recorder, *displays, *people]
         self._session = build_session(config, env, self._observers, config.dataset.fps, *people)
         self._rehearsal = Rehearsal(env.model, build_modes(config, env))
+        self._config, self._real = replace(config, cameras=""), env.real
 
     def warm_up(self, seed: int) -> None:
-        """Compile what an update needs, before somebody waits for it in real time."""
-        self._session.warm_up(seed, self._rehearsal)
+        """Compile what an update needs, before somebody waits for it in real time; no robot moves."""
+        if not self._real:
+            self._session.warm_up(seed, self._rehearsal)
+            return
+        fps = self._config.dataset.fps
+        with contextlib.closing(build_env(self._config, fps)) as simulated:
+            build_session(self._config, simulated, (), fps, *self.people).warm_up(seed, self._rehearsal)
 
     def episode(
         self,

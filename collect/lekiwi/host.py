@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from handrail.collect.envs.env import HandrailEnv
-from handrail.collect.lekiwi.host_config import HostConfig
 from handrail.collect.lekiwi.body import LeKiwiBody
+from handrail.collect.lekiwi.host_config import HostConfig
 from handrail.collect.lekiwi.host_loop import LeKiwiLoop
 from handrail.collect.processor.units import robot_units
 from handrail.collect.tasks.catalogue import TASKS

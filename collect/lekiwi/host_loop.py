@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from handrail.collect.lekiwi.host_config import HostConfig
 from handrail.collect.lekiwi.body import LeKiwiBody
-from handrail.collect.processor.units import number
+from handrail.collect.lekiwi.host_config import HostConfig
 from handrail.collect.lekiwi.wire import Wire
+from handrail.collect.processor.units import number
 
 EPISODE, SEED, SENT = "handrail.episode", "handrail.seed", "handrail.sent"  # a real host overlooks these
 _QUALITY = 90  # of the JPEGs, as LeRobot's host has it

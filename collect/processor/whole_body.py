@@ -38,6 +38,7 @@ class WholeBody:
     Attributes:
         trouble: what is wrong with the observation now; empty if nothing is.
         targets: where the arm's joints are sent, (n − b,) [rad, m].
+        sent: the command sent last, inside the limits, (n + 1,).
     """
 
     def __init__(self, model: RobotModel, units: RobotUnits, period: float, timeout: float = 0.25) -> None:
@@ -60,7 +61,12 @@ class WholeBody:
         self._heard, self._time, self._sent_at = -math.inf, -math.inf, -math.inf
         self._held = np.zeros(self._model.size, dtype=bool)
         self._twist, self.trouble, self._grip = np.zeros(3), "", 0.0
+        self.sent = np.zeros(self._model.size + 1)
         self.targets = np.zeros(self._model.size - self._b)
+
+    def place(self, base: ArrayLike) -> None:
+        """Take the base to be somewhere now, (3,) [m, rad]; the robot has no odometry of its own."""
+        self._base, self._heard = np.array(base, dtype=np.float64), self._time
 
     @property
     def velocity(self) -> FloatArray:
@@ -111,7 +117,7 @@ class WholeBody:
             self._gate.velocity[b:][self._units.sends_position] = 0.0
         self._sent_at = self._time
         before = self._gate.velocity
-        self._gate.limit(command, np.append(base, self.targets))
+        self.sent = self._gate.limit(command, np.append(base, self.targets))
         way = 0.5 * self._period * (before + self._gate.velocity)[b:]
         wanted, arm = self.targets + way, self._reading.arm
         self.targets = np.clip(wanted, arm - _LEAD, arm + _LEAD)

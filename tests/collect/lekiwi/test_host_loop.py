@@ -9,11 +9,11 @@ import pytest
 from command_helpers import command
 
 from handrail.collect.envs.env import HandrailEnv
-from handrail.collect.lekiwi.host_config import HostConfig
 from handrail.collect.lekiwi.body import LeKiwiBody
+from handrail.collect.lekiwi.host_config import HostConfig
 from handrail.collect.lekiwi.host_loop import EPISODE, SEED, SENT, LeKiwiLoop
-from handrail.collect.processor.units import robot_units
 from handrail.collect.lekiwi.wire import Wire
+from handrail.collect.processor.units import robot_units
 from handrail.collect.tasks.reach import Reach
 
 STILL = {"x.vel": 0.0, "y.vel": 0.0, "theta.vel": 0.0}
