@@ -195,6 +195,7 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             poses=now.poses(),
             still=now.still(),
             stable=now.is_stable,
+            scale=self.model.description.world.scale,
         )
 
     def reset(

@@ -1,4 +1,4 @@
-"""The arm's meshes as a camera sees them: STL files, split into their pieces, coloured."""
+"""The arm's meshes as a camera sees them: STL files, coloured as the URDF says, or by their pieces' form."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -15,6 +15,7 @@ from handrail.controllers.errors import HandrailError
 from handrail.controllers.robot.model import RobotModel
 
 _TUBE, _JOINT, _CAP = (0.80, 0.81, 0.83, 1.0), (0.42, 0.44, 0.47, 1.0), (0.32, 0.56, 0.76, 1.0)
+_GRID, _FINE = 1e-3, 10_000  # a mesh of more triangles is drawn with its vertices on a grid [m]
 _TRIANGLE = np.dtype([("normal", "<3f4"), ("vertices", "<9f4"), ("attribute", "<u2")])
 
 
@@ -32,18 +33,21 @@ class PlacedMesh:
     """A link's mesh: its pieces, and its placement in the frame of a pinocchio joint."""
 
     name: str
+    link: str
     joint: int
     placement: pin.SE3
     pieces: tuple[Piece, ...]
 
 
 def placed_meshes(model: RobotModel) -> Iterator[PlacedMesh]:
-    """Yield the collision meshes that the robot's URDF names."""
+    """Yield the collision meshes that the URDF names, in the colour of a visual one of the same file."""
     description = model.description
     arm = pin.buildModelFromUrdf(str(description.urdf))
-    geometry = pin.buildGeomFromUrdf(
-        arm, str(description.urdf), pin.COLLISION, package_dirs=[str(description.mesh_root)]
+    geometry, seen = (
+        pin.buildGeomFromUrdf(arm, str(description.urdf), kind, package_dirs=[str(description.mesh_root)])
+        for kind in (pin.COLLISION, pin.VISUAL)
     )
+    colours = {item.meshPath: tuple(map(float, item.meshColor)) for item in seen.geometryObjects}
     for item in geometry.geometryObjects:
         path = Path(item.meshPath)
         if not path.is_file():
@@ -51,7 +55,23 @@ def placed_meshes(model: RobotModel) -> Iterator[PlacedMesh]:
         link = arm.frames[item.parentFrame]
         frame = model.pinocchio.frames[model.pinocchio.getFrameId(link.name, pin.FrameType.BODY)]
         placement = frame.placement * (link.placement.inverse() * item.placement)
-        yield PlacedMesh(item.name, frame.parentJoint, placement, _pieces(path, item.meshScale))
+        rgba = colours.get(item.meshPath)
+        pieces = _pieces(path, item.meshScale) if rgba is None else _whole(path, item.meshScale, rgba)
+        yield PlacedMesh(item.name, link.name, frame.parentJoint, placement, pieces)
+
+
+def _whole(path: Path, scale: FloatArray, rgba: tuple[float, ...]) -> tuple[Piece, ...]:
+    """Return a binary STL file as one piece of a colour, without details that nobody sees."""
+    vertices, faces = _read_stl(path)
+    vertices = vertices * scale
+    if len(faces) > _FINE:
+        vertices, index = np.unique((vertices / _GRID).round(), axis=0, return_inverse=True)
+        faces, vertices = index.ravel()[faces], vertices * _GRID
+        corners = np.sort(faces, axis=1)
+        whole = (corners[:, 0] < corners[:, 1]) & (corners[:, 1] < corners[:, 2])
+        faces = faces[np.unique(np.where(whole[:, None], corners, 0), axis=0, return_index=True)[1]]
+        faces = faces[np.ptp(faces, axis=1) > 0]
+    return (Piece(vertices, faces, (rgba[0], rgba[1], rgba[2], rgba[3])),)
 
 
 def _pieces(path: Path, scale: FloatArray) -> tuple[Piece, ...]:

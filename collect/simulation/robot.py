@@ -12,10 +12,11 @@ import pinocchio as pin
 from handrail.collect.simulation import geometry
 from handrail.collect.simulation.gl import MjsBody, MjSpec, mujoco
 from handrail.collect.simulation.gripper import add_gripper
+from handrail.collect.simulation.jaw import JAW
 from handrail.collect.simulation.meshes import placed_meshes
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.numerics.rotation import quaternion_from_matrix
-from handrail.controllers.robot.description import PlacedShape, Placement
+from handrail.controllers.robot.description import Gripper, PlacedShape, Placement
 from handrail.controllers.robot.model import RobotModel
 from handrail.controllers.robot.scene_shapes import floor_shapes
 
@@ -32,11 +33,13 @@ class RobotSpec:
         spec: bodies, joints, actuators, cameras of the robot.
         contact_geoms: names of its geoms that collide.
         grasp_geoms: those that may touch movable things: fingers and palm.
+        finger_joints: names of the joints by which its fingers move; none where they do not.
     """
 
     spec: MjSpec
     contact_geoms: tuple[str, ...]
     grasp_geoms: tuple[str, ...]
+    finger_joints: tuple[str, ...]
 
 
 class Mounts:
@@ -72,17 +75,45 @@ def build_robot(model: RobotModel, meshes: bool = True, grips: bool = True) -> R
     mounts.bodies[tool.parentJoint].add_site(name="tool", group=4, **at)
     contact = _add_contact_shapes(model, mounts)
     gripper = model.description.gripper
+    jaw = None
     if gripper is not None:
-        add_gripper(spec, gripper, *mounts.place(gripper.frame, gripper.placement), grips)
+        jaw = _add_hand(spec, model, gripper, mounts, grips)
         contact += FINGERS
     _add_pairs(spec, model)
     _add_servos(spec, model)
     if meshes:
-        _add_meshes(spec, model, mounts)
+        _add_meshes(spec, model, mounts, jaw)
         for index, shape in enumerate(model.description.visual):
             ghost = _ghost(geometry.VISIBLE_GROUP)
             _add_shape(mounts, shape, name=f"visual_{index}", rgba=shape.rgba, **ghost)
-    return RobotSpec(spec, contact, _grasp_geoms(model, contact))
+    return RobotSpec(spec, contact, _grasp_geoms(model, contact), _finger_joints(gripper, grips))
+
+
+def _add_hand(
+    spec: MjSpec, model: RobotModel, gripper: Gripper, mounts: Mounts, grips: bool
+) -> tuple[str, MjsBody, pin.SE3] | None:
+    """Add the gripper; return the URDF's link that turns, its body, and where its zero is on the hand's body.
+
+    Raises:
+        HandrailError: the jaw is not on the body that carries the gripper.
+    """
+    body, frame = mounts.place(gripper.frame, gripper.placement)
+    if gripper.jaw is None:
+        add_gripper(spec, gripper, body, frame, None, grips)
+        return None
+    carrier, zero = mounts.place(gripper.jaw.frame, Placement(np.zeros(3), np.eye(3)))
+    if carrier is not body:
+        raise HandrailError(
+            f"jaw of robot {model.description.name}: expected a frame on the link of {gripper.frame!r}, "
+            f"got {gripper.jaw.frame!r}"
+        )
+    return gripper.jaw.frame, add_gripper(spec, gripper, body, frame, zero, grips), zero
+
+
+def _finger_joints(gripper: Gripper | None, grips: bool) -> tuple[str, ...]:
+    if gripper is None or not grips:
+        return ()
+    return FINGERS if gripper.jaw is None else (JAW,)
 
 
 def _ghost(group: int) -> dict[str, int]:
@@ -209,8 +240,13 @@ def _add_servos(spec: MjSpec, model: RobotModel) -> None:
         servo.set_to_velocity(kv=gain)
 
 
-def _add_meshes(spec: MjSpec, model: RobotModel, mounts: Mounts) -> None:
+def _add_meshes(
+    spec: MjSpec, model: RobotModel, mounts: Mounts, jaw: tuple[str, MjsBody, pin.SE3] | None
+) -> None:
     for mesh in placed_meshes(model):
+        body, placement = mounts.bodies[mesh.joint], mesh.placement
+        if jaw is not None and mesh.link == jaw[0]:
+            body, placement = jaw[1], jaw[2].actInv(placement)
         for index, piece in enumerate(mesh.pieces):
             name = f"{mesh.name}_{index}"
             spec.add_mesh(
@@ -219,13 +255,13 @@ def _add_meshes(spec: MjSpec, model: RobotModel, mounts: Mounts) -> None:
                 userface=piece.faces.ravel(),
                 inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL,
             )
-            mounts.bodies[mesh.joint].add_geom(
+            body.add_geom(
                 name=name,
                 type=mujoco.mjtGeom.mjGEOM_MESH,
                 meshname=name,
                 rgba=piece.rgba,
                 **_ghost(geometry.VISIBLE_GROUP),
-                **geometry.pose(mesh.placement.translation, mesh.placement.rotation),
+                **geometry.pose(placement.translation, placement.rotation),
             )
 
 

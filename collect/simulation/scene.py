@@ -144,6 +144,11 @@ class Viewpoint:
     target: tuple[float, float, float] = (0.0, 0.0, 0.6)
     fovy: float = 50.0
 
+    def scaled(self, scale: float) -> "Viewpoint":
+        """Return the view of a world of another scale."""
+        position, target = ((x * scale, y * scale, z * scale) for x, y, z in (self.position, self.target))
+        return Viewpoint(position, target, self.fovy)
+
 
 @dataclass(frozen=True)
 class Scene:

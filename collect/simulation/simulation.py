@@ -80,11 +80,11 @@ class Simulation:
         fingers = FINGERS if self._gripper else ()
         portable = [item.name for item in scene.movables if item.portable]
         self._grasp = GraspMonitor(self.mujoco_model, fingers, portable)
-        self._index()
+        self._index(robot.finger_joints)
         self._gate = gate or Gate(model, step, float(grip is not None))
         self._place(q, grip)
 
-    def _index(self) -> None:
+    def _index(self, fingers: tuple[str, ...]) -> None:
         """Find where the robot is in MuJoCo's arrays."""
         compiled, names = self.mujoco_model, self._model.joints
         self._q_index = _span([compiled.joint(name).qposadr[0] for name in names])
@@ -92,11 +92,12 @@ class Simulation:
         self._servo_index = np.array([compiled.actuator(name).id for name in names])
         self._tool = compiled.site("tool").id
         gripper = self._gripper
-        self._stroke = gripper.stroke if gripper else 0.0
-        self._speed = gripper.speed if gripper else 0.0
+        self._travel = gripper.travel if gripper else 0.0
+        self._speed = gripper.pace if gripper else 0.0
+        self._beyond = gripper.beyond if gripper else 0.0
         self._gripper_servo = -1
         if gripper:
-            self._finger_index = np.array([compiled.joint(name).qposadr[0] for name in FINGERS])
+            self._finger_index = np.array([compiled.joint(name).qposadr[0] for name in fingers])
             self._gripper_servo = compiled.actuator("gripper").id
         bodies = {item.name: int(compiled.body(item.name).mocapid[0]) for item in self._scene.movers}
         self._patrols = [(bodies[item.name], item.patrol) for item in self._scene.movers if item.patrol]
@@ -104,8 +105,9 @@ class Simulation:
     def _place(self, q: FloatArray, grip: float | None) -> None:
         """Put the robot at q, the gripper open, or closed around something of width `grip` [m]."""
         self.data.qpos[self._q_index] = q
-        if self._stroke:
-            self.data.qpos[self._finger_index] = (self._stroke if grip is None else grip) / 2
+        if self._gripper:
+            apart = self._travel if grip is None else grip * (self._travel / self._gripper.stroke)
+            self.data.qpos[self._finger_index] = apart / len(self._finger_index)
             self.data.ctrl[self._gripper_servo] = self._gripper_target(0.0 if grip is None else 1.0)
         mujoco.mj_forward(self.mujoco_model, self.data)
 
@@ -177,8 +179,8 @@ class Simulation:
         return _ramp(self.data.ctrl, before, self._gate.velocity, self._shares, self._servo_index, fingers)
 
     def _gripper_target(self, gripper: float) -> float:
-        """Return the opening that the gripper's servo is sent to [m]; closed is a little beyond touching."""
-        return (1.0 - gripper) * self._stroke - 0.01 * gripper
+        """Return the opening that the gripper's servo is sent to [m, rad]; closed is a little beyond it."""
+        return (1.0 - gripper) * self._travel - self._beyond * gripper
 
     def _move_obstacles(self) -> None:
         """Put what moves by itself where it is now."""
@@ -206,7 +208,7 @@ class Simulation:
         """How far the gripper is open, from 0 to 1; 0 for a robot without one."""
         if self._gripper is None:
             return float(self._model.description.gripper is not None)
-        return float(np.clip(self.data.qpos[self._finger_index].sum() / self._stroke, 0.0, 1.0))
+        return float(np.clip(self.data.qpos[self._finger_index].sum() / self._travel, 0.0, 1.0))
 
     @property
     def is_stable(self) -> bool:

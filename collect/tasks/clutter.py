@@ -42,21 +42,22 @@ def sample_obstacles(
         model: of the robot.
         q: where it starts, (n,).
         rng: drawn from.
-        clearance: between the robot's start and an obstacle, and between obstacles [m].
+        clearance: between the robot's start and an obstacle, and between obstacles, at scale 1 [m].
 
     Raises:
         HandrailError: there is no room for them.
     """
     wanted = int(rng.integers(2, MOST_OBSTACLES + 1))
     start, reach = _start_circle(model, q)
+    scale = model.description.world.scale
     placed: list[SceneObject] = []
     for _ in range(1000):
         if len(placed) == wanted:
             return placed
-        item = _sample_obstacle(f"{_PREFIX}_{len(placed)}", rng)
+        item = _sample_obstacle(f"{_PREFIX}_{len(placed)}", scale, rng)
         circles = [(start, reach), *((other.position[:2], footprint(other)) for other in placed)]
         if all(
-            np.linalg.norm(item.position[:2] - centre) > radius + footprint(item) + clearance
+            np.linalg.norm(item.position[:2] - centre) > radius + footprint(item) + clearance * scale
             for centre, radius in circles
         ):
             placed.append(item)
@@ -66,12 +67,12 @@ def sample_obstacles(
     )
 
 
-def _sample_obstacle(name: str, rng: np.random.Generator) -> SceneObject:
-    x, y = rng.uniform([-0.4, -0.45], [0.5, 0.45])
-    height = rng.uniform(0.2, 0.5)
+def _sample_obstacle(name: str, scale: float, rng: np.random.Generator) -> SceneObject:
+    x, y = scale * rng.uniform([-0.4, -0.45], [0.5, 0.45])
+    height = scale * rng.uniform(0.2, 0.5)
     if rng.random() < 0.6:
-        return pillar(name, x, y, rng.uniform(0.10, 0.18), height)
-    width, depth = rng.uniform(0.16, 0.26, 2)
+        return pillar(name, x, y, scale * rng.uniform(0.10, 0.18), height)
+    width, depth = scale * rng.uniform(0.16, 0.26, 2)
     return crate(name, x, y, rng.uniform(-np.pi / 4, np.pi / 4), (width, depth, height))
 
 

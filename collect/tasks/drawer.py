@@ -6,7 +6,7 @@ import numpy as np
 
 from handrail.collect.simulation.scene import Scene, Viewpoint
 from handrail.collect.tasks.cabinet import HANDLE, cabinet, drawer, inward
-from handrail.collect.tasks.starts import near_home
+from handrail.collect.tasks.starts import check_large, near_home
 from handrail.collect.tasks.task import Start, TaskState, Verdict
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.robot.model import RobotModel
@@ -37,7 +37,12 @@ class Drawer:
         return (*names, "inward.nx", "inward.ny", "drawer.opening", *(f"cabinet.{axis}" for axis in "xyz"))
 
     def sample(self, model: RobotModel, rng: np.random.Generator) -> Start:
-        """Draw the cabinet, then the robot's start."""
+        """Draw the cabinet, then the robot's start.
+
+        Raises:
+            HandrailError: the robot is too small for the cabinet.
+        """
+        check_large(model, "Drawer")
         x, y = 0.95 + rng.uniform(-0.1, 0.1), rng.uniform(-0.6, 0.6)
         body = cabinet("cabinet", x, y, rng.uniform(-0.3, 0.3), rng.uniform(0.76, 0.95))
         return Start(Scene((body, drawer("drawer", body)), _VIEW), near_home(model, rng))

@@ -17,10 +17,10 @@ _TRAY: Colour = (0.30, 0.55, 0.42, 1.0)
 TRAY_BAR = 0.03  # width and height of a tray's handle [m]
 
 
-def table(name: str, x: float, y: float, size: tuple[float, float, float]) -> SceneObject:
+def table(name: str, x: float, y: float, size: tuple[float, float, float], scale: float = 1.0) -> SceneObject:
     """Return a solid table on the floor, centred at x, y; size is depth, width, height [m]."""
     depth, width, height = size
-    slab, inset = 0.04, 0.03
+    slab, inset = 0.04 * scale, 0.03 * scale
     parts = (
         Part(box([depth, width, slab]), np.array([0.0, 0.0, (height - slab) / 2])),
         Part(
@@ -46,9 +46,11 @@ def cube(name: str, x: float, y: float, bottom: float, yaw: float, edge: float, 
     )
 
 
-def open_bin(name: str, x: float, y: float, bottom: float, inner: float, height: float) -> SceneObject:
-    """Return a square bin without a lid, 1 cm thick; to the controller it is one box [m]."""
-    wall = 0.01
+def open_bin(
+    name: str, x: float, y: float, bottom: float, inner: float, height: float, scale: float = 1.0
+) -> SceneObject:
+    """Return a square bin without a lid, 1 cm · scale thick; to the controller it is one box [m]."""
+    wall = 0.01 * scale
     outer = inner + 2 * wall
     parts = [Part(box([outer, outer, wall]), np.array([0.0, 0.0, (wall - height) / 2]))]
     for sign in (-1.0, 1.0):

@@ -19,12 +19,13 @@ ORIENTATION_TOLERANCE = 0.05  # largest d_r of a success
 
 _SHORTEST = 300  # shortest motion of the planner [steps]
 _SPEED = 0.08  # of the planner over long distances [m/s]
+type Place = tuple[float, float, float]
 _LOWER, _UPPER = (-1.0, -1.0, 0.7), (1.0, 1.0, 1.0)  # of goals [m]
 
 
-def sample_goal(rng: np.random.Generator) -> Pose:
+def sample_goal(rng: np.random.Generator, lower: Place = _LOWER, upper: Place = _UPPER) -> Pose:
     """Draw a goal: x, y ∈ [−1, 1] m, z ∈ [0.7, 1.0] m, a normalised uniform-cube axis, an angle in [0, π]."""
-    position = rng.uniform(_LOWER, _UPPER)
+    position = rng.uniform(lower, upper)
     axis = rng.uniform(-1.0, 1.0, 3)
     axis /= np.linalg.norm(axis)
     return Pose(position, pin.exp3(axis * rng.uniform(0.0, np.pi)))

@@ -36,7 +36,7 @@ def mover_features(scene: Scene, time: float, count: int) -> FloatArray:
 def sample_movers(
     count: int, model: RobotModel, q: FloatArray, rng: np.random.Generator
 ) -> list[SceneObject]:
-    """Draw cylinders that pass through the middle of the workspace, in any direction, at up to 0.5 m/s.
+    """Draw cylinders that pass through the workspace's middle, in any direction, at up to 0.5 m/s · scale.
 
     Args:
         count: how many.
@@ -44,23 +44,23 @@ def sample_movers(
         q: where the robot starts, (n,); no mover starts near its base.
         rng: drawn from.
     """
-    base = model.pose(q, "planar_base").position[:2]
+    base, scale = model.pose(q, "planar_base").position[:2], model.description.world.scale
     movers: list[SceneObject] = []
     while len(movers) < count:
-        item = _sample_mover(f"mover_{len(movers)}", rng)
-        if np.linalg.norm(item.position[:2] - base) > _APART + footprint(item):
+        item = _sample_mover(f"mover_{len(movers)}", scale, rng)
+        if np.linalg.norm(item.position[:2] - base) > _APART * scale + footprint(item):
             movers.append(item)
     return movers
 
 
-def _sample_mover(name: str, rng: np.random.Generator) -> SceneObject:
-    """Return a mover that begins 1.5 to 2 m before a point of the workspace and turns 3 m behind it."""
-    radius, height = rng.uniform(0.1, 0.2), rng.uniform(0.3, 1.5)
+def _sample_mover(name: str, scale: float, rng: np.random.Generator) -> SceneObject:
+    """Return a mover from 1.5 to 2 m · scale before a point of the workspace to 3 m · scale behind it."""
+    radius, height = scale * rng.uniform(0.1, 0.2), scale * rng.uniform(0.3, 1.5)
     angle = rng.uniform(-np.pi, np.pi)
     ahead = np.array([np.cos(angle), np.sin(angle), 0.0])
-    middle = np.array([*rng.uniform([-1.2, -0.8], [0.6, 0.8]), height / 2])
-    start, end = middle - rng.uniform(1.5, 2.0) * ahead, middle + 3.0 * ahead
-    patrol = Patrol(start, end, rng.uniform(_SLOWEST, FASTEST))
+    middle = np.array([*(scale * rng.uniform([-1.2, -0.8], [0.6, 0.8])), height / 2])
+    start, end = middle - scale * rng.uniform(1.5, 2.0) * ahead, middle + 3.0 * scale * ahead
+    patrol = Patrol(start, end, scale * rng.uniform(_SLOWEST, FASTEST))
     return SceneObject(
         name, Shape("cylinder", np.array([radius, height])), start, rgba=_COLOUR, patrol=patrol
     )

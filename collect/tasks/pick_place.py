@@ -11,9 +11,10 @@ from handrail.collect.tasks.starts import near_home
 from handrail.collect.tasks.task import Start, TaskState, Verdict
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.numerics.rotation import quaternion_from_matrix
+from handrail.controllers.robot.description import World
 from handrail.controllers.robot.model import RobotModel
 
-_EDGE, _MASS = 0.05, 0.1  # of the cube [m], [kg]
+_MASS = 0.1  # of a cube of 5 cm [kg]
 _BIN_HEIGHT = 0.10
 _POSE = ("x", "y", "z", "qw", "qx", "qy", "qz")
 _VIEW = Viewpoint(position=(3.0, 0.0, 3.5), target=(0.05, 0.0, 0.2), fovy=56.0)
@@ -21,7 +22,7 @@ _VIEW = Viewpoint(position=(3.0, 0.0, 3.5), target=(0.05, 0.0, 0.2), fovy=56.0)
 
 @dataclass(frozen=True)
 class PickPlace:
-    """The tables are 2.7 m apart, farther than the arm reaches, so the base has to drive.
+    """The tables are 2.7 m · scale apart, farther than the arm reaches, so the base has to drive.
 
     Success: the cube at rest inside the bin, the gripper open and away from it.
     Failure: the cube on the floor.
@@ -29,7 +30,7 @@ class PickPlace:
     Attributes:
         description: what the operator is asked to do.
         horizon: time limit [s].
-        clearance: between the robot's start and anything on the floor, and between obstacles [m].
+        clearance: between the robot's start and anything on the floor, and between obstacles, at scale 1 [m].
     """
 
     description: str = "Pick up the cube and put it into the bin on the other table."
@@ -45,18 +46,18 @@ class PickPlace:
 
     def sample(self, model: RobotModel, rng: np.random.Generator) -> Start:
         """Draw tables, cube, bin, obstacles and the robot's start."""
-        side = rng.choice([-1.0, 1.0])
-        cube_table = _sample_table("cube_table", side, rng)
-        bin_table = _sample_table("bin_table", -side, rng)
+        side, world = rng.choice([-1.0, 1.0]), model.description.world
+        cube_table = _sample_table("cube_table", side, world, rng)
+        bin_table = _sample_table("bin_table", -side, world, rng)
         q = near_home(model, rng)
         objects = (
             cube_table,
             bin_table,
-            _sample_cube(cube_table, rng),
-            _sample_bin(bin_table, rng),
+            _sample_cube(cube_table, world, rng),
+            _sample_bin(bin_table, world, rng),
             *sample_obstacles(model, q, rng, self.clearance),
         )
-        return Start(Scene(objects, _VIEW), q)
+        return Start(Scene(objects, _VIEW.scaled(world.scale)), q)
 
     def features(self, state: TaskState) -> FloatArray:
         """Return the numbers that `state_names` names, (28,)."""
@@ -70,29 +71,31 @@ class PickPlace:
     def outcome(self, state: TaskState) -> Verdict:
         """Judge where the cube is, whether it rests, and where the gripper is."""
         position = state.pose("cube").position
-        if position[2] < 2 * _EDGE:
+        if position[2] < 2 * state.object("cube").shape.size[0]:
             return Verdict(failure="dropped")
         rests = _inside_bin(state, position) and "cube" in state.still
         return Verdict(success=rests and state.let_go(position))
 
 
-def _sample_table(name: str, side: float, rng: np.random.Generator) -> SceneObject:
+def _sample_table(name: str, side: float, world: World, rng: np.random.Generator) -> SceneObject:
+    scale = world.scale
     x, y = 1.05 + rng.uniform(-0.05, 0.05), side * 1.35 + rng.uniform(-0.05, 0.05)
-    return table(name, x, y, (0.6, 0.7, rng.uniform(0.55, 0.65)))
+    return table(name, scale * x, scale * y, (scale * 0.6, scale * 0.7, rng.uniform(*world.tables)), scale)
 
 
-def _sample_cube(on: SceneObject, rng: np.random.Generator) -> SceneObject:
-    x = on.front + rng.uniform(0.10, 0.20)
-    y = on.position[1] + rng.uniform(-0.15, 0.15)
+def _sample_cube(on: SceneObject, world: World, rng: np.random.Generator) -> SceneObject:
+    x = on.front + world.scale * rng.uniform(0.10, 0.20)
+    y = on.position[1] + world.scale * rng.uniform(-0.15, 0.15)
     yaw = rng.uniform(-np.pi / 4, np.pi / 4)  # a cube looks the same every quarter turn
-    return cube("cube", x, y, on.top, yaw, _EDGE, _MASS)
+    return cube("cube", x, y, on.top, yaw, world.cube, _MASS * world.grip**3)
 
 
-def _sample_bin(on: SceneObject, rng: np.random.Generator) -> SceneObject:
-    inner = rng.uniform(0.24, 0.28)
-    x = on.front + inner / 2 + rng.uniform(0.04, 0.10)
-    y = on.position[1] + rng.uniform(-0.12, 0.12)
-    return open_bin("bin", x, y, on.top, inner, _BIN_HEIGHT)
+def _sample_bin(on: SceneObject, world: World, rng: np.random.Generator) -> SceneObject:
+    scale = world.scale
+    inner = scale * rng.uniform(0.24, 0.28)
+    x = on.front + inner / 2 + scale * rng.uniform(0.04, 0.10)
+    y = on.position[1] + scale * rng.uniform(-0.12, 0.12)
+    return open_bin("bin", x, y, on.top, inner, scale * _BIN_HEIGHT, scale)
 
 
 def _inside_bin(state: TaskState, position: FloatArray) -> bool:

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from handrail.collect.simulation.scene import Part, Scene, SceneObject, Viewpoint
-from handrail.collect.tasks.goal_reaching import pose_error, reached, sample_goal
+from handrail.collect.tasks.goal_reaching import pose_error, reached
+from handrail.collect.tasks.goals import sample_goal_for
 from handrail.collect.tasks.moving import mover_features, mover_names, sample_movers
 from handrail.collect.tasks.task import Start, TaskState, Verdict
 from handrail.controllers.arrays import FloatArray
@@ -21,7 +22,8 @@ _ARROW = 0.18  # length of the marker's axes [m]
 class Reach:
     """Goals uniform in x, y ∈ [−1, 1] m, z ∈ [0.7, 1.0] m, with a random orientation; start at home.
 
-    Success at the first moment with `d_p ≤ 0.1 m` and `d_r = 1 − ⟨q, g⟩² ≤ 0.05`.
+    Success at the first moment with `d_p ≤ 0.1 m` and `d_r = 1 − ⟨q, g⟩² ≤ 0.05`. Lengths are made to the
+    measure of the robot's world; goals of an arm that cannot point everywhere are those that it gets to.
 
     Attributes:
         description: what the operator is asked to do.
@@ -41,9 +43,10 @@ class Reach:
 
     def sample(self, model: RobotModel, rng: np.random.Generator) -> Start:
         """Draw a goal, then the moving obstacles."""
-        goal = sample_goal(rng)
+        goal, scale = sample_goal_for(model, rng), model.description.world.scale
         movers = sample_movers(self.moving_obstacles, model, model.description.home, rng)
-        return Start(Scene((goal_marker(goal), *movers), _VIEW), model.description.home, goal)
+        scene = Scene((goal_marker(goal, scale), *movers), _VIEW.scaled(scale))
+        return Start(scene, model.description.home, goal)
 
     def features(self, state: TaskState) -> FloatArray:
         """Return the goal pose, (7,), and place, velocity and size of what moves, (6,) each."""
@@ -53,7 +56,8 @@ class Reach:
 
     def outcome(self, state: TaskState) -> Verdict:
         """Judge by the distance and the orientation error."""
-        return Verdict(reached(*pose_error(state.tool.position, state.tool.rotation, _goal(state))))
+        d_p, d_r = pose_error(state.tool.position, state.tool.rotation, _goal(state))
+        return Verdict(reached(d_p / state.scale, d_r))
 
 
 _VIEW = Viewpoint(position=(-2.6, -3.0, 2.2), target=(-0.35, 0.0, 0.65))
@@ -63,21 +67,21 @@ def _goal(state: TaskState) -> Pose:
     return state.goal if state.goal is not None else state.tool
 
 
-def goal_marker(goal: Pose) -> SceneObject:
+def goal_marker(goal: Pose, scale: float = 1.0) -> SceneObject:
     """Return three coloured axes on a ball, drawn without contact."""
     axes = tuple(
         Part(
-            Shape("capsule", np.array([0.011, _ARROW])),
-            np.eye(3)[index] * _ARROW / 2,
+            Shape("capsule", scale * np.array([0.011, _ARROW])),
+            scale * np.eye(3)[index] * _ARROW / 2,
             matrix_to_axis(np.eye(3)[index]),
             colour,
         )
         for index, colour in enumerate(_COLOURS)
     )
-    ball = Part(Shape("sphere", np.array([0.03])), np.zeros(3), rgba=(0.95, 0.85, 0.2, 1.0))
+    ball = Part(Shape("sphere", scale * np.array([0.03])), np.zeros(3), rgba=(0.95, 0.85, 0.2, 1.0))
     return SceneObject(
         "goal",
-        Shape("sphere", np.array([_ARROW])),
+        Shape("sphere", scale * np.array([_ARROW])),
         goal.position,
         goal.rotation,
         ghost=True,

@@ -48,6 +48,7 @@ class TaskState:
         poses: of every object of the scene, by name.
         still: names of the movable objects that are at rest.
         stable: whether the physics went well so far.
+        scale: of the robot's world.
     """
 
     time: float
@@ -57,6 +58,7 @@ class TaskState:
     poses: Mapping[str, Pose]
     still: frozenset[str] = frozenset()
     stable: bool = True
+    scale: float = 1.0
 
     @property
     def goal(self) -> Pose | None:
@@ -69,8 +71,9 @@ class TaskState:
         return self.start.scene.obstacles(self.time)
 
     def let_go(self, place: FloatArray) -> bool:
-        """Return whether the gripper is open, and the tool point 8 cm or more from a place, (3,) [m]."""
-        return float(np.linalg.norm(self.tool.position - place)) >= _AWAY and self.opening > 0.8
+        """Return whether the gripper is open, and the tool point away from a place, (3,): by 8 cm · scale."""
+        away = float(np.linalg.norm(self.tool.position - place))
+        return away >= _AWAY * self.scale and self.opening > 0.8
 
     def pose(self, name: str) -> Pose:
         """Return where an object is.

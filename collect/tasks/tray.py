@@ -7,7 +7,7 @@ import numpy as np
 from handrail.collect.simulation.scene import Scene, SceneObject, Viewpoint
 from handrail.collect.tasks.clutter import obstacle_features, obstacle_names, sample_obstacles
 from handrail.collect.tasks.furniture import TRAY_BAR, can, table, tray
-from handrail.collect.tasks.starts import reach_share
+from handrail.collect.tasks.starts import check_large, reach_share
 from handrail.collect.tasks.task import Start, TaskState, Verdict
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import HandrailError
@@ -52,7 +52,12 @@ class Tray:
         return (*names, *(f"table.{axis}" for axis in "xyz"), *obstacle_names())
 
     def sample(self, model: RobotModel, rng: np.random.Generator) -> Start:
-        """Draw the table, the robot's start with the tray in hand, the can on it, and obstacles."""
+        """Draw the table, the robot's start with the tray in hand, the can on it, and obstacles.
+
+        Raises:
+            HandrailError: the robot is too small for the tray, or cannot hold it.
+        """
+        check_large(model, "Tray")
         side = rng.choice([-1.0, 1.0])
         x, y = 1.05 + rng.uniform(-0.05, 0.05), side * 1.30 + rng.uniform(-0.10, 0.10)
         goal = table("table", x, y, (0.6, 0.7, rng.uniform(0.55, 0.65)))

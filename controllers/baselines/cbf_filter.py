@@ -16,7 +16,7 @@ ALPHA = 1.0
 Braking from v along `d' = -α (d - margin)` takes `α v`: above a_max / v_max it asks for more than the robot
 has.
 """
-MARGIN = 0.10  # signed distance kept between shapes [m]
+MARGIN = 0.10  # signed distance kept between shapes, at scale 1 [m]
 _WORK_MARGIN = 0.008  # the same between tool shapes and work surfaces [m]
 _ACTIVATION_DISTANCE = 2.0  # beyond the margin, at which a pair gets a row [m]
 _SLACK = 1e4  # linear penalty of the slack of the rows, per m/s; and the quadratic one
@@ -37,7 +37,8 @@ class CbfFilter(ReactiveController):
     """
 
     def __init__(self, model: RobotModel, period: float = 0.05) -> None:
-        super().__init__(model, self._filtered, period, margins=(MARGIN, _WORK_MARGIN))
+        scale = model.description.world.scale
+        super().__init__(model, self._filtered, period, margins=(scale * MARGIN, scale * _WORK_MARGIN))
 
     def _filtered(self, state: State, intent: Intent, previous: FloatArray) -> FloatArray:
         """Return the nearest velocity that is allowed, (n,).

@@ -4,7 +4,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from handrail.controllers.arrays import FloatArray
+from handrail.controllers.arrays import BoolArray, FloatArray
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import State
 from handrail.controllers.interface.intent import Intent
@@ -21,6 +21,7 @@ from handrail.controllers.ocp.residuals import StageResiduals
 from handrail.controllers.ocp.settings import MpcSettings
 from handrail.controllers.robot.model import RobotModel
 
+_TRANSLATIONS = ("base.vx", "base.vy", "ee.vx", "ee.vy", "ee.vz", "joint.x", "joint.y")
 _MASKS = 1024  # whose weights are remembered
 
 
@@ -88,12 +89,21 @@ def built_in_objectives(
     velocity = np.where(arm, settings.arm_velocity, settings.base_velocity)
     commanded = np.full(channels.size, settings.tracking)
     commanded[channels.tool_slice][3:] = settings.turn_tracking
+    lengths = np.array([name in _TRANSLATIONS for name in channels.names])
+    shifts = lengths[channels.joint_slice]
     return (
-        tracking(channels, commanded),
-        velocity_regularisation(channels, velocity),
-        acceleration_regularisation(np.full(model.size, settings.acceleration)),
+        tracking(channels, _per_length(commanded, lengths, settings)),
+        velocity_regularisation(channels, _per_length(velocity, shifts, settings)),
+        acceleration_regularisation(
+            _per_length(np.full(model.size, settings.acceleration), shifts, settings)
+        ),
         posture(channels, model.description.home, settings.posture * arm),
     )
+
+
+def _per_length(weights: FloatArray, lengths: BoolArray, settings: MpcSettings) -> FloatArray:
+    """Return the weights of rows, those of translations over the square of what weighs as a radian."""
+    return np.where(lengths, weights / settings.length**2, weights)
 
 
 def resumed(commanded: FloatArray, measured: FloatArray, tolerance: FloatArray) -> FloatArray:

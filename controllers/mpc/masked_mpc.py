@@ -37,7 +37,7 @@ class MaskedMpc:
 
     Args:
         model: of the robot.
-        settings: weights, margins, horizon.
+        settings: weights, margins, horizon; made to the measure of the robot's world by default.
         objectives: autonomous objectives besides the built-in ones.
         predict: intent prediction Ψ.
 
@@ -54,7 +54,7 @@ class MaskedMpc:
         predict: Prediction = constant,
     ) -> None:
         self.model = model
-        self.settings = settings or MpcSettings()
+        self.settings = settings or MpcSettings.of(model.description.world.scale)
         self.channels = Channels.of(model.description)
         built_in = built_in_objectives(model, self.channels, self.settings)
         horizon = self.settings.horizon

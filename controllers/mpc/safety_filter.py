@@ -19,7 +19,8 @@ def safety_filter(model: RobotModel, period: float = 0.05) -> MaskedMpc:
         period: of the control loop; a command is reached after it [s]. It is the length of a stage too, so
             that the first planned velocity is the filtered command.
     """
-    settings = MpcSettings(
+    settings = MpcSettings.of(
+        model.description.world.scale,
         dt=period,
         decay=0.85,
         tracked_stages=5,

@@ -1,10 +1,13 @@
 """Settings of the masked MPC."""
 
 from dataclasses import dataclass, fields
+from typing import Self
 
 import numpy as np
 
 from handrail.controllers.errors import HandrailError
+
+_LENGTHS = ("margin", "work_margin", "activation_distance", "largest_speed", "length")
 
 
 @dataclass(frozen=True)
@@ -34,6 +37,7 @@ class MpcSettings:
         intent_timeout: age from which an intent is stale [s].
         velocity_tolerance: how far a robot that cannot follow may fall behind the commanded velocity before
             the plan waits for it, relative to the velocity limit; more than the measured velocity's noise.
+        length: what weighs as much as one radian [m]: weights of translations are divided by its square.
     """
 
     horizon: int = 10
@@ -58,6 +62,20 @@ class MpcSettings:
     intent_timeout: float = 0.25
     velocity_tolerance: float = 0.1
 
+    length: float = 1.0
+
+    @classmethod
+    def of(cls, scale: float, **values: float) -> Self:
+        """Return the settings of a robot whose world has a scale; its lengths are made to that measure.
+
+        Args:
+            scale: `World.scale` of the robot.
+            values: of other settings.
+        """
+        usual = cls()
+        lengths = {name: scale * getattr(usual, name) for name in _LENGTHS}
+        return cls(**lengths, **values)  # type: ignore[arg-type]
+
     def __post_init__(self) -> None:
         """Check the numbers.
 
@@ -73,6 +91,8 @@ class MpcSettings:
                 "MPC settings horizon, dt, decay: expected horizon >= 2, dt > 0, 0 < decay <= 1, "
                 f"got {self.horizon}, {self.dt}, {self.decay}"
             )
+        if not self.length:
+            raise HandrailError("MPC setting length: expected a number > 0, got 0")
 
     @property
     def discounts(self) -> np.ndarray:

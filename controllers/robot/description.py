@@ -16,6 +16,7 @@ from handrail.controllers.robot.shape import Shape, ShapeKind
 from handrail.controllers.strict_toml import read_toml
 
 _PLANAR = ("x", "y", "theta")
+_BEYOND = 0.01  # touching, where fingers are sent to close [m]
 _SIMPLE: tuple[ShapeKind, ...] = ("box", "sphere", "cylinder")
 
 
@@ -52,9 +53,29 @@ class Limits:
 
 
 @dataclass(frozen=True)
+class Jaw:
+    """A finger that turns, instead of two that slide.
+
+    Attributes:
+        frame: of the URDF's link that turns, at the joint's zero, about its z axis; more angle is more open.
+        closed: angle where it is closed [rad].
+        open: angle where it is open [rad].
+        parallel: angle at which its pad is parallel to the other finger's [rad].
+        gap: from pad to pad there [m].
+    """
+
+    frame: str
+    closed: float
+    open: float
+    parallel: float
+    gap: float
+
+
+@dataclass(frozen=True)
 class Gripper:
     """Two fingers that slide along the x axis of a placement on a frame; lengths [m], force [N], speed [m/s].
 
+    With a `jaw` the finger to +x stands still, its inner face at x = 0, and the one to −x turns.
     `shape` is the collision shape that encloses the fingers, open or closed: real ones stand in for it.
     """
 
@@ -71,6 +92,48 @@ class Gripper:
     camera: tuple[float, float, float]
     camera_tilt: float
     shape: str = "fingers"
+    jaw: Jaw | None = None
+
+    @property
+    def travel(self) -> float:
+        """From closed to open, as its joints count it: [m] of both fingers that slide, [rad] of a jaw."""
+        return self.stroke if self.jaw is None else self.jaw.open - self.jaw.closed
+
+    @property
+    def pace(self) -> float:
+        """Its speed, as its joints count it [m/s, rad/s]."""
+        return self.speed if self.jaw is None else self.speed * self.travel / self.stroke
+
+    @property
+    def beyond(self) -> float:
+        """How far beyond touching it is sent to close, as its joints count it [m, rad]."""
+        return _BEYOND if self.jaw is None else _BEYOND * self.travel / self.stroke
+
+
+@dataclass(frozen=True)
+class World:
+    """How large the world is that a robot works in: tasks, sticks and margins are made to its measure.
+
+    Attributes:
+        scale: of lengths and speeds against those of a robot as large as a person.
+        tables: height of the lowest and of the highest table [m].
+        goals: height of the lowest and of the highest goal of the hand [m].
+        cube: edge of the cube that it carries [m].
+        pitch: of goals of a hand on an arm of fewer than six joints: 0 points ahead, π/2 down [rad].
+        roll: of such goals, about where the hand points [rad].
+    """
+
+    scale: float = 1.0
+    tables: tuple[float, float] = (0.55, 0.65)
+    goals: tuple[float, float] = (0.7, 1.0)
+    cube: float = 0.05
+    pitch: tuple[float, float] = (0.0, 1.5)
+    roll: tuple[float, float] = (-1.5, 1.5)
+
+    @property
+    def grip(self) -> float:
+        """Scale of what the hand does close to a thing: of the cube against one of 5 cm."""
+        return self.cube / 0.05
 
 
 @dataclass(frozen=True)
@@ -95,6 +158,7 @@ class RobotDescription:
     self_pairs: tuple[tuple[str, str], ...]
     self_margins: FloatArray  # largest margin that each self pair can keep [m]
     visual: tuple[PlacedShape, ...]
+    world: World = World()
 
     @property
     def base_joints(self) -> tuple[str, ...]:
@@ -151,15 +215,19 @@ def _parse(data: dict[str, Any], folder: Path) -> RobotDescription:
         self_pairs=tuple((first, second) for first, second, *_ in self_collision["pairs"]),
         self_margins=frozen([(*pair, np.inf)[2] for pair in self_collision["pairs"]]),
         visual=tuple(_placed_shape(entry) for entry in data.get("visual", [])),
+        world=World(**_frozen_lists(data.get("world", {}))),
     )
 
 
 def _gripper(data: dict[str, Any]) -> Gripper:
-    placed = ("translation", "rpy")
-    values: dict[str, Any] = {
-        k: tuple(v) if isinstance(v, list) else v for k, v in data.items() if k not in placed
-    }
-    return Gripper(placement=_placement(data), **values)
+    apart = ("translation", "rpy", "jaw")
+    values = _frozen_lists({name: value for name, value in data.items() if name not in apart})
+    jaw = Jaw(**data["jaw"]) if "jaw" in data else None
+    return Gripper(placement=_placement(data), jaw=jaw, **values)
+
+
+def _frozen_lists(data: dict[str, Any]) -> dict[str, Any]:
+    return {name: tuple(value) if isinstance(value, list) else value for name, value in data.items()}
 
 
 def _placement(data: dict[str, Any], key: str = "translation") -> Placement:

@@ -32,6 +32,13 @@ def _positive(unit: str) -> Entry:
     return Entry(f"a number above 0 [{unit}]", is_positive)
 
 
+def _range(fits: Callable[[Any], bool], unit: str) -> Entry:
+    def rises(value: Any) -> bool:
+        return lists(fits, 2)(value) and value[0] <= value[1]
+
+    return Entry(f"the lowest and the highest, {unit}", rises, needed=False)
+
+
 def _is_colour(value: Any) -> bool:
     return lists(is_number)(value) and len(value) in (3, 4) and all(0 <= share <= 1 for share in value)
 
@@ -89,6 +96,13 @@ _TABLES: Mapping[str, Mapping[str, Entry]] = {
         "friction": _positive("1"),
         "camera": _vector(needed=True),
         "camera_tilt": Entry("a number [rad]", is_number),
+        "jaw": Entry("a table", is_table, needed=False),
+    },
+    "world": {
+        "scale": Entry("a number above 0", is_positive, needed=False),
+        **{name: _range(is_positive, "above 0 [m]") for name in ("tables", "goals")},
+        **{name: _range(is_number, "[rad]") for name in ("pitch", "roll")},
+        "cube": Entry("a length above 0 [m]", is_positive, needed=False),
     },
     "self_collision": {
         "pairs": Entry(
@@ -97,9 +111,15 @@ _TABLES: Mapping[str, Mapping[str, Entry]] = {
         ),
     },
 }
+_JAW: Mapping[str, Entry] = {
+    "frame": Entry("a name", is_text),
+    **{name: Entry("a number [rad]", is_number) for name in ("closed", "open", "parallel")},
+    "gap": _positive("m"),
+}
+_OPTIONAL = ("gripper", "world")
 _WHOLE: Mapping[str, Entry] = {
     "name": Entry("a name", is_text),
-    **{name: Entry("a table", is_table, needed=name != "gripper") for name in _TABLES},
+    **{name: Entry("a table", is_table, needed=name not in _OPTIONAL) for name in _TABLES},
     "collision": Entry("tables of shapes", lists(is_table)),
     "visual": Entry("tables of shapes", lists(is_table), needed=False),
 }
@@ -119,12 +139,22 @@ def check_description(content: Mapping[str, Any], where: str) -> None:
     for name, entries in _TABLES.items():
         if name in content:
             check_entries(content[name], entries, f"{where}: [{name}]")
+    _check_jaw(content.get("gripper", {}).get("jaw"), f"{where}: [gripper.jaw]")
     for kind in ("collision", "visual"):
         for number, shape in enumerate(content.get(kind, ()), start=1):
             name = shape["name"] if is_text(shape.get("name")) else number
             _check_shape(shape, f"{where}: {name} of [[{kind}]]", kind == "collision")
     _check_joints(content, where)
     _check_names(content, where)
+
+
+def _check_jaw(jaw: Mapping[str, Any] | None, where: str) -> None:
+    if jaw is None:
+        return
+    check_entries(jaw, _JAW, where)
+    if not jaw["closed"] <= jaw["parallel"] < jaw["open"]:
+        got = ", ".join(f"{name} {jaw[name]}" for name in ("closed", "parallel", "open"))
+        raise HandrailError(f"{where}: expected closed <= parallel < open, got {got}")
 
 
 def _check_shape(shape: Mapping[str, Any], where: str, named: bool) -> None:

@@ -25,16 +25,28 @@ def arm_configuration(
         goal: of the tool.
         tolerance: largest entry of e that is good enough [m, rad].
     """
-    q, arm = np.array(q, dtype=float), slice(len(model.description.base_joints), model.size)
-    limits = model.description.limits
+    return _configuration(model, q, goal, tolerance, slice(len(model.description.base_joints), model.size))
+
+
+def body_configuration(
+    model: RobotModel, q: FloatArray, goal: Pose, tolerance: float = 1e-4
+) -> tuple[FloatArray, float]:
+    """Return the same with a base that moves too: where it would stand, and the arm there, (n,)."""
+    return _configuration(model, q, goal, tolerance, slice(0, model.size))
+
+
+def _configuration(
+    model: RobotModel, q: FloatArray, goal: Pose, tolerance: float, moving: slice
+) -> tuple[FloatArray, float]:
+    q, limits = np.array(q, dtype=float), model.description.limits
     error = pose_error(model.pose(q), goal)
     for _ in range(_STEPS):
         if np.max(np.abs(error)) < tolerance:
             break
-        jacobian = model.jacobian(q)[:, arm]
+        jacobian = model.jacobian(q)[:, moving]
         step = jacobian.T @ np.linalg.solve(jacobian @ jacobian.T + _DAMPING * np.eye(6), error)
-        moved = q[arm] + np.clip(step, -_LARGEST_STEP, _LARGEST_STEP)
-        q[arm] = np.clip(moved, limits.position_lower[arm], limits.position_upper[arm])
+        moved = q[moving] + np.clip(step, -_LARGEST_STEP, _LARGEST_STEP)
+        q[moving] = np.clip(moved, limits.position_lower[moving], limits.position_upper[moving])
         error = pose_error(model.pose(q), goal)
     return q, float(np.max(np.abs(error)))
 

@@ -200,7 +200,7 @@ def _levels(
     model: RobotModel, mode: TeleopMode, raw: FloatArray, values: FloatArray
 ) -> tuple[Gains, FloatArray]:
     """Return the operator's gains and full stick, (m,), at the speed level that the values tell."""
-    usual = gains_of(mode, HumanSettings())
+    usual = gains_of(model, mode, HumanSettings())
     full = StickMap(model, mode, usual).full
     asked = np.linalg.norm(full * raw, axis=1)
     moving = (asked > 0) & values.any(axis=1)

@@ -1,6 +1,6 @@
 """Where an operator pushes the stick: towards a pose, slower when near."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -34,6 +34,10 @@ class Gains:
     base_rate: float = 0.3
     joint_rate: float = 0.8
     patience: float = 1.0
+
+    def scaled(self, scale: float) -> "Gains":
+        """Return the gains in a world of another scale: as brisk, and its lengths are others."""
+        return replace(self, hand_speed=scale * self.hand_speed, base_speed=scale * self.base_speed)
 
     @property
     def full(self) -> FloatArray:

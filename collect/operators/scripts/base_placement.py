@@ -6,14 +6,15 @@ from numpy.typing import ArrayLike
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.numerics.rotation import turned
-from handrail.controllers.robot.inverse_kinematics import arm_configuration
+from handrail.controllers.robot.inverse_kinematics import arm_configuration, body_configuration
 from handrail.controllers.robot.model import Pose, RobotModel
 
 _COMFORT = 0.85  # of the reach at home
 _YAWS = (0.0, 0.5, -0.5, 1.0, -1.0, 1.5, -1.5)  # in which a person would try to stand [rad]
 _FARTHER = (_COMFORT, 0.95, 1.05, 1.1, 1.15, 0.75)  # shares of it to try, the first that will do
 _ABOUT = 0.05  # error of the hand's pose there that a person puts up with [m, rad]
-_CLEAR = 0.08  # of the arm to itself that is enough [m]
+_CLEAR = 0.08  # of the arm to itself that is enough, at scale 1 [m]
+_UPRIGHT = 0.2  # horizontal part of where the hand points, below which its heading does not matter
 
 
 def standing_point(
@@ -69,13 +70,25 @@ def standing_pose(model: RobotModel, q: FloatArray, goal: Pose) -> FloatArray:
     """
     if not model.description.base_joints:
         return np.zeros(3)
+    if len(model.description.arm_joints) < 6:
+        return _standing_in_line(model, q, goal)
     collision, best, fewest = CollisionModel(model), standing_point(model, goal.position), np.inf
     for yaw in _YAWS:
         stand = standing_point(model, goal.position, yaw)
         there, error = arm_configuration(model, np.concatenate([stand, q[3:]]), goal)
-        lack = max(_CLEAR - float(np.min(collision.values(there[None, :]))), 0.0) + 10.0 * (error > 0.01)
+        lack = max(
+            _CLEAR * model.description.world.scale - float(np.min(collision.values(there[None, :]))), 0.0
+        ) + 10.0 * (error > 0.01)
         if lack < fewest:
             best, fewest = stand, lack
         if not lack:
             break
     return best
+
+
+def _standing_in_line(model: RobotModel, q: FloatArray, goal: Pose) -> FloatArray:
+    """Return where the base of an arm that points only away from its foot has to stand, (x, y, θ)."""
+    away = goal.rotation[:2, 2]
+    yaw = float(np.arctan2(away[1], away[0])) if np.linalg.norm(away) > _UPRIGHT else float(q[2])
+    behind = np.concatenate([standing_point(model, goal.position, yaw), model.description.home[3:]])
+    return body_configuration(model, behind, goal)[0][:3]

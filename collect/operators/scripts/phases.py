@@ -44,6 +44,7 @@ class PhasedScript(ABC):
 
     def __init__(self, model: RobotModel, gains: Gains, drives: bool) -> None:
         self._model, self._gains, self._drives = model, gains, drives
+        self._scale, self._grip = model.description.world.scale, model.description.world.grip
 
     @abstractmethod
     def plan(self, view: View) -> list[Phase]:

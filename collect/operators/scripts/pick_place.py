@@ -33,7 +33,7 @@ class PickPlaceScript(PhasedScript):
     def replan(self, view: View, name: str) -> list[Phase] | None:
         """Grasp again when the cube stayed behind."""
         cube = view.task.pose("cube").position
-        if name != "lift" or np.linalg.norm(cube - view.tool.position) < _HELD:
+        if name != "lift" or np.linalg.norm(cube - view.tool.position) < _HELD * self._grip:
             return None
         return from_phase(self.plan(view), "above")
 
@@ -59,16 +59,17 @@ class PickPlaceScript(PhasedScript):
                 *phases,
             ]
         elif self._route.blocked(view.state.q[:2], self._stand(pick)[:2]):
-            height = cube.position[2] + 0.30
-            around = Pose(np.array([lane + _AHEAD, cube.position[1], height]), down)
+            height = cube.position[2] + 0.30 * self._scale
+            around = Pose(np.array([lane + _AHEAD * self._scale, cube.position[1], height]), down)
             base = np.array([lane, cube.position[1], 0.0])
-            phases.insert(0, Phase(around, base, name="approach", distance=0.15, angle=0.5))
+            phases.insert(0, Phase(around, base, name="approach", distance=0.15 * self._scale, angle=0.5))
         return phases
 
     def _ready(self, base: FloatArray, pick: _Place, down: FloatArray) -> Phase:
         """Return the phase that folds the arm before it is driven up to the table, from where the base is."""
-        hand = np.array([base[0] + _AHEAD, base[1], pick.thing[2] + 0.30])
-        return Phase(Pose(hand, down), base, name="ready", distance=0.15, angle=0.5)
+        scale = self._scale
+        hand = np.array([base[0] + _AHEAD * scale, base[1], pick.thing[2] + 0.30 * scale])
+        return Phase(Pose(hand, down), base, name="ready", distance=0.15 * scale, angle=0.5)
 
     def _room(self, cube: SceneObject) -> float:
         """Return how far beside the cube the hand may be for the open fingers to close around it [m].
@@ -77,57 +78,60 @@ class PickPlaceScript(PhasedScript):
         """
         gripper = self._model.description.gripper
         width = float(cube.shape.size[0]) * (np.cos(_ALIGNED) + np.sin(_ALIGNED))
-        return _NEAR if gripper is None else max(_NEAR, (gripper.stroke - width) / 2)
+        near = _NEAR * self._grip
+        return near if gripper is None else max(near, (gripper.stroke - width) / 2)
 
     def _pick(self, pick: _Place, down: FloatArray, room: float) -> list[Phase]:
         """Go above the cube, down until it is between the fingers, close them, lift."""
-        cube, base = pick.thing, self._stand(pick)
-        stage = np.array([pick.edge - 0.15, cube[1], cube[2] + 0.30])
-        grasp = _above(cube, round(tips_beyond_tool(self._model) - _BELOW, 6))
+        cube, base, scale, grip = pick.thing, self._stand(pick), self._scale, self._grip
+        stage = np.array([pick.edge - 0.15 * scale, cube[1], cube[2] + 0.30 * scale])
+        grasp = _above(cube, round(tips_beyond_tool(self._model) - _BELOW * grip, 6))
+        near = _NEAR * grip
 
         def phase(name: str, position: FloatArray, **options: float) -> Phase:
             return Phase(Pose(position, down), base, name=name, **options)  # type: ignore[arg-type]
 
         return [
-            phase("stage", stage, distance=0.10, angle=0.30),
-            phase("above", _above(cube, 0.14), distance=0.02, angle=0.10),
-            phase("descend", grasp, distance=_NEAR, beside=room, angle=_ALIGNED, pace=0.4, patience=8.0),
+            phase("stage", stage, distance=0.10 * scale, angle=0.30),
+            phase("above", _above(cube, 0.14 * grip), distance=0.02 * grip, angle=0.10),
+            phase("descend", grasp, distance=near, beside=room, angle=_ALIGNED, pace=0.4, patience=8.0),
             phase("grasp", grasp, distance=1.0, angle=3.2, gripper=1.0, dwell=1.2),
-            phase("lift", _above(cube, 0.22), distance=0.04, angle=0.3, gripper=1.0, pace=0.6),
+            phase("lift", _above(cube, 0.22 * grip), distance=0.04 * grip, angle=0.3, gripper=1.0, pace=0.6),
         ]
 
     def _carry(self, pick: _Place, place: _Place, down: FloatArray) -> list[Phase]:
         """Pull back until the base is behind the floor obstacles, cross, and go up to the other table."""
-        height = max(pick.thing[2], place.thing[2]) + 0.30
-        lane = self._route.lane
-        hand_lane = lane + _AHEAD
+        scale = self._scale
+        height = max(pick.thing[2], place.thing[2]) + 0.30 * scale
+        lane, ahead = self._route.lane, _AHEAD * scale
+        hand_lane = lane + ahead
 
         def phase(name: str, x: float, at: _Place, base: FloatArray) -> Phase:
             hand = Pose(np.array([x, at.thing[1], height]), down)
-            return Phase(hand, base, name=name, gripper=1.0, distance=0.12, angle=0.4)
+            return Phase(hand, base, name=name, gripper=1.0, distance=0.12 * scale, angle=0.4)
 
         if self._drives:
-            retreat = phase("retreat", self._stand(pick)[0] + _AHEAD, pick, self._stand(pick))
-            front = phase("front", self._stand(place)[0] + _AHEAD, place, self._stand(place))
+            retreat = phase("retreat", self._stand(pick)[0] + ahead, pick, self._stand(pick))
+            front = phase("front", self._stand(place)[0] + ahead, place, self._stand(place))
             return [retreat, *self._route.drive(self._stand(pick), self._stand(place), front.hand, 1.0)]
         return [
             phase("retreat", hand_lane, pick, np.array([lane, pick.thing[1], 0.0])),
             phase("cross", hand_lane, place, np.array([lane, place.thing[1], 0.0])),
-            phase("front", place.edge - _RETREAT, place, self._stand(place)),
+            phase("front", place.edge - _RETREAT * scale, place, self._stand(place)),
         ]
 
     def _place(self, place: _Place, down: FloatArray, height: float) -> list[Phase]:
         rim = _above(place.thing, height)
-        base = self._stand(place)
+        base, grip = self._stand(place), self._grip
 
         def phase(name: str, rise: float, **options: float) -> Phase:
             return Phase(Pose(_above(rim, rise), down), base, name=name, **options)  # type: ignore[arg-type]
 
         return [
-            phase("over", 0.18, gripper=1.0, distance=0.03, angle=0.3),
-            phase("lower", 0.045, gripper=1.0, distance=0.025, angle=0.3, pace=0.4),
-            phase("release", 0.045, distance=1.0, angle=3.2, dwell=0.8),
-            phase("rise", 0.25, distance=0.05, angle=0.5),
+            phase("over", 0.18 * grip, gripper=1.0, distance=0.03 * grip, angle=0.3),
+            phase("lower", 0.045 * grip, gripper=1.0, distance=0.025 * grip, angle=0.3, pace=0.4),
+            phase("release", 0.045 * grip, distance=1.0, angle=3.2, dwell=0.8),
+            phase("rise", 0.25 * grip, distance=0.05 * grip, angle=0.5),
         ]
 
     def _stand(self, place: _Place) -> FloatArray:

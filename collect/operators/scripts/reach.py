@@ -14,8 +14,12 @@ class ReachScript(PhasedScript):
         """Return the way: drive to where the goal is in comfortable reach, then steer the hand to it."""
         goal = view.task.goal or view.tool
         base = standing_pose(self._model, view.state.q, goal)
-        phases = [Phase(goal, base, name="reach", distance=0.06, angle=0.25)]
-        far = np.hypot(*(base[:2] - view.state.q[:2])) > 0.4 or abs(base[2] - view.state.q[2]) > 0.2
+        phases = [Phase(goal, base, name="reach", distance=0.06 * self._scale, angle=0.25)]
+        far = (
+            np.hypot(*(base[:2] - view.state.q[:2])) > 0.4 * self._scale
+            or abs(base[2] - view.state.q[2]) > 0.2
+        )
         if self._drives and far:
-            phases.insert(0, Phase(goal, base, name="drive", focus="base", distance=0.15, angle=0.2))
+            near = 0.15 * self._scale
+            phases.insert(0, Phase(goal, base, name="drive", focus="base", distance=near, angle=0.2))
         return phases

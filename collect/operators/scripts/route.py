@@ -10,7 +10,7 @@ from handrail.controllers.arrays import FloatArray
 from handrail.controllers.robot.model import Pose, RobotModel
 
 _FROM_ABOVE = 0.7  # of the reach at home: comfortable where the hand points down
-_CLEARANCE = 0.25  # of the chassis behind the floor obstacles, and before a table [m]
+_CLEARANCE = 0.25  # of the chassis behind the floor obstacles, and before a table at scale 1 [m]
 
 
 class Route:
@@ -25,10 +25,11 @@ class Route:
     """
 
     def __init__(self, model: RobotModel, task: TaskState) -> None:
-        self._model = model
+        self._model, self._scale = model, model.description.world.scale
+        self._clearance = _CLEARANCE * self._scale
         self._obstacles = floor_obstacles(task.start.scene)
         behind = [item.position[0] - np.hypot(*item.shape.size[:2]) / 2 for item in self._obstacles]
-        self.lane = float(min(behind, default=0.0)) - model.description.base_size[0] / 2 - _CLEARANCE
+        self.lane = float(min(behind, default=0.0)) - model.description.base_size[0] / 2 - self._clearance
 
     def stand(self, place: FloatArray, edge: float) -> FloatArray:
         """Return where the base stands to work at a place, (3,): comfortable, and clear of the table.
@@ -39,23 +40,23 @@ class Route:
         """
         base = standing_point(self._model, place, comfort=_FROM_ABOVE)
         length = self._model.description.base_size[0]
-        base[0] = min(base[0], edge - length / 2 - _CLEARANCE)
+        base[0] = min(base[0], edge - length / 2 - self._clearance)
         return base
 
     def drive(self, start: FloatArray, goal: FloatArray, hand: Pose, gripper: float) -> list[Phase]:
         """Return the phases that drive in the lane, then up to the goal, (3,)."""
-        points = [goal]
-        if abs(goal[1] - start[1]) > 0.3:
+        points, near = [goal], 0.12 * self._scale
+        if abs(goal[1] - start[1]) > 0.3 * self._scale:
             back, across = (np.array([min(self.lane, start[0]), y, 0.0]) for y in (start[1], goal[1]))
             points = [back, across, goal] if start[0] > self.lane else [across, goal]
         return [
-            Phase(hand, point, name="drive", focus="base", gripper=gripper, distance=0.12, angle=0.15)
+            Phase(hand, point, name="drive", focus="base", gripper=gripper, distance=near, angle=0.15)
             for point in points
         ]
 
     def blocked(self, start: FloatArray, goal: FloatArray) -> bool:
         """Return whether something on the floor is in the chassis' way between two places, (2,) each."""
-        width = np.hypot(*self._model.description.base_size) / 2 + _CLEARANCE / 2
+        width = np.hypot(*self._model.description.base_size) / 2 + self._clearance / 2
         for item in self._obstacles:
             along = np.clip(
                 (item.position[:2] - start) @ (goal - start) / max(np.sum((goal - start) ** 2), 1e-9), 0, 1

@@ -63,7 +63,7 @@ class ScriptedOperator:
         self._script = script
         self._mode = mode
         device = DEVICES.find(mode.device)
-        self._map = device.build(model, mode, gains or gains_of(mode, human))
+        self._map = device.build(model, mode, gains or gains_of(model, mode, human))
         self._human = replace(human, refractory=human.refractory * device.refractory)
 
     def reset(self, view: View, rng: np.random.Generator) -> None:
@@ -101,7 +101,7 @@ def scripted_operator(
     model: RobotModel, mode: TeleopMode, task: TaskSpec, human: HumanSettings
 ) -> ScriptedOperator:
     """Return who does a task's script in a mode, as brisk as people are with its device."""
-    gains = gains_of(mode, human)
+    gains = gains_of(model, mode, human)
     return ScriptedOperator(model, script_of(model, mode, task, gains), mode, human, gains)
 
 
@@ -111,7 +111,7 @@ def script_of(model: RobotModel, mode: TeleopMode, task: TaskSpec, gains: Gains)
     return resolved(task.script)(model, gains, drives=drives)
 
 
-def gains_of(mode: TeleopMode, human: HumanSettings) -> Gains:
-    """Return how briskly a person steers with a mode's device."""
-    gains = DEVICES.find(mode.device).gains
+def gains_of(model: RobotModel, mode: TeleopMode, human: HumanSettings) -> Gains:
+    """Return how briskly a person steers a robot with a mode's device."""
+    gains = DEVICES.find(mode.device).gains.scaled(model.description.world.scale)
     return replace(gains, gain=human.briskness * gains.gain)

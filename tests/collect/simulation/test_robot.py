@@ -165,7 +165,8 @@ def test_a_gripper_that_does_not_grip_is_the_open_one(shipped):
     assert simulation.opening == 1.0
     with pytest.raises(HandrailError, match="grip of a simulation: expected none without grips"):
         Simulation(model, Scene(), home, 0.03, grip=0.05, grips=False)
-    assert np.linalg.norm(ends[0][-1] - model.pose(home).position) > 0.1
+    moved = np.linalg.norm(ends[0][-1] - model.pose(home).position)
+    assert moved > 0.1 * model.description.world.scale
     np.testing.assert_allclose(ends[1], ends[0], atol=5e-4)
     np.testing.assert_allclose(ends[2], ends[0], atol=2e-3)
 
@@ -218,15 +219,45 @@ def test_the_hand_opens_as_far_and_presses_as_hard_as_it_says(shipped):
     assert gripper is not None
     simulation = Simulation(shipped, Scene(), q, 0.05)
     left, right = (simulation.data.geom(name).xpos.copy() for name in FINGERS)
-    inner = np.linalg.norm(right - left) - gripper.finger_size[0]
-    assert inner == pytest.approx(gripper.stroke, abs=1e-6)
     tool = shipped.pose(q)
     across = tool.rotation.T @ (right - left)
-    np.testing.assert_allclose(across / np.linalg.norm(across), [1.0, 0.0, 0.0], atol=1e-6)
+    if gripper.jaw is None:
+        assert np.linalg.norm(across) - gripper.finger_size[0] == pytest.approx(gripper.stroke, abs=1e-6)
+        np.testing.assert_allclose(across / np.linalg.norm(across), [1.0, 0.0, 0.0], atol=1e-6)
+    else:
+        assert across[0] > 0.0
+        assert [tool_to_pad(simulation, name) for name in FINGERS] == pytest.approx(
+            [gripper.stroke / 2] * 2, abs=2e-4
+        )
     bar = SceneObject("bar", box([0.03, 0.03, 0.03]), tool.position, tool.rotation)
     simulation = Simulation(shipped, Scene((bar,)), q, 0.05)
     for _ in range(60):
         simulation.send(np.append(np.zeros(shipped.size), 1.0))
-    assert simulation.opening * gripper.stroke == pytest.approx(0.03, abs=0.002)
-    force = simulation.data.actuator("gripper").force[0]
-    assert abs(force) == pytest.approx(gripper.force, rel=0.02)
+    if gripper.jaw is None:
+        assert simulation.opening * gripper.stroke == pytest.approx(0.03, abs=0.002)
+        force = simulation.data.actuator("gripper").force[0]
+    else:
+        assert sum(tool_to_pad(simulation, name) for name in FINGERS) == pytest.approx(0.03, abs=0.005)
+        force = pressed(simulation, "finger_left")
+        assert pressed(simulation, "finger_right") == pytest.approx(force, rel=0.2)
+    assert abs(force) == pytest.approx(gripper.force, rel=0.02 if gripper.jaw is None else 0.25)
+
+
+def tool_to_pad(simulation: Simulation, finger: str) -> float:
+    """Return how far it is from the tool point along its x axis to the inner face of a finger [m]."""
+    tool, side = simulation.tool, -1.0 if finger == "finger_left" else 1.0
+    pad, width = simulation.data.geom(finger), simulation.mujoco_model.geom(finger).size[0]
+    normal = -side * pad.xmat.reshape(3, 3)[:, 0]
+    face = pad.xpos + width * normal
+    return float(normal @ (face - tool.position) / (normal @ (side * tool.rotation[:, 0])))
+
+
+def pressed(simulation: Simulation, finger: str) -> float:
+    """Return the normal force on a finger [N]."""
+    model, data = simulation.mujoco_model, simulation.data
+    total, force = 0.0, np.zeros(6)
+    for index in range(data.ncon):
+        if model.geom(finger).id in data.contact.geom[index]:
+            mujoco.mj_contactForce(model, data, index, force)
+            total += force[0]
+    return total

@@ -19,7 +19,7 @@ from handrail.controllers.robot.description import robot_names
 from handrail.controllers.robot.model import load_model
 
 MODEL = load_model()
-ROBOTS = robot_names()
+ROBOTS = [name for name in robot_names() if load_model(name).description.world.scale == 1.0]
 SEEDS = range(30)
 
 
