@@ -16,6 +16,7 @@ from handrail.controllers.errors import HandrailError, message_of
 from handrail.controllers.interface.controller import State
 from handrail.controllers.robot.model import RobotModel
 
+_BACKLOG = 1000  # observations that may have waited
 _GONE = 2.0  # without a usable observation for so long, the robot is gone [s]
 
 
@@ -94,7 +95,7 @@ class Link:
             raise HandrailError(f"--robot_client {name}: cannot be reached: {message_of(error)}") from error
         self._heard = self._deadline = clock()
         try:
-            self._listen()
+            self._catch_up()
         except BaseException:
             client.disconnect()
             raise
@@ -104,8 +105,8 @@ class Link:
         self._episode += 1
         if self._simulated:
             self._extras = {EPISODE: self._episode, SEED: seed}
+        self._catch_up()
         self._deadline = self._heard = self._clock()
-        self._listen()
 
     def exchange(self, command: ArrayLike) -> NDArray[np.floating]:
         """Send a command, wait for the end of the period, and listen; return what was sent, (n + 1,).
@@ -158,6 +159,14 @@ class Link:
         elif -ahead > self.period:
             self._deadline = self._clock()
 
+    def _catch_up(self) -> None:
+        """Hear what was said while nobody listened: the network keeps it, and hands it on bit by bit."""
+        for _ in range(_BACKLOG):
+            before = self._said
+            self._listen()
+            if self._said is before:
+                return
+
     def _listen(self) -> None:
         try:
             said = self._client.get_observation()
@@ -197,4 +206,5 @@ def connect(
         port_zmq_observations=config.port_zmq_observations,
         cameras={name: camera for name, camera in lekiwi_cameras_config().items() if name in wanted},
     )
-    return Link(LeKiwiClient(settings), robot, model, 1.0 / fps, config.simulated)
+    client: Any = LeKiwiClient(settings)
+    return Link(client, robot, model, 1.0 / fps, config.simulated)

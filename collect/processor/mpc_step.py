@@ -104,7 +104,7 @@ class MaskedMpcStep(RobotActionProcessorStep):
         self._body = WholeBody(model, units, 1.0 / self.fps, self.timeout)
         self._action_names = units.action_names
         centring = narrow_joint_centring(channels, model.description.limits, _CENTRED)
-        self._mpc = MaskedMpc(model, self._mpc_settings(), centring)
+        self._mpc = MaskedMpc(model, self._mpc_settings(model.description.world.scale), centring)
         self.reset()
 
     def reset(self) -> None:
@@ -165,7 +165,7 @@ class MaskedMpcStep(RobotActionProcessorStep):
             if not isinstance(getattr(self, name), Mapping):
                 raise HandrailError(f"{name} of {NAME}: expected a table, got {shown(getattr(self, name))}")
 
-    def _mpc_settings(self) -> MpcSettings:
+    def _mpc_settings(self, scale: float) -> MpcSettings:
         usual = asdict(MpcSettings())
         for name, value in self.settings.items():
             if name not in usual or type(value) not in (int, type(usual[name])):
@@ -173,7 +173,7 @@ class MaskedMpcStep(RobotActionProcessorStep):
                     f"settings of {NAME}: expected numbers for some of {', '.join(usual)}; "
                     f"got {shown(name)} = {shown(value)}"
                 )
-        return replace(MpcSettings(), **self.settings)
+        return MpcSettings.of(scale, **self.settings)
 
 
 Pipeline = RobotProcessorPipeline[tuple[RobotAction, Any], RobotAction]
