@@ -8,6 +8,7 @@ from typing import Annotated
 
 import tyro
 
+from handrail.collect.client_config import ClientConfig
 from handrail.collect.cockpit_config import CockpitConfig
 from handrail.collect.flags import one_of, only_one
 from handrail.collect.operators.catalogue import OPERATORS
@@ -206,6 +207,9 @@ class RecordConfig(SessionConfig):
     """Remove the dataset that is there, if Handrail recorded it."""
     cockpit: CockpitConfig = field(default_factory=CockpitConfig)
     teleop: TeleopConfig = field(default_factory=TeleopConfig)
+    robot_client: str = ""
+    """Drive this robot of LeRobot's through its client instead of a simulation: lekiwi."""
+    client: ClientConfig = field(default_factory=ClientConfig)
     display_data: bool = False
     """Show robot, cameras, intent and distances in rerun's viewer (needs a screen)."""
     display_web: bool = False
@@ -223,6 +227,11 @@ class RecordConfig(SessionConfig):
         self.dataset.check()
         self.cockpit.check()
         self.teleop.check(self.operator)
+        self.client.check(self.robot_client, self.operator)
+        if self.robot_client and (self.moving_obstacles or not self.physics):
+            raise HandrailError(
+                f"--robot_client {self.robot_client}: expected neither --moving_obstacles nor --no_physics"
+            )
         self._check_rates()
         if self.resume and self.overwrite:
             raise HandrailError("--resume and --overwrite: expected one of them, got both")

@@ -74,7 +74,7 @@ def record(config: RecordConfig) -> int:
     interactive = OPERATORS.find(config.operator).interactive
     if interactive:
         come_first()
-    env = build_env(config, config.dataset.fps, render=interactive)
+    env, link = _opened(config, interactive)
     displays: list[Display] = []
     people: list[Any] = []
     try:
@@ -90,7 +90,7 @@ def record(config: RecordConfig) -> int:
             if writer.repaired and not writer.repaired.clean:
                 console.print(str(writer.repaired), **PLAIN)
             recording = Recording(config, env, writer, people, displays)
-            if interactive:
+            if interactive or env.real:
                 console.print("Getting ready; the first time on a computer takes about a minute.", **PLAIN)
                 recording.warm_up(config.seed)
                 console.print("Ready.", **PLAIN)
@@ -101,7 +101,18 @@ def record(config: RecordConfig) -> int:
         for display in [*displays, *people]:
             display.close()
         env.close()
+        if link:
+            link.close()
     return log.exit_code
+
+
+def _opened(config: RecordConfig, interactive: bool) -> tuple[HandrailEnv, Any]:
+    """Return the environment; and the link to a robot, if it is no simulation."""
+    if not config.robot_client:
+        return build_env(config, config.dataset.fps, render=interactive), None
+    from handrail.collect.lekiwi.client_env import open_client  # loads LeRobot
+
+    return open_client(config)
 
 
 def episode_seed(seed: int, episode: int, attempt: int = 0) -> int:

@@ -1,15 +1,21 @@
 """A session whose episodes become a dataset: what `handrail-record` and a user study share."""
 
+import contextlib
 import os
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from dataclasses import replace
 from typing import Any, Protocol
 
 from handrail.collect.commands.interrupts import Interrupts
 from handrail.collect.config import RecordConfig
 from handrail.collect.envs.env import HandrailEnv
-from handrail.collect.session.build import build_modes, build_session, session_features, software_versions
+from handrail.collect.session.build import (
+    build_env,
+    build_modes,
+    build_session,
+    session_features,
+    software_versions,
+)
 from handrail.collect.session.outcome import Outcome
 from handrail.collect.session.recorded_settings import COLUMN as SETTINGS
 from handrail.collect.session.recorded_settings import settings_json
@@ -25,7 +31,7 @@ _NICE = -10  # of a loop that a person steers, where the system allows that
 
 def come_first() -> None:
     """Let other programs wait for this one and its threads to come, where the system allows that."""
-    with suppress(AttributeError, OSError):
+    with contextlib.suppress(AttributeError, OSError):
         os.setpriority(os.PRIO_PROCESS, 0, _NICE)
 
 
@@ -67,10 +73,16 @@ class Recording:
         self._observers: list[EpisodeObserver] = [recorder, *displays, *people]
         self._session = build_session(config, env, self._observers, config.dataset.fps, *people)
         self._rehearsal = Rehearsal(env.model, build_modes(config, env))
+        self._config, self._real = replace(config, cameras=""), env.real
 
     def warm_up(self, seed: int) -> None:
-        """Compile what an update needs, before somebody waits for it in real time."""
-        self._session.warm_up(seed, self._rehearsal)
+        """Compile what an update needs, before somebody waits for it in real time; no robot moves."""
+        if not self._real:
+            self._session.warm_up(seed, self._rehearsal)
+            return
+        fps = self._config.dataset.fps
+        with contextlib.closing(build_env(self._config, fps)) as simulated:
+            build_session(self._config, simulated, (), fps, *self.people).warm_up(seed, self._rehearsal)
 
     def episode(
         self,

@@ -1,7 +1,7 @@
 """The Gymnasium environment: a robot, a task, velocities in, observations out."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +12,7 @@ from gymnasium.envs.registration import load_env_creator
 from numpy.typing import ArrayLike, NDArray
 
 from handrail.collect.envs.observation import AgentObservation, bounded, box_space
-from handrail.collect.simulation.protocols import Plant, Robot, World
+from handrail.collect.simulation.protocols import Plant, Robot, Seeing, World
 from handrail.collect.simulation.rendering import CAMERAS, Painter
 from handrail.collect.simulation.simulation import Simulation
 from handrail.collect.tasks.task import Start, Task, TaskState, Verdict
@@ -44,8 +44,10 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         render_size: height and width of what `render` returns [px].
         sample: draws how an episode begins, `(model, rng)`, instead of the task.
         observes: whether there is anything in observations; without, steps are quicker.
+        real: whether a step takes its time, as of a robot that is no simulation: there is no way back.
 
     Attributes:
+        real: as it was said.
         task: what is to be done.
         model: kinematics of the robot.
         fps: steps a second.
@@ -71,8 +73,10 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         render_size: tuple[int, int] = RENDER_SIZE,
         sample: Callable[[RobotModel, np.random.Generator], Start] | None = None,
         observes: bool = True,
+        real: bool = False,
     ) -> None:
         _check(fps, cameras, render_mode)
+        self.real = real
         self.task: Task = load_env_creator(task)() if isinstance(task, str) else task  # pyright: ignore
         self.model: RobotModel = robot if isinstance(robot, RobotModel) else load_model(robot)
         self.fps = fps
@@ -234,8 +238,13 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             "environment_state": bounded(self.task.features(state)),
         }
         if self.cameras:
-            observation["pixels"] = {camera: self._paint("pixels", camera) for camera in self.cameras}
+            observation["pixels"] = self._pictures()
         return observation
+
+    def _pictures(self) -> Mapping[str, NDArray[np.uint8]]:
+        if isinstance(self._present, Seeing):
+            return self._present.pictures(self.cameras, self.image_size)
+        return {camera: self._paint("pixels", camera) for camera in self.cameras}
 
     def _info(self, state: TaskState, outcome: Verdict, sent: NDArray[np.floating[Any]]) -> dict[str, Any]:
         contacts = self.world.contacts

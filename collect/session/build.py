@@ -1,7 +1,7 @@
 """From settings to a session: the robot, the environment, the operator and the controller."""
 
 import importlib.metadata
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -16,6 +16,7 @@ from handrail.collect.perturbations.shift import sample_shifted
 from handrail.collect.session.mode_controller import ModeController
 from handrail.collect.session.session import Observer, Session
 from handrail.collect.simulation.ideal_robot import IdealRobot
+from handrail.collect.simulation.protocols import Plant
 from handrail.collect.simulation.simulation import Simulation
 from handrail.collect.tasks.catalogue import TASKS
 from handrail.collect.tasks.task import Task
@@ -34,7 +35,11 @@ _VERSIONED = ("handrail", "lerobot", "mujoco", "pin", "coal", "casadi", "daqp", 
 
 
 def build_env(
-    config: SessionConfig, fps: int, render: tuple[int, int] | bool = False, shift: float = 0.0
+    config: SessionConfig,
+    fps: int,
+    render: tuple[int, int] | bool = False,
+    shift: float = 0.0,
+    plant: Callable[..., Plant] | None = None,
 ) -> HandrailEnv:
     """Return the environment of a session.
 
@@ -43,6 +48,7 @@ def build_env(
         fps: recording rate [Hz], and the robot's where the settings do not say another.
         render: whether `env.render()` shall give good-looking pictures; or their height and width [px].
         shift: how far from the demonstrations' start the robot begins at most [m, rad].
+        plant: makes a robot that is no simulation.
 
     Raises:
         HandrailError: a setting is wrong, or cameras are asked for and GL is missing.
@@ -54,7 +60,8 @@ def build_env(
         task,
         config.robot,
         fps=config.robot_fps or fps,
-        plant=Simulation if config.physics else IdealRobot,
+        plant=plant or (Simulation if config.physics else IdealRobot),
+        real=plant is not None,
         cameras=config.camera_names,
         image_size=(config.image_size, config.image_size),
         render_mode="rgb_array" if render else None,
@@ -97,10 +104,10 @@ def build_session(
         controller,
         operator,
         observers,
-        config.realtime or person is not None,
+        (config.realtime or person is not None) and not env.real,
         control_period=1.0 / control_fps,
         record_period=1.0 / fps,
-        undoes=person is not None,
+        undoes=person is not None and not env.real,
     )
 
 

@@ -1,7 +1,7 @@
 """What a session asks of a robot and of the world around it: behind these stands MuJoCo, or anything else."""
 
 from collections.abc import Mapping
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -82,6 +82,15 @@ class World(Protocol):
 
     def still(self) -> frozenset[str]:
         """Return the names of the movable objects that are at rest: slower than 2 cm/s and 0.2 rad/s."""
+        ...
+
+
+@runtime_checkable
+class Seeing(Protocol):
+    """A plant with cameras of its own; nobody has to draw what they see."""
+
+    def pictures(self, cameras: tuple[str, ...], size: tuple[int, int]) -> Mapping[str, NDArray[np.uint8]]:
+        """Return what cameras see, (height, width, 3) each, in a size (height, width) [px]."""
         ...
 
 

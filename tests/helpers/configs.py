@@ -8,6 +8,7 @@ from handrail.collect.experiments.operator_fit.config import FitOperatorConfig
 from handrail.collect.experiments.profiling.config import ProfileConfig
 from handrail.collect.experiments.showcase.config import ShowcaseConfig
 from handrail.collect.experiments.trials.config import TrialsConfig
+from handrail.collect.lekiwi.host_config import HostConfig
 from handrail.collect.teleop_config import CalibrateConfig
 from handrail.collect.user_study.config import StudySessionConfig
 from handrail.datasets.comparison.config import CompareConfig
@@ -21,6 +22,7 @@ CONFIGS = {
     "handrail-record": RecordConfig,
     "handrail-cockpit": DriveConfig,
     "handrail-calibrate": CalibrateConfig,
+    "handrail-lekiwi-host": HostConfig,
     "handrail-replay": ReplayConfig,
     "handrail-inspect": InspectConfig,
     "handrail-repair": RepairConfig,

@@ -8,7 +8,9 @@ MOST_LINES = 300
 
 
 def test_rooms_are_small():
-    assert not {room: len(files) for room, files in rooms().items() if len(files) > MOST_FILES}
+    # in scripts there is a file a command
+    sizes = {room: len(files) for room, files in rooms().items() if room != "scripts"}
+    assert not {room: size for room, size in sizes.items() if size > MOST_FILES}
 
 
 def test_files_are_short():

@@ -1,0 +1,47 @@
+"""Which robot of LeRobot's is driven instead of a simulation, as typed settings; light to import."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from handrail.controllers.errors import HandrailError, unknown_name
+
+CLIENTS: Mapping[str, Mapping[str, str]] = {  # the robots, and what they call our cameras
+    "lekiwi": {"scene": "front", "wrist": "wrist"},
+}
+NO_SCREEN = "browser"  # it draws a simulation
+
+
+@dataclass(frozen=True)
+class ClientConfig:
+    """Where the robot is; the flags are LeRobot's."""
+
+    remote_ip: str = "127.0.0.1"
+    """Of the computer on the robot."""
+    port_zmq_cmd: int = 5555
+    """Where it takes commands."""
+    port_zmq_observations: int = 5556
+    """Where it sends observations."""
+    simulated: bool = False
+    """It is handrail-lekiwi-host: let it begin every episode anew, in the episode's own scene."""
+
+    def check(self, robot: str, operator: str) -> None:
+        """Check the settings.
+
+        Args:
+            robot: which one; empty where a simulation is driven.
+            operator: who steers.
+
+        Raises:
+            HandrailError: one is wrong.
+        """
+        if not robot:
+            if self != ClientConfig():
+                raise HandrailError("--client.*: expected --robot_client too, got none")
+            return
+        if robot not in CLIENTS:
+            raise unknown_name("--robot_client", robot, CLIENTS)
+        if operator == NO_SCREEN:
+            raise HandrailError(f"--robot_client {robot}: expected another --operator than {NO_SCREEN}")
+        for name in ("port_zmq_cmd", "port_zmq_observations"):
+            if not 1 <= getattr(self, name) <= 65535:
+                raise HandrailError(f"--client.{name} {getattr(self, name)}: expected 1 to 65535")

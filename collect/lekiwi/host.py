@@ -1,0 +1,127 @@
+"""A simulated LeKiwi on the network, in the protocol of LeRobot's own host.
+
+Commands arrive at a PULL socket as JSON, the latest one wins. Observations leave a PUSH socket in several
+parts: a JSON header with `_cams`, then one JPEG a camera (`lerobot/robots/lekiwi/lekiwi_host.py`).
+"""
+
+import json
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from handrail.collect.envs.env import HandrailEnv
+from handrail.collect.lekiwi.body import LeKiwiBody
+from handrail.collect.lekiwi.host_config import HostConfig
+from handrail.collect.lekiwi.host_loop import LeKiwiLoop
+from handrail.collect.processor.units import robot_units
+from handrail.collect.tasks.catalogue import TASKS
+from handrail.controllers.errors import HandrailError, message_of, not_installed
+from handrail.controllers.registry import resolved
+from handrail.controllers.robot.model import load_model
+from handrail.datasets.storage.strict_json import write_json
+
+_FPS = 60  # of the simulation [Hz]
+
+
+class HostSockets:
+    """The two sockets of a host.
+
+    Args:
+        config: says where they are.
+
+    Raises:
+        HandrailError: pyzmq is not installed, or a port is taken.
+    """
+
+    def __init__(self, config: HostConfig) -> None:
+        zmq = import_zmq("handrail-lekiwi-host")
+        self._again, self._nowait = zmq.Again, zmq.NOBLOCK
+        self._context = zmq.Context()
+        self._commands = self._context.socket(zmq.PULL)
+        self._commands.setsockopt(zmq.CONFLATE, 1)
+        self._observations = self._context.socket(zmq.PUSH)
+        self._observations.setsockopt(zmq.SNDHWM, 2)
+        for socket in (self._commands, self._observations):
+            socket.setsockopt(zmq.LINGER, 0)
+        try:
+            self._commands.bind(f"tcp://{config.address}:{config.port_zmq_cmd}")
+            self._observations.bind(f"tcp://{config.address}:{config.port_zmq_observations}")
+        except zmq.ZMQError as error:
+            self.close()
+            ports = f"{config.port_zmq_cmd}, {config.port_zmq_observations}"
+            raise HandrailError(f"{config.address}, ports {ports}: {message_of(error)}") from error
+
+    def receive(self) -> list[bytes]:
+        """Return the newest command, if one has come."""
+        try:
+            return [self._commands.recv(self._nowait)]
+        except self._again:
+            return []
+
+    def send(self, parts: list[bytes]) -> None:
+        """Send an observation; while nobody takes it, it is forgotten."""
+        try:
+            self._observations.send_multipart(parts, flags=self._nowait)
+        except self._again:
+            return
+
+    def close(self) -> None:
+        """Give the ports back."""
+        self._commands.close()
+        self._observations.close()
+        self._context.term()
+
+
+def serve(config: HostConfig, say: Callable[[str], None] = print) -> int:
+    """Run the host until its time is over or Ctrl-C; return the exit code.
+
+    Raises:
+        HandrailError: a port is taken, or the robot is no LeKiwi.
+    """
+    model = load_model(config.robot)
+    units = robot_units("lekiwi", model.description)
+    task = resolved(TASKS.find(config.task).task)()
+    render = "rgb_array" if config.cameras else None
+    env = HandrailEnv(task, model, fps=_FPS, render_mode=render, observes=False)
+    body, sockets = LeKiwiBody(env, units), HostSockets(config)
+    loop = LeKiwiLoop(body, config, time.monotonic())
+    say(
+        f"LeKiwi (simulated): commands {config.address}:{config.port_zmq_cmd}, "
+        f"observations :{config.port_zmq_observations}; Ctrl-C ends it"
+    )
+    try:
+        _run(loop, sockets, config)
+    except KeyboardInterrupt:
+        pass
+    finally:
+        sockets.close()
+        body.close()
+        env.close()
+        summary = loop.log.summary()
+        if config.json:
+            write_json(Path(config.json).expanduser(), summary)
+        say(json.dumps({name: value for name, value in summary.items() if name != "episodes"}))
+    return 0
+
+
+def _run(loop: LeKiwiLoop, sockets: HostSockets, config: HostConfig) -> None:
+    period, start = 1.0 / config.max_loop_freq_hz, time.monotonic()
+    while not config.seconds or time.monotonic() - start < config.seconds:
+        now = time.monotonic()
+        if parts := loop.tick(now, sockets.receive(), time.time()):
+            sockets.send(parts)
+        time.sleep(max(period - (time.monotonic() - now), 0.0))
+
+
+def import_zmq(wanted_by: str) -> Any:
+    """Return pyzmq.
+
+    Raises:
+        HandrailError: it is not installed.
+    """
+    try:
+        import zmq
+    except ImportError as error:
+        raise not_installed(wanted_by, "pyzmq", "lekiwi") from error
+    return zmq

@@ -1,0 +1,167 @@
+"""What LeKiwi's host does in every round: take the newest command, stop the base when none comes, answer."""
+
+import json
+import math
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+
+from handrail.collect.lekiwi.body import LeKiwiBody
+from handrail.collect.lekiwi.host_config import HostConfig
+from handrail.collect.lekiwi.wire import Wire
+from handrail.collect.processor.units import number
+
+EPISODE, SEED, SENT = "handrail.episode", "handrail.seed", "handrail.sent"  # a real host overlooks these
+_QUALITY = 90  # of the JPEGs, as LeRobot's host has it
+
+
+class LeKiwiLoop:
+    """LeRobot's host loop, on a simulated robot and a network with faults.
+
+    Args:
+        body: the robot.
+        config: of the host.
+        start: now [s].
+
+    Attributes:
+        log: what happened.
+    """
+
+    def __init__(self, body: LeKiwiBody, config: HostConfig, start: float) -> None:
+        self._body, self._config = body, config
+        rng = np.random.default_rng(config.seed)
+        self._commands: Wire[bytes] = Wire(config.latency, config.drop, rng)
+        self._answers: Wire[list[bytes]] = Wire(config.latency, config.drop, rng)
+        self._heard = self._began = start
+        self._stopped, self._episode = False, 0.0
+        self._pictures: dict[str, bytes] = {}
+        self._painted = -math.inf
+        self.log = HostLog()
+        body.reset(config.seed)
+        self.log.begin(config.seed)
+
+    def tick(self, now: float, received: Iterable[bytes], wall: float = math.nan) -> list[bytes] | None:
+        """Do one round; return the parts of the message to send, if one is due.
+
+        Args:
+            now: on a clock that advances [s].
+            received: commands since the last round.
+            wall: the time of day, on which commands say when they were sent [s].
+        """
+        for message in received:
+            self._commands.put(message, now)
+        message = self._commands.newest(now)
+        if message is not None:
+            self._take(message, now, wall)
+        if now - self._heard > self._config.watchdog_timeout_ms / 1000.0 and not self._stopped:
+            self._stopped = True
+            self.log.stops += 1
+            self._body.stop_base()
+        self._body.advance(now - self._began)
+        self.log.see(self._body)
+        self._answers.put(self._answer(now), now)
+        self.log.lost = self._commands.lost + self._answers.lost
+        return self._answers.newest(now)
+
+    def _take(self, message: bytes, now: float, wall: float) -> None:
+        command = _parsed(message)
+        if command is None or not self._take_episode(command, now) or not self._body.take(command):
+            self.log.malformed += 1
+            return
+        self._heard, self._stopped = now, False
+        self.log.commanded(now, wall - number(command, SENT))
+
+    def _take_episode(self, command: dict[str, Any], now: float) -> bool:
+        """Begin the episode that a command asks for, if it does; whether that made sense."""
+        if EPISODE not in command:
+            return True
+        episode, seed = number(command, EPISODE), number(command, SEED)
+        if not (math.isfinite(episode) and 0.0 <= seed < 2.0**53):
+            return False
+        if episode != self._episode:
+            self._episode, self._began = episode, now
+            self._pictures.clear()
+            self._body.reset(int(seed))
+            self.log.begin(int(seed))
+        return True
+
+    def _answer(self, now: float) -> list[bytes]:
+        """Return LeKiwi's observation: a header, and a JPEG a camera; of a lost one nothing."""
+        cameras = self._config.camera_names
+        if cameras and now - self._painted >= 1.0 / self._config.camera_fps:
+            self._painted = now
+            lost = self._config.lost_camera
+            self._pictures = {name: b"" if name == lost else _jpeg(self._body, name) for name in cameras}
+        header = {"_cams": list(cameras), **self._body.observation()}
+        return [json.dumps(header).encode(), *(self._pictures.get(name, b"") for name in cameras)]
+
+
+class HostLog:
+    """What a host saw: commands, and how each episode went.
+
+    Attributes:
+        malformed: commands that made no sense.
+        stops: of the base, by the watchdog.
+        lost: messages, on purpose.
+        episodes: one table each.
+    """
+
+    def __init__(self) -> None:
+        self.malformed = self.stops = self.lost = 0
+        self.episodes: list[dict[str, Any]] = []
+        self._times: list[float] = []
+        self._ages: list[float] = []
+
+    def begin(self, seed: int) -> None:
+        """Take note that an episode begins."""
+        self.episodes.append({"seed": seed, "success_at": math.nan, "contacts": 0, "seconds": 0.0})
+
+    def commanded(self, now: float, age: float) -> None:
+        """Take note of a command that was followed."""
+        self._times.append(now)
+        if math.isfinite(age):
+            self._ages.append(age)
+
+    def see(self, body: LeKiwiBody) -> None:
+        """Take note of how the episode stands."""
+        base = body.base.round(4).tolist()
+        seen = {"success_at": body.done_at, "contacts": body.contacts, "seconds": body.time, "base": base}
+        self.episodes[-1] |= seen
+
+    def summary(self) -> dict[str, Any]:
+        """Return it as one table; intervals and ages in [ms]."""
+        gaps = np.diff(self._times)
+        gaps = gaps[gaps < 0.5]  # within an episode
+        return {
+            "commands": len(self._times),
+            "rate_hz": round(1.0 / float(np.mean(gaps)), 2) if len(gaps) else None,
+            "interval_ms": _percentiles(gaps),
+            "command_age_ms": _percentiles(np.array(self._ages)),
+            "malformed": self.malformed,
+            "messages_lost": self.lost,
+            "base_stops": self.stops,
+            "episodes": self.episodes,
+        }
+
+
+def _percentiles(seconds: np.ndarray) -> dict[str, float] | None:
+    if not len(seconds):
+        return None
+    return {f"p{p}": round(1e3 * float(np.percentile(seconds, p)), 1) for p in (50, 95, 100)}
+
+
+def _parsed(message: bytes) -> dict[str, Any] | None:
+    try:
+        command = json.loads(message)
+    except (ValueError, RecursionError):
+        return None
+    return command if isinstance(command, dict) else None
+
+
+def _jpeg(body: LeKiwiBody, camera: str) -> bytes:
+    import cv2
+
+    picture = cv2.cvtColor(body.picture(camera), cv2.COLOR_RGB2BGR)
+    done, coded = cv2.imencode(".jpg", picture, [int(cv2.IMWRITE_JPEG_QUALITY), _QUALITY])
+    return coded.tobytes() if done else b""

@@ -1,0 +1,210 @@
+"""The link to a robot through its LeRobot client: one command out and one observation in, a period."""
+
+import time
+from collections.abc import Callable, Mapping
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from handrail.collect.client_config import CLIENTS, ClientConfig
+from handrail.collect.lekiwi.host import import_zmq
+from handrail.collect.lekiwi.host_loop import EPISODE, SEED, SENT
+from handrail.collect.processor.units import RobotUnits, robot_units
+from handrail.collect.processor.whole_body import WholeBody
+from handrail.controllers.errors import HandrailError, message_of
+from handrail.controllers.interface.controller import State
+from handrail.controllers.robot.model import RobotModel
+
+_BACKLOG = 1000  # observations that may have waited
+_GONE = 2.0  # without a usable observation for so long, the robot is gone [s]
+
+
+class Client(Protocol):
+    """What is needed of a LeRobot robot."""
+
+    @property
+    def action_features(self) -> Mapping[str, Any]:
+        """Names of the action's entries."""
+        ...
+
+    def connect(self) -> None:
+        """Connect."""
+        ...
+
+    def get_observation(self) -> dict[str, Any]:
+        """Return what it says."""
+        ...
+
+    def send_action(self, action: dict[str, Any]) -> Any:
+        """Send it an action."""
+        ...
+
+    def disconnect(self) -> None:
+        """Disconnect."""
+        ...
+
+
+class Link:
+    """Keeps the beat: a command is sent, the period passes, the robot is heard.
+
+    Args:
+        client: LeRobot's, not connected.
+        name: of the robot.
+        model: of the robot.
+        period: from one command to the next [s].
+        simulated: whether it is our simulation, which is told what episode it is.
+        clock: [s].
+        sleep: waits [s].
+
+    Raises:
+        HandrailError: it does not answer, or is another robot.
+
+    Attributes:
+        body: what is known of the robot.
+        state: of the robot; its time stands still while nothing usable is heard.
+    """
+
+    state: State
+
+    def __init__(
+        self,
+        client: Client,
+        name: str,
+        model: RobotModel,
+        period: float,
+        simulated: bool = False,
+        clock: Callable[[], float] = time.monotonic,
+        sleep: Callable[[float], None] = time.sleep,
+    ) -> None:
+        self._client, self._name, self.model, self.period = client, name, model, period
+        self._simulated, self._clock, self._sleep = simulated, clock, sleep
+        units: RobotUnits = robot_units(name, model.description)
+        missing = set(client.action_features) ^ set(units.action_names)
+        if missing:
+            raise HandrailError(
+                f"--robot_client {name}: expected a robot with {', '.join(client.action_features)}; "
+                f"got {model.description.name} (--robot {name}?)"
+            )
+        self.body = WholeBody(model, units, period)
+        self._said: Mapping[str, Any] = {}
+        self._episode, self._extras = 0, {}
+        try:
+            client.connect()
+        except Exception as error:  # whatever a driver's code raises
+            raise HandrailError(f"--robot_client {name}: cannot be reached: {message_of(error)}") from error
+        self._heard = self._deadline = clock()
+        try:
+            self._catch_up()
+        except BaseException:
+            client.disconnect()
+            raise
+
+    def begin(self, seed: int) -> None:
+        """Begin an episode; our own simulation is told which, in every command, until it has heard."""
+        self._episode += 1
+        if self._simulated:
+            self._extras = {EPISODE: self._episode, SEED: seed}
+        self._catch_up()
+        self._deadline = self._heard = self._clock()
+
+    def exchange(self, command: ArrayLike) -> NDArray[np.floating]:
+        """Send a command, wait for the end of the period, and listen; return what was sent, (n + 1,).
+
+        Raises:
+            HandrailError: the robot cannot be reached, or has said nothing usable for two seconds.
+        """
+        action = {**self.body.send(command), **self._extras}
+        if self._simulated:
+            action[SENT] = time.time()
+        try:
+            self._client.send_action(action)
+        except Exception as error:  # whatever a driver's code raises
+            raise HandrailError(f"robot {self._name}: cannot be reached: {message_of(error)}") from error
+        self._wait()
+        self._listen()
+        return self.body.sent
+
+    def pictures(self, cameras: tuple[str, ...], size: tuple[int, int]) -> dict[str, NDArray[np.uint8]]:
+        """Return what cameras of ours see, (height, width, 3), in a size (height, width).
+
+        Raises:
+            HandrailError: a camera says nothing.
+        """
+        import cv2
+
+        names = {camera: CLIENTS[self._name][camera] for camera in cameras}
+        for name in names.values():
+            if name not in self._said:
+                raise HandrailError(f"robot {self._name}: camera {name} says nothing; look at its cable")
+        # LeRobot's client hands on OpenCV's pictures, whose colours are the other way round
+        seen = {
+            camera: cv2.cvtColor(np.asarray(self._said[name]), cv2.COLOR_BGR2RGB)
+            for camera, name in names.items()
+        }
+        return {
+            camera: cv2.resize(picture, size[::-1], interpolation=cv2.INTER_AREA)
+            for camera, picture in seen.items()
+        }  # pyright: ignore[reportReturnType]
+
+    def close(self) -> None:
+        """Let it go; its own watchdog stops what still moves."""
+        self._client.disconnect()
+
+    def _wait(self) -> None:
+        self._deadline += self.period
+        ahead = self._deadline - self._clock()
+        if ahead > 0.0:
+            self._sleep(ahead)
+        elif -ahead > self.period:
+            self._deadline = self._clock()
+
+    def _catch_up(self) -> None:
+        """Hear what was said while nobody listened: the network keeps it, and hands it on bit by bit."""
+        for _ in range(_BACKLOG):
+            before = self._said
+            self._listen()
+            if self._said is before:
+                return
+
+    def _listen(self) -> None:
+        try:
+            said = self._client.get_observation()
+        except Exception as error:  # whatever a driver's code raises
+            raise HandrailError(f"robot {self._name}: cannot be heard: {message_of(error)}") from error
+        now = self._clock()
+        state, self._said = self.body.observe(said, now), said
+        if not self.body.trouble:
+            self.state, self._heard = state, now
+        elif now - self._heard > _GONE:
+            raise HandrailError(f"robot {self._name}: nothing usable heard for {_GONE:.0f} s; is it on?")
+
+
+def connect(
+    robot: str, config: ClientConfig, cameras: tuple[str, ...], model: RobotModel, fps: float
+) -> Link:
+    """Return the link to a robot.
+
+    Args:
+        robot: which one.
+        config: where it is.
+        cameras: of ours, that it shall show.
+        model: of the robot.
+        fps: commands a second.
+
+    Raises:
+        HandrailError: it cannot be reached, or pyzmq is missing.
+    """
+    import_zmq(f"--robot_client {robot}")
+    from lerobot.robots.lekiwi import LeKiwiClient, LeKiwiClientConfig
+    from lerobot.robots.lekiwi.config_lekiwi import lekiwi_cameras_config
+
+    wanted = {CLIENTS[robot][camera] for camera in cameras}
+    settings = LeKiwiClientConfig(
+        remote_ip=config.remote_ip,
+        port_zmq_cmd=config.port_zmq_cmd,
+        port_zmq_observations=config.port_zmq_observations,
+        cameras={name: camera for name, camera in lekiwi_cameras_config().items() if name in wanted},
+    )
+    client: Any = LeKiwiClient(settings)
+    return Link(client, robot, model, 1.0 / fps, config.simulated)

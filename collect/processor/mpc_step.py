@@ -1,0 +1,219 @@
+"""The masked MPC as a step of LeRobot's processors: a part of the motion becomes the whole robot's action.
+
+```
+ teleoperator ─ action ─┐                                     ┌─▶ robot.send_action, dataset
+                        ├─▶ intent ─▶ masked MPC ─▶ limits ─▶ action in the robot's names and units
+ robot ─ observation ───┘   (state: odometry, targets)
+```
+"""
+
+import logging
+import math
+import time
+from collections import Counter
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from lerobot.configs import FeatureType, PipelineFeatureType, PolicyFeature
+from lerobot.lerobot_types import RobotAction, TransitionKey
+from lerobot.processor import ProcessorStepRegistry, RobotActionProcessorStep, RobotProcessorPipeline
+from lerobot.processor.converters import (
+    robot_action_observation_to_transition,
+    transition_to_robot_action,
+)
+
+from handrail.collect.processor.obstacles import parsed_obstacles
+from handrail.collect.processor.partial_intent import PartialIntent
+from handrail.collect.processor.units import robot_units
+from handrail.collect.processor.whole_body import WholeBody
+from handrail.controllers.errors import HandrailError, message_of, shown
+from handrail.controllers.interface.channels import Channels
+from handrail.controllers.interface.command import Diagnostics
+from handrail.controllers.interface.frames import Frames
+from handrail.controllers.mpc.masked_mpc import MaskedMpc
+from handrail.controllers.objectives.regularisation import narrow_joint_centring
+from handrail.controllers.ocp.settings import MpcSettings
+from handrail.controllers.robot.catalogue import ROBOTS
+from handrail.controllers.robot.model import load_model
+from handrail.datasets.storage.strict_json import load_json
+
+NAME = "handrail_masked_mpc"
+_CENTRED = 10.0  # weight of the middle of joints that cannot turn half around
+_LONG_AGO = -1e6  # when nobody who is listened to has asked [s]
+_log = logging.getLogger(__name__)
+
+
+@ProcessorStepRegistry.register(NAME)
+@dataclass
+class MaskedMpcStep(RobotActionProcessorStep):
+    """Completes a teleoperator's action to that of the whole robot; saved and loaded with its settings.
+
+    What it sends keeps the limits of the description and distances to the floor, to the robot itself and to
+    the obstacles. Where input is stale, malformed, not finite or from the future, it brakes, and counts.
+
+    Attributes:
+        robot: its name, or its description (.toml).
+        units: its names and units: lekiwi, so_follower, plain, or a table (docs/processor.md).
+        fps: how often the step is asked [Hz].
+        inputs: other names that the teleoperator uses: `{"delta_x": ["ee.vx", 0.2]}`.
+        tool_frame: frame in which the hand's twist is meant: world or tool.
+        base_frame: the same of the base's: base or world.
+        obstacles: what stands around, as tables of name, kind, size, position, rpy and work_surface.
+        start: where the base is at the beginning: x, y, heading [m, rad].
+        settings: what shall differ of `MpcSettings`.
+        timeout: age from which an observation is stale [s].
+        clock: [s]; not saved.
+        counts: how often it braked, and why.
+        diagnostics: how the controller fared in the last update.
+    """
+
+    robot: str = "ridgeback_ur10"
+    units: str | dict[str, Any] = "plain"
+    fps: float = 30.0
+    inputs: dict[str, Any] = field(default_factory=dict)
+    tool_frame: str = "world"
+    base_frame: str = "base"
+    obstacles: list[dict[str, Any]] = field(default_factory=list)
+    start: list[float] = field(default_factory=lambda: [0.0, 0.0, 0.0])
+    settings: dict[str, Any] = field(default_factory=dict)
+    timeout: float = 0.25
+    clock: Callable[[], float] = field(default=time.monotonic, repr=False)
+    counts: Counter[str] = field(default_factory=Counter, init=False, repr=False)
+    diagnostics: Diagnostics | None = field(default=None, init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        """Build the controller.
+
+        Raises:
+            HandrailError: a setting is wrong.
+        """
+        self._check()
+        model = load_model(self.robot)
+        frames, channels = Frames(self.base_frame, self.tool_frame), Channels.of(model.description)
+        if not frames.are_known:
+            raise HandrailError(
+                "tool_frame, base_frame: expected world or tool, base or world; "
+                f"got {shown(self.tool_frame)}, {shown(self.base_frame)}"
+            )
+        units = robot_units(self.units, model.description)
+        self._around = parsed_obstacles(self.obstacles)
+        self._intent = PartialIntent(channels, units, self.inputs, frames)
+        self._body = WholeBody(model, units, 1.0 / self.fps, self.timeout)
+        self._action_names = units.action_names
+        centring = narrow_joint_centring(channels, model.description.limits, _CENTRED)
+        self._mpc = MaskedMpc(model, self._mpc_settings(model.description.world.scale), centring)
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget the past; the base is at `start` with the next observation."""
+        self._body.reset(self.start)
+        self._intent.reset()
+        self._mpc.reset(self._around)
+        self._braking = ""
+
+    def action(self, action: RobotAction) -> RobotAction:
+        """Return the whole robot's action.
+
+        Raises:
+            HandrailError: no observation so far has the numbers that the robot's units name.
+        """
+        now = float(self.clock())
+        state = self._body.observe(self.transition.get(TransitionKey.OBSERVATION), now)
+        intent = self._intent.read(action, self._body.targets, self._body.opening, now)
+        if self._body.trouble:
+            intent = replace(intent, time=_LONG_AGO)
+        command = self._mpc.update(state, intent)
+        self.diagnostics = command.diagnostics
+        self._count(command.diagnostics)
+        return self._body.send(np.append(command.velocity(1.0 / self.fps), command.gripper))
+
+    def get_config(self) -> dict[str, Any]:
+        """Return the settings."""
+        kept = ("robot", "units", "fps", "inputs", "tool_frame", "base_frame", "obstacles", "start")
+        return {name: getattr(self, name) for name in (*kept, "settings", "timeout")}
+
+    def transform_features(
+        self, features: dict[PipelineFeatureType, dict[str, PolicyFeature]]
+    ) -> dict[PipelineFeatureType, dict[str, PolicyFeature]]:
+        """Return the features with the robot's own action."""
+        own = PolicyFeature(type=FeatureType.ACTION, shape=(1,))
+        return {**features, PipelineFeatureType.ACTION: dict.fromkeys(self._action_names, own)}
+
+    def _count(self, diagnostics: Diagnostics) -> None:
+        """Count a brake, and say so when one begins."""
+        brakes = diagnostics.status.brakes
+        why = (self._body.trouble or str(diagnostics.status)) if brakes else ""
+        if why:
+            self.counts[why] += 1
+            if why != self._braking:
+                _log.warning("handrail: braking: %s", why)
+        self._braking = why
+
+    def _check(self) -> None:
+        numbers = {"fps": self.fps, "timeout": self.timeout}
+        for name, value in numbers.items():
+            if not (isinstance(value, int | float) and 0.0 < value < math.inf):
+                raise HandrailError(f"{name} of {NAME}: expected a number above 0, got {shown(value)}")
+        start = self.start
+        fits = isinstance(start, list | tuple) and len(start) == 3
+        if not (fits and all(isinstance(each, int | float) and math.isfinite(each) for each in start)):
+            raise HandrailError(f"start of {NAME}: expected x, y and heading, got {shown(start)}")
+        for name in ("inputs", "settings"):
+            if not isinstance(getattr(self, name), Mapping):
+                raise HandrailError(f"{name} of {NAME}: expected a table, got {shown(getattr(self, name))}")
+
+    def _mpc_settings(self, scale: float) -> MpcSettings:
+        usual = asdict(MpcSettings())
+        for name, value in self.settings.items():
+            if name not in usual or type(value) not in (int, type(usual[name])):
+                raise HandrailError(
+                    f"settings of {NAME}: expected numbers for some of {', '.join(usual)}; "
+                    f"got {shown(name)} = {shown(value)}"
+                )
+        return MpcSettings.of(scale, **self.settings)
+
+
+Pipeline = RobotProcessorPipeline[tuple[RobotAction, Any], RobotAction]
+
+
+def mpc_pipeline(step: MaskedMpcStep) -> Pipeline:
+    """Return the pipeline of the step alone, as `lerobot_record.record(teleop_action_processor=…)` takes."""
+    return RobotProcessorPipeline(
+        steps=[step],
+        name=NAME,
+        to_transition=robot_action_observation_to_transition,
+        to_output=transition_to_robot_action,
+    )
+
+
+def load_pipeline(folder: str | Path, clock: Callable[[], float] = time.monotonic) -> Pipeline:
+    """Return a pipeline of the step that `save_pretrained` wrote into a folder.
+
+    LeRobot's loader imports whatever a file names: what is not this step is refused before.
+
+    Raises:
+        HandrailError: there is none, it has other steps, or a setting is wrong.
+    """
+    file = Path(folder) / f"{NAME}.json"
+    content = load_json(file, "a processor that save_pretrained wrote")
+    steps = content.get("steps") if isinstance(content, dict) else None
+    step = steps[0] if isinstance(steps, list) and len(steps) == 1 else None
+    if not isinstance(step, dict) or step.get("registry_name") != NAME:
+        raise HandrailError(f"processor {file}: expected the step {NAME} alone")
+    config = step.get("config")
+    if isinstance(config, dict) and isinstance(config.get("robot"), str):
+        ROBOTS.admit(config["robot"])
+    try:
+        return RobotProcessorPipeline.from_pretrained(
+            folder,
+            config_filename=file.name,
+            local_files_only=True,
+            overrides={NAME: {"clock": clock}},
+            to_transition=robot_action_observation_to_transition,
+            to_output=transition_to_robot_action,
+        )
+    except Exception as error:  # whatever LeRobot's loader raises; it wraps what we say
+        raise HandrailError(f"processor {file}: cannot be loaded: {message_of(error)}") from error

@@ -1,0 +1,102 @@
+"""From what a teleoperator says to an intent: the channels that it names are owned, the rest is completed."""
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from handrail.collect.processor.units import RobotUnits, number
+from handrail.controllers.arrays import FloatArray
+from handrail.controllers.errors import HandrailError, shown, unknown_name
+from handrail.controllers.interface.channels import Channels
+from handrail.controllers.interface.frames import Frames
+from handrail.controllers.interface.intent import Intent
+
+GRIPPER, TIME = "gripper", "time"
+_FOLLOW = 4.0  # of a joint towards the position that is asked for [1/s]
+
+
+class PartialIntent:
+    """Reads actions.
+
+    An entry is one of
+    - a channel (`ee.vx`, `base.wz`, `joint.elbow_flex`), in m/s and rad/s;
+    - a name of `inputs`: so many times a channel;
+    - an entry of the robot's own action: a leader's joint, which is followed, or the base's velocity;
+    - `gripper`, 0 open to 1 closed; `time`, when it was asked, on the clock of the step [s].
+
+    Args:
+        channels: of the robot.
+        units: of the robot.
+        inputs: by name of an entry, the channel and how much of it one unit is.
+        frames: in which twists are meant.
+
+    Raises:
+        HandrailError: an input's channel is none.
+    """
+
+    def __init__(
+        self, channels: Channels, units: RobotUnits, inputs: Mapping[str, Any], frames: Frames
+    ) -> None:
+        self._channels, self._units, self._frames = channels, units, frames
+        self._scaled = {name: (index, 1.0) for index, name in enumerate(channels.names)}
+        for name, said in inputs.items():
+            channel, scale = _checked(name, said)
+            if channel not in channels.names:
+                raise unknown_name(f"channel of input {name}:", channel, channels.names)
+            self._scaled[name] = (channels.names.index(channel), scale)
+        if base := units.base:
+            twist = zip((base.x, base.y, base.theta), (1.0, 1.0, units.turn), strict=True)
+            self._scaled |= {name: (index, scale) for index, (name, scale) in enumerate(twist)}
+        self._first_arm = channels.joint_slice.start + len(channels.base)
+        self._joints = {name: index for index, name in enumerate(units.positions)}
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget how far the gripper was asked to close."""
+        self._grip: float | None = None
+
+    def read(self, action: Any, targets: FloatArray, opening: float, now: float) -> Intent:
+        """Return the intent of an action; one that is malformed says so by numbers that are none.
+
+        Args:
+            action: of a teleoperator.
+            targets: where the arm's joints are sent now, (n − b,).
+            opening: of the gripper.
+            now: the time of an action that says none [s].
+        """
+        values, mask = np.zeros(self._channels.size), np.zeros(self._channels.size, dtype=bool)
+        entries = action if isinstance(action, Mapping) else {"": math.nan}
+        stamp, grip = now, self._grip if self._grip is not None else float(opening < 0.5)
+        for name in entries:
+            value = number(entries, name)
+            if name == TIME:
+                stamp = value
+            elif name == GRIPPER:
+                grip = value
+            elif name in self._scaled:
+                index, scale = self._scaled[name]
+                values[index] += scale * value
+                mask[index] = True
+            elif name in self._joints:
+                joint = self._joints[name]
+                wanted = self._units.joint_positions(np.where(np.arange(len(targets)) == joint, value, 0.0))
+                values[self._first_arm + joint] += _FOLLOW * (wanted[joint] - targets[joint])
+                mask[self._first_arm + joint] = True
+            elif self._units.gripper and name == self._units.gripper.name:
+                grip = self._units.grip(value)
+            else:
+                values[:], mask[:] = math.nan, True
+        self._grip = grip if math.isfinite(grip) else self._grip
+        return Intent(values, mask, grip, "processor", stamp, self._frames)
+
+
+def _checked(name: str, said: Any) -> tuple[str, float]:
+    try:
+        channel, scale = said
+        if isinstance(channel, str) and math.isfinite(float(scale)):
+            return channel, float(scale)
+    except (TypeError, ValueError):
+        pass
+    raise HandrailError(f"input {name}: expected a channel and how much of it one unit is, got {shown(said)}")

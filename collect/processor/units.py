@@ -1,0 +1,272 @@
+"""What a robot of LeRobot's calls its joints, and in which units: from its numbers to ours, and back."""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from handrail.controllers.arrays import FloatArray
+from handrail.controllers.entries import Entry, check_entries, is_number, is_table, is_text
+from handrail.controllers.errors import HandrailError, unknown_name
+from handrail.controllers.robot.description import RobotDescription
+
+POSITION, VELOCITY = ".pos", ".vel"
+_DEGREE = math.pi / 180.0
+_UNITS = ("degrees", "radians", "metres", "range")
+_SENT = {"position": POSITION, "velocity": VELOCITY}
+
+
+@dataclass(frozen=True)
+class JointUnits:
+    """A joint of the arm: `q = q₀ + sign · s · (value − zero)`.
+
+    Attributes:
+        name: of its entries, without `.pos` and `.vel`.
+        unit: degrees, radians or metres, where `q₀ = 0`; or range: −100 to 100 between the joint's limits.
+        sign: 1, or −1 where it turns the other way.
+        zero: the value at `q₀`.
+        sends: position or velocity: what the robot takes.
+    """
+
+    name: str
+    unit: str = "degrees"
+    sign: float = 1.0
+    zero: float = 0.0
+    sends: str = "position"
+
+
+@dataclass(frozen=True)
+class BaseUnits:
+    """The base: velocities in its own frame [m/s, unit/s]; and its pose, where the robot has odometry.
+
+    Attributes:
+        x: name of the velocity ahead.
+        y: to the left.
+        theta: of the turn.
+        unit: of the turn: degrees or radians.
+        pose: names of x, y and heading in the world [m, unit]; none where they are to be integrated.
+    """
+
+    x: str = "x.vel"
+    y: str = "y.vel"
+    theta: str = "theta.vel"
+    unit: str = "degrees"
+    pose: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class GripperUnits:
+    """The gripper: its name, and its values when it is open and closed."""
+
+    name: str
+    opened: float
+    closed: float
+
+
+class Reading(NamedTuple):
+    """What an observation says [m, rad]: joints, (n − b,); the base's twist and pose, (3,); opening."""
+
+    arm: FloatArray
+    twist: FloatArray
+    pose: FloatArray | None
+    opening: float
+
+
+class RobotUnits:
+    """Names and units of a whole robot.
+
+    Args:
+        description: of the robot.
+        joints: of the arm, by the description's names.
+        base: of the base; None on a fixed one.
+        gripper: None where there is none.
+
+    Raises:
+        HandrailError: a joint of the arm is missing or unknown, or a unit is none.
+
+    Attributes:
+        action_names: of the action's entries, in order.
+        sends_position: which joints of the arm are sent positions, (n − b,).
+    """
+
+    def __init__(
+        self,
+        description: RobotDescription,
+        joints: Mapping[str, JointUnits],
+        base: BaseUnits | None,
+        gripper: GripperUnits | None,
+    ) -> None:
+        arm = description.arm_joints
+        if set(joints) != set(arm) or bool(base) != bool(description.base_joints):
+            raise HandrailError(
+                f"units of robot {description.name}: expected joints {', '.join(arm)} and "
+                f"{'a' if description.base_joints else 'no'} base; got {', '.join(joints) or 'no joints'} "
+                f"and {'a' if base else 'no'} base"
+            )
+        self.base, self.gripper = base, gripper
+        self._joints = [joints[name] for name in arm]
+        offset = len(description.base_joints)
+        lower, upper = (
+            limit[offset:] for limit in (description.limits.position_lower, description.limits.position_upper)
+        )
+        terms = [_terms(joint, *ends) for joint, *ends in zip(self._joints, lower, upper, strict=True)]
+        self._scale, self._centre = np.array(terms).reshape(-1, 2).T
+        self._zero = np.array([joint.zero for joint in self._joints])
+        self.sends_position = np.array([joint.sends == "position" for joint in self._joints], dtype=bool)
+        self.turn = _angle(base.unit) if base else 1.0
+        self.positions = tuple(joint.name + POSITION for joint in self._joints)
+        grip = (gripper.name,) if gripper else ()
+        twist = (base.x, base.y, base.theta) if base else ()
+        self.action_names = (*(joint.name + _SENT[joint.sends] for joint in self._joints), *grip, *twist)
+
+    @property
+    def observation_names(self) -> tuple[str, ...]:
+        """Names of the numbers that an observation has to have."""
+        base = (self.base.pose or (self.base.x, self.base.y, self.base.theta)) if self.base else ()
+        return (*self.positions, *((self.gripper.name,) if self.gripper else ()), *base)
+
+    def read(self, observation: Any) -> Reading | None:
+        """Return what an observation says; None where a number is missing or not finite."""
+        values = {name: number(observation, name) for name in self.observation_names}
+        if not all(map(math.isfinite, values.values())):
+            return None
+        arm = self.joint_positions(np.array([values[name] for name in self.positions]))
+        twist, pose = np.zeros(3), None
+        if self.base is not None:
+            rad = np.array([1.0, 1.0, self.turn])
+            named = (self.base.x, self.base.y, self.base.theta)
+            if self.base.pose:
+                pose = rad * [values[name] for name in self.base.pose]
+            else:
+                twist = rad * [values[name] for name in named]
+        grip = self.gripper
+        opening = 1.0 - self.grip(values[grip.name]) if grip else 0.0
+        return Reading(arm, twist, pose, opening)
+
+    def action(self, q: FloatArray, v: FloatArray, twist: FloatArray, gripper: float) -> dict[str, float]:
+        """Return the robot's action.
+
+        Args:
+            q: where the arm's joints shall be, (n − b,).
+            v: how fast they shall move, (n − b,).
+            twist: of the base in its own frame [m/s, rad/s], (3,).
+            gripper: 0 open, 1 closed.
+        """
+        values = np.where(self.sends_position, (q - self._centre) / self._scale + self._zero, v / self._scale)
+        numbers = values.tolist()
+        if self.gripper:
+            numbers.append(self.gripper.opened + gripper * (self.gripper.closed - self.gripper.opened))
+        if self.base:
+            numbers += (twist / [1.0, 1.0, self.turn]).tolist()
+        return dict(zip(self.action_names, map(float, numbers), strict=True))
+
+    def joint_positions(self, values: FloatArray) -> FloatArray:
+        """Return the arm's joints from the robot's values, (n − b,) [m, rad]."""
+        return self._centre + self._scale * (values - self._zero)
+
+    def grip(self, value: float) -> float:
+        """Return how far the gripper is closed, from 0 to 1."""
+        assert self.gripper is not None
+        share = (value - self.gripper.opened) / (self.gripper.closed - self.gripper.opened)
+        return min(max(share, 0.0), 1.0) if math.isfinite(share) else share
+
+
+def number(values: Any, name: str) -> float:
+    """Return the number of a name; NaN where there is none, or something else."""
+    try:
+        return float(values[name])
+    except (KeyError, TypeError, ValueError, OverflowError, RuntimeError):  # torch raises the last
+        return math.nan
+
+
+def lekiwi(description: RobotDescription) -> RobotUnits:
+    """Return what LeRobot's LeKiwi says: degrees, the gripper's percents, and the base's velocities."""
+    joints = {name: JointUnits(f"arm_{name}") for name in description.arm_joints}
+    return RobotUnits(description, joints, BaseUnits(), GripperUnits("arm_gripper.pos", 100.0, 0.0))
+
+
+def so_follower(description: RobotDescription) -> RobotUnits:
+    """Return what LeRobot's SO-100 and SO-101 say: degrees, and the gripper's percents."""
+    joints = {name: JointUnits(name) for name in description.arm_joints}
+    return RobotUnits(description, joints, None, GripperUnits("gripper.pos", 100.0, 0.0))
+
+
+def plain(description: RobotDescription) -> RobotUnits:
+    """Return the description's own names, in radians; the gripper from 0 (open) to 1, the base in radians."""
+    joints = {name: JointUnits(name, "radians") for name in description.arm_joints}
+    base = BaseUnits(unit="radians") if description.base_joints else None
+    grip = GripperUnits("gripper.pos", 0.0, 1.0) if description.gripper else None
+    return RobotUnits(description, joints, base, grip)
+
+
+UNITS: Mapping[str, Callable[[RobotDescription], RobotUnits]] = {
+    "lekiwi": lekiwi,
+    "so_follower": so_follower,
+    "plain": plain,
+}
+_NUMBER = Entry("a finite number", is_number, needed=False)
+_JOINT = {
+    "name": Entry("LeRobot's name of a joint", is_text),
+    "unit": Entry(", ".join(_UNITS), lambda value: value in _UNITS, needed=False),
+    "sign": Entry("1 or -1", lambda value: value in (1, -1), needed=False),
+    "zero": _NUMBER,
+    "sends": Entry("position or velocity", lambda value: value in tuple(_SENT), needed=False),
+}
+_BASE = {
+    **{name: Entry("a name", is_text, needed=False) for name in ("x", "y", "theta")},
+    "unit": Entry("degrees or radians", lambda value: value in _UNITS[:2], needed=False),
+    "pose": Entry(
+        "three names", lambda value: len(value) in (0, 3) and all(map(is_text, value)), needed=False
+    ),
+}
+_GRIPPER = {
+    "name": Entry("a name", is_text),
+    "opened": Entry("a finite number", is_number),
+    "closed": Entry("a finite number", is_number),
+}
+_TABLE = {
+    "joints": Entry("a table of the arm's joints", is_table),
+    "base": Entry("a table, or nothing", lambda value: value is None or is_table(value), needed=False),
+    "gripper": Entry("a table, or nothing", lambda value: value is None or is_table(value), needed=False),
+}
+
+
+def robot_units(said: str | Mapping[str, Any], description: RobotDescription) -> RobotUnits:
+    """Return names and units: those of a known robot, or as a table says.
+
+    Raises:
+        HandrailError: there is none of that name, or the table does not fit the robot.
+    """
+    if isinstance(said, str):
+        if said not in UNITS:
+            raise unknown_name("units", said, UNITS)
+        return UNITS[said](description)
+    check_entries(said, _TABLE, "units")
+    joints = dict(said["joints"])
+    for name, joint in joints.items():
+        check_entries(joint, _JOINT, f"units: joint {name}")
+    base, gripper = said.get("base"), said.get("gripper")
+    if base is not None:
+        check_entries(base, _BASE, "units: base")
+        base = BaseUnits(**{**base, "pose": tuple(base.get("pose", ()))})
+    if gripper is not None:
+        check_entries(gripper, _GRIPPER, "units: gripper")
+        if gripper["opened"] == gripper["closed"]:
+            raise HandrailError("units: gripper: expected opened and closed to differ")
+        gripper = GripperUnits(**gripper)
+    return RobotUnits(
+        description, {name: JointUnits(**joint) for name, joint in joints.items()}, base, gripper
+    )
+
+
+def _terms(joint: JointUnits, lower: float, upper: float) -> tuple[float, float]:
+    """Return `sign · s` and q₀."""
+    if joint.unit == "range":
+        return joint.sign * (upper - lower) / 200.0, 0.5 * (lower + upper)
+    return joint.sign * _angle(joint.unit), 0.0
+
+
+def _angle(unit: str) -> float:
+    return _DEGREE if unit == "degrees" else 1.0

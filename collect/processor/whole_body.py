@@ -1,0 +1,149 @@
+"""A robot of LeRobot's as a whole body: what it says becomes a state, velocities become its action."""
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from handrail.collect.processor.odometry import moved
+from handrail.collect.processor.units import Reading, RobotUnits
+from handrail.collect.simulation.gate import Gate
+from handrail.controllers.arrays import FloatArray
+from handrail.controllers.errors import HandrailError, shown
+from handrail.controllers.interface.controller import State
+from handrail.controllers.numerics.rotation import turned
+from handrail.controllers.robot.model import RobotModel
+
+_LEAD = 0.3  # how far a joint's target may be ahead of where the joint is [rad, m]
+_STROKES = 1.5  # of a gripper whose speed nobody knows [1/s]
+
+
+class WholeBody:
+    """Knows where a robot is, and what it was sent.
+
+    A joint that takes positions is sent the path of its velocity, `r⁺ = r + ½ h (v + v⁺)`: on from the target
+    before, not from where it is, so that a joint that sags under its weight sags no further. It goes no
+    farther ahead of the joint than 0.3 rad; where it would, the joint counts as standing still.
+
+    A robot without odometry is where its base's velocities have led. An observation that makes no sense, or
+    the very same object again, is none: the base goes on as it was sent, until the next one.
+
+    Args:
+        model: of the robot.
+        units: its names and units.
+        period: from one command to the next [s].
+        timeout: age from which an observation is stale [s].
+
+    Attributes:
+        trouble: what is wrong with the observation now; empty if nothing is.
+        targets: where the arm's joints are sent, (n − b,) [rad, m].
+        sent: the command sent last, inside the limits, (n + 1,).
+    """
+
+    def __init__(self, model: RobotModel, units: RobotUnits, period: float, timeout: float = 0.25) -> None:
+        self._model, self._units, self._period, self._timeout = model, units, period, timeout
+        self._b = len(model.description.base_joints)
+        gripper = model.description.gripper
+        self._grip_step = period * (gripper.speed / gripper.stroke if gripper else _STROKES)
+        self.reset()
+
+    def reset(self, base: ArrayLike = (0.0, 0.0, 0.0)) -> None:
+        """Begin anew with the next observation.
+
+        Args:
+            base: where the base is taken to be then, (3,) [m, rad].
+        """
+        self._gate = Gate(self._model, self._period, precision=np.float64)
+        self._base = np.array(base, dtype=np.float64)
+        self._reading: Reading | None = None
+        self._said: object = None
+        self._heard, self._time, self._sent_at = -math.inf, -math.inf, -math.inf
+        self._held = np.zeros(self._model.size, dtype=bool)
+        self._twist, self.trouble, self._grip = np.zeros(3), "", 0.0
+        self.sent = np.zeros(self._model.size + 1)
+        self.targets = np.zeros(self._model.size - self._b)
+
+    def place(self, base: ArrayLike) -> None:
+        """Take the base to be somewhere now, (3,) [m, rad]; the robot has no odometry of its own."""
+        self._base, self._heard = np.array(base, dtype=np.float64), self._time
+
+    @property
+    def velocity(self) -> FloatArray:
+        """What was sent last, (n,)."""
+        return self._gate.velocity
+
+    @property
+    def opening(self) -> float:
+        """How far the gripper is open, from 0 to 1."""
+        return self._reading.opening if self._reading else 0.0
+
+    def observe(self, observation: Any, now: float) -> State:
+        """Take what the robot says, and return its state.
+
+        Args:
+            observation: LeRobot's.
+            now: on any clock that advances [s].
+
+        Raises:
+            HandrailError: there never was one that makes sense: its names are others.
+        """
+        reading = self._units.read(observation)
+        nonsense = "malformed_observation" if reading is None else ""
+        if reading is not None and observation is not self._said:
+            self._take(reading, now)
+        self._said = observation
+        if self._reading is None:
+            raise HandrailError(
+                f"observation of {self._model.description.name}: expected finite numbers "
+                f"{', '.join(self._units.observation_names)}; got {shown(observation)}"
+            )
+        stale = now - self._heard > self._timeout
+        self.trouble = nonsense or ("stale_observation" if stale else "")
+        if math.isfinite(now):
+            self._time = now
+        v = np.where(self._held, 0.0, self.velocity)
+        return State(np.append(self._now(), self._reading.arm), v, now, self.velocity)
+
+    def send(self, command: ArrayLike) -> dict[str, float]:
+        """Return the robot's action for a command, inside the limits.
+
+        Args:
+            command: velocities at the end of a period, the base's in the world, and gripper, (n + 1,).
+        """
+        assert self._reading is not None
+        b, base = self._b, self._now()
+        if self._time - self._sent_at > self._timeout:  # meanwhile joints stand at their targets
+            self._gate.velocity[b:][self._units.sends_position] = 0.0
+        self._sent_at = self._time
+        before = self._gate.velocity
+        self.sent = self._gate.limit(command, np.append(base, self.targets))
+        way = 0.5 * self._period * (before + self._gate.velocity)[b:]
+        wanted, arm = self.targets + way, self._reading.arm
+        self.targets = np.clip(wanted, arm - _LEAD, arm + _LEAD)
+        self._held[b:] = np.abs(self.targets - wanted) > 1e-9
+        self._twist = turned(self._gate.velocity[:3], -base[2]) if b else np.zeros(3)
+        self._grip += float(np.clip(self._gate.gripper - self._grip, -self._grip_step, self._grip_step))
+        return self._units.action(self.targets, self._gate.velocity[b:], self._twist, self._grip)
+
+    def _take(self, reading: Reading, now: float) -> None:
+        """Take an observation that makes sense."""
+        before = self._reading
+        if before is None:
+            self.targets = reading.arm.copy()
+            self._grip = 1.0 - reading.opening
+        elif reading.pose is None:
+            self._base = moved(self._base, 0.5 * (before.twist + reading.twist), self._since(now))
+        if reading.pose is not None:
+            self._base = reading.pose
+        self._reading = reading
+        self._heard = now if math.isfinite(now) else self._heard
+
+    def _now(self) -> FloatArray:
+        """Return where the base is, (b,): since it was last heard of it goes on as it was sent."""
+        return moved(self._base, self._twist, self._since(self._time))[: self._b]
+
+    def _since(self, now: float) -> float:
+        """Return how long ago the robot was heard of, no longer than it may be [s]."""
+        passed = now - self._heard
+        return min(max(passed, 0.0), self._timeout) if math.isfinite(passed) else 0.0

@@ -1,0 +1,253 @@
+"""The masked MPC as a step of LeRobot's processors."""
+
+import json
+import math
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from places import ROOT
+from processor_helpers import PERIOD, Clock, Drive
+
+from handrail.collect.processor.mpc_step import NAME, MaskedMpcStep, load_pipeline
+from handrail.collect.processor.odometry import moved
+from handrail.collect.processor.units import robot_units
+from handrail.controllers.errors import HandrailError
+from handrail.controllers.robot.model import load_model
+
+AHEAD = {"ee.vx": 0.2, "ee.vy": 0.0, "ee.vz": 0.0, "ee.wx": 0.0, "ee.wy": 0.0, "ee.wz": 0.0}
+SCRIPT = """
+import json, sys
+sys.path.insert(0, {helpers!r})
+from processor_helpers import Clock
+from handrail.collect.processor.mpc_step import load_pipeline
+clock = Clock()
+pipeline = load_pipeline(sys.argv[1], clock)
+answers = []
+for now, action, observation in json.loads(sys.stdin.read()):
+    clock.now = now
+    answers.append(pipeline((action, observation)))
+print(json.dumps(answers))
+"""
+
+
+def degrees(**more) -> dict:
+    """Return units in which every joint is said otherwise than in the description."""
+    arm = load_model().description.arm_joints
+    joints = {name: {"name": f"arm_{i}", "sign": (-1) ** i, "zero": 10.0 * i} for i, name in enumerate(arm)}
+    joints[arm[-1]] |= {"unit": "range", "zero": 0.0}
+    return {"joints": joints, "base": {}, "gripper": {"name": "g.pos", "opened": 100.0, "closed": 0.0}} | more
+
+
+@pytest.mark.parametrize("units", ["plain", degrees()], ids=["radians", "degrees"])
+def test_the_hand_goes_as_asked_and_the_whole_robot_keeps_its_limits(units):
+    drive = Drive(units=units)
+    start = drive.hand
+    drive.go(AHEAD, 2.0)
+    assert drive.hand - start == pytest.approx([0.4, 0.0, 0.0], abs=0.03)
+    assert np.linalg.norm(drive.robot.pose[:2]) > 0.1  # the base comes along, and its odometry is right
+    assert not drive.step.counts
+    readings = [drive.robot.units.read(action) for action in drive.sent]
+    arm = np.array([reading.arm for reading in readings])
+    limits, base = drive.model.description.limits, 3
+    velocity = np.diff(arm, axis=0) / PERIOD
+    assert (np.abs(velocity) <= limits.velocity[base:] + 1e-6).all()
+    assert (np.abs(np.diff(velocity, axis=0)) <= PERIOD * limits.acceleration[base:] + 1e-6).all()
+    twist = np.array([reading.twist for reading in readings])
+    assert (np.abs(np.diff(twist[:, 2])) <= PERIOD * limits.acceleration[2] + 1e-6).all()
+
+
+def test_an_obstacle_is_kept_from():
+    pillar = {"name": "pillar", "kind": "cylinder", "size": [0.15, 0.4], "position": [0.95, 0.1, 0.2]}
+    without, beside = Drive(), Drive(obstacles=[pillar])
+    closest = math.inf
+    for drive in (without, beside):
+        for _ in range(90):
+            drive.go(AHEAD)
+            if drive is beside:
+                closest = min(closest, drive.step.diagnostics.smallest_distance)
+    assert np.linalg.norm(without.robot.pose - beside.robot.pose) > 0.05
+    assert closest > 0.0
+
+
+def test_loaded_in_a_fresh_process_it_says_the_same(tmp_path):
+    drive = Drive(
+        units=degrees(), inputs={"delta_x": ["ee.vx", 0.2]}, settings={"margin": 0.05}, start=[1, 2, 3]
+    )
+    drive.pipeline.save_pretrained(tmp_path)
+    asked = []
+    for index in range(40):
+        action = {"delta_x": 1.0, "ee.vz": 0.1} if index < 25 else {"base.wz": 0.2, "gripper": 1.0}
+        action |= {"ee.vx": math.nan} if index == 30 else {}
+        asked.append((drive.clock.now, action, drive.robot.observation()))
+        drive.go(action)
+    assert drive.step.counts == {"invalid_intent": 1}
+    script = SCRIPT.format(helpers=str(ROOT / "tests" / "helpers"))
+    done = subprocess.run(
+        [sys.executable, "-c", script, str(tmp_path)],
+        input=json.dumps(asked), capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    assert json.loads(done.stdout.splitlines()[-1]) == drive.sent
+
+
+@pytest.mark.parametrize(
+    ("wrong", "why"),
+    [
+        ({"ee.vx": math.nan}, "invalid_intent"),
+        ({"ee.vx": "fast"}, "invalid_intent"),
+        ({"ee.vx": None}, "invalid_intent"),
+        ({"ee.vx": 0.1, "ee.typo": 0.0}, "invalid_intent"),
+        ({"ee.vx": 0.1, "gripper": math.inf}, "invalid_intent"),
+        ({"ee.vx": 0.1, "time": 1e9}, "invalid_intent"),
+        ({"ee.vx": 0.1, "time": 99.0}, "stale_intent"),
+    ],
+)
+def test_wrong_actions_brake_and_are_counted(wrong, why):
+    drive = Drive()
+    drive.go(AHEAD, 1.0)
+    drive.go(wrong, 2.0)
+    assert not drive.moves(drive.go(wrong))
+    assert drive.step.counts == {why: 61}
+    drive.go(AHEAD, 0.3)
+    assert drive.moves(drive.sent[-1])
+    assert drive.step.counts == {why: 61}
+
+
+@pytest.mark.parametrize("wrong", [{}, None, {"base": 1}, "nan"])
+def test_observations_that_make_no_sense_brake(wrong):
+    drive = Drive()
+    drive.go(AHEAD, 1.0)
+    for _ in range(60):
+        broken = drive.robot.observation() | {"shoulder_pan_joint.pos": math.nan} if wrong == "nan" else wrong
+        drive.robot.send(drive.pipeline((AHEAD, broken)))
+        drive.clock.now += PERIOD
+    assert np.abs(drive.robot.twist).max() < 1e-9
+    assert set(drive.step.counts) == {"malformed_observation"}
+
+
+def test_the_very_same_observation_is_stale_after_its_time():
+    drive = Drive()
+    drive.go(AHEAD, 1.0)
+    old, statuses = drive.robot.observation(), []
+    for _ in range(60):
+        drive.robot.send(drive.pipeline((AHEAD, old)))
+        statuses.append(drive.step.diagnostics.status.brakes)
+        drive.clock.now += PERIOD
+    assert statuses.index(True) == 8  # a quarter of a second
+    assert all(statuses[8:])
+    assert np.abs(drive.robot.twist).max() < 1e-9
+    assert set(drive.step.counts) == {"stale_observation"}
+
+
+def test_a_clock_that_stands_brakes():
+    drive = Drive()
+    drive.go(AHEAD, 1.0)
+    for _ in range(60):
+        drive.robot.send(drive.pipeline((AHEAD, drive.robot.observation())))
+    assert not drive.moves(drive.pipeline((AHEAD, drive.robot.observation())))
+    assert set(drive.step.counts) == {"invalid_state"}
+
+
+def test_a_joint_that_is_blocked_is_not_sent_far_ahead():
+    drive = Drive()
+    arm = drive.robot.arm.copy()
+    for _ in range(120):
+        sent = drive.pipeline(({"joint.elbow_joint": 1.0}, drive.robot.observation()))
+        drive.robot.send(sent)
+        drive.robot.arm = arm
+        drive.clock.now += PERIOD
+        assert np.abs(drive.robot.units.read(sent).arm - arm).max() <= 0.3 + 1e-9
+
+
+def test_a_leaders_joints_and_the_base_s_keys_are_followed():
+    drive = Drive(units=degrees())
+    names = drive.robot.units.positions
+    leader = {name: value + 5.0 for name, value in drive.robot.observation().items() if name in names}
+    drive.go({**leader, "x.vel": 0.1, "y.vel": 0.0, "theta.vel": 0.0, "g.pos": 0.0}, 4.0)
+    now = drive.robot.observation()
+    assert [now[name] for name in names] == pytest.approx([leader[name] for name in names], abs=0.5)
+    assert now["x.vel"] == pytest.approx(0.1, abs=0.01)
+    assert drive.sent[-1]["g.pos"] == 0.0
+
+
+def test_odometry_follows_a_circle():
+    pose = np.zeros(3)
+    for _ in range(600):
+        pose = moved(pose, np.array([0.3, 0.1, 1.0]), PERIOD)
+    radius, angle = np.array([0.3, 0.1]) / 1.0, 600 * PERIOD
+    c, s = math.cos(angle), math.sin(angle)
+    exact = [radius[0] * s - radius[1] * (1 - c), radius[0] * (1 - c) + radius[1] * s, angle]
+    assert pose == pytest.approx(exact, abs=1e-4)
+
+
+def test_values_go_there_and_back():
+    units = robot_units(degrees(), load_model().description)
+    q, twist = np.random.default_rng(0).normal(size=6), np.array([0.1, -0.2, 0.3])
+    reading = units.read(units.action(q, np.zeros(6), twist, 0.25))
+    assert reading.arm == pytest.approx(q)
+    assert reading.twist == pytest.approx(twist)
+    assert reading.opening == pytest.approx(0.75)
+
+
+def test_velocities_are_sent_where_the_robot_takes_them():
+    units = degrees()
+    for joint in units["joints"].values():
+        joint["sends"] = "velocity"
+    drive = Drive(units=units)
+    drive.robot.units = robot_units(degrees(), drive.model.description)  # which says positions
+    sent = drive.pipeline(({"joint.elbow_joint": 0.5}, drive.robot.observation()))
+    rate = np.array([sent[f"arm_{i}.vel"] for i in range(6)])
+    limit = drive.model.description.limits.acceleration[3 + 2] * PERIOD
+    assert 0.0 < math.radians(rate[2]) <= limit + 1e-9
+
+
+def test_it_says_the_robot_s_own_action():
+    from lerobot.datasets import aggregate_pipeline_dataset_features, create_initial_features
+
+    drive = Drive()
+    features = aggregate_pipeline_dataset_features(
+        pipeline=drive.pipeline, initial_features=create_initial_features(action={"ee.vx": float})
+    )
+    assert features["action"]["names"] == list(drive.robot.units.action_names)
+
+
+@pytest.mark.parametrize(
+    ("setting", "words"),
+    [
+        ({"robot": "nobody"}, "unknown robot"),
+        ({"units": "yards"}, "unknown units 'yards': expected one of lekiwi, plain, so_follower"),
+        ({"units": {"joints": {}}}, "expected joints shoulder_pan_joint"),
+        ({"units": {"joints": {"a": {"name": "a", "unit": "yards"}}}}, "unit: expected degrees"),
+        ({"inputs": {"a": ["ee.up", 1.0]}}, "'ee.up': expected one of"),
+        ({"inputs": {"a": "ee.vx"}}, "how much of it"),
+        ({"settings": {"horizons": 3}}, "expected numbers for some of horizon"),
+        ({"obstacles": [{"name": "a"}]}, "expected an entry 'kind'"),
+        ({"fps": 0}, "fps"),
+        ({"start": [0, 0]}, "start"),
+        ({"tool_frame": "moon"}, "tool_frame"),
+    ],
+)
+def test_wrong_settings_are_named(setting, words):
+    with pytest.raises(HandrailError, match=words):
+        MaskedMpcStep(**setting)
+
+
+def test_names_that_the_robot_does_not_say_are_told_at_once():
+    with pytest.raises(HandrailError, match=r"expected finite numbers shoulder_pan_joint\.pos"):
+        Drive().pipeline((AHEAD, {"other.pos": 1.0}))
+
+
+def test_a_stranger_s_processor_imports_nothing(tmp_path):
+    Drive().pipeline.save_pretrained(tmp_path)
+    file = tmp_path / f"{NAME}.json"
+    good = json.loads(file.read_text())
+    for steps in (
+        [{"class": "os.system", "config": {}}],
+        [*good["steps"], {"class": "os.system", "config": {}}],
+        [{**good["steps"][0], "config": {"robot": "antigravity:X"}}],
+    ):
+        file.write_text(json.dumps({**good, "steps": steps}))
+        with pytest.raises(HandrailError, match=r"expected the step|may not choose what is imported"):
+            load_pipeline(tmp_path, Clock())
+    assert "antigravity" not in sys.modules
