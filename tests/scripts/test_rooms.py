@@ -4,11 +4,16 @@ import networkx
 from rooms import FLOORS, ROOT, arrows, drawing, drawn, rooms
 
 MOST_FILES = 20
+COMMANDS = (
+    "scripts"  # a thin file each: as many as there are commands, which is no room to look for things in
+)
 MOST_LINES = 300
 
 
 def test_rooms_are_small():
-    assert not {room: len(files) for room, files in rooms().items() if len(files) > MOST_FILES}
+    assert not {
+        room: len(files) for room, files in rooms().items() if len(files) > MOST_FILES and room != COMMANDS
+    }
 
 
 def test_files_are_short():
