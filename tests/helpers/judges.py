@@ -9,6 +9,7 @@ from handrail.datasets.reading.reader import read_frames, read_info
 
 WIDER = ("ACTION_STATE_DIVERGENCE_CRASHED", "ACTION_RANGE_MISMATCH_CRASHED")
 HARMLESS = ("SATURATED_JOINT", "LOW_DIVERSITY")  # warnings: a joint that rests, few episodes
+SWAY = 1e-3  # of a quaternion: a hand that keeps its turn sways by 0.1° when it begins to move
 ROUNDING = 1e-5  # of a gripper that is open, in single precision and under gravity
 
 
@@ -73,6 +74,8 @@ def within_acceleration(root, finding):
     """Return whether a jump is rounding, or a velocity that changes as fast as the robot may."""
     joint, _, kind = state_name(root, finding).partition(".")
     jump, model = abs(finding.data["delta"]), load_model(read_info(root).robot_type)
+    if joint == "tool" and kind.startswith("q"):
+        return jump < SWAY
     if kind != "vel":
         return jump < ROUNDING
     most = model.description.limits.acceleration[model.joints.index(joint)] / read_info(root).fps

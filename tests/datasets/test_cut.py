@@ -1,0 +1,75 @@
+"""A stretch of a video shows exactly its pictures, whoever encoded the whole, copied or encoded anew."""
+
+from fractions import Fraction
+
+import av
+import numpy as np
+import pytest
+
+from handrail.controllers.errors import HandrailError
+from handrail.datasets.format.cut import cut_video
+from handrail.datasets.format.schema import Feature
+from handrail.datasets.format.video import VideoEncoder, count_frames
+
+COUNT, FPS = 24, 20
+CAMERA = Feature("video", (32, 48, 3))
+OTHERS = {"one group": {"g": "100", "bf": "0"}, "pictures between": {"g": "8", "bf": "2"}}
+
+
+def level(index: int) -> int:
+    return 20 + 9 * index
+
+
+def pictures():
+    return [np.full((32, 48, 3), level(index), np.uint8) for index in range(COUNT)]
+
+
+@pytest.fixture(scope="module", params=["ours", *OTHERS])
+def video(request, tmp_path_factory):
+    path = tmp_path_factory.mktemp("video") / "whole.mp4"
+    if request.param == "ours":
+        encoder = VideoEncoder(path, FPS, CAMERA)
+        for picture in pictures():
+            encoder.add(picture)
+        encoder.finish(COUNT)
+        return path
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream("libx264", rate=FPS, options=OTHERS[request.param] | {"crf": "18"})
+        stream.height, stream.width, stream.pix_fmt = 32, 48, "yuv420p"
+        stream.time_base = Fraction(1, FPS)
+        for index, picture in enumerate(pictures()):
+            frame = av.VideoFrame.from_ndarray(picture, format="rgb24")
+            frame.pts, frame.time_base = index, Fraction(1, FPS)
+            container.mux(stream.encode(frame))
+        container.mux(stream.encode(None))
+    return path
+
+
+def shown(path) -> list[tuple[float, float]]:
+    """Return time [s] and brightness of every picture."""
+    with av.open(str(path)) as container:
+        return [
+            (float(frame.time or 0.0), float(frame.to_ndarray(format="rgb24").mean()))
+            for frame in container.decode(video=0)
+        ]
+
+
+@pytest.mark.parametrize(("first", "count"), [(0, 24), (0, 7), (4, 9), (5, 8), (8, 8), (16, 8), (23, 1)])
+def test_a_stretch_shows_its_pictures(video, tmp_path, first, count):
+    cut_video(video, first, count, tmp_path / "cut.mp4", FPS, CAMERA)
+    assert count_frames(tmp_path / "cut.mp4") == count
+    times, levels = np.array(shown(tmp_path / "cut.mp4")).T
+    assert times == pytest.approx(np.arange(count) / FPS, abs=1e-3)
+    assert levels == pytest.approx([level(first + index) for index in range(count)], abs=2.5)
+
+
+def test_more_than_there_is_cannot_be_cut(video, tmp_path):
+    for first, count in ((20, 9), (40, 2)):
+        with pytest.raises(HandrailError, match="expected"):
+            cut_video(video, first, count, tmp_path / "cut.mp4", FPS, CAMERA)
+
+
+def test_what_is_no_video_is_said_in_one_line(tmp_path):
+    (tmp_path / "text.mp4").write_text("no video")
+    with pytest.raises(HandrailError, match="expected a whole mp4"):
+        cut_video(tmp_path / "text.mp4", 0, 1, tmp_path / "cut.mp4", FPS, CAMERA)
