@@ -100,6 +100,7 @@ def test_a_checkpoint_of_an_earlier_version_goes_on_with_as_much_data(recorded, 
             assert weights(train(again, quiet=True)) == weights(whole)
 
 
+@pytest.mark.slow
 def test_a_killed_training_goes_on(recorded, tmp_path):
     steps = 250
     whole = tiny(recorded, tmp_path / "whole", steps=steps, save_freq=20)
