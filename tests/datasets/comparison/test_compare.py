@@ -23,6 +23,9 @@ from handrail.scripts import cli
 from handrail.scripts.compare import main
 
 
+pytestmark = pytest.mark.usefixtures("few_resamples")
+
+
 @pytest.fixture(scope="module")
 def foreign(tmp_path_factory):
     """Two datasets of another robot, not made by Handrail."""
