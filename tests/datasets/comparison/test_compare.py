@@ -22,7 +22,6 @@ from handrail.datasets.quality.measure import measure
 from handrail.scripts import cli
 from handrail.scripts.compare import main
 
-
 pytestmark = pytest.mark.usefixtures("few_resamples")
 
 
