@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray
-from handrail.controllers.entries import Entry, check_entries, is_number, is_table, is_text
+from handrail.controllers.entries import Entry, check_entries, is_number, is_table
 from handrail.controllers.errors import HandrailError
+from handrail.controllers.fields import check_fields
 from handrail.datasets.storage.atomic import explained, make_folder, write_whole
 
 _OPEN, _CLOSED = 0.6, 0.4  # of the gripper's way: where it counts as open, and as closed
@@ -78,20 +79,8 @@ class LeaderCalibration:
         return (*(joint.source for joint in self.joints.values()), *handle)
 
 
-_JOINT = {
-    "source": Entry("LeRobot's name of a position", is_text),
-    "scale": Entry("a finite number, not 0", lambda value: is_number(value) and value != 0),
-    "offset": Entry("a finite number [rad]", is_number, needed=False),
-}
-_GRIPPER = {
-    "source": Entry("LeRobot's name of a position", is_text),
-    "closed": Entry("a finite number", is_number),
-    "opened": Entry("a finite number", is_number),
-}
-_TABLE = {
-    "joints": Entry("a table of the arm's joints", is_table),
-    "gripper": Entry("a table, or nothing", lambda value: value is None or is_table(value), needed=False),
-}
+_SCALE = Entry("a finite number, not 0", lambda value: is_number(value) and value != 0)
+_GRIPPER = Entry("a table, or nothing", lambda value: value is None or is_table(value), needed=False)
 
 
 def load_calibration(path: Path, arm: tuple[str, ...], advice: str) -> LeaderCalibration:
@@ -112,17 +101,14 @@ def load_calibration(path: Path, arm: tuple[str, ...], advice: str) -> LeaderCal
         content: Any = json.loads(path.read_text())
     except (OSError, ValueError, RecursionError) as error:
         raise HandrailError(f"{where}: expected JSON; make it anew: {advice}") from error
-    check_entries(content, _TABLE, where)
-    check_entries(
-        content["joints"],
-        {name: Entry("a table", is_table, needed=False) for name in arm},
-        f"{where}: joints",
-    )
+    check_fields(content, LeaderCalibration, where, gripper=_GRIPPER)
+    joint_entries = {name: Entry("a table", is_table, needed=False) for name in arm}
+    check_entries(content["joints"], joint_entries, f"{where}: joints")
     for name, joint in content["joints"].items():
-        check_entries(joint, _JOINT, f"{where}: {name}")
+        check_fields(joint, LeaderJoint, f"{where}: {name}", scale=_SCALE)
     gripper = content.get("gripper")
     if gripper is not None:
-        check_entries(gripper, _GRIPPER, f"{where}: gripper")
+        check_fields(gripper, LeaderGripper, f"{where}: gripper")
         if gripper["closed"] == gripper["opened"]:
             raise HandrailError(f"{where}: gripper: expected closed and opened to differ")
     joints = {name: LeaderJoint(**joint) for name, joint in content["joints"].items()}

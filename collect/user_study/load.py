@@ -18,6 +18,7 @@ from handrail.controllers.entries import (
     lists,
 )
 from handrail.controllers.errors import HandrailError, shown, unknown_name
+from handrail.controllers.fields import check_fields
 from handrail.controllers.robot.catalogue import ROBOTS
 from handrail.controllers.strict_toml import read_toml
 
@@ -34,33 +35,19 @@ def _whole(least: int, most: int) -> Callable[[Any], bool]:
     return lambda value: is_count(value) and least <= value <= most
 
 
-def _some(fits: Callable[[Any], bool]) -> Callable[[Any], bool]:
-    return lambda value: value == [] or lists(fits)(value)
-
-
-_FLAG = Entry("true or false", lambda value: isinstance(value, bool), needed=False)
-_NAMES = Entry("a list of names", _some(is_name), needed=False)
-_STUDY: Mapping[str, Entry] = {
+_STUDY: Mapping[str, Entry] = {  # what the types of the fields do not say
     "title": Entry("a text in one line", is_text),
     "consent": Entry(f"a text of at most {_LONGEST_PAGE} characters", _is_page),
     "modes": Entry("a list of modes", lists(is_name)),
     "tasks": Entry("a list of tasks", lists(is_name)),
     "trials": Entry(f"1 to {_MOST_TRIALS}", _whole(1, _MOST_TRIALS), needed=False),
-    "practice": Entry("a table", is_table, needed=False),
-    "forms": _NAMES,
-    "questions": Entry("tables [[questions]]", _some(is_table), needed=False),
+    "questions": Entry(
+        "tables [[questions]]", lambda value: value == [] or lists(is_table)(value), needed=False
+    ),
     "instructions": Entry(
         "texts by mode", lambda value: is_table(value) and all(map(_is_page, value.values())), needed=False
     ),
-    "allow": _NAMES,
     "thanks": Entry("a text", _is_page, needed=False),
-    "robot": Entry("a robot", is_name, needed=False),
-    "fps": Entry("a whole number [Hz]", is_count, needed=False),
-    "cameras": _NAMES,
-    "image_size": Entry("a whole number [pixels]", is_count, needed=False),
-    "time_limit": Entry("a number [s]", is_number, needed=False),
-    "seed": Entry("a whole number, 0 or more", is_count, needed=False),
-    "demo": _FLAG,
 }
 _PRACTICE: Mapping[str, Entry] = {
     "successes": Entry(f"1 to {_MOST_TRIALS}", _whole(1, _MOST_TRIALS), needed=False),
@@ -106,7 +93,7 @@ def parse_study(content: Any, where: str) -> UserStudy:
     Raises:
         HandrailError: something in it is wrong; one line.
     """
-    check_entries(content, _STUDY, where)
+    check_fields(content, UserStudy, where, **_STUDY)
     practice = content.get("practice", {})
     check_entries(practice, _PRACTICE, f"{where}: [practice]")
     questions = tuple(_question(each, where) for each in content.get("questions", []))

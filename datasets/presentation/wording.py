@@ -58,6 +58,11 @@ def p_value(p: float) -> str:
     return "p < 0.001" if p < 0.001 else f"p = {p:.2g}"
 
 
+def p_alone(p: float | None) -> str:
+    """Return a p-value for a column whose heading says p; a dash for none."""
+    return DASH if p is None else p_value(p).removeprefix("p = ").removeprefix("p ")
+
+
 def counted(number_: int, family: str) -> str:
     """Return how many differences a family of comparisons has."""
     return f"{number_} {family} difference{'' if number_ == 1 else 's'}"

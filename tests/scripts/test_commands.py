@@ -237,7 +237,7 @@ def saved_after(root, number, process):
     raise AssertionError(f"no {number} episodes came; exit code {process.poll()}")
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [pytest.param(signal.SIGINT, marks=pytest.mark.slow), signal.SIGTERM])
 def test_an_interrupt_keeps_the_saved_episodes(number, tmp_path):
     root = tmp_path / "d"
     process = subprocess.Popen(

@@ -1,18 +1,15 @@
 """Writing a comparison of people: a page, JSON, and two CSV files."""
 
-import json
 from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from handrail.controllers.errors import HandrailError
 from handrail.datasets.comparison.people.contrasts import Contrast
 from handrail.datasets.comparison.people.people import Part, PeopleComparison
 from handrail.datasets.comparison.people.tables import people_tables
-from handrail.datasets.comparison.report.report import plain
+from handrail.datasets.comparison.report.report import json_text, plain, write_texts
 from handrail.datasets.presentation.markup import folded, items, page, paragraph, section
-from handrail.datasets.storage.atomic import write_whole
 from handrail.datasets.storage.csv_file import csv_text
 
 FORMAT = "handrail.people/1"
@@ -34,19 +31,11 @@ def write_people_report(comparison: PeopleComparison) -> list[Path]:
     """
     texts = {
         "report.html": people_page(comparison),
-        "report.json": json.dumps(as_json(comparison), indent=1, ensure_ascii=False, allow_nan=False) + "\n",
+        "report.json": json_text(as_json(comparison)),
         "trials.csv": csv_text([plain(row) for row in _trial_rows(comparison)]),
         "differences.csv": _differences_csv(comparison),
     }
-    folder = comparison.config.folder
-    try:
-        for name, text in texts.items():
-            write_whole(folder / name, text.encode())
-    except OSError as error:
-        raise HandrailError(
-            f"--output {str(folder)!r}: expected a folder that can be written, {error}"
-        ) from error
-    return [folder / name for name in texts]
+    return write_texts(comparison.config.folder, texts)
 
 
 def people_page(comparison: PeopleComparison) -> str:

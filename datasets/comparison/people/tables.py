@@ -9,7 +9,7 @@ from handrail.datasets.presentation.table import Cell, Table
 from handrail.datasets.presentation.wording import (
     DASH,
     number,
-    p_value,
+    p_alone,
     percent,
     percent_span,
     points,
@@ -53,9 +53,7 @@ def contrasts_table(part: Part, comparison: PeopleComparison) -> Table:
             each.label,
             _estimate(each),
             _interval(each),
-            DASH
-            if each.p_adjusted is None
-            else p_value(each.p_adjusted).removeprefix("p = ").removeprefix("p "),
+            p_alone(each.p_adjusted),
             str(each.count),
         ]
         for each in part.contrasts

@@ -7,7 +7,6 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from handrail.controllers.errors import HandrailError
 from handrail.datasets.comparison.compare import Comparison, View
 from handrail.datasets.comparison.differences import Difference
 from handrail.datasets.comparison.finding import Finding
@@ -15,7 +14,7 @@ from handrail.datasets.comparison.findings import findings
 from handrail.datasets.comparison.report.page import report_page
 from handrail.datasets.quality.catalogue import METRICS
 from handrail.datasets.quality.measure import Measured
-from handrail.datasets.storage.atomic import write_whole
+from handrail.datasets.storage.atomic import explained, write_whole
 from handrail.datasets.storage.csv_file import csv_text
 
 _FIELDS = (
@@ -40,19 +39,11 @@ def write_report(comparison: Comparison) -> list[Path]:
     numbers = as_json(comparison, found)
     texts = {
         "report.html": report_page(comparison, found),
-        "report.json": json.dumps(numbers, indent=1, ensure_ascii=False, allow_nan=False) + "\n",
+        "report.json": json_text(numbers),
         "episodes.csv": csv_text([plain(row) for row in _episode_rows(comparison)]),
         "differences.csv": csv_text([plain(row) for row in _difference_rows(comparison)]),
     }
-    folder = comparison.config.folder
-    try:
-        for name, text in texts.items():
-            write_whole(folder / name, text.encode())
-    except OSError as error:
-        raise HandrailError(
-            f"--output {str(folder)!r}: expected a folder that can be written, {error}"
-        ) from error
-    return [folder / name for name in texts]
+    return write_texts(comparison.config.folder, texts)
 
 
 def as_json(comparison: Comparison, found: list[Finding]) -> dict[str, Any]:
@@ -138,6 +129,23 @@ def _difference_rows(comparison: Comparison) -> list[dict[str, Any]]:
                     row[name] = value
             rows.append(row)
     return rows
+
+
+def write_texts(folder: Path, texts: Mapping[str, str]) -> list[Path]:
+    """Write files of a report by name, and return them.
+
+    Raises:
+        HandrailError: The folder cannot be written.
+    """
+    with explained(f"--output {str(folder)!r}: expected a folder that can be written"):
+        for name, text in texts.items():
+            write_whole(folder / name, text.encode())
+    return [folder / name for name in texts]
+
+
+def json_text(content: Any) -> str:
+    """Return content as JSON; what is no finite number is null."""
+    return json.dumps(plain(content), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
 
 
 def plain(value: Any) -> Any:

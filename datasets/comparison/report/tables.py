@@ -14,6 +14,7 @@ from handrail.datasets.presentation.wording import (
     counted,
     duration,
     number,
+    p_alone,
     p_value,
     percent,
     percent_span,
@@ -130,7 +131,7 @@ def _metric(comparison: Comparison, metric: Metric, label: str) -> list[Cell | s
         _mean(one),
         *([_estimate(each) for each in (every, number_, time)]),
         reason if untested or metric.name == "length" else _at_length(every),
-        reason if untested else p_value(every.p_adjusted).removeprefix("p = ").removeprefix("p "),
+        reason if untested else p_alone(every.p_adjusted),
     ]
 
 

@@ -21,9 +21,9 @@ from handrail.collect.config import FPS_RANGE
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.entries import Entry, is_count, is_name, is_table
 from handrail.controllers.errors import HandrailError, message_of
+from handrail.controllers.fields import check_fields
 from handrail.datasets.storage.atomic import sync_folder, write_whole
 from handrail.datasets.storage.strict_json import load_json
-from handrail.policies.fields import check_fields
 from handrail.policies.imitation.config import ACTION_SPACES
 from handrail.policies.imitation.interface.interface import ENVIRONMENT, STATE, PolicyInterface
 from handrail.policies.imitation.interface.trust import CONFIG, check_policy_folder, registered_policies

@@ -14,10 +14,10 @@ import numpy as np
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.entries import Entry, is_text, lists
 from handrail.controllers.errors import HandrailError, unknown_name
+from handrail.controllers.fields import check_fields
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.intent import Intent
 from handrail.datasets.format.schema import Feature
-from handrail.policies.fields import check_fields
 from handrail.policies.imitation.interface.relative import RelativeView
 
 Columns = Mapping[str, np.ndarray]

@@ -6,8 +6,8 @@ import draccus
 
 from handrail.controllers.entries import Entry, is_name, is_table
 from handrail.controllers.errors import unknown_name
+from handrail.controllers.fields import check_fields
 from handrail.controllers.strict_toml import read_toml
-from handrail.policies.fields import check_fields
 from handrail.policies.study.design.design import Robustness, StudyDesign, Sweep, TaskDesign
 from handrail.policies.study.design.settings import check_jobs
 

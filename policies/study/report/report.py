@@ -1,7 +1,6 @@
 """What a study writes: a page for people, JSON for programs, and its part of a Markdown page."""
 
 import importlib.metadata
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -11,7 +10,7 @@ import numpy as np
 
 from handrail.collect.session.build import software_versions
 from handrail.datasets.comparison.finding import Finding
-from handrail.datasets.comparison.report.report import plain
+from handrail.datasets.comparison.report.report import json_text
 from handrail.datasets.presentation import markup
 from handrail.datasets.presentation.drawing import png, svg
 from handrail.datasets.presentation.markdown import markdown_table, write_part
@@ -99,7 +98,7 @@ def _json(progress: StudyProgress, results: Sequence[TaskResults]) -> str:
         "versions": versions,
         "tasks": {each.task: asdict(each) for each in results},
     }
-    return json.dumps(plain(content), indent=1, ensure_ascii=False) + "\n"
+    return json_text(content)
 
 
 def _write_page(

@@ -43,18 +43,18 @@ def check(seeds, seconds, movers=0, robot="ridgeback_ur10", make=MaskedMpc, fail
 @pytest.mark.parametrize("make", [MaskedMpc, safety_filter])
 @pytest.mark.parametrize("robot", robot_names())
 def test_rude_intents_in_clutter(make, robot):
-    statuses, _ = check(range(1000, 1004), 5.0, make=make, robot=robot)
+    statuses, _ = check(range(1000, 1002), 5.0, make=make, robot=robot)
     assert {"ok", "invalid_intent", "stale_intent"} <= set(statuses)
 
 
 @pytest.mark.parametrize("movers", [1, 2])
 def test_rude_intents_among_movers(movers):
-    assert not check(range(1000, 1003), 5.0, movers)[1]
+    assert not check(range(1000, 1002), 5.0, movers)[1]
 
 
 def test_rude_intents_in_clutter_with_a_solver_that_fails():
-    statuses, _ = check(range(1000, 1004), seconds=5.0, failures=0.05)
-    assert statuses["solver_failed"] > 20
+    statuses, _ = check(range(1000, 1002), seconds=5.0, failures=0.05)
+    assert statuses["solver_failed"] > 10
 
 
 class Frozen(MaskedMpc):
@@ -66,7 +66,7 @@ class Frozen(MaskedMpc):
 
 def test_a_controller_that_freezes_fails():
     with pytest.raises(AssertionError, match="travelled"):
-        check(range(1000, 1002), 5.0, make=Frozen)
+        check([1000], 5.0, make=Frozen)
 
 
 @pytest.mark.slow

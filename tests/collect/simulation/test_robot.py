@@ -35,7 +35,7 @@ def random_configurations(model: RobotModel, count: int) -> np.ndarray:
 
 
 def test_tool_pose_and_jacobian_are_pinocchios(model):
-    for q in random_configurations(model, 20):
+    for q in random_configurations(model, 5):
         simulation = Simulation(model, Scene(), q, 0.05)
         compiled, data = simulation.mujoco_model, simulation.data
         J = np.zeros((6, compiled.nv))

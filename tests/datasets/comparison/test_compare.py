@@ -22,6 +22,8 @@ from handrail.datasets.quality.measure import measure
 from handrail.scripts import cli
 from handrail.scripts.compare import main
 
+pytestmark = pytest.mark.usefixtures("few_resamples")
+
 
 @pytest.fixture(scope="module")
 def foreign(tmp_path_factory):

@@ -32,12 +32,7 @@ LONG = ("a robot steered by the hand through the controller", "a robot steered j
 JUDGED = re.compile(r"\b(better|worse|best|worst)\b")
 
 
-@pytest.fixture(scope="module", autouse=True)
-def quick():
-    """Few resamples: what is tested here does not hang on the third digit of p."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("handrail.datasets.statistics.resampling.RESAMPLES", 500)
-        yield
+pytestmark = pytest.mark.usefixtures("few_resamples")
 
 
 @pytest.fixture(scope="module")
@@ -46,12 +41,12 @@ def ours(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def alike(ours):
+def alike(ours, few_resamples):
     return compare(CompareConfig(tuple(ours), labels=LONG))
 
 
 @pytest.fixture(scope="module")
-def unlike(ours, tmp_path_factory):
+def unlike(ours, few_resamples):
     """The same comparison, but the second dataset is another task of another robot."""
     found = compare(CompareConfig(tuple(ours)))
     return replace(found, views=[replace(view, groups=_another(view.groups)) for view in found.views])
@@ -220,8 +215,7 @@ def evaluated(folder: Path, **shares) -> str:
     return str(path)
 
 
-@pytest.mark.parametrize("base", ["quick", "slow"])
-@pytest.mark.parametrize("label", ["quick", "quick__intent"])
+@pytest.mark.parametrize(("base", "label"), [("quick", "quick__intent"), ("slow", "quick")])
 def test_policies_come_first_also_with_one_arm(ours, tmp_path, base, label):
     given = evaluated(tmp_path, **{label: 0.9})
     comparison = compare(CompareConfig(tuple(ours), baseline=base, evaluations=(given,)))

@@ -2,8 +2,6 @@
 
 import json
 import os
-import subprocess
-import sys
 import warnings
 
 import numpy as np
@@ -119,11 +117,9 @@ def test_resume_says_what_it_put_in_order(tmp_path):
     assert len(read_episodes(tmp_path / "set")) == 3
 
 
-def test_the_command_runs_as_a_command(tmp_path):
+def test_the_command_takes_a_folder_in_two_ways(tmp_path):
     root = record(tmp_path / "set", 1)
-    words = [sys.executable, "-m", "handrail.scripts.repair"]
-    for place in ([str(root)], ["--dataset.root", str(root)]):
-        done = subprocess.run([*words, *place], capture_output=True, text=True, check=True)
-        assert "nothing to repair" in done.stdout
-    done = subprocess.run([*words, str(tmp_path)], capture_output=True, text=True)
+    for place in ([root], ["--dataset.root", root]):
+        assert "nothing to repair" in command(*place, name="repair").stdout
+    done = command(tmp_path, name="repair")
     assert (done.returncode, done.stderr.count("\n")) == (2, 1)

@@ -5,7 +5,6 @@ import os
 import signal
 from dataclasses import replace
 
-import numpy as np
 import pytest
 from command_helpers import command
 from policy_helpers import StandIn, checkpoint, load
@@ -62,6 +61,7 @@ def test_seeds_are_never_those_of_a_recording():
     assert max(first) < min(second)
 
 
+@pytest.mark.slow
 def test_parallel_rollouts_are_the_serial_ones(folder, tmp_path):
     both = config(
         folder, "random", "chase_1", perturbation="none,push+shift+delay", episodes=2, time_limit=2.0
@@ -138,6 +138,7 @@ def killed(path):
     os.kill(os.getpid(), signal.SIGKILL)
 
 
+@pytest.mark.slow
 def test_a_killed_worker_is_one_line_and_the_same_command_goes_on(folder, tmp_path):
     some = config(folder, "short", json=str(tmp_path / "e.json"), time_limit=0.5)
     evaluate(replace(some, episodes=1), load=load)
@@ -162,7 +163,7 @@ def test_an_intent_meets_the_controller_of_its_mode(folder):
 
 @pytest.mark.parametrize(("name", "protection"), [("bold", "mpc"), ("bold", "filter"), ("bold_hand", "own")])
 def test_protected_policies_touch_nothing_whatever_they_do(folder, name, protection):
-    asked = config(folder, name, protection=protection, episodes=3, time_limit=10.0)
+    asked = config(folder, name, protection=protection, episodes=3, time_limit=5.0)
     label = policy_conditions(asked)[0][0].label
     for row in rollouts(evaluate(asked, load=load), label):
         assert row["contacts"] == 0
@@ -170,7 +171,7 @@ def test_protected_policies_touch_nothing_whatever_they_do(folder, name, protect
 
 
 def test_without_protection_the_same_policy_does_touch(folder):
-    content = evaluate(config(folder, "bold", episodes=3, time_limit=10.0), load=load)
+    content = evaluate(config(folder, "bold", episodes=3, time_limit=5.0), load=load)
     rows = rollouts(content, "direct")
     assert sum(row["contacts"] for row in rows) > 0
     assert all(row["contact_time"] > 0 for row in rows if row["contacts"])
@@ -246,18 +247,3 @@ def test_the_command_says_one_line():
     assert (done.returncode, done.stderr.count("\n")) == (2, 1), done.stderr
     assert "expected a checkpoint with a config.json" in done.stderr
     assert "--perturbation" in command("--help", name="evaluate").stdout
-
-
-@pytest.mark.needs_gl
-def test_a_rollout_can_be_filmed(folder, tmp_path):
-    import av
-
-    from handrail.policies.imitation.evaluation.video import film
-
-    path = tmp_path / "film.mp4"
-    asked = config(folder, "chase", video=str(path), time_limit=0.5, episodes=1)
-    assert film(asked, evaluate(asked, load=load), load) == ""
-    with av.open(str(path)) as video:
-        pictures = [frame.to_ndarray(format="rgb24") for frame in video.decode(video=0)]
-    assert len(pictures) == 10
-    assert np.std(pictures[0]) > 10

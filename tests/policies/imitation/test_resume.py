@@ -23,18 +23,6 @@ from handrail.policies.imitation.training.training import train
 pytestmark = pytest.mark.filterwarnings("ignore:.*(torchcodec|pin_memory|video).*")
 
 
-@pytest.fixture(scope="module")
-def recorded(tmp_path_factory):
-    return write_dataset(tmp_path_factory.mktemp("data") / "set")
-
-
-@pytest.fixture(scope="module")
-def trained(recorded, tmp_path_factory):
-    """A training that was never interrupted, and its settings."""
-    config = tiny(recorded, tmp_path_factory.mktemp("trained") / "policy")
-    return train(config, quiet=True), config
-
-
 def test_a_resumed_training_is_the_same_to_the_bit(trained, tmp_path):
     """With dropout, over the end of an epoch: 24 samples are three batches."""
     folder, config = trained
@@ -100,6 +88,7 @@ def test_a_checkpoint_of_an_earlier_version_goes_on_with_as_much_data(recorded, 
             assert weights(train(again, quiet=True)) == weights(whole)
 
 
+@pytest.mark.slow
 def test_a_killed_training_goes_on(recorded, tmp_path):
     steps = 250
     whole = tiny(recorded, tmp_path / "whole", steps=steps, save_freq=20)

@@ -28,18 +28,6 @@ from handrail.policies.imitation.training.training import train
 pytestmark = pytest.mark.filterwarnings("ignore:.*(torchcodec|pin_memory|video).*")
 
 
-@pytest.fixture(scope="module")
-def recorded(tmp_path_factory):
-    return write_dataset(tmp_path_factory.mktemp("data") / "set")
-
-
-@pytest.fixture(scope="module")
-def trained(recorded, tmp_path_factory):
-    """A training that was never interrupted, and its settings."""
-    config = tiny(recorded, tmp_path_factory.mktemp("trained") / "policy")
-    return train(config, quiet=True), config
-
-
 @pytest.mark.parametrize("policy", ["act", "diffusion"])
 def test_the_dataset_in_memory_gives_the_same_tensors_as_lerobot_s_own(policy, recorded, tmp_path):
     from lerobot.datasets.factory import resolve_delta_timestamps

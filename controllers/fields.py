@@ -25,6 +25,7 @@ _COUNTS = _listed("whole numbers, 0 or more", is_count)
 _TABLE = Entry("a table", is_table)
 _OF_TYPE: Mapping[Any, Entry] = {
     int: Entry("a whole number, 0 or more", is_count),
+    bool: Entry("true or false", lambda value: isinstance(value, bool)),
     float: Entry("a finite number", is_number),
     str: Entry("a name", is_name),
     tuple[int, ...]: _COUNTS,
