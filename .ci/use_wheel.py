@@ -2,6 +2,7 @@
 
 python use_wheel.py REPOSITORY    compare with the repository
 python use_wheel.py --commands    print the commands
+python use_wheel.py --found       check that LeRobot's commands find Handrail's plugins by themselves
 """
 
 import importlib
@@ -34,6 +35,33 @@ def load(module: str) -> None:
             raise
 
 
+def check_found() -> None:
+    """Let LeRobot discover installed plugins as its commands do, and look for ours among what it knows then.
+
+    Raises:
+        SystemExit: one is missing.
+    """
+    utils = importlib.import_module("lerobot.utils.import_utils")
+    utils.register_third_party_plugins()
+    known = {
+        "lerobot.robots:RobotConfig": ("handrail_sim",),
+        "lerobot.teleoperators:TeleoperatorConfig": (
+            "handrail_scripted",
+            "handrail_cockpit",
+            "handrail_gamepad",
+        ),
+        "lerobot.envs.configs:EnvConfig": ("handrail",),
+    }
+    for place, names in known.items():
+        module, _, kind = place.partition(":")
+        choices = getattr(importlib.import_module(module), kind).get_known_choices()
+        if missing := [name for name in names if name not in choices]:
+            sys.exit(f"{kind}: expected {', '.join(missing)} of lerobot_robot_handrail, got {list(choices)}")
+    steps = importlib.import_module("lerobot.processor").ProcessorStepRegistry.list()
+    if "handrail_policy_view" not in steps:
+        sys.exit(f"steps: expected handrail_policy_view, got {steps}")
+
+
 def check(repository: Path) -> None:
     """Import every module and compare the files with the repository's.
 
@@ -59,5 +87,7 @@ def check(repository: Path) -> None:
 if __name__ == "__main__":
     if sys.argv[1:] == ["--commands"]:
         print(*commands(), sep="\n")
+    elif sys.argv[1:] == ["--found"]:
+        check_found()
     else:
         check(Path(sys.argv[1]).resolve())

@@ -238,7 +238,7 @@ def open_cockpit(config: RecordConfig, env: HandrailEnv, say: Callable[[str], No
     Raises:
         HandrailError: what the server needs is not installed, or it does not start.
     """
-    _check_installed()
+    check_installed()
     modes = build_modes(config, env)
     server = ServerProcess(config.cockpit, say)
     say(f"Drive at {server.address}")
@@ -256,7 +256,12 @@ def open_cockpit(config: RecordConfig, env: HandrailEnv, say: Callable[[str], No
     )
 
 
-def _check_installed() -> None:
+def check_installed() -> None:
+    """Check that what the page's server needs is there.
+
+    Raises:
+        HandrailError: it is not.
+    """
     for module in _NEEDED:
         if find_spec(module) is None:
             raise not_installed("the cockpit", module, "cockpit")

@@ -3,18 +3,25 @@
 `--robot.discover_packages_path=handrail.collect.lerobot` lets LeRobot find them: importing this registers
 
     robot.type   handrail_sim
-    teleop.type  handrail_scripted
+    teleop.type  handrail_scripted, handrail_cockpit, handrail_gamepad
     env.type     handrail
 """
 
+from handrail.collect.lerobot.config_cockpit import HandrailCockpitConfig
 from handrail.collect.lerobot.config_env import HandrailEnvConfig
+from handrail.collect.lerobot.config_gamepad import HandrailGamepadConfig
 from handrail.collect.lerobot.config_scripted import HandrailScriptedConfig
 from handrail.collect.lerobot.config_sim import HandrailSimConfig
+from handrail.collect.lerobot.person import HandrailCockpit, HandrailGamepad
 from handrail.collect.lerobot.scripted import HandrailScripted
 from handrail.collect.lerobot.sim import HandrailSim
 
 __all__ = [  # LeRobot looks for the classes here, by the names of their configs
+    "HandrailCockpit",
+    "HandrailCockpitConfig",
     "HandrailEnvConfig",
+    "HandrailGamepad",
+    "HandrailGamepadConfig",
     "HandrailScripted",
     "HandrailScriptedConfig",
     "HandrailSim",

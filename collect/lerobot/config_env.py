@@ -90,16 +90,16 @@ class HandrailEnvConfig(EnvConfig):
             raise HandrailError("--env.task: expected a task, got none")
         if self.render_size < 16 or self.render_size % 2:
             raise HandrailError(f"--env.render_size {self.render_size}: expected an even number from 16")
-        steers = {"mask": self.mode.removeprefix(MASK)} if self.mode.startswith(MASK) else {}
-        steers |= {"mode": self.mode} if self.mode and not steers else {}
+        masked = self.mode.startswith(MASK)
         config = SessionConfig(
             task=self.task,
+            mode=SessionConfig.mode if masked or not self.mode else self.mode,
+            mask=self.mode.removeprefix(MASK) if masked else "",
             robot=self.robot,
             cameras=self.camera_names,
             image_size=self.image_size,
             moving_obstacles=self.moving_obstacles,
             time_limit=self.time_limit,
-            **steers,
         )
         config.check()
         return config

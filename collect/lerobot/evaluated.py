@@ -12,6 +12,7 @@ from handrail.collect.envs.env import Observation
 from handrail.collect.lerobot.mode_action import ModeAction
 from handrail.collect.session.build import build_controller, build_env, build_mode
 from handrail.collect.session.driver import Driver
+from handrail.collect.simulation.rendering import Painter
 from handrail.controllers.baselines.direct import DirectController
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import Controller
@@ -45,7 +46,7 @@ class EvaluatedEnv(gymnasium.Wrapper[Observation, NDArray[np.float32], Observati
     ) -> None:
         env = build_env(config, fps, render_size)
         super().__init__(env)
-        self._env, self._first_seed = env, first_seed
+        self._env, self._first_seed, self._painter = env, first_seed, None
         self._channels = Channels.of(env.model.description)
         self._action, self._controller = self._steered(config, fps) if mode else (None, self._direct())
         size = len(self._action.names) if self._action else env.model.size + 1
@@ -66,6 +67,7 @@ class EvaluatedEnv(gymnasium.Wrapper[Observation, NDArray[np.float32], Observati
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
         """Begin an episode."""
+        self._put_away()
         observation, info = self._env.reset(seed=None if seed is None else seed + self._first_seed)
         self._driver = Driver(self._controller, self._env, self._env.period)
         self._steps = 0
@@ -77,6 +79,22 @@ class EvaluatedEnv(gymnasium.Wrapper[Observation, NDArray[np.float32], Observati
         observation, reward, terminated, truncated, info = self._env.step(self._driver.action(self._steps))
         self._steps += 1
         return observation, reward, terminated, truncated, _plain(info)
+
+    def render(self) -> NDArray[np.uint8]:  # pyright: ignore[reportIncompatibleMethodOverride]
+        """Return a quick picture from the scene camera: LeRobot films every step of ten episodes."""
+        now = self._env.simulation
+        self._painter = self._painter or Painter(now.mujoco_model, self._env.render_size)
+        return self._painter.paint(now.data, "scene")
+
+    def close(self) -> None:
+        """Give the OpenGL contexts back."""
+        self._put_away()
+        self._env.close()
+
+    def _put_away(self) -> None:
+        if self._painter:
+            self._painter.close()
+        self._painter = None
 
     def _intent(self, numbers: NDArray[np.float64]) -> Intent:
         time, gripper = self._env.state().time, float(numbers[-1] > _HALF)

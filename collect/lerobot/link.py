@@ -4,22 +4,27 @@ LeRobot shows a teleoperator nothing of the robot. A script must see the scene, 
 """
 
 import weakref
-from typing import TYPE_CHECKING
+from typing import Protocol
 
+from handrail.collect.lerobot.stepwise import Stepwise
 from handrail.controllers.errors import HandrailError
 
-if TYPE_CHECKING:
-    from handrail.collect.lerobot.sim import HandrailSim
 
-_newest: list["weakref.ref[HandrailSim]"] = []
+class Steered(Protocol):
+    """A simulated robot."""
+
+    stepwise: Stepwise
 
 
-def announce(robot: "HandrailSim") -> None:
+_newest: list[weakref.ref[Steered]] = []
+
+
+def announce(robot: Steered) -> None:
     """Take note of the robot that was made last."""
     _newest[:] = [weakref.ref(robot)]
 
 
-def simulated_robot(wanted_by: str) -> "HandrailSim":
+def simulated_robot(wanted_by: str) -> Steered:
     """Return the robot that was made last.
 
     Args:

@@ -33,7 +33,7 @@ class ModeAction:
         self._hand, self._base = (channels.mask(*mode.groups(focus)) for focus in ("hand", "base"))
         self._owned = np.flatnonzero(self._hand | self._base)
         focus = (FOCUS,) if mode.by_focus else ()
-        self.names = (*(channels.names[index] for index in self._owned), *focus, GRIPPER)
+        self.names: tuple[str, ...] = (*(channels.names[i] for i in self._owned), *focus, GRIPPER)
 
     def intent(self, action: Mapping[str, float], time: float) -> Intent:
         """Return what an action asks for; a number that is not finite becomes an intent that brakes.

@@ -39,15 +39,15 @@ class HandrailScripted(SimTeleoperator):
         who.check()
         self._operator = build_operator(who, session.mode, session.env.model)
         self._clock = EpisodeClock(config.episode_time_s, config.reset_time_s, _MARGIN / session.fps)
-        self._begun = -1
+        self._begun = 0
 
     def _act(self, session: Stepwise) -> dict[str, float]:
         phase = self._clock.phase(session.done)
         if phase is not Phase.DRIVE:
             return session.action.still(session.gripper) | {NEXT if phase is Phase.NEXT else HOLD: 1.0}
-        if session.scene != self._begun:
+        if session.episodes != self._begun:
             self._operator.reset(session.view, np.random.default_rng([session.seed, 1]))
-            self._begun = session.scene
+            self._begun = session.episodes
         asked = self._operator.act(session.view)
         assert not isinstance(asked, EpisodeEvent)  # of which a script says none
         return session.action.action(asked, session.view.tool.rotation)

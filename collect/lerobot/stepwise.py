@@ -1,5 +1,6 @@
 """A session that somebody else's loop runs, one period at a time."""
 
+import time
 from dataclasses import replace
 from typing import Any
 
@@ -15,7 +16,7 @@ from handrail.collect.session.driver import Driver
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.command import Diagnostics, Status
 from handrail.controllers.interface.intent import Intent
-from handrail.datasets.recording.frames import finite_distance
+from handrail.datasets.recording.frames import Frame, finite_distance
 
 _CREEP = 1e-3  # slower, a robot that is held is sent rest [m/s, rad/s]
 _LONG_AGO = -1e6  # when nobody who steers has asked last [s]
@@ -36,12 +37,15 @@ class Stepwise:
         mode: teleop mode.
         action: what is asked for every period.
         scene: number of the episode's beginning.
+        episodes: how many have begun.
         view: what there is to see now.
         success: whether the task succeeded in this episode.
         done: whether it is over, as the task judges.
+        frame: what happened in the last period; None before any.
     """
 
     view: View
+    frame: Frame | None
 
     def __init__(self, config: SessionConfig, fps: int, diagnostics: bool = True) -> None:
         self.config, self.fps, self._told = config, fps, diagnostics
@@ -49,12 +53,14 @@ class Stepwise:
         self.mode = build_mode(config, self.env.model)
         self.action = ModeAction(self.mode, Channels.of(self.env.model.description))
         self._controller = build_controller(self.mode, self.env.model, fps, config.task)
-        self._steps = self.brakes = 0
-        self.scene, self.success, self.done = -1, False, False
+        self._steps = self.brakes = self.episodes = 0
+        self.scene, self.success, self.done, self.frame = -1, False, False, None
 
     def begin(self, scene: int) -> None:
         """Begin an episode in a scene, by its number: the same number, the same beginning."""
         self.scene, self._steps, self.brakes = scene, 0, 0
+        self.episodes += 1
+        self._started, self.frame = time.perf_counter(), None
         self._observation, self._info = self.env.reset(seed=self.seed)
         self._driver = Driver(self._controller, self.env, self.env.period)
         self._diagnostics = Diagnostics()
@@ -82,16 +88,35 @@ class Stepwise:
         return float(self._info["sent"][-1])
 
     def _move(self, intent: Intent, stops: bool = False) -> None:
+        seen, wall_clock = self._observation, time.perf_counter() - self._started
         self._driver.drive(self._steps, self.view.state, intent)
         self._diagnostics = self._driver.command.diagnostics
         self.brakes += Status(self._diagnostics.status).brakes
         sent = self._driver.action(self._steps)
         if stops and np.abs(sent[:-1]).max() < _CREEP:
             sent[:-1] = 0.0  # a controller may come ever nearer to rest
+        commanded = time.perf_counter() - self._started
         self._observation, _, terminated, truncated, self._info = self.env.step(sent)
-        self._steps += 1
         self.success |= bool(self._info["is_success"])
         self.done |= terminated or truncated
+        self.frame = Frame(
+            state=seen["agent_pos"],
+            environment=seen["environment_state"],
+            images=seen.get("pixels", {}),
+            intent=intent,
+            action=self._info["sent"],
+            command=sent.astype(np.float32),
+            diagnostics=self._diagnostics,
+            contacts=self._info["contacts"],
+            success=self.success,
+            done=self.done,
+            wall_clock=wall_clock,
+            number=self._steps,
+            safe=self._steps + 1,
+            plan=self._driver.command,
+            commanded=commanded,
+        )
+        self._steps += 1
         self._look()
 
     def _look(self) -> None:

@@ -34,9 +34,18 @@ from handrail.controllers.interface.channels import Channels
 Say = Callable[[str], None]
 
 
-def open_gamepad(config: RecordConfig, env: HandrailEnv, say: Say) -> LocalPerson:
-    """Return a person with a gamepad; the keys of the terminal, if there is one, ask for things too."""
-    return _with(config, env, say, _gamepad(config.teleop))
+def open_gamepad(
+    config: RecordConfig, env: HandrailEnv, say: Say, modes: Mapping[str, TeleopMode] | None = None
+) -> LocalPerson:
+    """Return a person with a gamepad; the keys of the terminal, if there is one, ask for things too.
+
+    Args:
+        config: of the recording.
+        env: of the recording.
+        say: is told what to hold.
+        modes: that one can change to; all by default.
+    """
+    return _with(config, env, say, _gamepad(config.teleop), modes)
 
 
 def open_spacemouse(config: RecordConfig, env: HandrailEnv, say: Say) -> LocalPerson:
@@ -69,7 +78,13 @@ def open_leader_arm(config: RecordConfig, env: HandrailEnv, say: Say) -> LocalPe
     return _person(config, env, modes, main, beside, Follower(env.model, calibration))
 
 
-def _with(config: RecordConfig, env: HandrailEnv, say: Say, made: tuple[Device, ControlMap]) -> LocalPerson:
+def _with(
+    config: RecordConfig,
+    env: HandrailEnv,
+    say: Say,
+    made: tuple[Device, ControlMap],
+    modes: Mapping[str, TeleopMode] | None = None,
+) -> LocalPerson:
     """Return a person with a device, and the terminal's keys for what the device has no control for."""
     device, controls = made
     pollers, tables = [Poller(device)], [controls]
@@ -78,7 +93,8 @@ def _with(config: RecordConfig, env: HandrailEnv, say: Say, made: tuple[Device, 
         tables.append(load_map("keyboard", NAMES).only())
     sources = _opened(pollers, tables)
     say(f"{device.name}: hold {control_of([controls], 'hold') or 'what moves'} to move")
-    return _person(config, env, build_modes(config, env), sources[0], (sources[1:] or [None])[0], None)
+    modes = modes or build_modes(config, env)
+    return _person(config, env, modes, sources[0], (sources[1:] or [None])[0], None)
 
 
 def _person(

@@ -4,11 +4,19 @@ import ast
 import re
 import tomllib
 from collections.abc import Iterator
+from dataclasses import fields
 from pathlib import Path
 
 import pytest
 from command_helpers import command
+from lerobot.configs.dataset import DatasetRecordConfig
+from lerobot.configs.default import EvalConfig
+from lerobot.envs.configs import EnvConfig
+from lerobot.robots import RobotConfig
+from lerobot.teleoperators import TeleoperatorConfig
 from places import ROOT
+
+import handrail.collect.lerobot  # noqa: F401  (registers our plugins)
 
 SCRIPTS = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["scripts"]
 FLAG = re.compile(r"(?<![\w(-])--[a-z][\w.]*(?:-[a-z]\w*)*")
@@ -33,7 +41,19 @@ def flags_of(name: str) -> set[str]:
 
 @pytest.fixture(scope="module")
 def known() -> set[str]:
-    return {"--version"}.union(*map(flags_of, SCRIPTS))  # which every command has, beside its own
+    ours = {"--version"}.union(*map(flags_of, SCRIPTS))  # which every command has, beside its own
+    return ours | flags_of_lerobot()
+
+
+def flags_of_lerobot() -> set[str]:
+    """Return those of LeRobot's commands that are about our plugins, or that these have to agree with."""
+    kinds = {"robot": RobotConfig, "teleop": TeleoperatorConfig, "env": EnvConfig}
+    flags = {f"--{part}.{name}" for part in kinds for name in ("type", "discover_packages_path")}
+    for part, kind in kinds.items():
+        chosen = [each for name, each in kind.get_known_choices().items() if name.startswith("handrail")]
+        flags |= {f"--{part}.{entry.name}" for each in chosen for entry in fields(each)}
+    flags |= {f"--dataset.{entry.name}" for entry in fields(DatasetRecordConfig)}
+    return flags | {f"--eval.{entry.name}" for entry in fields(EvalConfig)}
 
 
 def texts() -> Iterator[tuple[str, ast.expr, Function]]:

@@ -150,16 +150,30 @@ def load_policy(folder: str | Path, device: str = "cpu") -> TrainedPolicy:
     import draccus
     from lerobot.policies.factory import get_policy_class, make_pre_post_processors
 
+    from handrail.policies.imitation.interface.steps import without_steps
+
     kind, override = settings.pop("type"), {"device_processor": {"device": device}}
     try:
         config = draccus.decode(registered_policies()[kind], settings | {"device": device})
         policy = get_policy_class(kind).from_pretrained(place, config=config)
-        before, after = make_pre_post_processors(config, str(place), preprocessor_overrides=override)
+        around = make_pre_post_processors(config, str(place), preprocessor_overrides=override)
     except Exception as error:  # of LeRobot and all below it: whatever the files hold, they are refused
         raise HandrailError(f"policy {str(place)!r}: {message_of(error)}") from error
+    interface = _interface_of(around[0], interface, place)
+    before, after = map(without_steps, around)  # an operator sees and acts through the interface itself
     policy.eval()
     policy.eval = lambda: policy  # LeRobot asks for it twice an action: a third of its time
     return TrainedPolicy(interface, meta, policy, before, after)
+
+
+def _interface_of(before: Any, said: PolicyInterface | None, place: Path) -> PolicyInterface | None:
+    """Return the interface of a checkpoint: as its notes say, or its steps."""
+    from handrail.policies.imitation.interface.steps import interface_in
+
+    stepped = interface_in(before)
+    if stepped is not None and said not in (None, stepped):
+        raise HandrailError(f"policy {str(place)!r}: expected {NAME} and the steps to agree on the interface")
+    return said or stepped
 
 
 def read_meta(folder: Path) -> tuple[PolicyInterface | None, PolicyMeta]:

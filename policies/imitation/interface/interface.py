@@ -79,7 +79,7 @@ class PolicyInterface:
     def action_names(self) -> tuple[str, ...]:
         """Names of what the policy writes: channels, a number for each mask if several, the gripper, (a,)."""
         flags = tuple(f"mask.{index}" for index in range(len(self.masks))) if len(self.masks) > 1 else ()
-        return (*(self.channels[index] for index in self._commanded), *flags, _GRIPPER)
+        return (*(self.channels[index] for index in self.commanded), *flags, _GRIPPER)
 
     def observe(self, state: FloatArray, environment: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return what the policy reads, ([T,] s') and ([T,] e') float32, of what is recorded."""
@@ -97,13 +97,13 @@ class PolicyInterface:
             values[:, pair] = pose.turned(values[:, pair])
         rows = columns["teleop.mask"][:, : len(self.channels)].astype(bool)
         flags = [(rows == mask).all(axis=1) for mask in self.masks] if len(self.masks) > 1 else []
-        return np.column_stack([values[:, self._commanded], *flags, gripper]).astype(np.float32)
+        return np.column_stack([values[:, self.commanded], *flags, gripper]).astype(np.float32)
 
     def decode(self, action: FloatArray, state: FloatArray) -> Intent:
         """Return what an action (a,) asks for, on the likeliest mask, in an observed state (s,)."""
         action, pose = np.asarray(action, float), self._view.pose(np.asarray(state, float)[None])
-        values, count = np.zeros((1, len(self.channels))), len(self._commanded)
-        values[0, self._commanded] = action[:count]
+        values, count = np.zeros((1, len(self.channels))), len(self.commanded)
+        values[0, self.commanded] = action[:count]
         for pair in self._pairs:
             values[:, pair] = pose.turned_back(values[:, pair])
         flags = action[count:-1]
@@ -158,7 +158,8 @@ class PolicyInterface:
         return self.masks or (tuple(self._known.mask("joint").tolist()),)
 
     @cached_property
-    def _commanded(self) -> list[int]:
+    def commanded(self) -> list[int]:
+        """Which channels it writes, by index."""
         return np.flatnonzero(np.any(self._sets, axis=0)).tolist()
 
     @cached_property

@@ -126,6 +126,8 @@ def _registered_steps(policy: str) -> frozenset[str]:
     """Return the names of the steps that LeRobot knows, those that a policy brings included."""
     from lerobot.processor.pipeline import ProcessorStepRegistry
 
+    import handrail.policies.imitation.interface.steps  # noqa: F401  (registers those of handrail-train)
+
     module = registered_policies()[policy].__module__.replace("configuration_", "processor_")
     with contextlib.suppress(ImportError):  # what is missing for it is said when it is loaded
         importlib.import_module(module)  # where LeRobot looks for them; beside a registered policy

@@ -14,6 +14,7 @@ from lerobot.policies.factory import make_policy, make_pre_post_processors
 
 from handrail.controllers.errors import HandrailError
 from handrail.policies.imitation.interface.checkpoint import MODEL
+from handrail.policies.imitation.interface.steps import without_steps
 from handrail.policies.imitation.training.memory import MemoryMeta
 
 _WHOLE_MODEL = (DistributedType.NO, DistributedType.MULTI_CPU, DistributedType.MULTI_GPU)  # in every process
@@ -51,7 +52,8 @@ def build_learner(
         around = make_pre_post_processors(described, dataset_stats=stats)
     else:
         device = {"device_processor": {"device": accelerator.device.type}}
-        around = make_pre_post_processors(described, str(checkpoint / MODEL), preprocessor_overrides=device)
+        loaded = make_pre_post_processors(described, str(checkpoint / MODEL), preprocessor_overrides=device)
+        around = tuple(map(without_steps, loaded))  # the data in memory are seen so already
     step: int = 0
     optimizer, schedule = make_optimizer_and_scheduler(settings, policy)
     _fuse(optimizer)

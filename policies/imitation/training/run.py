@@ -22,6 +22,8 @@ from torch.utils.data import BatchSampler
 
 from handrail.datasets.storage.atomic import publish_folder
 from handrail.policies.imitation.interface.checkpoint import MODEL, point_to
+from handrail.policies.imitation.interface.interface import PolicyInterface
+from handrail.policies.imitation.interface.steps import with_steps
 from handrail.policies.imitation.training.curve import Curve
 from handrail.policies.imitation.training.learner import Learner, build_accelerator, build_learner
 from handrail.policies.imitation.training.memory import MemoryDataset
@@ -42,6 +44,7 @@ class Run:
         checkpoint: the checkpoint to go on from; None to begin.
         finish: called with the `pretrained_model` folder of every new checkpoint and its step.
         quiet: whether to show no progress.
+        interface: what the policy reads and writes, for the checkpoints; None if that is what was recorded.
     """
 
     settings: TrainPipelineConfig
@@ -49,6 +52,7 @@ class Run:
     checkpoint: Path | None
     finish: Callable[[Path, int], None]
     quiet: bool = False
+    interface: PolicyInterface | None = None
 
     def train(self) -> None:
         """Train to the end; one of the processes writes checkpoints and the curve, and shows the progress.
@@ -123,7 +127,8 @@ class Run:
         draft = folder.with_name(f".{folder.name}")
         shutil.rmtree(draft, ignore_errors=True)
         policy, processes = accelerator.unwrap_model(learner.policy), accelerator.num_processes
-        parts = (policy, learner.optimizer, learner.schedule, learner.before, learner.after)
+        around = with_steps(learner.before, learner.after, self.interface)
+        parts = (policy, learner.optimizer, learner.schedule, *around)
         save_checkpoint(draft, step, self.settings, *parts, processes, self.settings.batch_size)
         self.finish(draft / MODEL, step)
         publish_folder(draft, folder)

@@ -81,6 +81,7 @@ def _run(config: TrainConfig, source: Source, steps: int, checkpoint: Path | Non
         checkpoint,
         lambda folder, step: write_meta(folder, source.interface, _meta(source, step)),
         quiet,
+        source.interface,
     ).train()
 
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from gymnasium.vector import SyncVectorEnv
 from lerobot.envs.factory import make_env, make_env_config
 from lerobot.envs.utils import env_to_policy_features, preprocess_observation
 
@@ -13,7 +14,9 @@ from handrail.controllers.errors import HandrailError
 
 def made(**settings):
     config = make_env_config("handrail", **settings)
-    return config, make_env(config, n_envs=1)["handrail"][0]
+    env = make_env(config, n_envs=1)["handrail"][0]
+    assert isinstance(env, SyncVectorEnv)
+    return config, env
 
 
 @pytest.mark.parametrize("task", TASKS)
@@ -27,7 +30,7 @@ def test_what_a_policy_reads_is_what_its_features_say(task):
     }
     assert env.single_action_space.shape == features["action"].shape
     assert env.call("_max_episode_steps")[0] > 0
-    with_nan, *_ = env.step(np.full(env.action_space.shape, np.nan, np.float32))
+    with_nan, *_ = env.step(np.full((1, *features["action"].shape), np.nan, np.float32))
     assert np.isfinite(with_nan["agent_pos"]).all()
     env.close()
 

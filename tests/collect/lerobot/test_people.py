@@ -1,0 +1,104 @@
+"""People steer LeRobot's robot: at the cockpit's page, or with a gamepad of SDL's; who lets go, brakes."""
+
+import json
+import time
+from itertools import count
+
+import pytest
+from cockpit_helpers import drive, page, told
+from device_players import VirtualPad
+
+from handrail.collect.devices.gamepad import Gamepad
+from handrail.collect.devices.reading import DeviceGoneError
+from handrail.collect.lerobot import (
+    HandrailCockpit,
+    HandrailCockpitConfig,
+    HandrailGamepad,
+    HandrailGamepadConfig,
+    HandrailSim,
+    HandrailSimConfig,
+)
+from handrail.collect.lerobot.mode_action import HOLD, NEXT
+
+pytestmark = pytest.mark.slow
+FORWARD = (0.0, 0.0, 0.0, 1.0, *(0.0,) * 14)  # base twist, then the hand's
+PATIENCE = 120.0  # [s]
+
+
+@pytest.fixture
+def robot(tmp_path):
+    made = HandrailSim(HandrailSimConfig(calibration_dir=tmp_path))
+    yield made
+    if made.is_connected:
+        made.disconnect()
+
+
+def until(robot, teleop, told_so, each=lambda: None):
+    """Run LeRobot's loop until an action is as wanted; return it."""
+    end = time.monotonic() + PATIENCE
+    while time.monotonic() < end:
+        each()
+        robot.get_observation()
+        action = teleop.get_action()
+        robot.send_action(action)
+        if told_so(action):
+            return action
+    raise TimeoutError
+
+
+def test_a_person_at_a_page_drives_and_takes_the_next_scene(robot, tmp_path):
+    teleop = HandrailCockpit(HandrailCockpitConfig(port=0, open=False, calibration_dir=tmp_path))
+    teleop.connect()
+    robot.connect()
+    try:
+        with page(teleop) as socket:
+            numbers, stamp = count(1), [0.0]
+
+            def say(axes):
+                stamp[0] = told(socket, "frame")["frame"]["stamp"]
+                socket.send(drive(next(numbers), stamp[0], axes))
+
+            def ask(what):
+                socket.send(json.dumps({"kind": "ask", "what": what, "value": True}))
+
+            assert teleop.get_action()[HOLD]
+            until(robot, teleop, lambda action: robot.stepwise.frame is None)
+            ask("mode")  # of no use here
+            ask("start")
+            until(robot, teleop, lambda action: HOLD not in action, lambda: say((0.0,) * 18))
+            until(robot, teleop, lambda action: action["ee.vx"] > 0.1, lambda: say(FORWARD))
+            until(robot, teleop, lambda action: HOLD in action)  # nothing more comes from the page
+            ask("success")
+            until(robot, teleop, lambda action: NEXT in action)
+            assert robot.get_observation()["scene"] == 1
+    finally:
+        teleop.disconnect()
+
+
+@pytest.fixture
+def pad():
+    made = VirtualPad()
+    with pytest.raises(DeviceGoneError):
+        Gamepad().open()
+    made.plug_in()
+    yield made
+    made.unplug()
+
+
+def test_a_person_with_a_gamepad_drives(robot, pad, tmp_path):
+    teleop = HandrailGamepad(HandrailGamepadConfig(calibration_dir=tmp_path))
+    teleop.connect()
+    robot.connect()
+    try:
+        assert until(robot, teleop, lambda action: HOLD in action)
+        for control in ("left_shoulder", "start"):
+            pad.move(control, 1)
+        until(robot, teleop, lambda action: HOLD not in action)
+        pad.move("left_y", -1.0)
+        until(robot, teleop, lambda action: abs(action["ee.vx"]) > 0.1)
+        pad.move("left_shoulder", 0)
+        until(robot, teleop, lambda action: HOLD in action)
+        pad.move("y", 1)
+        until(robot, teleop, lambda action: NEXT in action)
+    finally:
+        teleop.disconnect()

@@ -1,0 +1,69 @@
+"""LeRobot's evaluation on our environment, and ours: one policy on one seed moves alike, to the bit."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from lerobot.configs.policies import PreTrainedConfig
+from lerobot.envs.factory import make_env, make_env_config, make_env_pre_post_processors
+from lerobot.policies.factory import make_policy, make_pre_post_processors
+from lerobot.scripts.lerobot_eval import rollout
+from training_helpers import tiny
+
+from handrail.collect.config import FIRST_SEED, StoredConfig
+from handrail.policies.imitation.evaluation.conditions import policy_conditions
+from handrail.policies.imitation.evaluation.config import EvaluateConfig
+from handrail.policies.imitation.evaluation.rollout import run_rollout
+from handrail.policies.imitation.interface.checkpoint import load_policy
+from handrail.policies.imitation.training.training import train
+
+pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("default")]
+SEED, SECONDS = 3, 2.0
+
+
+class Trace:
+    """Keeps the states of a session."""
+
+    def __init__(self):
+        self.states = []
+
+    def begin(self, env, seed):
+        self.states.clear()
+
+    def see(self, frame):
+        self.states.append(frame.state)
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory):
+    from command_helpers import command
+
+    root = tmp_path_factory.mktemp("evaluated") / "set"
+    done = command(root, "--task", "reach", "--dataset.num_episodes", 2)
+    assert done.returncode == 0, done.stderr
+    return root
+
+
+@pytest.mark.parametrize(("actions", "mode"), [("realised", ""), ("recorded", ""), ("intent", "ee")])
+def test_both_evaluations_move_the_robot_alike(actions, mode, recorded, tmp_path):
+    settings = tiny(recorded, tmp_path / "policy", actions=actions, steps=40)
+    folder = train(dataclasses.replace(settings, dataset=StoredConfig("me/set", str(recorded))), quiet=True)
+    config = EvaluateConfig(policy=(str(folder),), episodes=1, time_limit=SECONDS, task="reach")
+    (condition,), _ = policy_conditions(config)
+    trace = Trace()
+    run_rollout(condition, FIRST_SEED + SEED, load_policy, [trace])
+
+    env_config = make_env_config("handrail", task="reach", mode=mode, time_limit=SECONDS)
+    env = make_env(env_config, n_envs=1)["handrail"][0]
+    described = PreTrainedConfig.from_pretrained(folder)
+    described.pretrained_path = folder
+    policy = make_policy(described, env_cfg=env_config)
+    policy.eval()
+    around = make_env_pre_post_processors(env_config, described)
+    policy_around = make_pre_post_processors(described, str(folder))
+    done = rollout(env, policy, *around, *policy_around, seeds=[SEED], return_observations=True)
+    env.close()
+    theirs = done["observation"]["observation.state"][0, : len(trace.states)].numpy()
+    assert len(trace.states) == SECONDS * 20
+    assert np.abs(np.diff(trace.states, axis=0)).max() > 1e-3
+    np.testing.assert_array_equal(theirs, trace.states)

@@ -1,0 +1,109 @@
+"""A checkpoint of handrail-train carries its view: LeRobot's plain loading runs it, to the same numbers."""
+
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+import torch
+from lerobot.configs.policies import PreTrainedConfig
+from lerobot.policies.factory import get_policy_class, make_pre_post_processors
+from training_helpers import CHANNELS, ENVIRONMENT, STATE, frame, tiny, write_dataset
+
+from handrail.controllers.errors import HandrailError
+from handrail.policies.imitation.interface.checkpoint import load_policy
+from handrail.policies.imitation.interface.interface import PolicyInterface
+from handrail.policies.imitation.interface.steps import PolicyActionStep, PolicyViewStep, with_steps
+from handrail.policies.imitation.training.training import train
+
+MASKS = tuple(sorted(tuple(CHANNELS.mask(group).tolist()) for group in ("ee", "base")))
+FRESH = """
+import sys
+import handrail.policies.lerobot
+from lerobot.configs.policies import PreTrainedConfig
+from lerobot.policies.factory import make_pre_post_processors
+before, after = make_pre_post_processors(PreTrainedConfig.from_pretrained(sys.argv[1]), sys.argv[1])
+print(*(step._registry_name for step in (*before.steps, *after.steps)))
+"""
+
+
+@pytest.fixture(scope="module")
+def dataset(tmp_path_factory):
+    return write_dataset(tmp_path_factory.mktemp("steps") / "set")
+
+
+@pytest.fixture(scope="module", params=["realised", "intent"])
+def trained(request, dataset, tmp_path_factory):
+    output = tmp_path_factory.mktemp(request.param) / "policy"
+    return train(tiny(dataset, output, actions=request.param, steps=3), quiet=True)
+
+
+def seen():
+    row = frame(np.random.default_rng(7))
+    return {
+        key: np.asarray(row[key], np.float32)
+        for key in ("observation.state", "observation.environment_state")
+    }
+
+
+def test_plain_loading_acts_as_the_interface_does(trained):
+    """What LeRobot's evaluation does with a checkpoint, and what ours does with it, are the same."""
+    config = PreTrainedConfig.from_pretrained(trained)
+    policy = get_policy_class(config.type).from_pretrained(trained, config=config)
+    before, after = make_pre_post_processors(config, str(trained))
+    ours, raw = load_policy(trained), seen()
+    state, environment = raw.values()
+    for _ in range(3):
+        batch = before({key: torch.from_numpy(values)[None] for key, values in raw.items()})
+        with torch.inference_mode():
+            acted = after(policy.select_action(batch))[0].numpy()
+        meant = ours.interface.decode(ours.act(*ours.interface.observe(state, environment)), state)
+        np.testing.assert_array_equal(acted[:-1], meant.values[meant.mask])
+        assert acted[-1] == meant.gripper
+
+
+def test_a_mask_becomes_the_focus_and_what_is_no_number_stays_none():
+    interface = PolicyInterface("intent", STATE, ENVIRONMENT, CHANNELS.names, MASKS)
+    described = json.loads(json.dumps(interface.__dict__, default=list))
+    view, act = PolicyViewStep(described), PolicyActionStep(described)
+    raw = {key: torch.from_numpy(values)[None] for key, values in seen().items()}
+    view({"observation": raw})
+    size = len(interface.action_names)
+    for chosen, mask in enumerate(MASKS):
+        action = torch.zeros(1, size)
+        action[0, size - 3 + chosen] = 1.0
+        assert act({"action": action})["action"][0, -2] == float(mask[0])
+    assert act({"action": torch.full((1, size), torch.nan)})["action"].isnan().any()
+
+
+def test_what_was_not_seen_or_does_not_fit_is_said():
+    interface = PolicyInterface("realised", STATE, ENVIRONMENT, CHANNELS.names)
+    described = json.loads(json.dumps(interface.__dict__, default=list))
+    view, act = PolicyViewStep(described), PolicyActionStep(described)
+    with pytest.raises(HandrailError, match="to see something first"):
+        act({"action": torch.zeros(1, 10)})
+    with pytest.raises(HandrailError, match=rf"expected observation\.state with {len(STATE)} numbers"):
+        view({"observation": {"observation.state": torch.zeros(1, 3)}})
+    with pytest.raises(HandrailError, match="action space"):
+        PolicyViewStep(described | {"actions": "none"})
+
+
+def test_nothing_is_added_where_the_policy_reads_what_is_recorded():
+    around = object(), object()
+    assert with_steps(*around, None) == around
+
+
+@pytest.mark.slow
+def test_a_fresh_process_that_discovers_our_package_loads_it(trained):
+    done = subprocess.run([sys.executable, "-c", FRESH, str(trained)], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert "handrail_policy_view" in done.stdout
+    assert "handrail_policy_action" in done.stdout
+
+
+def test_a_training_that_goes_on_keeps_the_steps_and_adds_none(dataset, tmp_path):
+    begun = train(tiny(dataset, tmp_path / "policy", steps=2), quiet=True)
+    gone_on = train(tiny(dataset, tmp_path / "policy", steps=4, resume=True), quiet=True)
+    for processor in ("policy_preprocessor.json", "policy_postprocessor.json"):
+        assert (gone_on / processor).read_bytes() == (begun / processor).read_bytes()
