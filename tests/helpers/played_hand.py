@@ -1,4 +1,4 @@
-"""A LeRobot teleoperator that says three numbers for the hand, as a gamepad does; importing it takes LeRobot."""
+"""A LeRobot teleoperator that says three numbers for the hand; importing it takes LeRobot."""
 
 import math
 import time
@@ -20,10 +20,16 @@ class PlayedHand(Teleoperator):
 
     config_class = PlayedHandConfig
     name = "played_hand"
-    action_features = {"delta_x": float, "delta_y": float, "delta_z": float, "gripper": float}
-    feedback_features = {}
     is_connected = False
     is_calibrated = True
+
+    @property
+    def action_features(self) -> dict[str, type]:
+        return {"delta_x": float, "delta_y": float, "delta_z": float, "gripper": float}
+
+    @property
+    def feedback_features(self) -> dict[str, type]:
+        return {}
 
     def connect(self, calibrate: bool = True) -> None:
         self.is_connected = True

@@ -22,7 +22,7 @@ DRIVER = """
 import sys, time
 from lerobot.robots.lekiwi import LeKiwiClient, LeKiwiClientConfig
 ports = map(int, sys.argv[1:])
-client = LeKiwiClient(LeKiwiClientConfig(None, "127.0.0.1", *ports, cameras={}, connect_timeout_s=60))
+client = LeKiwiClient(LeKiwiClientConfig("127.0.0.1", *ports, cameras={}, connect_timeout_s=60))
 client.connect()
 said = client.get_observation()
 arm = {name: value for name, value in said.items() if name.endswith(".pos")}
