@@ -42,10 +42,12 @@ def shapes(model: MjModel) -> dict[str, Any]:
 
 
 def hand(model: MjModel) -> list[int]:
-    """Return the bodies that are the robot's hand: the gripper and what hangs on it, or the last link."""
+    """Return the bodies that are the hand: the gripper, or the link behind it, and what hangs on that."""
     names = {model.body(index).name: index for index in range(model.nbody)}
     tool = int(model.site_bodyid[model.site("tool").id])
+    drawn = set(model.geom_bodyid[model.geom_group == VISIBLE_GROUP].tolist())
     first = names.get("gripper", tool)
+    first = first if first in drawn else tool
     within = [first]
     for index in range(first + 1, model.nbody):  # a body comes after the one that it hangs on
         if int(model.body_parentid[index]) in within:

@@ -10,7 +10,7 @@ from rich.table import Table
 
 from handrail.collect.commands.interrupts import Interrupts
 from handrail.collect.commands.progress import recording_bar
-from handrail.collect.commands.recording import Recording, open_writer
+from handrail.collect.commands.recording import Recording, come_first, open_writer
 from handrail.collect.commands.target import located, next_commands
 from handrail.collect.config import RecordConfig
 from handrail.collect.envs.env import HandrailEnv
@@ -72,6 +72,8 @@ def record(config: RecordConfig) -> int:
     """
     console = Console(stderr=True)
     interactive = OPERATORS.find(config.operator).interactive
+    if interactive or config.robot_client:
+        come_first()
     env, link = _opened(config, interactive)
     displays: list[Display] = []
     people: list[Any] = []

@@ -3,7 +3,7 @@ import { OrbitControls, THREE } from "/lib/three.js";
 import { keep, recall } from "./store.js";
 
 export const CAMERAS = { follow: "along with the robot", free: "from where I put it", hand: "from the hand", above: "from above" };
-const BACK = 0.34, UP = 0.2; // of the hand's camera, behind and beside the tool point [m]
+const BACK = 0.34, UP = 0.2; // of the hand's camera, behind and beside the tool point, at scale 1 [m]
 
 export class Cameras {
   constructor(canvas) {
@@ -15,6 +15,13 @@ export class Cameras {
     this.controls.maxPolarAngle = 1.7;
     this.choice = recall("camera", (name) => name in CAMERAS, "follow");
     this.before = null;
+    this.scale = 1;
+  }
+
+  // scale: of the robot's world; one that is smaller is looked at from nearer.
+  stage({ scale }) {
+    if (scale !== this.scale) this.before = null;
+    this.scale = scale;
   }
 
   choose(name) {
@@ -48,11 +55,11 @@ export class Cameras {
   lookAt(base) {
     const forward = new THREE.Vector3(1, 0, 0).applyQuaternion(base.quaternion).setZ(0).normalize();
     const side = new THREE.Vector3(-forward.y, forward.x, 0);
-    const at = base.position.clone();
-    this.controls.target.copy(at).addScaledVector(forward, 0.5).setZ(0.6);
+    const at = base.position.clone(), s = this.scale;
+    this.controls.target.copy(at).addScaledVector(forward, 0.5 * s).setZ(0.6 * s);
     this.camera.position.copy(at);
-    if (this.choice === "above") this.camera.position.addScaledVector(forward, 0.35).setZ(4.4);
-    else this.camera.position.addScaledVector(forward, -2.2).addScaledVector(side, 1.0).setZ(2.2);
+    if (this.choice === "above") this.camera.position.addScaledVector(forward, 0.35 * s).setZ(4.4 * s);
+    else this.camera.position.addScaledVector(forward, -2.2 * s).addScaledVector(side, s).setZ(2.2 * s);
   }
 
   // Looks along the hand's z axis, from behind it and a little beside it, with the horizon level where it can be.
@@ -62,7 +69,7 @@ export class Cameras {
     if (up.length() < 0.2) up.set(1, 0, 0).applyQuaternion(tool.quaternion);
     up.normalize();
     this.camera.up.copy(up);
-    this.camera.position.copy(tool.position).addScaledVector(along, -BACK).addScaledVector(up, UP);
+    this.camera.position.copy(tool.position).addScaledVector(along, -BACK * this.scale).addScaledVector(up, UP * this.scale);
     this.camera.lookAt(tool.position);
   }
 

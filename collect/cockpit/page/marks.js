@@ -35,9 +35,9 @@ function tube(scene, colour, radius) {
   return made;
 }
 
-function drawTube(made, points) {
+function drawTube(made, points, scale) {
   const length = points.slice(1).reduce((sum, point, index) => sum + point.distanceTo(points[index]), 0);
-  made.visible = length > 0.01;
+  made.visible = length > 0.01 * scale;
   if (!made.visible) return;
   made.geometry.dispose();
   made.geometry = new THREE.TubeGeometry(new THREE.CatmullRomCurve3(points), 24, made.radius, 6);
@@ -48,6 +48,7 @@ export class Marks {
   constructor(scene, label) {
     this.scene = scene;
     this.label = label;
+    this.scale = 1; // of the robot's world; lengths here are those at scale 1
     this.path = tube(scene, PLAN, 0.006);
     this.track = tube(scene, PLAN, 0.012);
     this.asked = line(scene, ASKED, 0.03);
@@ -66,12 +67,24 @@ export class Marks {
     this.bodies = bodies;
     this.hand = stage.hand;
     this.baseSize = stage.base_size;
+    this.setScale(stage.scale);
     this.ghost.clear();
     for (const index of stage.hand) {
       const copy = new THREE.Group();
       for (const part of bodies[index].children) copy.add(...this.hollow(part));
       this.ghost.add(copy);
     }
+  }
+
+  // Lines of a small robot are drawn finer.
+  setScale(scale) {
+    for (const each of [this.path, this.track]) each.radius *= scale / this.scale;
+    for (const { material } of [this.asked, this.near, this.outline]) {
+      material.dashSize *= scale / this.scale;
+      material.gapSize *= scale / this.scale;
+    }
+    for (const end of this.ends) end.scale.setScalar(scale);
+    this.scale = scale;
   }
 
   hollow(part) {
@@ -81,20 +94,21 @@ export class Marks {
       each.position.copy(part.position);
       each.quaternion.copy(part.quaternion);
       each.renderOrder = 3;
+      each.frustumCulled = false;
     }
     return [skin, edges];
   }
 
   frame(frame) {
-    drawTube(this.path, frame.path.map((point) => new THREE.Vector3(...point)));
-    drawTube(this.track, frame.track.map(([x, y]) => new THREE.Vector3(x, y, ON_FLOOR)));
+    drawTube(this.path, frame.path.map((point) => new THREE.Vector3(...point)), this.scale);
+    drawTube(this.track, frame.track.map(([x, y]) => new THREE.Vector3(x, y, ON_FLOOR)), this.scale);
     this.leadHand(frame);
     this.leadBase(frame);
     const points = frame.nearest?.points ?? [];
     const ends = points.length ? [new THREE.Vector3(...points.slice(0, 3)), new THREE.Vector3(...points.slice(3))] : [];
     draw(this.near, ends);
     this.ends.forEach((end, index) => { end.visible = ends.length > 0; if (end.visible) end.position.copy(ends[index]); });
-    this.said = frame.nearest ? `${(100 * frame.nearest.distance).toFixed(0)} cm` : "";
+    this.said = frame.nearest ? `${(100 * frame.nearest.distance).toFixed(this.scale < 1 ? 1 : 0)} cm` : "";
   }
 
   // Every part of the hand stands to the ghost as it stands to the hand now.
@@ -120,7 +134,7 @@ export class Marks {
     const [x, y, yaw] = frame.ghost_base;
     if (!frame.ghost_base.length) return draw(this.outline, []);
     const [a, b] = this.baseSize.map((side) => side / 2);
-    const corners = [[a, -b], [a, b], [-a, b], [-a, -b], [a, -b], [a + 0.15, 0], [a, b]];
+    const corners = [[a, -b], [a, b], [-a, b], [-a, -b], [a, -b], [a + 0.15 * this.scale, 0], [a, b]];
     draw(this.outline, corners.map(([p, q]) => new THREE.Vector3(
       x + Math.cos(yaw) * p - Math.sin(yaw) * q, y + Math.sin(yaw) * p + Math.cos(yaw) * q, ON_FLOOR,
     )));
@@ -134,6 +148,14 @@ export class Marks {
     if (!seen) return;
     this.label.textContent = this.said;
     this.label.style.transform = `translate(${((middle.x + 1) / 2 * width + 10).toFixed(0)}px, ${((1 - middle.y) / 2 * height - 10).toFixed(0)}px)`;
+  }
+
+  // Shows everything there is to show, anywhere.
+  rehearse() {
+    const points = [new THREE.Vector3(), new THREE.Vector3(1, 0, 0)];
+    for (const each of [this.asked, this.near, this.outline]) draw(each, points);
+    for (const each of [this.path, this.track]) drawTube(each, points);
+    for (const each of [this.ghost, ...this.ends]) each.visible = true;
   }
 
   hide() {
