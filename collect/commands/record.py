@@ -72,7 +72,7 @@ def record(config: RecordConfig) -> int:
     """
     console = Console(stderr=True)
     interactive = OPERATORS.find(config.operator).interactive
-    if interactive:
+    if interactive or config.robot_client:
         come_first()
     env, link = _opened(config, interactive)
     displays: list[Display] = []

@@ -1,8 +1,8 @@
 """A session whose episodes become a dataset: what `handrail-record` and a user study share."""
 
-import contextlib
 import os
 from collections.abc import Callable, Sequence
+from contextlib import closing, suppress
 from dataclasses import replace
 from typing import Any, Protocol
 
@@ -31,7 +31,7 @@ _NICE = -10  # of a loop that a person steers, where the system allows that
 
 def come_first() -> None:
     """Let other programs wait for this one and its threads to come, where the system allows that."""
-    with contextlib.suppress(AttributeError, OSError):
+    with suppress(AttributeError, OSError):
         os.setpriority(os.PRIO_PROCESS, 0, _NICE)
 
 
@@ -81,7 +81,7 @@ class Recording:
             self._session.warm_up(seed, self._rehearsal)
             return
         fps = self._config.dataset.fps
-        with contextlib.closing(build_env(self._config, fps)) as simulated:
+        with closing(build_env(self._config, fps)) as simulated:
             build_session(self._config, simulated, (), fps, *self.people).warm_up(seed, self._rehearsal)
 
     def episode(

@@ -1,6 +1,7 @@
 """Which joint of a leader arm drives which joint of the robot's arm, which way, and how far."""
 
 import json
+import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -81,6 +82,30 @@ class LeaderCalibration:
 
 _SCALE = Entry("a finite number, not 0", lambda value: is_number(value) and value != 0)
 _GRIPPER = Entry("a table, or nothing", lambda value: value is None or is_table(value), needed=False)
+
+
+_SO_ARM = ("shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll")
+_SO_LEADERS = ("so100_leader", "so101_leader")
+_IN_DEGREES = ("", "use_degrees=true", "use_degrees=True")
+
+
+def same_arm(leader: str, options: str, arm: tuple[str, ...]) -> LeaderCalibration | None:
+    """Return the calibration of a leader that is a twin of the arm, as LeRobot's SO-100 and SO-101 are.
+
+    Joint by joint the same names and degrees; both are zero in the middle of their range.
+
+    Args:
+        leader: its type.
+        options: other settings of it.
+        arm: names of the arm's joints.
+
+    Returns:
+        None for any other pair.
+    """
+    if leader not in _SO_LEADERS or options not in _IN_DEGREES or arm != _SO_ARM:
+        return None
+    joints = {name: LeaderJoint(f"{name}.pos", math.pi / 180.0) for name in arm}
+    return LeaderCalibration(joints, LeaderGripper("gripper.pos", closed=0.0, opened=100.0))
 
 
 def load_calibration(path: Path, arm: tuple[str, ...], advice: str) -> LeaderCalibration:

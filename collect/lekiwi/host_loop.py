@@ -112,6 +112,7 @@ class HostLog:
         self.episodes: list[dict[str, Any]] = []
         self._times: list[float] = []
         self._ages: list[float] = []
+        self._speed = 0.0
 
     def begin(self, seed: int) -> None:
         """Take note that an episode begins."""
@@ -125,7 +126,7 @@ class HostLog:
 
     def see(self, body: LeKiwiBody) -> None:
         """Take note of how the episode stands."""
-        base = body.base.round(4).tolist()
+        base, self._speed = body.base.round(4).tolist(), body.speed
         seen = {"success_at": body.done_at, "contacts": body.contacts, "seconds": body.time, "base": base}
         self.episodes[-1] |= seen
 
@@ -141,6 +142,7 @@ class HostLog:
             "malformed": self.malformed,
             "messages_lost": self.lost,
             "base_stops": self.stops,
+            "base_speed": self._speed,
             "episodes": self.episodes,
         }
 

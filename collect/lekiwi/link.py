@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -176,7 +177,9 @@ class Link:
         state, self._said = self.body.observe(said, now), said
         if not self.body.trouble:
             self.state, self._heard = state, now
-        elif now - self._heard > _GONE:
+            return
+        self.state = replace(state, time=self.state.time)  # it knows what was sent; its clock stands
+        if now - self._heard > _GONE:
             raise HandrailError(f"robot {self._name}: nothing usable heard for {_GONE:.0f} s; is it on?")
 
 

@@ -15,7 +15,7 @@ from handrail.collect.devices.spacemouse import SpaceMouse
 from handrail.collect.devices.stick import StickShape
 from handrail.collect.devices.terminal import has_terminal
 from handrail.collect.envs.env import HandrailEnv
-from handrail.collect.leader.calibration import load_calibration
+from handrail.collect.leader.calibration import load_calibration, same_arm
 from handrail.collect.leader.follower import Follower
 from handrail.collect.leader.leader_arm import LeaderArm
 from handrail.collect.leader.setup import calibration_file, how_to_calibrate
@@ -69,7 +69,8 @@ def open_leader_arm(config: RecordConfig, env: HandrailEnv, say: Say) -> LocalPe
     modes = _led(build_modes(config, env), env, config.mode_name)
     arm = description.arm_joints
     advice = how_to_calibrate(teleop, config.robot)
-    calibration = load_calibration(calibration_file(teleop, description.name), arm, advice)
+    file, twin = calibration_file(teleop, description.name), same_arm(teleop.type, teleop.options, arm)
+    calibration = twin if twin and not file.is_file() else load_calibration(file, arm, advice)
     leader = LeaderArm(lambda: make_teleoperator(teleop), teleop.type, calibration.sources)
     device, controls = {"keyboard": _keyboard, "gamepad": _gamepad}[teleop.beside](teleop)
     pollers = [Poller(leader), Poller(device)]

@@ -12,7 +12,7 @@ import math
 import time
 from collections import Counter
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -43,6 +43,10 @@ from handrail.datasets.storage.strict_json import load_json
 NAME = "handrail_masked_mpc"
 _CENTRED = 10.0  # weight of the middle of joints that cannot turn half around
 _LONG_AGO = -1e6  # when nobody who is listened to has asked [s]
+_KEPT = (
+    *("robot", "units", "fps", "inputs", "tool_frame", "base_frame", "gripper"),
+    *("obstacles", "start", "settings", "timeout"),
+)
 _log = logging.getLogger(__name__)
 
 
@@ -61,6 +65,7 @@ class MaskedMpcStep(RobotActionProcessorStep):
         inputs: other names that the teleoperator uses: `{"delta_x": ["ee.vx", 0.2]}`.
         tool_frame: frame in which the hand's twist is meant: world or tool.
         base_frame: the same of the base's: base or world.
+        gripper: what its entry is: share (0 open, 1 closed) or actions (LeRobot's 0 close, 1 stay, 2 open).
         obstacles: what stands around, as tables of name, kind, size, position, rpy and work_surface.
         start: where the base is at the beginning: x, y, heading [m, rad].
         settings: what shall differ of `MpcSettings`.
@@ -76,6 +81,7 @@ class MaskedMpcStep(RobotActionProcessorStep):
     inputs: dict[str, Any] = field(default_factory=dict)
     tool_frame: str = "world"
     base_frame: str = "base"
+    gripper: str = "share"
     obstacles: list[dict[str, Any]] = field(default_factory=list)
     start: list[float] = field(default_factory=lambda: [0.0, 0.0, 0.0])
     settings: dict[str, Any] = field(default_factory=dict)
@@ -100,7 +106,7 @@ class MaskedMpcStep(RobotActionProcessorStep):
             )
         units = robot_units(self.units, model.description)
         self._around = parsed_obstacles(self.obstacles)
-        self._intent = PartialIntent(channels, units, self.inputs, frames)
+        self._intent = PartialIntent(channels, units, self.inputs, frames, self.gripper)
         self._body = WholeBody(model, units, 1.0 / self.fps, self.timeout)
         self._action_names = units.action_names
         centring = narrow_joint_centring(channels, model.description.limits, _CENTRED)
@@ -132,8 +138,7 @@ class MaskedMpcStep(RobotActionProcessorStep):
 
     def get_config(self) -> dict[str, Any]:
         """Return the settings."""
-        kept = ("robot", "units", "fps", "inputs", "tool_frame", "base_frame", "obstacles", "start")
-        return {name: getattr(self, name) for name in (*kept, "settings", "timeout")}
+        return {entry.name: getattr(self, entry.name) for entry in fields(self) if entry.name in _KEPT}
 
     def transform_features(
         self, features: dict[PipelineFeatureType, dict[str, PolicyFeature]]
@@ -173,7 +178,7 @@ class MaskedMpcStep(RobotActionProcessorStep):
                     f"settings of {NAME}: expected numbers for some of {', '.join(usual)}; "
                     f"got {shown(name)} = {shown(value)}"
                 )
-        return MpcSettings.of(scale, **self.settings)
+        return replace(MpcSettings.of(scale), **self.settings)
 
 
 Pipeline = RobotProcessorPipeline[tuple[RobotAction, Any], RobotAction]

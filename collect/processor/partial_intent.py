@@ -14,6 +14,9 @@ from handrail.controllers.interface.frames import Frames
 from handrail.controllers.interface.intent import Intent
 
 GRIPPER, TIME = "gripper", "time"
+_GRIPS = ("share", "actions")
+_STAYS = -1.0
+_LEROBOT = {0.0: 1.0, 1.0: _STAYS, 2.0: 0.0}  # LeRobot's gripper actions: close, stay, open
 _FOLLOW = 4.0  # of a joint towards the position that is asked for [1/s]
 
 
@@ -24,21 +27,31 @@ class PartialIntent:
     - a channel (`ee.vx`, `base.wz`, `joint.elbow_flex`), in m/s and rad/s;
     - a name of `inputs`: so many times a channel;
     - an entry of the robot's own action: a leader's joint, which is followed, or the base's velocity;
-    - `gripper`, 0 open to 1 closed; `time`, when it was asked, on the clock of the step [s].
+    - `gripper`, 0 open to 1 closed, or LeRobot's action: 0 closes, 1 leaves it, 2 opens;
+    - `time`, when it was asked, on the clock of the step [s].
 
     Args:
         channels: of the robot.
         units: of the robot.
         inputs: by name of an entry, the channel and how much of it one unit is.
         frames: in which twists are meant.
+        gripper: what `gripper` is: share or actions.
 
     Raises:
-        HandrailError: an input's channel is none.
+        HandrailError: an input's channel is none, or it is unknown what `gripper` is.
     """
 
     def __init__(
-        self, channels: Channels, units: RobotUnits, inputs: Mapping[str, Any], frames: Frames
+        self,
+        channels: Channels,
+        units: RobotUnits,
+        inputs: Mapping[str, Any],
+        frames: Frames,
+        gripper: str = "share",
     ) -> None:
+        if gripper not in _GRIPS:
+            raise unknown_name("gripper", gripper, _GRIPS)
+        self._actions = gripper == "actions"
         self._channels, self._units, self._frames = channels, units, frames
         self._scaled = {name: (index, 1.0) for index, name in enumerate(channels.names)}
         for name, said in inputs.items():
@@ -74,7 +87,8 @@ class PartialIntent:
             if name == TIME:
                 stamp = value
             elif name == GRIPPER:
-                grip = value
+                grip = _LEROBOT.get(value, math.nan) if self._actions else value
+                grip = (self._grip or 0.0) if grip == _STAYS else grip
             elif name in self._scaled:
                 index, scale = self._scaled[name]
                 values[index] += scale * value

@@ -195,7 +195,7 @@ def flags(config: type, prefix: str = "") -> set[str]:
 
 def test_flags_are_all_there():
     shown = {name.split(" ")[0] for name in table("recording", "Flags of `handrail-record`")}
-    groups = re.compile(r"--(human|cockpit|teleop)\..*")
+    groups = re.compile(r"--(human|cockpit|teleop|client)\..*")
     assert shown == {groups.sub(r"--\1.*", name) for name in flags(RecordConfig)}
 
 

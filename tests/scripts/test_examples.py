@@ -4,12 +4,16 @@ import re
 import runpy
 import sys
 
+import numpy as np
 import pytest
 from command_helpers import command
 from places import ROOT
 
 EXAMPLES = ROOT / "docs" / "examples"
-NAMES = ("dataset_metric", "gym_policy", "mpc_loop", "new_controller", "new_task")
+NAMES = (
+    *("another_arm", "dataset_metric", "gym_policy", "mpc_loop", "new_controller", "new_task"),
+    "record_with_mpc",
+)
 LONGEST = 60  # lines
 
 
@@ -59,3 +63,12 @@ def test_a_metric_of_a_dataset_is_computed(tmp_path, capsys, monkeypatch):
     out = shown("dataset_metric", capsys, monkeypatch, tmp_path / "reach")
     assert out.count("done in") == 2
     assert -6.0 < float(re.search(r"\(SPARC\): (-[\d.]+)", out)[1]) < -1.4
+
+
+def test_another_arm_draws_its_square_and_keeps_from_the_box(capsys, monkeypatch):
+    out = shown("another_arm", capsys, monkeypatch)
+    hand = [[float(number) for number in row.split()] for row in re.findall(r"hand at \[(.*?)\]", out)]
+    corners = [[0.0, 0.08, 0.0], [0.0, 0.08, 0.06], [0.0, 0.0, 0.06], [0.0, 0.0, 0.0]]
+    assert np.abs(np.array(hand[:4]) - corners).max() < 0.01
+    assert hand[4][1] > -0.06  # the box is in the way
+    assert float(re.search(r"nearest to anything: (-?[\d.]+)", out)[1]) > 0.02

@@ -1,0 +1,121 @@
+"""handrail-record drives a LeKiwi through LeRobot's client: here one in this process, in its own time."""
+
+import math
+from unittest import mock
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+from command_helpers import command
+from lekiwi_helpers import ZERO, PlayedClient
+
+from handrail.collect.lekiwi import client_env
+from handrail.collect.lekiwi.client_plant import ClientPlant
+from handrail.collect.lekiwi.link import Link
+from handrail.collect.simulation.scene import Scene, Viewpoint
+from handrail.controllers.errors import HandrailError
+from handrail.controllers.robot.model import load_model
+
+FLAGS = ("--robot", "lekiwi", "--robot_client", "lekiwi", "--task", "reach", "--client.simulated")
+
+
+def link(client: PlayedClient, robot: str = "lekiwi", simulated: bool = True) -> Link:
+    return Link(client, "lekiwi", load_model(robot), 0.05, simulated, client.clock, client.sleep)
+
+
+def recorded(client: PlayedClient, folder, *flags):
+    """Run handrail-record against a client."""
+
+    def connect(*_) -> Link:
+        return link(client)
+
+    with mock.patch.object(client_env, "connect", connect):
+        return command(folder, *FLAGS, *flags)
+
+
+def column(folder, name: str) -> list:
+    files = sorted((folder / "data").rglob("*.parquet"))
+    return [value for file in files for value in pq.read_table(file, columns=[name])[name].to_pylist()]
+
+
+def test_an_episode_through_the_client_reaches_its_goal(tmp_path):
+    client = PlayedClient()
+    done = recorded(client, tmp_path / "set", "--dataset.num_episodes", 2)
+    assert done.returncode == 0, done.stderr
+    assert "2/2 succeeded" in done.stderr
+    assert set(column(tmp_path / "set", "controller.status")) == {"ok"}
+    assert not math.isnan(client.body.done_at)  # the goal was reached in truth, not by odometry alone
+    assert client.body.contacts == 0
+    assert all(client.sent[-1][name] == 0.0 for name in ZERO)
+    assert not client.connected
+
+
+def test_a_robot_that_is_silent_for_a_moment_brakes_and_one_that_stays_so_ends_the_recording(tmp_path):
+    moment = PlayedClient(silent=(2.5, 3.2))
+    done = recorded(moment, tmp_path / "moment", "--dataset.num_episodes", 1)
+    assert done.returncode == 0, done.stderr
+    assert "invalid_state" in column(tmp_path / "moment", "controller.status")
+    gone = PlayedClient(silent=(2.5, math.inf))
+    done = recorded(gone, tmp_path / "gone", "--dataset.num_episodes", 3)
+    assert done.returncode == 1
+    assert "nothing usable heard for 2 s" in done.stderr
+    assert all(gone.sent[-1][name] == 0.0 for name in ZERO)
+
+
+def test_the_base_frame_is_where_the_task_has_put_it_wherever_the_robot_stands():
+    client, q = PlayedClient(), np.array([0.3, -0.2, 1.0, *load_model("lekiwi").description.home[3:]])
+    plant = ClientPlant(load_model("lekiwi"), Scene((), Viewpoint((0, 0, 1), (0, 0, 0))), q, link(client), 3)
+    assert plant.state().q == pytest.approx(q, abs=0.05)
+    assert plant.state().q[:3] == pytest.approx(q[:3], abs=1e-3)
+    start = client.body.base
+    for _ in range(40):
+        plant.send([0.0, 0.1, 0.0, 0, 0, 0, 0, 0, 0])
+    plant.stop()
+    away = client.body.base - start
+    c, s = math.cos(1.0 - start[2]), math.sin(1.0 - start[2])
+    moved = plant.state().q[:2] - q[:2]
+    assert moved == pytest.approx([0.0, 0.19], abs=0.02)
+    assert [c * away[0] - s * away[1], s * away[0] + c * away[1]] == pytest.approx(moved, abs=0.01)
+    with pytest.raises(HandrailError, match="cannot be put back"):
+        plant.restore(plant.checkpoint())
+
+
+def test_an_arm_that_does_not_come_home_is_named():
+    client = PlayedClient()
+    away = load_model("lekiwi").description.home + np.array([0, 0, 0, 0.5, 0, 0, 0, 0])
+    client.stubborn = True
+    with pytest.raises(HandrailError, match="joint shoulder_pan does not come to where the episode begins"):
+        ClientPlant(load_model("lekiwi"), Scene((), Viewpoint((0, 0, 1), (0, 0, 0))), away, link(client), 0)
+
+
+def test_another_robot_is_refused_at_once():
+    with pytest.raises(HandrailError, match=r"got ridgeback_ur10 \(--robot lekiwi\?\)"):
+        link(PlayedClient(), "ridgeback_ur10")
+
+
+def test_pictures_have_our_names_size_and_colours_and_a_lost_camera_ends_it():
+    picture = np.zeros((480, 640, 3), np.uint8)
+    picture[..., 2] = 200  # red, as OpenCV has it
+    one = link(PlayedClient(cameras={"front": picture}))
+    seen = one.pictures(("scene",), (64, 96))["scene"]
+    assert seen.shape == (64, 96, 3)
+    assert seen[0, 0].tolist() == [200, 0, 0]
+    with pytest.raises(HandrailError, match="camera wrist says nothing"):
+        one.pictures(("wrist",), (64, 64))
+
+
+@pytest.mark.parametrize(
+    ("flags", "words"),
+    [
+        (("--robot_client", "lawnmower"), "unknown --robot_client 'lawnmower': expected one of lekiwi"),
+        (("--robot_client", "lekiwi", "--operator", "browser"), "expected another --operator"),
+        (("--robot_client", "lekiwi", "--no_physics"), "expected neither"),
+        (("--client.simulated",), "expected --robot_client too"),
+        (("--robot_client", "lekiwi", "--client.port_zmq_cmd", "0"), "expected 1 to 65535"),
+    ],
+)
+def test_wrong_flags_are_named(tmp_path, flags, words):
+    done = command(tmp_path / "set", "--task", "reach", *flags)
+    assert done.returncode == 2
+    assert words in done.stderr
+    assert not (tmp_path / "set").exists()
