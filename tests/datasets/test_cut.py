@@ -47,11 +47,13 @@ def video(request, tmp_path_factory):
 
 def shown(path) -> list[tuple[float, float]]:
     """Return time [s] and brightness of every picture."""
+    found: list[tuple[float, float]] = []
     with av.open(str(path)) as container:
-        return [
+        found.extend(
             (float(frame.time or 0.0), float(frame.to_ndarray(format="rgb24").mean()))
             for frame in container.decode(video=0)
-        ]
+        )
+    return found
 
 
 @pytest.mark.parametrize(("first", "count"), [(0, 24), (0, 7), (4, 9), (5, 8), (8, 8), (16, 8), (23, 1)])
