@@ -157,7 +157,7 @@ class StudyFolder:
             HandrailError: the dataset is damaged, or of something else.
         """
         root = self.dataset(mode, task)
-        rows = read_episodes(root) if (root / "meta" / "handrail.json").exists() else []
+        rows = read_episodes(root) if (root / "meta" / "episodes").is_dir() else []  # else none was saved
         if any(not {"participant", "trial"} <= set(row) for row in rows):
             raise HandrailError(f"dataset {str(root)!r}: expected trials of a user study, got other episodes")
         return rows
