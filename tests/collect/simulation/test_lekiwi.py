@@ -31,8 +31,8 @@ HOME = np.array(ROBOT.home)
 def test_no_command_inside_the_limits_turns_a_wheel_faster_than_lerobot_lets_it():
     """Any drive and turn at once, whatever the heading: LeRobot would slow nothing down.
 
-    Its kinematics and figures (`lerobot/robots/lekiwi/lekiwi.py`): a wheel i that drives in direction aᵢ rolls at
-    `cos aᵢ vx + sin aᵢ vy + 0.125 ω` [m/s]; its radius is 0.05 m, 4096 ticks are a turn, 3000 ticks/s the most.
+    Its figures (`lerobot/robots/lekiwi/lekiwi.py`): a wheel that drives in direction a rolls at
+    `cos a vx + sin a vy + 0.125 ω` [m/s]; its radius is 0.05 m, 4096 ticks are a turn, 3000 ticks/s the most.
     """
     directions, most = np.radians([150.0, -90.0, 30.0]), 3000.0
     wheels = np.column_stack([np.cos(directions), np.sin(directions), np.full(3, 0.125)])
