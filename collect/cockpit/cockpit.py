@@ -76,6 +76,7 @@ class Cockpit:
         self._disk = DiskWatch(Path(folder).absolute()) if folder else None
         self._person = Person(model, modes, first)
         self._counts, self._refuses, self._strain = Counts(), refuses, Strain()
+        Image.preinit()  # else the first picture of an episode waits for that
         self._dropped: dict[str, int] = {}
         self._pictured = self._acted = -math.inf
         self._delay = 0.0  # of the last command, from when it was asked for [s]

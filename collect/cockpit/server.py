@@ -257,8 +257,8 @@ def _certificate(config: CockpitConfig) -> tuple[Path, Path]:
 def main() -> None:
     """Run the process."""
     pipe = Pipe(socket.socket(fileno=int(sys.argv[1])))
-    if hasattr(os, "nice"):
-        os.nice(_NICE)
+    with contextlib.suppress(AttributeError, OSError):
+        os.setpriority(os.PRIO_PROCESS, 0, _NICE)
     try:
         settings = _settings(pipe)
         folder = settings["folder"]

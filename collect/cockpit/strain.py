@@ -1,8 +1,8 @@
 """How far behind a loop is, and what waits longer then: pictures first, then those who only watch."""
 
 _FORGETS = 0.98  # share that is left at the next note
-_PICTURES = ((0.005, 0.1), (0.02, 0.3))  # up to which lag, how long between two pictures [s]
-_SPECTATORS = ((0.02, 0.1),)  # the same for their frames [s]
+_PICTURES = ((0.01, 0.1), (0.03, 0.3))  # up to which lag, how long between two pictures [s]
+_SPECTATORS = ((0.03, 0.1),)  # the same for their frames [s]
 _LONG_PICTURES, _LONG_SPECTATORS = 1.0, 0.5  # [s]
 
 

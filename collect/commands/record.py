@@ -10,7 +10,7 @@ from rich.table import Table
 
 from handrail.collect.commands.interrupts import Interrupts
 from handrail.collect.commands.progress import recording_bar
-from handrail.collect.commands.recording import Recording, open_writer
+from handrail.collect.commands.recording import Recording, come_first, open_writer
 from handrail.collect.commands.target import located, next_commands
 from handrail.collect.config import RecordConfig
 from handrail.collect.envs.env import HandrailEnv
@@ -72,6 +72,8 @@ def record(config: RecordConfig) -> int:
     """
     console = Console(stderr=True)
     interactive = OPERATORS.find(config.operator).interactive
+    if interactive:
+        come_first()
     env = build_env(config, config.dataset.fps, render=interactive)
     displays: list[Display] = []
     people: list[Any] = []

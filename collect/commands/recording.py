@@ -1,6 +1,8 @@
 """A session whose episodes become a dataset: what `handrail-record` and a user study share."""
 
+import os
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any, Protocol
 
@@ -17,6 +19,14 @@ from handrail.collect.session.session import Observer
 from handrail.datasets.format.columns import Scalar
 from handrail.datasets.format.manifest import Manifest
 from handrail.datasets.recording.writer import EpisodeWriter
+
+_NICE = -10  # of a loop that a person steers, where the system allows that
+
+
+def come_first() -> None:
+    """Let other programs wait for this one and its threads to come, where the system allows that."""
+    with suppress(AttributeError, OSError):
+        os.setpriority(os.PRIO_PROCESS, 0, _NICE)
 
 
 class EpisodeObserver(Observer, Protocol):

@@ -5,7 +5,7 @@ from typing import Self
 from handrail.collect.cockpit.cockpit import Cockpit
 from handrail.collect.cockpit.process import ServerProcess
 from handrail.collect.commands.interrupts import Interrupts
-from handrail.collect.commands.recording import Recording, open_writer
+from handrail.collect.commands.recording import Recording, come_first, open_writer
 from handrail.collect.envs.env import HandrailEnv
 from handrail.collect.operators.modes import TeleopMode
 from handrail.collect.session.build import build_env, build_modes
@@ -50,6 +50,7 @@ class Driving:
             HandrailError: the dataset is damaged or cannot be written.
         """
         self.close()
+        come_first()
         config = self._study.recording(mode, task, self._folder.dataset(mode, task))
         # render: the page draws the robot's meshes
         env = self._env = build_env(config, self._study.fps, render=True)

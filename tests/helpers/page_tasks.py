@@ -34,11 +34,8 @@ def _carry(learner, done):
     cube, bin_ = things["hand"][0], things["bin"][0]
     down = driver.hand(learner.mark)[1]
     learner.steer(cube + 0.15 * _UP, down, 0.1, 0.3, until=done, rest=False)
-    obstacles = [place[0] for name, (place, _) in things.items() if name.startswith("obstacle")]
-    behind = min([0.3, *obstacles]) - 0.3
-    high = bin_[2] + 0.30
-    for place in ((behind, cube[1], high), (behind, bin_[1], high), (bin_[0] - 0.3, bin_[1], high)):
-        _pass(learner, np.array(place), down, done)
+    _pass(learner, np.array([_behind(things), cube[1], bin_[2] + 0.30]), down, done)
+    _go_around(learner, things, bin_, down, done)
     learner.steer(bin_ + 0.25 * _UP, down, 0.05, 0.3, until=done)
     driver.set_speed(0.4)
     learner.steer(bin_ + 0.13 * _UP, down, 0.03, 0.3, until=done)
@@ -51,9 +48,20 @@ def _carry(learner, done):
     driver.wait(done, 3.0)  # the judge wants the cube at rest
 
 
+def _behind(things):
+    """Return how far forward nothing stands in the way of the base [m]."""
+    return min([0.3, *(place[0] for name, (place, _) in things.items() if name.startswith("obstacle"))]) - 0.3
+
+
+def _go_around(learner, things, goal, down, done):
+    """Bring the hand before a goal as anybody would: sideways behind the obstacles, then forward."""
+    for forward in (_behind(things), goal[0] - 0.3):
+        _pass(learner, np.array([forward, goal[1], goal[2] + 0.30]), down, done)
+
+
 def _pass(learner, place, down, done):
     """Bring the hand past a place; where the robot gets stuck, back off and try again, as anybody would."""
-    while not done() and not learner.steer(place, down, 0.15, 0.4, until=done, rest=False):
+    while not done() and not learner.steer(place, down, 0.25, 0.5, until=done, rest=False):
         back = learner.driver.place() + [-0.25, 0.0, 0.15]
         learner.steer(back, down, 0.1, 0.5, 8.0, done, rest=False)
 
@@ -65,7 +73,7 @@ def _has_cube(learner, done):
         learner.levers.grip()
     driver.set_speed(1.0)
     cube, down = _cube(driver, learner.mark)
-    learner.steer(cube + [-0.15, 0.0, 0.30], down, 0.15, 0.4, until=done, rest=False)
+    _go_around(learner, driver.things(), cube, down, done)
     learner.steer(cube + 0.12 * _UP, down, 0.03, 0.15, until=done)
     driver.set_speed(0.4)
     grasp = cube + _TIPS * _UP

@@ -134,7 +134,7 @@ function tell() {
 }
 
 function say() {
-  if (!stage) return;
+  if (!stage || !view.isReady) return;
   if (frame && frame !== told) tell();
   const input = inputs.read(stage.channels);
   if (byId("pad").textContent !== gamepad.says) byId("pad").textContent = gamepad.says;

@@ -81,6 +81,7 @@ export class Marks {
       each.position.copy(part.position);
       each.quaternion.copy(part.quaternion);
       each.renderOrder = 3;
+      each.frustumCulled = false;
     }
     return [skin, edges];
   }
@@ -134,6 +135,14 @@ export class Marks {
     if (!seen) return;
     this.label.textContent = this.said;
     this.label.style.transform = `translate(${((middle.x + 1) / 2 * width + 10).toFixed(0)}px, ${((1 - middle.y) / 2 * height - 10).toFixed(0)}px)`;
+  }
+
+  // Shows everything there is to show, anywhere.
+  rehearse() {
+    const points = [new THREE.Vector3(), new THREE.Vector3(1, 0, 0)];
+    for (const each of [this.asked, this.near, this.outline]) draw(each, points);
+    for (const each of [this.path, this.track]) drawTube(each, points);
+    for (const each of [this.ghost, ...this.ends]) each.visible = true;
   }
 
   hide() {

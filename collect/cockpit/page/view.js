@@ -34,6 +34,7 @@ export class View {
     this.choose(this.cameras.choice);
     this.bodies = [];
     this.owned = new Set();
+    this.isReady = false; // nobody drives who does not see
     new ResizeObserver(() => this.fit()).observe(canvas);
     this.fit();
   }
@@ -44,7 +45,20 @@ export class View {
     this.bodies = bodies;
     this.marks.stage(stage, bodies);
     this.light_up(this.owned);
-    if (!this.played) this.scene.add(...bodies);
+    if (this.played) return;
+    this.scene.add(...bodies);
+    this.rehearse();
+    this.isReady = true;
+  }
+
+  // Draws everything once and waits for it: how to draw is compiled at the first use, and who drives has no time for that.
+  rehearse() {
+    this.marks.rehearse();
+    this.renderer.render(this.scene, this.cameras.camera);
+    const gl = this.renderer.getContext();
+    gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4)); // waits
+    this.marks.hide();
+    this.stale = true;
   }
 
   // Lights the bodies that the operator owns.

@@ -150,7 +150,8 @@ def _shares(spent: dict[int, float], recording: int, took: float) -> dict[str, f
     """Return how much of one processor each program took."""
     shares: dict[str, float] = {}
     for process, words in family(os.getpid()).items():
-        name = "browser" if "chrom" in words else "burners" if "while True" in words else "clients"
+        program = words.partition("\0")[0]
+        name = "browser" if "chrom" in program else "burners" if "while True" in words else "clients"
         name = "web server" if "cockpit.server" in words else name
         name = "recording" if process == recording else name
         used = (seconds(process) - spent.get(process, 0.0)) / took

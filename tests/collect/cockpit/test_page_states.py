@@ -97,7 +97,8 @@ def test_a_refused_message_is_said_on_the_page_and_a_cut_is_seen(new_page):
         page.evaluate("socket.send('garbage')")
         expect(driver.at("notice")).to_contain_text("expected JSON")
         shoot(page, "error")
-        page.evaluate("() => { window.WebSocket = class { close() {} }; socket.close(); }")
+        page.evaluate("() => { window.WebSocket = class { static OPEN = 1; readyState = 0; close() {} }; }")
+        page.evaluate("socket.close()")
         driver.expect_phase("no connection")
         shoot(page, "reconnecting")
 

@@ -10,7 +10,7 @@ def periods(lag):
 
 
 def test_pictures_wait_before_spectators_do():
-    at_ease, some, more = periods(0.0), periods(0.01), periods(0.05)
+    at_ease, some, more = periods(0.0), periods(0.02), periods(0.05)
     assert some[0] > at_ease[0]
     assert some[1] == at_ease[1]
     assert more[0] > some[0]
