@@ -52,7 +52,7 @@ class ModeAction:
         return Intent(values, mask, float(numbers[-1]), self._mode.name, time)
 
     def numbers(self, action: Mapping[str, float]) -> FloatArray:
-        """Return the numbers of an action in the order of `names`, as exact as a dataset keeps them.
+        """Return the numbers of an action in the order of `names`.
 
         Raises:
             HandrailError: one is missing.
@@ -63,7 +63,7 @@ class ModeAction:
                 f"action of handrail_sim: expected {', '.join(self.names)} for mode {self._mode.name};"
                 f" missing: {', '.join(missing)}; a teleoperator of Handrail says them all"
             )
-        return np.array([float(action[name]) for name in self.names], np.float32).astype(np.float64)
+        return np.array([float(action[name]) for name in self.names])
 
     def action(self, intent: Intent, rotation: FloatArray) -> dict[str, float]:
         """Return an intent as an action, the hand's twist in the world's axes.

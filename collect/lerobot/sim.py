@@ -4,6 +4,7 @@ from contextlib import ExitStack
 from functools import cached_property
 from typing import Any
 
+import numpy as np
 from lerobot.robots import Robot
 
 from handrail.collect.lerobot.config_sim import HandrailSimConfig
@@ -12,7 +13,6 @@ from handrail.collect.lerobot.mode_action import AGAIN, HOLD, NEXT, pressed
 from handrail.collect.lerobot.pace import Pace
 from handrail.collect.lerobot.stepwise import Stepwise
 from handrail.controllers.errors import HandrailError
-from handrail.controllers.interface.intent import Intent
 from handrail.controllers.numerics.threads import single_threaded
 
 _REHEARSED = 3  # periods before the first, in which what is compiled at first use is compiled
@@ -106,7 +106,8 @@ class HandrailSim(Robot):
         """
         self._check_connected()
         session = self.stepwise
-        numbers = session.action.numbers(action)
+        numbers = session.action.numbers(action).astype(np.float32)  # as exact as a dataset keeps them
+        understood = dict(zip(session.action.names, map(float, numbers), strict=True))
         if self._config.realtime:
             self._pace.wait()
         button = pressed(action)
@@ -115,11 +116,8 @@ class HandrailSim(Robot):
         elif button == HOLD:
             session.hold()
         else:
-            session.step(self._intent(action))
-        return dict(zip(session.action.names, map(float, numbers), strict=True))
-
-    def _intent(self, action: dict[str, Any]) -> Intent:
-        return self.stepwise.action.intent(action, self.stepwise.view.state.time)
+            session.step(session.action.intent(understood, session.view.state.time))
+        return understood
 
     def disconnect(self) -> None:
         """Stop the robot and close its world."""

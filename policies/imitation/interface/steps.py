@@ -65,7 +65,7 @@ class PolicyViewStep(ProcessorStep):
             if values.shape[1]:
                 observation[key] = torch.as_tensor(values, device=getattr(like, "device", None))
         self.state = state
-        changed = transition.copy()
+        changed: Any = transition.copy()
         changed[TransitionKey.OBSERVATION] = observation
         return changed
 
@@ -130,7 +130,7 @@ class PolicyActionStep(ProcessorStep):
         rows = action.detach().cpu().numpy().reshape(-1, size)
         states = np.broadcast_to(self.view.state, (len(rows), self.view.state.shape[1]))
         meant = np.stack([self._meant(row, state) for row, state in zip(rows, states, strict=True)])
-        changed = transition.copy()
+        changed: Any = transition.copy()
         changed[TransitionKey.ACTION] = torch.as_tensor(meant).reshape(*action.shape[:-1], meant.shape[1])
         return changed
 

@@ -53,7 +53,7 @@ def build_learner(
     else:
         device = {"device_processor": {"device": accelerator.device.type}}
         loaded = make_pre_post_processors(described, str(checkpoint / MODEL), preprocessor_overrides=device)
-        around = tuple(map(without_steps, loaded))  # the data in memory are seen so already
+        around = without_steps(loaded[0]), without_steps(loaded[1])  # the data in memory are seen so already
     step: int = 0
     optimizer, schedule = make_optimizer_and_scheduler(settings, policy)
     _fuse(optimizer)

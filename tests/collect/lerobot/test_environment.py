@@ -1,10 +1,13 @@
 """LeRobot's evaluation runs our tasks: features are what there is to see, seeds are never a recording's."""
 
+from importlib.util import module_from_spec, spec_from_file_location
+
 import numpy as np
 import pytest
 from gymnasium.vector import SyncVectorEnv
 from lerobot.envs.factory import make_env, make_env_config
 from lerobot.envs.utils import env_to_policy_features, preprocess_observation
+from places import ROOT
 
 from handrail.collect.config import FIRST_SEED, SessionConfig
 from handrail.collect.session.build import build_env
@@ -61,3 +64,16 @@ def test_actions_of_a_mode_are_completed():
 def test_a_wrong_setting_is_named(wrong):
     with pytest.raises(HandrailError, match=str(*wrong.values())):
         make_env_config("handrail", **wrong)
+
+
+def test_a_repository_of_the_hub_makes_the_same_environments():
+    spec = spec_from_file_location("env", ROOT / "docs" / "lerobot" / "hub" / "env.py")
+    assert spec
+    assert spec.loader
+    spec.loader.exec_module(module := module_from_spec(spec))
+    env = module.make_env(n_envs=2)["handrail"][0]
+    assert (env.num_envs, env.get_attr("task_description")) == (
+        2,
+        ("Move the gripper to the goal frame.",) * 2,
+    )
+    env.close()
