@@ -116,6 +116,7 @@ class World:
 
     Attributes:
         scale: of lengths and speeds against those of a robot as large as a person.
+        pace: share of full stick's speeds and rates; less than 1 where the base is slow for its size.
         tables: height of the lowest and of the highest table [m].
         goals: height of the lowest and of the highest goal of the hand [m].
         cube: edge of the cube that it carries [m].
@@ -124,6 +125,7 @@ class World:
     """
 
     scale: float = 1.0
+    pace: float = 1.0
     tables: tuple[float, float] = (0.55, 0.65)
     goals: tuple[float, float] = (0.7, 1.0)
     cube: float = 0.05

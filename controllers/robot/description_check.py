@@ -99,7 +99,7 @@ _TABLES: Mapping[str, Mapping[str, Entry]] = {
         "jaw": Entry("a table", is_table, needed=False),
     },
     "world": {
-        "scale": Entry("a number above 0", is_positive, needed=False),
+        **{name: Entry("a number above 0", is_positive, needed=False) for name in ("scale", "pace")},
         **{name: _range(is_positive, "above 0 [m]") for name in ("tables", "goals")},
         **{name: _range(is_number, "[rad]") for name in ("pitch", "roll")},
         "cube": Entry("a length above 0 [m]", is_positive, needed=False),

@@ -50,14 +50,15 @@ class FuzzResult:
 
 def cluttered(model: RobotModel, movers: int, rng: np.random.Generator) -> tuple[Scene, np.ndarray]:
     """Draw a start posture and things around the robot, none nearer than the clearance."""
-    base = len(model.description.base_joints)
+    base, scale = len(model.description.base_joints), model.description.world.scale
     while True:
         q = np.array(model.description.home)
         q[:base] = rng.uniform([-1.5, -1.5, -3.0], [1.5, 1.5, 3.0])
+        q[:2] *= scale
         q[base:] += rng.uniform(-0.7, 0.7, model.size - base)
         limits, own = model.description.limits, CollisionModel(model)
         inside = np.all((q > limits.position_lower) & (q < limits.position_upper))
-        if inside and np.all(own.values(q[None])[0] > np.minimum(own.largest_margin, 0.10)):
+        if inside and np.all(own.values(q[None])[0] > np.minimum(own.largest_margin, scale * 0.10)):
             break
     objects: list[SceneObject] = sample_movers(movers, model, q, rng)
     wanted = movers + int(rng.integers(4, 11))
@@ -65,22 +66,22 @@ def cluttered(model: RobotModel, movers: int, rng: np.random.Generator) -> tuple
     for _ in range(400):
         if len(objects) == wanted:
             break
-        scene = Scene((*objects, _thing(f"thing_{len(objects)}", q, rng)), view)
+        scene = Scene((*objects, _thing(f"thing_{len(objects)}", q, scale, rng)), view)
         around = CollisionModel(model, scene.obstacles())
-        if np.all(around.values(q[None])[0] > np.minimum(around.largest_margin, CLEARANCE)):
+        if np.all(around.values(q[None])[0] > np.minimum(around.largest_margin, scale * CLEARANCE)):
             objects = list(scene.objects)
     return Scene(tuple(objects), view), q
 
 
-def _thing(name: str, q: np.ndarray, rng: np.random.Generator) -> SceneObject:
-    angle, distance = rng.uniform(-np.pi, np.pi), rng.uniform(0.5, 2.2)
+def _thing(name: str, q: np.ndarray, scale: float, rng: np.random.Generator) -> SceneObject:
+    angle, distance = rng.uniform(-np.pi, np.pi), scale * rng.uniform(0.5, 2.2)
     x, y = q[0] + distance * np.cos(angle), q[1] + distance * np.sin(angle)
-    height = rng.uniform(0.2, 1.6)
-    raised = rng.uniform(0.0, 1.0) if rng.random() < 0.3 else 0.0  # a shelf or a lamp in the air
+    height = scale * rng.uniform(0.2, 1.6)
+    raised = scale * rng.uniform(0.0, 1.0) if rng.random() < 0.3 else 0.0  # a shelf or a lamp in the air
     if rng.random() < 0.5:
-        shape = Shape("cylinder", [rng.uniform(0.05, 0.25), height])
+        shape = Shape("cylinder", [scale * rng.uniform(0.05, 0.25), height])
     else:
-        shape = Shape("box", [*rng.uniform(0.1, 0.6, 2), height])
+        shape = Shape("box", [*(scale * rng.uniform(0.1, 0.6, 2)), height])
     return SceneObject(name, shape, np.array([x, y, raised + height / 2]), rgba=(0.5, 0.5, 0.5, 1.0))
 
 

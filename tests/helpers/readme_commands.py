@@ -6,7 +6,7 @@ import shlex
 from places import ROOT
 
 MAIN = ("README.md", *(f"docs/{name}.md" for name in ("recording", "training", "evaluation", "comparison")))
-PAGES = (*MAIN, *(f"docs/{name}.md" for name in ("concepts", "study", "benchmark", "api")))
+PAGES = (*MAIN, *(f"docs/{name}.md" for name in ("concepts", "lekiwi", "study", "benchmark", "api")))
 LESS = {  # flag → the value that it gets where a page gives it
     "handrail-demo": {"--episodes": "1"},
     "handrail-record": {"--dataset.num_episodes": "2"},

@@ -6,6 +6,7 @@ import numpy as np
 
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.numerics.rotation import rotation_vector, turned
+from handrail.controllers.robot.description import World
 from handrail.controllers.robot.model import Pose
 
 
@@ -35,9 +36,15 @@ class Gains:
     joint_rate: float = 0.8
     patience: float = 1.0
 
-    def scaled(self, scale: float) -> "Gains":
-        """Return the gains in a world of another scale: as brisk, and its lengths are others."""
-        return replace(self, hand_speed=scale * self.hand_speed, base_speed=scale * self.base_speed)
+    def within(self, world: World) -> "Gains":
+        """Return the gains in a robot's world: as brisk, full stick made to its measure."""
+        speed, rate = world.scale * world.pace, world.pace
+        return replace(
+            self,
+            hand_speed=speed * self.hand_speed,
+            hand_rate=rate * self.hand_rate,
+            base_speed=speed * self.base_speed,
+        )
 
     @property
     def full(self) -> FloatArray:

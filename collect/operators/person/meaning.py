@@ -66,7 +66,7 @@ class InputMeaning:
         self.channels = Channels.of(model.description)
         self._base = len(self.channels.base)
         self._arm = slice(self.channels.joint_slice.start + self._base, self.channels.size)
-        self._full = StickMap(model, mode, Gains().scaled(model.description.world.scale)).full
+        self._full = StickMap(model, mode, Gains().within(model.description.world)).full
 
     def fits(self, inputs: Inputs) -> bool:
         """Whether inputs are those of this robot."""

@@ -113,5 +113,5 @@ def script_of(model: RobotModel, mode: TeleopMode, task: TaskSpec, gains: Gains)
 
 def gains_of(model: RobotModel, mode: TeleopMode, human: HumanSettings) -> Gains:
     """Return how briskly a person steers a robot with a mode's device."""
-    gains = DEVICES.find(mode.device).gains.scaled(model.description.world.scale)
+    gains = DEVICES.find(mode.device).gains.within(model.description.world)
     return replace(gains, gain=human.briskness * gains.gain)
