@@ -210,4 +210,9 @@ def connect(
         cameras={name: camera for name, camera in lekiwi_cameras_config().items() if name in wanted},
     )
     client: Any = LeKiwiClient(settings)
-    return Link(client, robot, model, 1.0 / fps, config.simulated)
+    try:
+        return Link(client, robot, model, 1.0 / fps, config.simulated)
+    except BaseException:
+        if not client.is_connected and client.zmq_context is not None:  # LeRobot leaves its sockets open
+            client.zmq_context.destroy(linger=0)
+        raise

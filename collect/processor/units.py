@@ -14,6 +14,7 @@ from handrail.controllers.robot.description import RobotDescription
 
 POSITION, VELOCITY = ".pos", ".vel"
 _DEGREE = math.pi / 180.0
+_OPEN = 35.0  # percent of the jaw's range, −0.17 to 1.75 rad: where the model of the SO-101 is open, 0.5 rad
 _UNITS = ("degrees", "radians", "metres", "range")
 _SENT = {"position": POSITION, "velocity": VELOCITY}
 
@@ -182,15 +183,15 @@ def number(values: Any, name: str) -> float:
 
 
 def lekiwi(description: RobotDescription) -> RobotUnits:
-    """Return what LeRobot's LeKiwi says: degrees, the gripper's percents, and the base's velocities."""
+    """Return what LeRobot's LeKiwi says: degrees, percents of the jaw, and the base's velocities."""
     joints = {name: JointUnits(f"arm_{name}") for name in description.arm_joints}
-    return RobotUnits(description, joints, BaseUnits(), GripperUnits("arm_gripper.pos", 100.0, 0.0))
+    return RobotUnits(description, joints, BaseUnits(), GripperUnits("arm_gripper.pos", _OPEN, 0.0))
 
 
 def so_follower(description: RobotDescription) -> RobotUnits:
-    """Return what LeRobot's SO-100 and SO-101 say: degrees, and the gripper's percents."""
+    """Return what LeRobot's SO-100 and SO-101 say: degrees, and percents of the jaw."""
     joints = {name: JointUnits(name) for name in description.arm_joints}
-    return RobotUnits(description, joints, None, GripperUnits("gripper.pos", 100.0, 0.0))
+    return RobotUnits(description, joints, None, GripperUnits("gripper.pos", _OPEN, 0.0))
 
 
 def plain(description: RobotDescription) -> RobotUnits:

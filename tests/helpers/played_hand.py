@@ -20,8 +20,15 @@ class PlayedHand(Teleoperator):
 
     config_class = PlayedHandConfig
     name = "played_hand"
-    is_connected = False
-    is_calibrated = True
+    _connected = False
+
+    @property
+    def is_connected(self) -> bool:
+        return self._connected
+
+    @property
+    def is_calibrated(self) -> bool:
+        return True
 
     @property
     def action_features(self) -> dict[str, type]:
@@ -32,7 +39,7 @@ class PlayedHand(Teleoperator):
         return {}
 
     def connect(self, calibrate: bool = True) -> None:
-        self.is_connected = True
+        self._connected = True
 
     def calibrate(self) -> None:
         pass
@@ -47,4 +54,4 @@ class PlayedHand(Teleoperator):
         pass
 
     def disconnect(self) -> None:
-        self.is_connected = False
+        self._connected = False
