@@ -23,6 +23,16 @@ FLAG = re.compile(r"(?<![\w(-])--[a-z][\w.]*(?:-[a-z]\w*)*")
 STYLE = ("var(--", 'style="')  # of a page: what begins with "--" there is a colour
 OTHERS = {  # flags of other programs, by the word that the same text must say
     "lerobot-dataset-viz": {"--repo-id", "--root", "--episode-index", "--save", "--output-dir"},
+    "lerobot-edit-dataset": {
+        "--repo_id",
+        "--root",
+        "--new_root",
+        "--operation.type",
+        "--operation.episode_indices",
+    },
+    "lerobot.robots.lekiwi.lekiwi_host": {"--host.connection_time_s"},
+    "--robot.type=lekiwi_client": {"--robot.remote_ip", "--robot.cameras"},
+    "--client.*": {"--client"},  # all of these
     "`--flag`": {"--flag"},
     "--config_path=": {"--config_path"},  # what LeRobot's training is given
     "accelerate launch": {"--multi_gpu"},

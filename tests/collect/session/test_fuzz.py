@@ -44,7 +44,7 @@ def check(seeds, seconds, movers=0, robot="ridgeback_ur10", make=MaskedMpc, fail
 @pytest.mark.parametrize("make", [MaskedMpc, safety_filter])
 @pytest.mark.parametrize("robot", robot_names())
 def test_rude_intents_in_clutter(make, robot):
-    statuses, _ = check(range(1000, 1002), 5.0, make=make, robot=robot)
+    statuses, _ = check(range(1000, 1003), 5.0, make=make, robot=robot)
     assert {"ok", "invalid_intent", "stale_intent"} <= set(statuses)
 
 
