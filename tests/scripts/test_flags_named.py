@@ -33,6 +33,7 @@ OTHERS = {  # flags of other programs, by the word that the same text must say
     "lerobot.robots.lekiwi.lekiwi_host": {"--host.connection_time_s"},
     "--robot.type=lekiwi_client": {"--robot.remote_ip", "--robot.cameras"},
     "--client.*": {"--client"},  # all of these
+    "--client.…": {"--client"},  # one of them
     "`--flag`": {"--flag"},
     "--config_path=": {"--config_path"},  # what LeRobot's training is given
     "accelerate launch": {"--multi_gpu"},
