@@ -55,6 +55,11 @@ class Hub:
         self._was_free = True
         self.counts: Counter[str] = Counter()
 
+    @property
+    def has_told_all(self) -> bool:
+        """Whether every page has taken what it was sent."""
+        return not any(page.is_owed for page in self._pages)
+
     def hear(self) -> None:
         """Pass on what the recording has sent.
 

@@ -9,6 +9,7 @@ import tempfile
 import time
 from collections import deque
 from collections.abc import Callable, Collection
+from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
 
@@ -16,7 +17,7 @@ from handrail.collect.cockpit.pipe import LOST, NOTE, SETTINGS, Pipe
 from handrail.collect.cockpit_config import CockpitConfig
 from handrail.controllers.errors import HandrailError
 
-_BEGIN, _END = 30.0, 3.0  # patience [s]
+_BEGIN, _LAST_WORDS, _END = 30.0, 1.0, 3.0  # patience [s]
 MOST_DEATHS, _WITHIN = 3, 60.0  # of the server, in a time [s]
 
 
@@ -93,9 +94,12 @@ class ServerProcess:
         (Path(self._folder.name) / name).unlink(missing_ok=True)
 
     def close(self) -> None:
-        """End the server."""
+        """Let the server have what waits for it, and end it: it tells its pages, then goes by itself."""
+        until = time.monotonic() + _LAST_WORDS
+        with suppress(HandrailError):
+            while not self.pipe.flush() and time.monotonic() < until:
+                time.sleep(0.01)
         self.pipe.close()
-        self.process.terminate()
         try:
             self.process.wait(_END)
         except subprocess.TimeoutExpired:

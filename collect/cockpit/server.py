@@ -40,6 +40,7 @@ _PATIENCE = 5.0  # with a form that is sent [s]
 _LONGEST = 200  # token [bytes]
 _PAUSE, _MOST_PAUSES = 1.0, 32  # before another wrong token is answered [s], and how many wait so
 _NICE = 5  # the loop of the robot comes first
+_LAST_WORDS = 1.0  # for pages to take them, at the end [s]
 _NOTES = 0.02  # between two looks at how late the loop is [s]
 _REPORTS, _COLLECTIONS = 25, 250  # so many looks to a report, to a collection of garbage
 _HEADERS = {
@@ -193,10 +194,11 @@ async def serve(pipe: Pipe, settings: dict[str, Any]) -> None:
         NOTE, json.dumps({"address": f"{scheme}://{shown}:{port}/{door}", "port": port}).encode()
     )
     loop = asyncio.get_running_loop()
-    loop.add_reader(pipe.fileno(), _ending(server, pipe, hub.hear))
-    noting = asyncio.create_task(_note(server, pipe, hub, guard))
+    gone = asyncio.Event()
+    loop.add_reader(pipe.fileno(), _noticing(gone, pipe, hub.hear))
+    beside = asyncio.gather(_note(gone, pipe, hub, guard), _end(server, gone, hub))
     await server.serve(sockets=[listener])
-    noting.cancel()
+    beside.cancel()
 
 
 def _uvicorn(site: Site, config: CockpitConfig) -> uvicorn.Config:
@@ -216,20 +218,29 @@ def _uvicorn(site: Site, config: CockpitConfig) -> uvicorn.Config:
     )
 
 
-def _ending(server: uvicorn.Server, pipe: Pipe, act: Callable[[], None]) -> Callable[[], None]:
-    """Return what acts, and ends the server when the recording is gone."""
+def _noticing(gone: asyncio.Event, pipe: Pipe, act: Callable[[], None]) -> Callable[[], None]:
+    """Return what acts, and notices when the recording is gone."""
 
     def acting() -> None:
         try:
             act()
         except HandrailError:
-            server.should_exit = True
+            gone.set()
             asyncio.get_running_loop().remove_reader(pipe.fileno())
 
     return acting
 
 
-async def _note(server: uvicorn.Server, pipe: Pipe, hub: Hub, guard: Guard) -> None:
+async def _end(server: uvicorn.Server, gone: asyncio.Event, hub: Hub) -> None:
+    """When the recording is gone, let the pages have its last words, and end the server."""
+    await gone.wait()
+    until = time.monotonic() + _LAST_WORDS
+    while not hub.has_told_all and time.monotonic() < until:
+        await asyncio.sleep(_NOTES)
+    server.should_exit = True
+
+
+async def _note(gone: asyncio.Event, pipe: Pipe, hub: Hub, guard: Guard) -> None:
     """Look again and again how late the loop is; send what waits for the recording; give memory back.
 
     A TLS connection that is gone is 256 KiB of garbage in a cycle: too few objects for Python to look soon.
@@ -239,9 +250,9 @@ async def _note(server: uvicorn.Server, pipe: Pipe, hub: Hub, guard: Guard) -> N
         before = time.monotonic()
         await asyncio.sleep(_NOTES)
         hub.note_lag(time.monotonic() - before - _NOTES)
-        _ending(server, pipe, hub.keep_up)()
+        _noticing(gone, pipe, hub.keep_up)()
         if turn % _REPORTS == 0:
-            _ending(server, pipe, lambda: hub.report(guard.refused))()
+            _noticing(gone, pipe, lambda: hub.report(guard.refused))()
         if turn % _COLLECTIONS == 0:
             gc.collect()
 
