@@ -64,7 +64,8 @@ class CollisionModel:
         self._all, self._along, self._after = (
             PairData(self._model, self._data, self._geometry, neutral) for _ in range(3)
         )
-        self.update_scene(obstacles)
+        self._last: tuple[FloatArray, FloatArray] | None = None  # trajectory, and distances along it
+        self._take_speeds(obstacles)
 
     @property
     def size(self) -> int:
@@ -116,7 +117,7 @@ class CollisionModel:
                 self._measure(self._along, q[after], times[after], witnesses[after], jacobians[after])
             measured(witnesses[stretch], chosen, bounds)
             values[stretch] = bounds
-        self._last = None if self._moving else (q.copy(), values)
+        self._last = None if self._moving else (q.copy(), values.copy())
         near, rows = gradients(witnesses, jacobians, self._moves, values, limits)
         return Distances(values, near, rows)
 
@@ -188,11 +189,18 @@ class CollisionModel:
         if (kept := _kept(obstacles)) != self._kept:
             expected, got = (", ".join(str(name) for name, *_ in things) for things in (self._kept, kept))
             raise HandrailError(f"obstacles: expected {expected} as they were, got {got}")
-        self._last: tuple[FloatArray, FloatArray] | None = None
-        self._shapes.update_scene(obstacles)
+        moved = self._shapes.update_scene(obstacles)
+        if not moved:
+            return
+        if self._last is not None:
+            self._last[1][:, [row for obstacle in moved for row in self._shapes.rows[obstacle.name]]] = -np.inf
+        self._take_speeds(obstacles)
+
+    def _take_speeds(self, obstacles: tuple[Obstacle, ...]) -> None:
         self._moving = [obstacle for obstacle in obstacles if obstacle.velocity.any()]
-        speeds = {obstacle.name: float(np.linalg.norm(obstacle.velocity)) for obstacle in obstacles}
-        self._speeds = np.array([speeds.get(second, 0.0) for _, second in self.pairs])
+        self._speeds = np.zeros(self.size)
+        for obstacle in self._moving:
+            self._speeds[self._shapes.rows[obstacle.name]] = np.linalg.norm(obstacle.velocity)
         self.kinds = np.where(self._speeds > 0.0, MOVING, STANDING)
         self.kinds[: len(self._robot.description.self_pairs)] = OWN
 
