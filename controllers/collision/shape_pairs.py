@@ -63,9 +63,10 @@ class ShapePairs:
         self.motion_bounds = np.zeros((model.size, len(self.names)))
         self._shape_bounds = dict(_all_motion_bounds(model))
         self.rows = {
-            thing.name: [row for row, pair in enumerate(self.names) if thing.name in pair] for thing in obstacles
+            name: [row for row, pair in enumerate(self.names) if name in pair]
+            for name in (obstacle.name for obstacle in obstacles)
         }
-        held = (row for thing in obstacles if thing.held for row in self.rows[thing.name])
+        held = (row for obstacle in obstacles if obstacle.held for row in self.rows[obstacle.name])
         self.held = np.array(list(held), dtype=int)
         self._seen: dict[str, tuple[bytes, ...]] = {}
         self._bound_motions(range(len(self.names)))
