@@ -11,6 +11,7 @@ FloatArray = NDArray[np.floating]
 BoolArray = NDArray[np.bool_]
 IntArray = NDArray[np.integer]
 
+_FLOAT = np.dtype(np.float64)
 _KINDS = {"f": "biuf", "i": "biu", "b": "b"}  # of numbers that may become floats, integers, truth values
 _WORDS = {"f": "real numbers", "i": "integers", "b": "True or False"}
 
@@ -27,9 +28,12 @@ def frozen(values: ArrayLike, dtype: Any = np.float64, what: str = "an array") -
         HandrailError: they are something else: text, complex numbers, rows of unequal length, or integers
             that are too large.
     """
-    if not (isinstance(values, np.ndarray) and values.dtype == dtype):
-        values = _checked(values, np.dtype(dtype).kind, what)
-    array = np.array(values, dtype=dtype)
+    if type(values) is np.ndarray and values.dtype is _FLOAT and dtype is np.float64:
+        array = values.copy()  # what nearly all are, and many in an update
+    else:
+        if not (isinstance(values, np.ndarray) and values.dtype == dtype):
+            values = _checked(values, np.dtype(dtype).kind, what)
+        array = np.array(values, dtype=dtype)
     array.setflags(write=False)
     return array
 

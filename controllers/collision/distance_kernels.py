@@ -5,7 +5,7 @@ A witness is `(n, p₁, p₂)`, (9,): the unit normal from the first shape to th
 
 import numpy as np
 
-from handrail.controllers.numerics.jit import copy, jit
+from handrail.controllers.numerics.jit import copy, exact_jit, jit
 
 
 @jit
@@ -79,11 +79,41 @@ def raise_bounds(bounds, path, known, there, motion_bounds, within):
 
 
 @jit
-def measured(witnesses, pairs, values):
-    """Write the distances of some pairs, (K, P), where they have been measured, (K, P, 9)."""
+def take(found, pairs, node, witnesses, values):
+    """Keep what coal found for some pairs at a node: witnesses, (K, P, 9), and distances, (K, P).
+
+    Args:
+        found: witnesses of all pairs, (P, 9).
+        pairs: indices of those that were measured.
+        node: k.
+        witnesses: of all nodes.
+        values: of all nodes [m].
+    """
+    for p in pairs:
+        copy(found[p], 9, witnesses[node, p])
+        values[node, p] = signed(witnesses[node, p])
+
+
+@jit
+def depth(values):
+    """Return by how much pairs overlap at any node that do not at the first, or not as much, (K, P) [m]."""
+    deepest = 0.0
     for k in range(len(values)):
-        for p in pairs:
-            values[k, p] = signed(witnesses[k, p])
+        for p in range(values.shape[1]):
+            deepest = max(deepest, min(values[0, p], 0.0) - values[k, p])
+    return deepest
+
+
+@exact_jit
+def smallest(distances, apart):
+    """Return the smallest of the distances, (P,), those apart left out, and the smallest of those [m]."""
+    others, theirs = np.inf, np.inf
+    for p in range(len(distances)):
+        if apart[p]:
+            theirs = min(theirs, distances[p])
+        else:
+            others = min(others, distances[p])
+    return others, theirs
 
 
 @jit

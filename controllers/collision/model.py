@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio as pin
 
 from handrail.controllers.arrays import FloatArray, IntArray
-from handrail.controllers.collision.distance_kernels import gradients, lower_bounds, measured, raise_bounds
+from handrail.controllers.collision.distance_kernels import gradients, lower_bounds, raise_bounds, take
 from handrail.controllers.collision.pair_data import PairData
 from handrail.controllers.collision.shape_pairs import ShapePairs
 from handrail.controllers.collision.slacks import MOVING, OWN, STANDING
@@ -64,7 +64,8 @@ class CollisionModel:
         self._all, self._along, self._after = (
             PairData(self._model, self._data, self._geometry, neutral) for _ in range(3)
         )
-        self.update_scene(obstacles)
+        self._last: tuple[FloatArray, FloatArray] | None = None  # trajectory, and distances along it
+        self._take_speeds(obstacles)
 
     @property
     def size(self) -> int:
@@ -101,8 +102,8 @@ class CollisionModel:
         for begin in range(0, len(q), _STRETCH):
             stretch = slice(begin, begin + _STRETCH)
             first = slice(begin, begin + 1)
-            self._measure(self._all, q[first], times[first], witnesses[first], jacobians[first])
-            measured(witnesses[first], self._every, values[first])
+            found = witnesses[first], values[first], jacobians[first]
+            self._measure(self._all, self._every, q[first], times[first], *found)
             ahead = times[stretch] - times[begin]
             bounds, close = lower_bounds(
                 values[begin], q[begin], q[stretch], ahead, self._motion_bounds, self._speeds, limits
@@ -113,10 +114,10 @@ class CollisionModel:
             chosen = self._along.select(close)
             if len(chosen):
                 after = slice(begin + 1, begin + len(bounds))
-                self._measure(self._along, q[after], times[after], witnesses[after], jacobians[after])
-            measured(witnesses[stretch], chosen, bounds)
+                found = witnesses[after], bounds[1:], jacobians[after]
+                self._measure(self._along, chosen, q[after], times[after], *found)
             values[stretch] = bounds
-        self._last = None if self._moving else (q.copy(), values)
+        self._last = None if self._moving else (q.copy(), values.copy())
         near, rows = gradients(witnesses, jacobians, self._moves, values, limits)
         return Distances(values, near, rows)
 
@@ -148,25 +149,28 @@ class CollisionModel:
                 return values
             chosen = data.select(close)
         witnesses = np.empty((len(q), self.size, 9))
-        self._measure(data, q, times, witnesses)
-        measured(witnesses, chosen, values)
+        self._measure(data, chosen, q, times, witnesses, values)
         return values
 
     def _measure(
         self,
         data: PairData,
+        chosen: IntArray,
         q: FloatArray,
         times: FloatArray,
         witnesses: FloatArray,
+        values: FloatArray,
         jacobians: FloatArray | None = None,
     ) -> None:
         """Let coal compute some pairs at configurations, with moving obstacles where they are then.
 
         Args:
             data: of the pairs.
+            chosen: their indices.
             q: configurations, (K, n).
             times: of them from now on, (K,) [s].
             witnesses: filled with normals and nearest points, (K, P, 9).
+            values: filled with signed distances, (K, P) [m].
             jacobians: filled with the joints' spatial Jacobians, if wanted, (K, 6, n).
         """
         model, kinematics, geometry = self._model, self._data, self._geometry
@@ -175,7 +179,7 @@ class CollisionModel:
                 for obstacle in self._moving:
                     self._shapes.place(obstacle, times[k])
             pin.computeDistances(model, kinematics, geometry, data.geometry, q[k])
-            witnesses[k] = data.read()
+            take(data.read(), chosen, k, witnesses, values)
             if jacobians is not None:
                 jacobians[k] = pin.computeJointJacobians(model, kinematics)
 
@@ -188,11 +192,19 @@ class CollisionModel:
         if (kept := _kept(obstacles)) != self._kept:
             expected, got = (", ".join(str(name) for name, *_ in things) for things in (self._kept, kept))
             raise HandrailError(f"obstacles: expected {expected} as they were, got {got}")
-        self._last: tuple[FloatArray, FloatArray] | None = None
-        self._shapes.update_scene(obstacles)
+        moved = self._shapes.update_scene(obstacles)
+        if not moved:
+            return
+        if self._last is not None:
+            for obstacle in moved:
+                self._last[1][:, self._shapes.rows[obstacle.name]] = -np.inf
+        self._take_speeds(obstacles)
+
+    def _take_speeds(self, obstacles: tuple[Obstacle, ...]) -> None:
         self._moving = [obstacle for obstacle in obstacles if obstacle.velocity.any()]
-        speeds = {obstacle.name: float(np.linalg.norm(obstacle.velocity)) for obstacle in obstacles}
-        self._speeds = np.array([speeds.get(second, 0.0) for _, second in self.pairs])
+        self._speeds = np.zeros(self.size)
+        for obstacle in self._moving:
+            self._speeds[self._shapes.rows[obstacle.name]] = np.linalg.norm(obstacle.velocity)
         self.kinds = np.where(self._speeds > 0.0, MOVING, STANDING)
         self.kinds[: len(self._robot.description.self_pairs)] = OWN
 

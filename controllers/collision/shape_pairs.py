@@ -8,6 +8,7 @@ import numpy as np
 import pinocchio as pin
 
 from handrail.controllers.arrays import BoolArray, FloatArray, frozen
+from handrail.controllers.collision.motion_bounds import motion_bounds
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.robot.description import PlacedShape, Placement
 from handrail.controllers.robot.model import RobotModel
@@ -33,6 +34,7 @@ class ShapePairs:
         names: of the two shapes of each pair, (P,) of (str, str).
         work: which pairs are a tool shape against a work surface, (P,).
         largest_margin: the largest margin that a pair can keep [m], (P,).
+        rows: those of the pairs with each obstacle, by its name.
         held: rows of the pairs with something that is held, (H,).
         moves: which coordinates move the two shapes of a pair: 1 or 0, (P, 2, n).
         motion_bounds: how far a unit of each coordinate can bring a pair together at most, (n, P) [m].
@@ -60,19 +62,33 @@ class ShapePairs:
         self.moves = self._pair_moves()
         self.motion_bounds = np.zeros((model.size, len(self.names)))
         self._shape_bounds = dict(_all_motion_bounds(model))
-        held = [obstacle.name for obstacle in obstacles if obstacle.held]
-        self._rows = {name: [row for row, pair in enumerate(self.names) if name in pair] for name in held}
-        self.held = np.array([row for rows in self._rows.values() for row in rows], dtype=int)
+        self.rows = {
+            name: [row for row, pair in enumerate(self.names) if name in pair]
+            for name in (obstacle.name for obstacle in obstacles)
+        }
+        held = (row for obstacle in obstacles if obstacle.held for row in self.rows[obstacle.name])
+        self.held = np.array(list(held), dtype=int)
+        self._seen: dict[str, tuple[bytes, ...]] = {}
         self._bound_motions(range(len(self.names)))
         self.update_scene(obstacles)
 
-    def update_scene(self, obstacles: tuple[Obstacle, ...]) -> None:
-        """Put every obstacle where it is now; a thing may have slipped in the hand, and reach farther."""
+    def update_scene(self, obstacles: tuple[Obstacle, ...]) -> list[Obstacle]:
+        """Put every obstacle where it is now; return those that have moved, or move.
+
+        A thing may have slipped in the hand, and reach farther.
+        """
+        moved = []
         for obstacle in obstacles:
+            now = tuple(each.tobytes() for each in (obstacle.position, obstacle.rotation, obstacle.velocity))
+            if now == self._seen.get(obstacle.name) and not obstacle.velocity.any():
+                continue
+            self._seen[obstacle.name] = now
+            moved.append(obstacle)
             self.place(obstacle)
             if obstacle.held:
-                self._shape_bounds[obstacle.name] = _motion_bounds(self._model, _placed(obstacle))
-                self._bound_motions(self._rows[obstacle.name])
+                self._shape_bounds[obstacle.name] = motion_bounds(self._model, _placed(obstacle))
+                self._bound_motions(self.rows[obstacle.name])
+        return moved
 
     def place(self, obstacle: Obstacle, time: float = 0.0) -> None:
         """Put an obstacle where it is after a time [s]."""
@@ -152,25 +168,4 @@ def _coal_shape(shape: Shape) -> coal.ShapeBase:
 
 @lru_cache(maxsize=8)
 def _all_motion_bounds(model: RobotModel) -> dict[str, FloatArray]:
-    return {shape.name: _motion_bounds(model, shape) for shape in model.description.collision}
-
-
-def _motion_bounds(model: RobotModel, placed: PlacedShape) -> FloatArray:
-    """Return bounds on how far a point of a shape moves per unit of each coordinate, (n,) [m].
-
-    1 for a prismatic joint; for a revolute one the length of the chain from its axis to the shape, and the
-    shape's own size; 0 for a joint that does not move it.
-    """
-    pinocchio, arms = model.pinocchio, np.zeros(model.size)
-    frame = pinocchio.frames[model.frame_id(placed.frame)]
-    size = float(np.linalg.norm(placed.shape.size)) if placed.shape.kind == "box" else placed.shape.size.sum()
-    radius = size + float(
-        np.linalg.norm(frame.placement.translation + frame.placement.rotation @ placed.placement.translation)
-    )
-    joint = frame.parentJoint
-    while joint > 0:
-        prismatic = pinocchio.joints[joint].shortname().startswith("JointModelP")
-        arms[pinocchio.joints[joint].idx_v] = 1.0 if prismatic else radius
-        radius += float(np.linalg.norm(pinocchio.jointPlacements[joint].translation))
-        joint = pinocchio.parents[joint]
-    return arms
+    return {shape.name: motion_bounds(model, shape) for shape in model.description.collision}

@@ -6,6 +6,7 @@ from typing import Self
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray
+from handrail.controllers.collision.distance_kernels import smallest
 from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.robot.shape import Obstacle
@@ -62,7 +63,7 @@ class Surroundings:
         except HandrailError:
             return replace(self, make_sense=False)
         if collision is self.collision:
-            return replace(self, make_sense=True)
+            return self if self.make_sense else replace(self, make_sense=True)
         rows = [] if self.unknown else self.collision.held.tolist()
         kept = {self.collision.pairs[row]: float(self.margins[row]) for row in rows}
         return self.of(collision, self.margin, self.work_margin, kept)
@@ -82,9 +83,7 @@ class Surroundings:
 
     def smallest(self, distances: FloatArray) -> tuple[float, float]:
         """Return the smallest distance, tools at work surfaces left out, and the smallest of those [m]."""
-        work = self.collision.work
-        everything, at_work = distances[~work], distances[work]
-        return float(np.min(everything, initial=np.inf)), float(np.min(at_work, initial=np.inf))
+        return smallest(distances, self.collision.work)
 
 
 def _wanted(collision: CollisionModel, margin: float, work_margin: float) -> FloatArray:

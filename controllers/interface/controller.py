@@ -8,6 +8,7 @@ import numpy as np
 from handrail.controllers.arrays import FloatArray, frozen, real
 from handrail.controllers.interface.command import Command
 from handrail.controllers.interface.intent import Intent
+from handrail.controllers.numerics.jit import are_finite, bounded
 from handrail.controllers.robot.description import Limits
 from handrail.controllers.robot.shape import Obstacle
 
@@ -44,7 +45,7 @@ class State:
 
     def is_of(self, size: int) -> bool:
         """Whether all of it but the time are finite numbers for a robot with `size` coordinates."""
-        return all(_known(values, size) for values in (self.q, self.v, self.commanded))
+        return _known(self.q, size) and _known(self.v, size) and _known(self.commanded, size)
 
     def sent(self, limits: Limits) -> FloatArray:
         """Return the velocity with which every command begins, (n,): the one sent last, within the limits.
@@ -53,14 +54,15 @@ class State:
         the robot does not say what it was sent, it is how it moves; where it does not say that, rest.
         """
         size = len(limits.velocity)
-        said = (values for values in (self.commanded, self.v) if _known(values, size))
-        velocity = next(said, np.zeros(size))
-        return np.minimum(np.maximum(velocity, -limits.velocity), limits.velocity)
+        for said in (self.commanded, self.v):
+            if _known(said, size):
+                return bounded(said, limits.velocity)
+        return np.zeros(size)
 
 
 def _known(values: FloatArray, size: int) -> bool:
     """Whether values are as many finite numbers."""
-    return values.shape == (size,) and bool(np.isfinite(values).all())
+    return values.shape == (size,) and are_finite(values)
 
 
 class Controller(Protocol):

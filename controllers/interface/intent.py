@@ -8,6 +8,7 @@ import numpy as np
 from handrail.controllers.arrays import BoolArray, FloatArray, frozen, real
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.frames import Frames
+from handrail.controllers.numerics.jit import are_finite
 
 _USUAL = Frames()
 
@@ -82,4 +83,4 @@ class Intent:
         """Whether every commanded value, the gripper and the time are numbers, and each value has a mask."""
         scalars = math.isfinite(self.gripper) and math.isfinite(self.time)
         scalars = scalars and self.values.ndim == 1 and self.values.shape == self.mask.shape
-        return scalars and bool(np.all(np.isfinite(self.values) | ~self.mask))
+        return scalars and (are_finite(self.values) or bool(np.all(np.isfinite(self.values) | ~self.mask)))

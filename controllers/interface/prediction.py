@@ -25,7 +25,9 @@ def after(predict: Prediction, intent: Intent) -> Prediction:
 
 def constant(intent: Intent, times: FloatArray) -> FloatArray:
     """Hold the command, `û(t) = u` (the paper's choice), (N, m)."""
-    return np.broadcast_to(intent.values, (len(times), len(intent.values)))
+    held = np.empty((len(times), len(intent.values)))
+    held[:] = intent.values
+    return held
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,8 @@
 """The checks that every controller makes before it listens to an intent."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from typing import NamedTuple
 
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.command import Status
@@ -12,8 +13,7 @@ _LEAD = 0.05  # by which an intent's stamp may be ahead of the state's clock: on
 _TICK = 1e-4  # by which the state's clock advances from update to update at least [s]
 
 
-@dataclass(frozen=True)
-class InputHistory:
+class InputHistory(NamedTuple):
     """When the inputs of the updates so far came.
 
     Attributes:
@@ -33,12 +33,12 @@ class InputHistory:
         if not math.isfinite(time):
             return self
         passed = time - self.time
-        return replace(self, time=time, age=self.age + max(passed, 0.0), jumped=self.jumped or passed < 0.0)
+        return InputHistory(time, self.stamp, self.age + max(passed, 0.0), self.jumped or passed < 0.0)
 
     def with_stamp(self, stamp: float) -> "InputHistory":
         """Return the history with an intent's stamp [s], if that is a new one."""
         if stamp > self.stamp or (self.jumped and stamp < self.stamp):
-            return replace(self, stamp=stamp, age=0.0, jumped=False)
+            return InputHistory(self.time, stamp)
         return self
 
 

@@ -9,6 +9,7 @@ from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import State
 from handrail.controllers.interface.intent import Intent
 from handrail.controllers.mpc.loop_state import LoopState
+from handrail.controllers.numerics.jit import exact_jit
 from handrail.controllers.objectives.objective import Objective
 from handrail.controllers.objectives.regularisation import (
     acceleration_regularisation,
@@ -49,10 +50,9 @@ class ProblemBuilder:
     def build(self, loop: LoopState, state: State, intent: Intent) -> Problem:
         """Return the optimal control problem of a state and an intent, which a loop is facing."""
         settings = self._settings
-        reference, parameters = self._reference.copy(), loop.parameters.copy()
+        parameters = loop.parameters.copy()
         predicted = np.asarray(loop.predict(intent, self._times), dtype=np.float64)
-        bounded = np.minimum(np.maximum(predicted, -self._largest), self._largest)
-        reference[:, : self._channels.size] = np.where(intent.mask, bounded, 0.0)
+        reference = _asked(self._reference, predicted, intent.mask, self._largest)
         parameters[self._residuals.parameter_slice("tracking")] = intent.frames.parameters
         return Problem(
             q=state.q,
@@ -106,6 +106,7 @@ def _per_length(weights: FloatArray, lengths: BoolArray, settings: MpcSettings) 
     return np.where(lengths, weights / settings.length**2, weights)
 
 
+@exact_jit
 def resumed(commanded: FloatArray, measured: FloatArray, tolerance: FloatArray) -> FloatArray:
     """Return the velocity from which a command goes on, (n,).
 
@@ -118,5 +119,28 @@ def resumed(commanded: FloatArray, measured: FloatArray, tolerance: FloatArray) 
         measured: v, (n,).
         tolerance: how far they may differ, (n,).
     """
-    close = np.minimum(np.maximum(commanded, measured - tolerance), measured + tolerance)
-    return np.minimum(np.maximum(close, np.minimum(commanded, 0.0)), np.maximum(commanded, 0.0))
+    result = np.empty(len(commanded))
+    for j in range(len(commanded)):
+        close = min(max(commanded[j], measured[j] - tolerance[j]), measured[j] + tolerance[j])
+        result[j] = min(max(close, min(commanded[j], 0.0)), max(commanded[j], 0.0))
+    return result
+
+
+@exact_jit
+def _asked(reference, predicted, mask, largest):
+    """Return a reference whose first columns are the predicted values within ± largest, 0 where masked out.
+
+    What is no number stays none: whoever solves for it fails, and the robot brakes.
+    """
+    result = reference.copy()
+    for k in range(len(predicted)):
+        for channel in range(len(mask)):
+            value = predicted[k, channel]
+            if not mask[channel]:
+                value = 0.0
+            elif value > largest[channel]:
+                value = largest[channel]
+            elif value < -largest[channel]:
+                value = -largest[channel]
+            result[k, channel] = value
+    return result

@@ -1,7 +1,7 @@
 """What lasts from one update of the masked MPC to the next, as one value."""
 
 import math
-from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,8 +18,7 @@ from handrail.controllers.robot.shape import Obstacle
 from handrail.controllers.solvers.active_set import NOTHING_ACTIVE
 
 
-@dataclass(frozen=True)
-class LoopState:
+class LoopState(NamedTuple):
     """The memory of a control loop. The velocity that was sent last is not in it: the robot knows that.
 
     Attributes:
@@ -38,24 +37,24 @@ class LoopState:
     surroundings: Surroundings
     parameters: FloatArray
     predict: Prediction
-    inputs: InputHistory = field(default_factory=InputHistory)
+    inputs: InputHistory = InputHistory()
     command: Command | None = None
     time: float = 0.0
     period: float = 0.0
     plan: Plan | None = None
     stored: Trajectory | None = None
-    active: IntArray = field(default_factory=lambda: NOTHING_ACTIVE)
+    active: IntArray = NOTHING_ACTIVE
 
     def among(self, obstacles: tuple[Obstacle, ...]) -> "LoopState":
         """Return the state among the obstacles as they are now."""
         around = self.surroundings.among(obstacles)
         same = around.collision is self.surroundings.collision
-        return replace(self, surroundings=around, active=self.active if same else NOTHING_ACTIVE)
+        return self._replace(surroundings=around, active=self.active if same else NOTHING_ACTIVE)
 
     def facing(self, state: State, intent: Intent) -> "LoopState":
         """Return the state in which the problem of a robot's state and an intent is built."""
         around = self.surroundings.known_at(state.q)
-        return replace(self, surroundings=around, predict=after(self.predict, intent))
+        return self._replace(surroundings=around, predict=after(self.predict, intent))
 
     def elapsed(self, time: float) -> float:
         """Return how long ago the command was sent [s]; 0 before the first.
@@ -77,7 +76,7 @@ class LoopState:
         elapsed, known = self.elapsed(time), math.isfinite(time)
         if self.command is not None:
             period = self.period if self.command.is_over(elapsed) else elapsed
-        return replace(self, command=command, time=time if known else self.time + elapsed, period=period)
+        return self._replace(command=command, time=time if known else self.time + elapsed, period=period)
 
     def guess(self, time: float, horizon: int, size: int) -> FloatArray:
         """Return the accelerations that the robot follows from a time on, (N, n): the warm start."""

@@ -1,6 +1,5 @@
 """The masked model predictive controller: the operator steers a part, the optimum completes the rest."""
 
-from dataclasses import replace
 from time import perf_counter
 
 from handrail.controllers.arrays import FloatArray, IntArray
@@ -89,18 +88,18 @@ class MaskedMpc:
         """
         parameters = self.loop.parameters.copy()
         parameters[self.residuals.parameter_slice(objective)] = values
-        self.loop = replace(self.loop, parameters=parameters)
+        self.loop = self.loop._replace(parameters=parameters)
 
     def update(self, state: State, intent: Intent) -> Command:
         """Return the command from now on: the plan, or what `Backup` has instead; it ends at rest."""
         start, plan = perf_counter(), None
         makes_sense = self.loop.surroundings.make_sense
         status, inputs = self._validator.check(state, intent, makes_sense, self.loop.inputs)
-        loop = replace(self.loop, inputs=inputs)
+        loop = self.loop._replace(inputs=inputs)
         if status is Status.OK:
             loop = loop.facing(state, intent)
             plan, active = self.solve(self._builder.build(loop, state, intent), loop, state)
-            loop = replace(loop, active=active)
+            loop = loop._replace(active=active)
             status = Status.SOLVER_FAILED if plan is None else Status.OK
         command, self.loop = self._supervisor.supervise(loop, state, intent, plan, status, start)
         return command

@@ -1,6 +1,6 @@
 """Turns a plan into a command: the plan where it is safe, else what `Backup` has instead."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from time import perf_counter
 
 import numpy as np
@@ -48,7 +48,7 @@ class Supervisor:
         """
         distances = self._distances(loop, state, plan)
         if distances is not None:
-            loop = replace(loop, surroundings=loop.surroundings.seen(distances))
+            loop = loop._replace(surroundings=loop.surroundings.seen(distances))
         motion, stored, planned = self._motion(loop, state, plan, distances, halt=status in _UNHEARD)
         if plan is not None and not planned:
             status = Status.BACKUP
@@ -56,7 +56,7 @@ class Supervisor:
         gripper = _gripper(loop, intent, status)
         command = Command(motion.velocities, motion.dt, motion.elapsed, gripper, diagnostics)
         loop = loop.following(command, state.time, self.settings.dt)
-        return command, replace(loop, plan=plan if planned else None, stored=stored)
+        return command, loop._replace(plan=plan if planned else None, stored=stored)
 
     def _motion(
         self, loop: LoopState, state: State, plan: Plan | None, distances: FloatArray | None, halt: bool

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numba
+import numpy as np
 from numba.core import event
 
 from handrail.controllers.numerics.first_use import compiling
@@ -40,6 +41,24 @@ class _FirstUse(event.Listener):
 
 
 event.register("numba:compile", _FirstUse())
+
+
+@exact_jit
+def are_finite(values):
+    """Whether all values are finite numbers, (n,); many times faster than numpy's own of so few."""
+    finite = True
+    for value in values:
+        finite &= np.isfinite(value)
+    return finite
+
+
+@exact_jit
+def bounded(values, limit):
+    """Return finite values within ± limit, (n,) both."""
+    result = np.empty(len(values))
+    for index in range(len(values)):
+        result[index] = min(max(values[index], -limit[index]), limit[index])
+    return result
 
 
 @jit

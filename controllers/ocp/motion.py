@@ -20,6 +20,16 @@ def rollout(q, v, dt, u, positions, velocities):
 
 
 @exact_jit
+def within(values, limit):
+    """Whether all values, (K, n), are within ± limit, (n,); those that are no numbers are not."""
+    inside = True
+    for k in range(len(values)):
+        for j in range(values.shape[1]):
+            inside &= abs(values[k, j]) <= limit[j]
+    return inside
+
+
+@exact_jit
 def approach(velocities, step):
     """Keep velocities, (K, n), within ± a step, (n,), of those before; the first stays."""
     for k in range(1, len(velocities)):

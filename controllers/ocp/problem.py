@@ -6,7 +6,7 @@ import numpy as np
 
 from handrail.controllers.arrays import FloatArray, IntArray, frozen
 from handrail.controllers.collision.model import CollisionModel
-from handrail.controllers.ocp.motion import approach, cumulated, rollout
+from handrail.controllers.ocp.motion import approach, cumulated, rollout, within
 from handrail.controllers.robot.description import Limits
 
 
@@ -107,7 +107,7 @@ class Plan:
         Cutting is monotone, so that no acceleration becomes larger.
         """
         limit = problem.limits.velocity
-        if np.all(np.abs(self.v[1:]) / limit <= 1.0):
+        if within(self.v[1:], limit):
             return self
         v = np.vstack([self.v[0], np.minimum(np.maximum(self.v[1:], -limit), limit)])
         u = np.diff(v, axis=0) / problem.dt
@@ -129,7 +129,8 @@ class Plan:
     def is_solution(self, problem: Problem, tolerance: float = 1e-6) -> bool:
         """Whether the plan is finite, obeys the dynamics from the state and the hard acceleration limits."""
         bound = problem.limits.acceleration * (1.0 + tolerance) + tolerance
-        if not (self.solved and np.all(np.abs(self.u) <= bound)):
+        if not (self.solved and within(self.u, bound)):
             return False
         q, v = problem.rollout(self.u)
-        return bool(np.all(np.abs(self.q - q) <= tolerance) and np.all(np.abs(self.v - v) <= tolerance))
+        error = np.full(len(problem.v), tolerance)
+        return within(self.q - q, error) and within(self.v - v, error)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray
-from handrail.controllers.numerics.jit import jit
+from handrail.controllers.numerics.jit import exact_jit, jit
 from handrail.controllers.robot.description import RobotDescription
 
 _TOLERANCE = 1e-5  # relative; rounding to float32 is no violation
@@ -50,11 +50,7 @@ class Limiter:
 
     def to_rest(self, velocities: FloatArray, dt: float) -> FloatArray:
         """Return velocities at knots, (k, n), and the fastest stop from the last one."""
-        last, deceleration = velocities[-1], self.limits.acceleration
-        steps = max(1, int(np.ceil(float(np.max(np.abs(last) / deceleration)) / dt)))
-        times = dt * np.arange(1, steps + 1)[:, None]
-        speeds = np.maximum(np.abs(last) - deceleration * times, 0.0)
-        return np.vstack([velocities, np.sign(last) * speeds])
+        return _to_rest(velocities, dt, self.limits.acceleration)
 
     def stop(self, q: FloatArray, v: FloatArray, shares: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return configurations along the fastest stop, (K, n), and their times, (K,) [s].
@@ -71,6 +67,24 @@ class Limiter:
         below = np.maximum(q - self.limits.position_lower, 0.0)
         twice = 2.0 * self.limits.acceleration
         return -np.sqrt(twice * below), np.sqrt(twice * above)
+
+
+@exact_jit
+def _to_rest(velocities, dt, deceleration):
+    count, n = velocities.shape
+    longest = 0.0
+    for j in range(n):
+        longest = max(longest, abs(velocities[-1, j]) / deceleration[j])
+    steps = max(1, int(np.ceil(longest / dt)))
+    result = np.empty((count + steps, n))
+    for k in range(count):
+        for j in range(n):
+            result[k, j] = velocities[k, j]
+    for k in range(steps):
+        for j in range(n):
+            last = velocities[-1, j]
+            result[count + k, j] = np.sign(last) * max(abs(last) - deceleration[j] * (dt * (k + 1)), 0.0)
+    return result
 
 
 @jit

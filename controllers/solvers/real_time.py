@@ -6,9 +6,10 @@ from typing import NamedTuple
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray, IntArray
+from handrail.controllers.collision.distance_kernels import depth
 from handrail.controllers.collision.model import Distances
 from handrail.controllers.collision.slacks import LIMITS
-from handrail.controllers.ocp.motion import changed
+from handrail.controllers.ocp.motion import changed, within
 from handrail.controllers.ocp.nodes import Nodes
 from handrail.controllers.ocp.problem import Plan, Problem
 from handrail.controllers.ocp.residuals import StageResiduals
@@ -73,7 +74,7 @@ class RealTimeSolver:
             q=step.moved.q,
             v=step.moved.v,
             u=step.moved.u,
-            collision_slack=float(slack[:LIMITS].max()),
+            collision_slack=max(slack[:LIMITS].tolist()),
             limit_slack=float(slack[LIMITS]),
             distances=step.distances,
             solved=step.answer.solved,
@@ -121,8 +122,9 @@ class RealTimeSolver:
         wrong = abs(moved.cost - before - answer.descent)
         if wrong > _COARSE * max(abs(answer.descent), _SMALL * moved.cost):
             return True
-        large = np.any(np.abs(moved.change) / problem.limits.acceleration > _LARGE)
-        return bool(large and np.any(answer.active >= constraints.first))
+        return max(answer.active.tolist(), default=0) >= constraints.first and not within(
+            moved.change, _LARGE * problem.limits.acceleration
+        )
 
     def _linearisation(self, problem: Problem, guess: FloatArray) -> _Guess:
         """Return what to linearise around: the guess, or a full stop where the guess runs into something.
@@ -185,9 +187,7 @@ def _rolled_out(problem: Problem, guess: FloatArray, change: FloatArray) -> tupl
 def _measured(problem: Problem, q: FloatArray, v: FloatArray, u: FloatArray) -> _Guess:
     nodes = Nodes(problem, q, v)
     distances = problem.collision.distances(nodes.q, problem.active_within, nodes.times)
-    values = distances.values
-    depth = np.max(np.minimum(values[0], 0.0) - values, initial=0.0)
-    return _Guess(q, v, u, nodes, distances, float(depth))
+    return _Guess(q, v, u, nodes, distances, depth(distances.values))
 
 
 def _penalty(problem: Problem, slack: FloatArray) -> float:
