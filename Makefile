@@ -12,6 +12,7 @@ STAMP := .venv/.handrail-is-set-up
 DEMO := outputs/demo
 
 export HF_HUB_OFFLINE ?= 1
+unexport PYTHONDONTWRITEBYTECODE  # with it, as in many images, every process would compile torch and LeRobot again
 
 setup: $(STAMP)
 

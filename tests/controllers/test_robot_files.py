@@ -16,7 +16,7 @@ from handrail.controllers.robot.description import load_description, robot_names
 from handrail.controllers.robot.model import RobotModel
 
 TEXTS = {name: spec.file.read_text() for name, spec in ROBOTS.items()}
-QUICK = settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
+QUICK = settings(max_examples=50, suppress_health_check=[HealthCheck.function_scoped_fixture])
 
 
 def one_line_or_a_robot(path) -> None:

@@ -1,12 +1,10 @@
 """What the documents say is true: commands parse, links lead somewhere, tables are complete."""
 
 import importlib
-import json
 import re
 import shlex
-import subprocess
-import sys
 import tomllib
+import warnings
 from collections.abc import Sequence
 from dataclasses import fields, is_dataclass
 from pathlib import Path
@@ -36,17 +34,6 @@ RESULTS = sorted(str(path.relative_to(ROOT)) for path in (ROOT / "docs" / "resul
 DOCUMENTS = (*PAGES, "CONTRIBUTING.md", "CHANGELOG.md", "SECURITY.md", *RESULTS)
 LONGEST_README = 150  # lines
 ROOMS = "controllers|datasets|collect|policies|scripts|tests|docs"
-_LEROBOT = """
-import json, sys
-import draccus
-from lerobot.configs.train import TrainPipelineConfig
-from lerobot.policies.act.configuration_act import ACTConfig
-from lerobot.policies.diffusion.configuration_diffusion import DiffusionConfig
-for arguments in json.loads(sys.argv[1]):
-    policy = draccus.parse(TrainPipelineConfig, args=arguments).policy
-    assert "ENV" in policy.normalization_mapping, "the environment's state would not be normalised"
-    assert not policy.push_to_hub
-"""
 
 
 def text(document: str) -> str:
@@ -94,9 +81,17 @@ def test_lerobot_s_own_parser_takes_the_training_commands():
     training = [words[1:] for words in commands("lerobot-train")]
     kinds = {word for words in training for word in words if word.startswith("--policy.type=")}
     assert kinds == {"--policy.type=act", "--policy.type=diffusion"}
-    command = [sys.executable, "-c", _LEROBOT, json.dumps(training)]
-    done = subprocess.run(command, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr[-2000:]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        import draccus
+        from lerobot.configs.train import TrainPipelineConfig
+        from lerobot.policies.act import configuration_act  # noqa: F401  (registered by their import)
+        from lerobot.policies.diffusion import configuration_diffusion  # noqa: F401
+
+        policies = [draccus.parse(TrainPipelineConfig, args=arguments).policy for arguments in training]
+    for policy in policies:
+        assert "ENV" in policy.normalization_mapping, "the environment's state would not be normalised"
+        assert not policy.push_to_hub
 
 
 def test_make_targets_exist():

@@ -12,6 +12,7 @@ from command_helpers import command
 from figure_helpers import shows
 from rich.console import Console
 
+from handrail.collect.experiments.benchmark import video
 from handrail.collect.experiments.benchmark.benchmark import benchmark
 from handrail.collect.experiments.benchmark.catalogue import BASELINES
 from handrail.collect.experiments.benchmark.config import BenchmarkConfig
@@ -257,7 +258,8 @@ def test_wrong_input_is_one_clear_line(case):
 
 
 @pytest.mark.needs_gl
-def test_the_report_has_a_video(tmp_path):
+def test_the_report_has_a_video(tmp_path, monkeypatch):
+    monkeypatch.setattr(video, "_EVERY", 30)  # steps between pictures: ten times as few
     config = replace(QUICK, goals=1, video=True, report=str(tmp_path / "report"))
     benchmark(config, BASELINES, QUIET)
     html = (tmp_path / "report" / "benchmark.html").read_text()

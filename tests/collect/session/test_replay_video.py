@@ -11,7 +11,7 @@ from handrail.datasets.reading.reader import read_episodes, read_info
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory):
     root = tmp_path_factory.mktemp("recorded") / "reach"
-    done = command(root, "--task", "reach", "--dataset.num_episodes", 1)
+    done = command(root, "--task", "reach", "--dataset.num_episodes", 1, "--time_limit", 1)
     assert done.returncode == 0, done.stderr
     return root
 

@@ -40,6 +40,19 @@ def ours(tmp_path_factory):
     return quick_and_slow(tmp_path_factory.mktemp("ours"))
 
 
+@pytest.fixture(scope="module")
+def foreign_report(foreign, few_resamples, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("report")
+    return report(foreign, folder), (folder / "report.html").read_text()
+
+
+@pytest.fixture(scope="module")
+def mixed_report(foreign, ours, few_resamples, tmp_path_factory):
+    """A dataset that Handrail did not make beside one that it made."""
+    folder = tmp_path_factory.mktemp("report")
+    return report([foreign[0], ours[0]], folder)[1], (folder / "episodes.csv").read_text()
+
+
 def report(arguments, folder, **options):
     comparison = compare(CompareConfig(tuple(arguments), str(folder), **options))
     files = write_report(comparison)
@@ -50,8 +63,8 @@ def _no_constant(name):
     raise AssertionError(f"{name} is no JSON")
 
 
-def test_two_datasets_that_handrail_did_not_make(foreign, tmp_path):
-    _, content, files = report(foreign, tmp_path)
+def test_two_datasets_that_handrail_did_not_make(foreign_report):
+    (_, content, files), page = foreign_report
     assert [file.name for file in files] == ["report.html", "report.json", "episodes.csv", "differences.csv"]
     metrics = content["views"]["all episodes"]["metrics"]
     applies = {name for name, groups in metrics.items() if groups["calm"]["mean"] is not None}
@@ -59,7 +72,6 @@ def test_two_datasets_that_handrail_did_not_make(foreign, tmp_path):
     never |= {"input_reversals", "active_axes", "mode_switches", "input_idle"}
     never |= {"undos", "input_age", "round_trip"}
     assert applies == {metric.name for metric in METRICS} - never
-    page = (tmp_path / "report.html").read_text()
     for name in never:
         assert metrics[name]["shaky"]["reason"].startswith("no column")
         (metric,) = [metric for metric in METRICS if metric.name == name]
@@ -73,9 +85,8 @@ def test_two_datasets_that_handrail_did_not_make(foreign, tmp_path):
     assert len(set(pictures)) == len(pictures) == 3  # the first of each of the first three episodes
 
 
-def test_the_page_needs_nothing_else(foreign, tmp_path):
-    report(foreign, tmp_path)
-    page = (tmp_path / "report.html").read_text()
+def test_the_page_needs_nothing_else(foreign_report):
+    _, page = foreign_report
     addresses = re.findall(r'(?:src|href)="([^"]{0,30})', page)
     assert addresses
     assert all(address.startswith("data:image/") for address in addresses)
@@ -92,16 +103,15 @@ def test_the_same_seed_gives_the_same_report(ours, tmp_path):
     assert one == two
 
 
-def test_what_does_not_apply_is_empty_and_never_zero(foreign, ours, tmp_path):
-    report([foreign[0], ours[0]], tmp_path)
-    rows = list(csv.DictReader((tmp_path / "episodes.csv").read_text().splitlines()))
+def test_what_does_not_apply_is_empty_and_never_zero(mixed_report):
+    rows = list(csv.DictReader(mixed_report[1].splitlines()))
     assert {row["contacts"] for row in rows if row["group"] == "calm"} == {""}
     assert [row["contacts"] for row in rows if row["group"] == "quick"][:3] == ["0.0", "1.0", "0.0"]
     assert not any("nan" in value for row in rows for value in row.values())
 
 
-def test_different_columns_are_not_put_on_one_scale(foreign, ours, tmp_path):
-    _, content, _ = report([foreign[0], ours[0]], tmp_path)
+def test_different_columns_are_not_put_on_one_scale(mixed_report):
+    content, _ = mixed_report
     reasons = {
         d["metric"]: d.get("does_not_apply", "") for d in content["views"]["all episodes"]["differences"]
     }
@@ -185,7 +195,7 @@ WRONG = {
     "no such": (["{quick}", "nowhere"], "nowhere.*expected a folder, found none"),
     "column": (["{quick}", "{slow}", "--by", "colour"], "unknown column 'colour'"),
     "labels": (["{quick}", "{slow}", "--labels", "a"], "--labels: expected 2 names, got 1"),
-    "same name": (["{quick}", "{quick}"], "two datasets are called 'ours0/quick'"),
+    "same name": (["{quick}", "{quick}"], r"two datasets are called 'ours\d+/quick'"),
     "baseline": (
         ["{quick}", "{slow}", "--baseline", "z"],
         "unknown baseline 'z': expected one of quick, slow",

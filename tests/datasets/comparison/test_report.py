@@ -46,6 +46,11 @@ def alike(ours, few_resamples):
 
 
 @pytest.fixture(scope="module")
+def page(alike):
+    return report_page(alike, findings(alike))
+
+
+@pytest.fixture(scope="module")
 def unlike(ours, few_resamples):
     """The same comparison, but the second dataset is another task of another robot."""
     found = compare(CompareConfig(tuple(ours)))
@@ -149,17 +154,15 @@ def test_no_text_covers_another(alike):
         check_texts(panel.figure)
 
 
-def test_figures_break_to_the_next_line_where_there_is_no_room(alike):
+def test_figures_break_to_the_next_line_where_there_is_no_room(page):
     """At 800 pixels a column of 420 does not fit twice; titles are text of the page and break."""
-    page = report_page(alike, findings(alike))
     assert "repeat(auto-fit, minmax(420px, 1fr))" in page
     assert "overflow-wrap: anywhere" in page
     assert page.count("<figcaption><strong>") == page.count('alt="') > 20
 
 
-def test_every_group_has_the_commands_that_leave_its_last_out(alike):
+def test_every_group_has_the_commands_that_leave_its_last_out(alike, page):
     """By the length of an episode: the three longest of each."""
-    page = report_page(alike, findings(alike))
     for group in alike.everything.groups:
         longest = sorted(group.episodes, key=lambda each: (-each.count, each.number))[:3]
         numbers = ",".join(str(each) for each in sorted(each.number for each in longest))
@@ -195,7 +198,7 @@ def test_headline_and_finding_name_the_same_difference_of_policies(ours, tmp_pat
         assert spans[0] == spans[1]
         assert spans[0].startswith("+")
         assert "over 1 like-for-like difference" in found[0].text
-        assert "1 like-for-like difference" in report_page(comparison, found).split("Families of Holm")[1]
+    assert "1 like-for-like difference" in report_page(comparison, found).split("Families of Holm")[1]
 
 
 def evaluated(folder: Path, **shares) -> str:
@@ -230,15 +233,14 @@ def test_policies_come_first_also_with_one_arm(ours, tmp_path, base, label):
     assert cards[1][1:] == ("–", "no policy was evaluated")
 
 
-def test_where_tasks_or_robots_differ_that_comes_first_and_nothing_is_better(unlike, alike):
+def test_where_tasks_or_robots_differ_that_comes_first_and_nothing_is_better(unlike, page):
     found = findings(unlike)
     first = found[0].text
     assert first.startswith("The tasks differ (quick: “go”; slow: “stay”). The robots differ (quick: ")
     assert headline(found) == first
-    page = report_page(unlike, found)
-    said = re.sub(r"<style>.*?</style>|data:[^\"]*", "", page)
+    said = re.sub(r"<style>.*?</style>|data:[^\"]*", "", report_page(unlike, found))
     assert not JUDGED.search(said), JUDGED.findall(said)
-    assert JUDGED.search(report_page(alike, findings(alike)))
+    assert JUDGED.search(page)
     (panel,) = effects_panels(unlike)
     assert panel.title.startswith("Right is more than quick, left is less")
     assert not any(axes.xaxis_inverted() for panel in metrics_panels(unlike) for axes in panel.figure.axes)

@@ -12,8 +12,9 @@ from handrail.datasets.reading.reader import read_info
 
 SHORT = "--task reach --dataset.num_episodes"
 DATASETS = {
-    "several modes": (f"{SHORT} 2", f"{SHORT} 1 --mode switching --resume"),
-    "moving obstacles": (f"{SHORT} 2 --moving_obstacles 2",),
+    "several modes among movers": tuple(
+        f"{SHORT} {words} --moving_obstacles 2" for words in ("2", "1 --mode switching --resume")
+    ),
     "cameras": (f"{SHORT} 1 --cameras wrist,scene --image_size 32",),
 }
 
