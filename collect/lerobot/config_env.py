@@ -22,12 +22,15 @@ from handrail.controllers.robot.model import load_model
 class HandrailEnvConfig(EnvConfig):
     """A task of Handrail. What policies read and write in it is what `handrail-record` records.
 
+    With a mode and `scene_in_state` it is what `lerobot-record` records (`--robot.diagnostics=false`).
+
     Attributes:
         task: what to do.
         robot: a robot, or a description file (.toml).
         fps: actions a second [Hz].
         mode: empty for actions that are joint velocities; a teleop mode, or `mask:` with 0 and 1, for actions
             that are its channels, which its controller completes.
+        scene_in_state: whether robot and scene are one vector, `observation.state`.
         camera_names: cameras that a policy sees: wrist, scene or both, with a comma.
         image_size: height and width of their pictures [px].
         render_size: height and width of the films that LeRobot makes of the first episodes [px].
@@ -41,6 +44,7 @@ class HandrailEnvConfig(EnvConfig):
     robot: str = "ridgeback_ur10"
     fps: int = 20
     mode: str = ""
+    scene_in_state: bool = False
     camera_names: str = ""
     image_size: int = 128
     render_size: int = 128
@@ -70,14 +74,22 @@ class HandrailEnvConfig(EnvConfig):
         if self.mode:
             mode = build_mode(config, model)
             actions = len(ModeAction(mode, Channels.of(model.description)).names)
-        self.features = {
-            ACTION: PolicyFeature(FeatureType.ACTION, (actions,)),
-            "agent_pos": PolicyFeature(FeatureType.STATE, (len(AgentObservation(model).names),)),
-            "environment_state": PolicyFeature(FeatureType.ENV, (len(build_task(config).state_names),)),
-        } | {
-            f"pixels/{camera}": PolicyFeature(FeatureType.VISUAL, (size, size, 3))
-            for camera in config.camera_names
-        }
+        robot, scene = len(AgentObservation(model).names), len(build_task(config).state_names)
+        if self.scene_in_state:
+            seen = {"agent_pos": PolicyFeature(FeatureType.STATE, (robot + scene,))}
+        else:
+            seen = {
+                "agent_pos": PolicyFeature(FeatureType.STATE, (robot,)),
+                "environment_state": PolicyFeature(FeatureType.ENV, (scene,)),
+            }
+        self.features = (
+            {ACTION: PolicyFeature(FeatureType.ACTION, (actions,))}
+            | seen
+            | {
+                f"pixels/{camera}": PolicyFeature(FeatureType.VISUAL, (size, size, 3))
+                for camera in config.camera_names
+            }
+        )
 
     def session(self) -> SessionConfig:
         """Return the settings of the session behind it.
@@ -121,6 +133,7 @@ class HandrailEnvConfig(EnvConfig):
             "config": self.session(),
             "fps": self.fps,
             "mode": bool(self.mode),
+            "scene_in_state": self.scene_in_state,
             "render_size": (self.render_size, self.render_size),
             "first_seed": self.first_seed,
         }

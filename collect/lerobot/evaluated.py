@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from handrail.collect.config import SessionConfig
 from handrail.collect.envs.env import Observation
+from handrail.collect.envs.observation import box_space
 from handrail.collect.lerobot.mode_action import ModeAction
 from handrail.collect.session.build import build_controller, build_env, build_mode
 from handrail.collect.session.driver import Driver
@@ -32,6 +33,7 @@ class EvaluatedEnv(gymnasium.Wrapper[Observation, NDArray[np.float32], Observati
         config: of the session.
         fps: actions a second [Hz].
         mode: whether actions are the channels of the session's mode.
+        scene_in_state: whether robot and scene are one vector, `agent_pos`, as `lerobot-record` records them.
         render_size: height and width of `render` [px].
         first_seed: added to every seed.
     """
@@ -41,6 +43,7 @@ class EvaluatedEnv(gymnasium.Wrapper[Observation, NDArray[np.float32], Observati
         config: SessionConfig,
         fps: int,
         mode: bool = False,
+        scene_in_state: bool = False,
         render_size: tuple[int, int] = (128, 128),
         first_seed: int = 0,
     ) -> None:
@@ -49,6 +52,13 @@ class EvaluatedEnv(gymnasium.Wrapper[Observation, NDArray[np.float32], Observati
         self._env, self._first_seed, self._painter = env, first_seed, None
         self._channels = Channels.of(env.model.description)
         self._action, self._controller = self._steered(config, fps) if mode else (None, self._direct())
+        self._joined = scene_in_state
+        if scene_in_state:
+            parts = dict(env.observation_space.spaces)  # pyright: ignore[reportAttributeAccessIssue]
+            parts.pop("environment_state")
+            self.observation_space = spaces.Dict(
+                parts | {"agent_pos": box_space(len(env.agent_names) + len(env.state_names))}
+            )
         size = len(self._action.names) if self._action else env.model.size + 1
         self.action_space = spaces.Box(-_MOST, _MOST, (size,), np.float32)
         self._max_episode_steps = env._max_episode_steps  # LeRobot asks for it
@@ -71,14 +81,14 @@ class EvaluatedEnv(gymnasium.Wrapper[Observation, NDArray[np.float32], Observati
         observation, info = self._env.reset(seed=None if seed is None else seed + self._first_seed)
         self._driver = Driver(self._controller, self._env, self._env.period)
         self._steps = 0
-        return observation, _plain(info)
+        return self._shown(observation), _plain(info)
 
     def step(self, action: ArrayLike) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Do what an action asks for, for one period."""
         self._driver.drive(self._steps, self._env.state(), self._intent(np.asarray(action, np.float64)))
         observation, reward, terminated, truncated, info = self._env.step(self._driver.action(self._steps))
         self._steps += 1
-        return observation, reward, terminated, truncated, _plain(info)
+        return self._shown(observation), reward, terminated, truncated, _plain(info)
 
     def render(self) -> NDArray[np.uint8]:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Return a quick picture from the scene camera: LeRobot films every step of ten episodes."""
@@ -99,11 +109,15 @@ class EvaluatedEnv(gymnasium.Wrapper[Observation, NDArray[np.float32], Observati
     def _intent(self, numbers: NDArray[np.float64]) -> Intent:
         time, gripper = self._env.state().time, float(numbers[-1] > _HALF)
         if self._action:
-            named = dict(zip(self._action.names, [*numbers[:-1], gripper], strict=True))
-            return self._action.intent(named, time)
+            return self._action.decided(numbers, time)
         values = np.zeros(self._channels.size)
         values[self._channels.joint_slice] = numbers[:-1]
         return Intent(values, self._channels.mask("joint"), gripper, time=time)
+
+    def _shown(self, observation: Observation) -> Observation:
+        if not self._joined:
+            return observation
+        return joined(observation)
 
     def _direct(self) -> Controller:
         return DirectController(self._env.model, self._env.period)
@@ -111,6 +125,13 @@ class EvaluatedEnv(gymnasium.Wrapper[Observation, NDArray[np.float32], Observati
     def _steered(self, config: SessionConfig, fps: int) -> tuple[ModeAction, Controller]:
         mode = build_mode(config, self._env.model)
         return ModeAction(mode, self._channels), build_controller(mode, self._env.model, fps, config.task)
+
+
+def joined(observation: Observation) -> Observation:
+    """Return an observation with robot and scene in one vector, as `lerobot-record` records them."""
+    parts = dict(observation)
+    scene = parts.pop("environment_state")
+    return parts | {"agent_pos": np.concatenate([parts["agent_pos"], scene])}
 
 
 def _plain(info: dict[str, Any]) -> dict[str, Any]:

@@ -51,6 +51,11 @@ class ModeAction:
         mask = self._base if self._mode.by_focus and not numbers[-2] <= _HALF else self._hand
         return Intent(values, mask, float(numbers[-1]), self._mode.name, time)
 
+    def decided(self, numbers: Sequence[float] | FloatArray, time: float) -> Intent:
+        """Return what the numbers of a policy ask for: a gripper beyond a half closes."""
+        named = dict(zip(self.names, [*numbers[:-1], float(numbers[-1] > _HALF)], strict=True))
+        return self.intent(named, time)
+
     def numbers(self, action: Mapping[str, float]) -> FloatArray:
         """Return the numbers of an action in the order of `names`.
 

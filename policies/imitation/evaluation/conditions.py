@@ -32,6 +32,7 @@ class Checkpoint:
         interface: what it reads and writes; None if that is what was recorded.
         pictures: height and width of what it sees, by camera [px].
         movers: how many moving obstacles it knows of.
+        joined: whether it reads robot and scene as one vector.
         digest: of all its files.
     """
 
@@ -40,6 +41,7 @@ class Checkpoint:
     interface: PolicyInterface | None
     pictures: Mapping[str, tuple[int, int]]
     movers: int
+    joined: bool
     digest: str
 
     @property
@@ -110,13 +112,14 @@ def read_checkpoint(folder: Path, config: EvaluateConfig) -> Checkpoint:
                 f"{where}: expected one trained for one of {', '.join(TASKS)}, got {meta.environment!r}"
             )
         movers = len({n.split(".")[0] for n in interface.environment_names if n.startswith("mover_")})
+        joined = False
     else:
         robot = meta.robot if meta.robot in ROBOTS else config.robot
-        known = place_of(
-            settings, where, robot, meta.environment if meta.environment in TASKS else config.task
-        )
+        task = meta.environment if meta.environment in TASKS else config.task
+        known = place_of(settings, where, robot, task, meta.mode if meta.actions == "intent" else "")
         meta, movers = replace(meta, environment=known.task, robot=known.robot), known.movers
-    return Checkpoint(place, meta, interface, pictures(settings, where), movers, _digest(place))
+        joined = known.joined
+    return Checkpoint(place, meta, interface, pictures(settings, where), movers, joined, _digest(place))
 
 
 def _plain(place: Path, settings: Mapping[str, Any], config: EvaluateConfig) -> PolicyMeta:
@@ -127,10 +130,10 @@ def _plain(place: Path, settings: Mapping[str, Any], config: EvaluateConfig) -> 
     step = place.parent.name
     return PolicyMeta(
         environment="",
-        mode="",
+        mode=config.mode,
         robot="",
         fps=config.fps,
-        actions="recorded",
+        actions="intent" if config.mode else "recorded",
         training_seed=seed if is_count(seed) else 0,
         dataset_draw=0,
         trained_on={},

@@ -41,9 +41,10 @@ class EvaluateConfig:
     task: Annotated[str, one_of(TASKS)] = ""
     """Of policies that do not say it, such as lerobot-train's, or that say a module:name."""
     mode: str = ""
-    """The teleop mode of policies that say a module:name: it is imported only if you say it too."""
+    """The teleop mode whose channels a policy of lerobot-train writes. Of policies that say a module:name:
+    it is imported only if you say it too."""
     robot: str = ""
-    """The same of the robot."""
+    """The robot of policies that do not say it, or that say a module:name."""
     fps: int = 20
     """Decisions a second of such policies: the rate of their dataset [Hz]."""
     time_limit: float = 0.0

@@ -6,15 +6,20 @@ and `action` are those of one robot and one task, or of none.
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from handrail.collect.config import CAMERAS, MOST_MOVING, SessionConfig
-from handrail.collect.session.build import build_task
+from handrail.collect.session.build import build_mode, build_task
 from handrail.collect.tasks.catalogue import TASKS
 from handrail.controllers.entries import is_count
 from handrail.controllers.errors import HandrailError
+from handrail.controllers.interface.channels import Channels
 from handrail.controllers.robot.description import load_description, robot_names
+from handrail.controllers.robot.model import load_model
 from handrail.policies.imitation.interface.interface import ACTION, ENVIRONMENT, STATE
+
+if TYPE_CHECKING:
+    from handrail.collect.lerobot.mode_action import ModeAction
 
 IMAGES = "observation.images."
 
@@ -28,12 +33,14 @@ class Place:
         task: its name.
         movers: how many obstacles move.
         sizes: of `observation.state`, `observation.environment_state` and `action`.
+        joined: whether the scene is in `observation.state` too, as `lerobot-record` records it.
     """
 
     robot: str
     task: str
     movers: int
     sizes: Mapping[str, int]
+    joined: bool = False
 
 
 def pictures(settings: Mapping[str, Any], where: str) -> dict[str, tuple[int, int]]:
@@ -54,7 +61,9 @@ def pictures(settings: Mapping[str, Any], where: str) -> dict[str, tuple[int, in
     return {name.removeprefix(IMAGES): (height, width) for name, (_, height, width) in found.items()}
 
 
-def place_of(settings: Mapping[str, Any], where: str, robot: str = "", task: str = "") -> Place:
+def place_of(
+    settings: Mapping[str, Any], where: str, robot: str = "", task: str = "", mode: str = ""
+) -> Place:
     """Return where a policy belongs that reads and writes recorded columns.
 
     Args:
@@ -62,23 +71,29 @@ def place_of(settings: Mapping[str, Any], where: str, robot: str = "", task: str
         where: it is, for the error.
         robot: its robot, where that is known.
         task: its task, where that is known.
+        mode: the teleop mode whose channels it writes; empty for joint velocities.
 
     Raises:
         HandrailError: Handrail has none such, or several.
     """
     given = _sizes(settings, where)
-    known = list(_places((robot,) if robot else robot_names(), (task,) if task else TASKS))
-    found = [place for place in known if all(place.sizes[name] == size for name, size in given.items())]
+    known = list(_places((robot,) if robot else robot_names(), (task,) if task else TASKS, mode))
+    found = [place for place in known if all(place.sizes.get(name) == size for name, size in given.items())]
     if ENVIRONMENT not in given:
-        found = [place for place in found if not place.movers]
+        found = [place for place in found if place.joined or not place.movers]
     if not found:
         raise HandrailError(
             f"{where}: expected the features of a task ({'; '.join(dict.fromkeys(map(_words, known)))}), "
             f"got {_sizes_in_words(given)}"
         )
     if len(found) > 1:
-        tasks = ", ".join(dict.fromkeys(place.task for place in found))
-        raise HandrailError(f"{where}: expected --task with one of {tasks}; its features do not say which")
+        several = {
+            name: list(dict.fromkeys(getattr(place, name) for place in found)) for name in ("task", "robot")
+        }
+        words = " and ".join(
+            f"--{name} with one of {', '.join(each)}" for name, each in several.items() if len(each) > 1
+        )
+        raise HandrailError(f"{where}: expected {words}; its features do not say which")
     return found[0]
 
 
@@ -114,14 +129,25 @@ def _shapes(settings: Mapping[str, Any], which: str, where: str) -> dict[str, tu
     return shapes
 
 
-def _places(robots: Iterable[str], tasks: Iterable[str]) -> Iterator[Place]:
+def _places(robots: Iterable[str], tasks: Iterable[str], mode: str) -> Iterator[Place]:
     for robot in robots:
         joints = len(load_description(robot).joints)
         for task in tasks:
+            action = len(action_of(mode, robot, task).names) if mode else joints + 1
             for movers in range(MOST_MOVING + 1 if TASKS.find(task).movers else 1):
                 names = build_task(SessionConfig(task=task, moving_obstacles=movers)).state_names
-                sizes = {STATE: 2 * joints + 8, ENVIRONMENT: len(names), ACTION: joints + 1}
-                yield Place(robot, task, movers, sizes)
+                state = 2 * joints + 8
+                yield Place(robot, task, movers, {STATE: state, ENVIRONMENT: len(names), ACTION: action})
+                if mode:
+                    yield Place(robot, task, movers, {STATE: state + len(names), ACTION: action}, joined=True)
+
+
+def action_of(mode: str, robot: str, task: str) -> "ModeAction":
+    """Return what the numbers of an action of a teleop mode are, as `lerobot-record` records them."""
+    from handrail.collect.lerobot.mode_action import ModeAction
+
+    model = load_model(robot)
+    return ModeAction(build_mode(SessionConfig(task=task, mode=mode), model), Channels.of(model.description))
 
 
 def _words(place: Place) -> str:

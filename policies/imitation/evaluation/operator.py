@@ -1,6 +1,7 @@
 """A trained policy as an operator: it sees what was recorded and asks for what it learned."""
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -9,6 +10,10 @@ from handrail.controllers.arrays import FloatArray
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.intent import Intent
 from handrail.policies.imitation.interface.checkpoint import TrainedPolicy
+from handrail.policies.imitation.interface.interface import PolicyInterface
+
+if TYPE_CHECKING:
+    from handrail.collect.lerobot.mode_action import ModeAction
 
 _CLOSED = 0.5  # a gripper command beyond it closes
 
@@ -39,6 +44,31 @@ class AsRecorded:
         return Intent(values, self._channels.mask("joint"), gripper=float(action[-1] > _CLOSED))
 
 
+class AsSteered:
+    """What `lerobot-record` records of `handrail_sim`: a mode's channels; perhaps robot and scene as one.
+
+    Args:
+        action: of the mode.
+        joined: whether robot and scene are one vector.
+    """
+
+    def __init__(self, action: "ModeAction", joined: bool) -> None:
+        self._action, self._joined = action, joined
+
+    @property
+    def action_names(self) -> tuple[str, ...]:
+        """The channels, the focus if there is one, and the gripper."""
+        return self._action.names
+
+    def observe(self, state: FloatArray, environment: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the observation."""
+        return (np.append(state, environment), environment[:0]) if self._joined else (state, environment)
+
+    def decode(self, action: FloatArray, state: FloatArray) -> Intent:
+        """Return the intent on the mode's channels."""
+        return self._action.decided(action, 0.0)
+
+
 class PolicyOperator:
     """Lets a policy steer; an operator.
 
@@ -47,6 +77,7 @@ class PolicyOperator:
 
     Args:
         policy: whoever was trained.
+        interface: what it reads and writes.
         channels: of the robot.
         mode: name of the teleop mode that the intents carry.
 
@@ -54,9 +85,15 @@ class PolicyOperator:
         malformed: unusable actions of this episode so far.
     """
 
-    def __init__(self, policy: TrainedPolicy, channels: Channels, mode: str) -> None:
+    def __init__(
+        self,
+        policy: TrainedPolicy,
+        interface: PolicyInterface | AsRecorded | AsSteered,
+        channels: Channels,
+        mode: str,
+    ) -> None:
         self._policy = policy
-        self._interface = policy.interface or AsRecorded(channels)
+        self._interface = interface
         self._channels = channels
         self._mode = mode
         self.malformed = 0

@@ -20,8 +20,9 @@ from handrail.controllers.baselines.unprotected import unprotected_controller
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import Controller
-from handrail.policies.imitation.evaluation.conditions import PolicyCondition, own_protection
-from handrail.policies.imitation.evaluation.operator import PolicyOperator
+from handrail.policies.imitation.evaluation.conditions import Checkpoint, PolicyCondition, own_protection
+from handrail.policies.imitation.evaluation.features import action_of
+from handrail.policies.imitation.evaluation.operator import AsRecorded, AsSteered, PolicyOperator
 from handrail.policies.imitation.interface.checkpoint import TrainedPolicy
 from handrail.policies.imitation.interface.torch_state import repeatable, threads
 
@@ -51,13 +52,23 @@ def run_rollout(
     env = _env(_session_config(condition), meta.fps, perturbation.shift, render)
     controller = _controller(condition.protection, checkpoint.intent_mode, meta.environment, env)
     policy = _policy(checkpoint.folder, checkpoint.digest, load)
+    channels = Channels.of(env.model.description)
+    interface = policy.interface or _columns(checkpoint, channels)
     with threads(1), repeatable(seed):
-        operator = PolicyOperator(policy, Channels.of(env.model.description), meta.mode)
+        operator = PolicyOperator(policy, interface, channels, meta.mode)
         late = DelayedOperator(operator, perturbation.delay)
         pushers = (Pusher(perturbation.push),) if perturbation.push else ()
         session = Session(env, controller, late, observers, disturbances=pushers)
         outcome = session.run(seed)
     return _row(outcome, operator.malformed)
+
+
+def _columns(checkpoint: Checkpoint, channels: Channels) -> AsRecorded | AsSteered:
+    """Return what a policy reads and writes that says nothing of it itself."""
+    meta, mode = checkpoint.meta, checkpoint.intent_mode
+    if not mode:
+        return AsRecorded(channels)
+    return AsSteered(action_of(mode, meta.robot, meta.environment), checkpoint.joined)
 
 
 def _session_config(condition: PolicyCondition) -> SessionConfig:

@@ -10,6 +10,7 @@ from lerobot.envs.utils import env_to_policy_features, preprocess_observation
 from places import ROOT
 
 from handrail.collect.config import FIRST_SEED, SessionConfig
+from handrail.collect.lerobot import HandrailSim, HandrailSimConfig
 from handrail.collect.session.build import build_env
 from handrail.collect.tasks.catalogue import TASKS
 from handrail.controllers.errors import HandrailError
@@ -57,6 +58,25 @@ def test_actions_of_a_mode_are_completed():
     moved = {name: after["agent_pos"][0][i] - observation["agent_pos"][0][i] for i, name in enumerate(names)}
     assert moved["tool.x"] > 0.1
     assert abs(moved["tool.y"]) < 0.01
+    env.close()
+
+
+@pytest.mark.parametrize("mode", ["ee", "switching"])
+def test_what_lerobot_records_of_our_robot_is_what_a_policy_reads_and_writes(mode):
+    config, env = made(task="pick_place", mode=mode, scene_in_state=True)
+    robot = HandrailSim(HandrailSimConfig(task="pick_place", mode=mode, diagnostics=False))
+    features = env_to_policy_features(config)
+    assert features.keys() == {"action", "observation.state"}
+    assert features["action"].shape == (len(robot.action_features),)
+    observation, _ = env.reset(seed=[5])
+    assert observation["agent_pos"].shape == (1, len(robot.observation_features))
+    after, *_ = env.step(np.zeros((1, *features["action"].shape), np.float32))
+    assert after["agent_pos"].shape == observation["agent_pos"].shape
+    alone = build_env(config.session(), 20)
+    expected, _ = alone.reset(seed=FIRST_SEED + 5)
+    said = dict(zip(robot.observation_features, observation["agent_pos"][0], strict=True))
+    for names, part in ((alone.agent_names, "agent_pos"), (alone.state_names, "environment_state")):
+        np.testing.assert_array_equal([said[name] for name in names], expected[part])
     env.close()
 
 

@@ -1,12 +1,14 @@
 """LeRobot's evaluation on our environment, and ours: one policy on one seed moves alike, to the bit."""
 
 import dataclasses
+import sys
 
 import numpy as np
 import pytest
 from lerobot.configs.policies import PreTrainedConfig
 from lerobot.envs.factory import make_env, make_env_config, make_env_pre_post_processors
 from lerobot.policies.factory import make_policy, make_pre_post_processors
+from lerobot.scripts import lerobot_record, lerobot_train
 from lerobot.scripts.lerobot_eval import rollout
 from training_helpers import tiny
 
@@ -48,12 +50,53 @@ def recorded(tmp_path_factory):
 def test_both_evaluations_move_the_robot_alike(actions, mode, recorded, tmp_path):
     settings = tiny(recorded, tmp_path / "policy", actions=actions, steps=40)
     folder = train(dataclasses.replace(settings, dataset=StoredConfig("me/set", str(recorded))), quiet=True)
-    config = EvaluateConfig(policy=(str(folder),), episodes=1, time_limit=SECONDS, task="reach")
+    both_alike(folder, {"mode": mode})
+
+
+@pytest.mark.needs_gl
+def test_a_policy_of_what_lerobot_recorded_and_trained(monkeypatch, tmp_path):
+    root, output = tmp_path / "set", tmp_path / "policy"
+    run(
+        monkeypatch,
+        lerobot_record,
+        *("--robot.discover_packages_path=handrail.collect.lerobot", "--robot.type=handrail_sim"),
+        *("--robot.diagnostics=false", "--robot.camera_names=wrist", "--robot.image_size=32"),
+        *(f"--robot.calibration_dir={tmp_path}", f"--teleop.calibration_dir={tmp_path}"),
+        *("--teleop.type=handrail_scripted", "--teleop.episode_time_s=3", "--teleop.reset_time_s=1"),
+        *("--dataset.single_task=reach", "--dataset.fps=20", "--dataset.num_episodes=1"),
+        *("--dataset.episode_time_s=3", "--dataset.reset_time_s=1", "--dataset.video=false"),
+        *("--dataset.repo_id=me/set", f"--dataset.root={root}", "--dataset.push_to_hub=false"),
+        "--play_sounds=false",
+    )
+    run(
+        monkeypatch,
+        lerobot_train,
+        *("--dataset.repo_id=me/set", f"--dataset.root={root}", f"--output_dir={output}", "--steps=40"),
+        *("--policy.type=act", "--policy.device=cpu", "--policy.pretrained_backbone_weights=null"),
+        *("--policy.chunk_size=8", "--policy.n_action_steps=4", "--policy.use_vae=false"),
+        *("--policy.dim_model=32", "--policy.dim_feedforward=64", "--policy.n_heads=2"),
+        *("--policy.n_encoder_layers=1", "--policy.push_to_hub=false", "--batch_size=8"),
+        *("--num_workers=0", "--wandb.enable=false"),
+    )
+    folder = output / "checkpoints" / "last" / "pretrained_model"
+    seen = {"camera_names": "wrist", "image_size": 32, "scene_in_state": True}
+    both_alike(folder, {"mode": "ee"} | seen, mode="ee")
+
+
+def run(monkeypatch, module, *words):
+    """Run a command of LeRobot's with its command line, in this process."""
+    monkeypatch.setattr(sys, "argv", ["lerobot", *words])
+    module.main()
+
+
+def both_alike(folder, environment, **settings):
+    """Check that both evaluations move the robot alike with a policy, to the bit."""
+    config = EvaluateConfig(policy=(str(folder),), episodes=1, time_limit=SECONDS, task="reach", **settings)
     (condition,), _ = policy_conditions(config)
     trace = Trace()
     run_rollout(condition, FIRST_SEED + SEED, load_policy, [trace])
 
-    env_config = make_env_config("handrail", task="reach", mode=mode, time_limit=SECONDS)
+    env_config = make_env_config("handrail", task="reach", time_limit=SECONDS, **environment)
     env = make_env(env_config, n_envs=1)["handrail"][0]
     described = PreTrainedConfig.from_pretrained(folder)
     described.pretrained_path = folder
@@ -63,7 +106,8 @@ def test_both_evaluations_move_the_robot_alike(actions, mode, recorded, tmp_path
     policy_around = make_pre_post_processors(described, str(folder))
     done = rollout(env, policy, *around, *policy_around, seeds=[SEED], return_observations=True)
     env.close()
-    theirs = done["observation"]["observation.state"][0, : len(trace.states)].numpy()
+    size = len(trace.states[0])
+    theirs = done["observation"]["observation.state"][0, : len(trace.states), :size].numpy()
     assert len(trace.states) == SECONDS * 20
     assert np.abs(np.diff(trace.states, axis=0)).max() > 1e-3
     np.testing.assert_array_equal(theirs, trace.states)

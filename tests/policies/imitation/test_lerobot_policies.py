@@ -46,6 +46,13 @@ def reads(folder, **features):
     path.write_text(json.dumps(json.loads(path.read_text()) | {"input_features": features}))
 
 
+def writes(folder, size):
+    """Let a policy say that it writes so many numbers."""
+    path = folder / "config.json"
+    said = {"output_features": {"action": {"type": "ACTION", "shape": [size]}}}
+    path.write_text(json.dumps(json.loads(path.read_text()) | said))
+
+
 def config(*folders, **settings):
     return EvaluateConfig(policy=tuple(map(str, folders)), **({"episodes": 1, "time_limit": 0.5} | settings))
 
@@ -99,6 +106,19 @@ def test_without_the_environment_s_state_the_task_has_to_be_said(plain):
         "tray",
         {"wrist": (64, 64)},
     )
+
+
+@pytest.mark.parametrize(("size", "mode", "numbers"), [(33, "ee", 7), (54, "switching", 11)])
+def test_what_lerobot_record_recorded_is_driven_with_its_mode(size, mode, numbers, plain):
+    """There robot and scene are one vector, and an action is the mode's channels."""
+    reads(plain, **{"observation.state": {"type": "STATE", "shape": [size]}})
+    writes(plain, numbers)
+    with pytest.raises(HandrailError, match=f"action {numbers}"):
+        policy_conditions(config(plain))
+    (condition,), _ = policy_conditions(config(plain, mode=mode, robot="ridgeback_ur10"))
+    checkpoint = condition.checkpoint
+    assert (checkpoint.intent_mode, checkpoint.joined, condition.protection) == (mode, True, "mpc")
+    assert checkpoint.meta.environment == {33: "reach", 54: "pick_place"}[size]
 
 
 @pytest.mark.parametrize(
