@@ -52,13 +52,13 @@ class Hub:
         self._pages: set[PageSocket] = set()
         self._stage = self._card = ""
         self._stamps: deque[float] = deque(maxlen=64)  # of the frames that pages have got
-        self._was_free = True
+        self._was_free, self._is_over = True, False
         self.counts: Counter[str] = Counter()
 
     @property
-    def has_told_all(self) -> bool:
-        """Whether every page has taken what it was sent."""
-        return not any(page.is_owed for page in self._pages)
+    def is_leaving(self) -> bool:
+        """Whether pages that have been told that it is over are still there: they go when they hear it."""
+        return self._is_over and bool(self._pages)
 
     def hear(self) -> None:
         """Pass on what the recording has sent.
@@ -76,6 +76,7 @@ class Hub:
                 for page in self._pages:
                     page.offer(STAGE, self._stage)
             elif kind == OVER:
+                self._is_over = True
                 for page in self._pages:
                     page.offer(OVER, f'{{"kind":"over","over":{data.decode()}}}')
             elif kind == CARD:

@@ -22,13 +22,11 @@ class PageSocket:
         echo: the newest time of the server that it has answered [s].
         round_trip: how long that answer took [s].
         is_late: whether what it says comes too late to steer.
-        is_owed: whether a message waits for it, or is on its way.
     """
 
     def __init__(self, socket: WebSocket, name: str) -> None:
         self.socket, self.name = socket, name
         self.sequence, self.echo, self.round_trip, self.is_late = -1, 0.0, 0.0, False
-        self.is_owed = False
         self._newest: dict[Any, str | bytes] = {}
         self._waiting = asyncio.Event()
         self._next: dict[Any, float] = {}
@@ -36,7 +34,6 @@ class PageSocket:
     def offer(self, kind: Any, data: str | bytes) -> None:
         """Let it have a message; an older one of its kind that still waits is dropped."""
         self._newest[kind] = data
-        self.is_owed = True
         self._waiting.set()
 
     def offer_each(self, kind: Any, data: str | bytes, now: float, period: float) -> None:
@@ -69,4 +66,3 @@ class PageSocket:
                 socket = self.socket
                 send = socket.send_bytes(data) if isinstance(data, bytes) else socket.send_text(data)
                 await asyncio.wait_for(send, SLOW)
-            self.is_owed = False

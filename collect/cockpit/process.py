@@ -17,7 +17,7 @@ from handrail.collect.cockpit.pipe import LOST, NOTE, SETTINGS, Pipe
 from handrail.collect.cockpit_config import CockpitConfig
 from handrail.controllers.errors import HandrailError
 
-_BEGIN, _LAST_WORDS, _END = 30.0, 1.0, 3.0  # patience [s]
+_BEGIN, _LAST_WORDS, _END = 30.0, 1.0, 5.0  # patience [s]
 MOST_DEATHS, _WITHIN = 3, 60.0  # of the server, in a time [s]
 
 

@@ -40,7 +40,7 @@ _PATIENCE = 5.0  # with a form that is sent [s]
 _LONGEST = 200  # token [bytes]
 _PAUSE, _MOST_PAUSES = 1.0, 32  # before another wrong token is answered [s], and how many wait so
 _NICE = 5  # the loop of the robot comes first
-_LAST_WORDS = 1.0  # for pages to take them, at the end [s]
+_LEAVING = 2.0  # for pages to hear that it is over, and go [s]
 _NOTES = 0.02  # between two looks at how late the loop is [s]
 _REPORTS, _COLLECTIONS = 25, 250  # so many looks to a report, to a collection of garbage
 _HEADERS = {
@@ -232,10 +232,10 @@ def _noticing(gone: asyncio.Event, pipe: Pipe, act: Callable[[], None]) -> Calla
 
 
 async def _end(server: uvicorn.Server, gone: asyncio.Event, hub: Hub) -> None:
-    """When the recording is gone, let the pages have its last words, and end the server."""
+    """When the recording is gone, let the pages hear its last words and leave, and end the server."""
     await gone.wait()
-    until = time.monotonic() + _LAST_WORDS
-    while not hub.has_told_all and time.monotonic() < until:
+    until = time.monotonic() + _LEAVING
+    while hub.is_leaving and time.monotonic() < until:
         await asyncio.sleep(_NOTES)
     server.should_exit = True
 

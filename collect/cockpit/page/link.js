@@ -42,9 +42,15 @@ export class Link {
       return;
     }
     const said = JSON.parse(data);
-    if (said.kind === "over") this.isOver = true; // nothing to come back to
+    if (said.kind === "over") this.leave();
     if (said.kind === "frame") this.stamp = said.frame.stamp;
     this.handlers[said.kind](said[said.kind] ?? said);
+  }
+
+  // Nothing to come back to; the server waits for it, so that nobody misses the last words.
+  leave() {
+    this.isOver = true;
+    this.socket.close();
   }
 
   get isOpen() {
