@@ -53,8 +53,10 @@ class LoopState(NamedTuple):
 
     def facing(self, state: State, intent: Intent) -> "LoopState":
         """Return the state in which the problem of a robot's state and an intent is built."""
-        around = self.surroundings.known_at(state.q)
-        return self._replace(surroundings=around, predict=after(self.predict, intent))
+        around, predict = self.surroundings.known_at(state.q), after(self.predict, intent)
+        if around is self.surroundings and predict is self.predict:
+            return self
+        return self._replace(surroundings=around, predict=predict)
 
     def elapsed(self, time: float) -> float:
         """Return how long ago the command was sent [s]; 0 before the first.

@@ -1,7 +1,8 @@
 """The backup: what the robot does where no new plan may be sent."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,8 +16,7 @@ _SAMPLES = 2  # of a plan's stage
 _SAME = 1e-6  # difference of velocities that is rounding [m/s, rad/s]
 
 
-@dataclass(frozen=True)
-class Situation:
+class Situation(NamedTuple):
     """Where the robot is, and what was stored.
 
     Attributes:
@@ -34,8 +34,7 @@ class Situation:
     elapsed: float
 
 
-@dataclass(frozen=True)
-class Candidate:
+class Candidate(NamedTuple):
     """Something that the robot may do now.
 
     Attributes:
@@ -49,8 +48,7 @@ class Candidate:
     planned: bool = False
 
 
-@dataclass(frozen=True)
-class Backup:
+class Backup(NamedTuple):
     """A ladder of ways, of which the robot takes the first that is safe.
 
     1. The new plan, if a full stop after its first stage is safe; that stage and stop are stored.

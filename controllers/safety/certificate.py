@@ -1,6 +1,5 @@
 """The certificate that a motion is safe: no pair comes too near, no joint beyond its range."""
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -31,8 +30,7 @@ class Violation(NamedTuple):
     all: float
 
 
-@dataclass(frozen=True)
-class StopCertificate:
+class StopCertificate(NamedTuple):
     """Measures motions by exact distances; moving obstacles go on at constant velocity.
 
     A motion is safe when no pair comes below its least distance and no joint leaves its range, or, where one

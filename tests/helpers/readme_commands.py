@@ -22,7 +22,7 @@ MORE = {  # what is added where a page leaves it out
     "handrail-train": {"--steps": "4", "--batch_size": "4", "--device": "cpu"},
     "handrail-evaluate": {"--time_limit": "1"},
     "handrail-showcase": {"--seconds": "1"},
-    "handrail-profile": {"--updates": "10", "--solves": "1"},
+    "handrail-profile": {"--updates": "10", "--solves": "1", "--tasks": "reach"},
     "handrail-train-rl": {
         "--steps": "60",
         "--random_steps": "20",

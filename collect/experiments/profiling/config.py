@@ -2,7 +2,10 @@
 
 from dataclasses import dataclass
 
-from handrail.collect.flags import check_json, check_whole
+from handrail.collect.flags import check_json, check_names, check_whole, names
+from handrail.collect.tasks.catalogue import TASKS
+from handrail.controllers.robot.catalogue import ROBOTS
+from handrail.datasets.lists import Names
 
 
 @dataclass(frozen=True)
@@ -21,6 +24,10 @@ class ProfileConfig:
     """Converged solves of IPOPT a case."""
     qps: int = 100
     """QPs of every case that DAQP and PIQP solve too; 0 for none."""
+    tasks: Names = "reach,pick_place"
+    """Tasks that the scripted operator does meanwhile in mode ee, in their own table; or all."""
+    robots: Names = "lekiwi,ridgeback_ur10"
+    """Robots that do these tasks; or all."""
     json: str = ""
     """Write everything measured to this file."""
 
@@ -31,4 +38,6 @@ class ProfileConfig:
             HandrailError: one is wrong.
         """
         check_whole(self, updates=10, solves=1, seed=0, qps=0)
+        check_names("task", "--tasks", names(self.tasks, TASKS), TASKS)
+        check_names("robot", "--robots", names(self.robots, ROBOTS), ROBOTS)
         check_json(self.json)

@@ -10,6 +10,7 @@ from handrail.collect.experiments.benchmark.mink import ACTIVATION_DISTANCE
 from handrail.collect.experiments.profiling.baselines import Baseline, converged, mink
 from handrail.collect.experiments.profiling.config import ProfileConfig
 from handrail.collect.experiments.profiling.qp import compare_qp
+from handrail.collect.experiments.profiling.tasks import time_tasks
 from handrail.collect.experiments.profiling.timing_loop import (
     CASES,
     Case,
@@ -18,7 +19,10 @@ from handrail.collect.experiments.profiling.timing_loop import (
     longer,
     times,
 )
+from handrail.collect.flags import names
+from handrail.collect.tasks.catalogue import TASKS
 from handrail.controllers.numerics.threads import single_threaded
+from handrail.controllers.robot.catalogue import ROBOTS
 
 _BLOCK = 10  # updates of one loop before the next has its turn
 _SHORT = 0.05  # beyond the margin: a mink that looks no farther than it needs to [m]
@@ -54,11 +58,14 @@ def profile(config: ProfileConfig) -> dict[str, Any]:
                     if baseline.loop is loop:
                         baseline.run(made)
         qp = compare_qp(config.qps, config.seed) if config.qps else {}
+        tasks = names(config.tasks, TASKS)
+        in_tasks = time_tasks(names(config.robots, ROBOTS), tasks, config.updates, config.seed)
     ours = {case.name: _case(case, updates[case.name]) for case in cases}
     return {
         **{case.name: ours.pop(case.name) for case in CASES},
         **{name: baseline.measured()["ratio"] for name, baseline in baselines.items()},
         "growth": ours,
+        "tasks": in_tasks,
         "rivals": _by_case(list(baselines.values())),
         "seed": config.seed,
         "machine": {"cores": os.cpu_count(), "load_before": load, "load_after": os.getloadavg()[0]},

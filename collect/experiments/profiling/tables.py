@@ -5,12 +5,13 @@ from typing import Any
 
 from handrail.datasets.presentation.table import Table
 
+_PHASES = ("distances", "residuals", "solve", "rest")
 _HEADINGS = ("median", "p95", "p99", "worst")
 
 
 def profile_tables(results: Mapping[str, Any]) -> list[Table]:
     """Return everything measured, for printing."""
-    return [_cases(results), _baselines(results), _qp(results)]
+    return [_cases(results), _tasks(results), _baselines(results), _qp(results)]
 
 
 def _times(measured: Mapping[str, Any]) -> list[str]:
@@ -28,6 +29,29 @@ def _cases(results: Mapping[str, Any]) -> Table:
     ]
     headings = ("case", "n", "N", "pairs", "near", "rows", "braked", *_HEADINGS)
     return Table(headings, rows, "Update of the masked MPC [ms]", caption)
+
+
+def _tasks(results: Mapping[str, Any]) -> Table:
+    rows = []
+    for each in results["tasks"]:
+        counts = (f"{each[name]:.0f}" for name in ("updates", "pairs", "rows_mean", "braked"))
+        taken = (f"{each[clock][name]:.2f}" for clock in ("cpu", "wall") for name in ("median_ms", "p95_ms"))
+        phases = (f"{each['phases_ms'][name]:.2f}" for name in _PHASES)
+        rows.append([each["robot"], each["task"], *counts, *taken, *phases])
+    headings = (
+        "robot",
+        "task",
+        "updates",
+        "pairs",
+        "rows",
+        "braked",
+        "CPU median",
+        "p95",
+        "wall median",
+        "p95",
+    )
+    caption = "CPU: processor time of the thread. Phases: medians on the clock"
+    return Table((*headings, *_PHASES), rows, "The same while a task is done [ms]", caption)
 
 
 def _baselines(results: Mapping[str, Any]) -> Table:

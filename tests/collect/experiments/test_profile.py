@@ -24,17 +24,24 @@ def check(results):
 
 
 def test_a_tiny_run_writes_what_it_promises(tmp_path):
-    results = profile(ProfileConfig(updates=10, rivals=False, growth=False, qps=0))
+    config = ProfileConfig(updates=10, rivals=False, growth=False, qps=0, tasks="reach", robots="lekiwi")
+    results = profile(config)
     check(results)
+    (reach,) = results["tasks"]
+    assert (reach["robot"], reach["task"], reach["successes"]) == ("lekiwi", "reach", reach["episodes"])
+    assert reach["updates"] >= 10
+    assert reach["cpu"]["median_ms"] > 0
+    assert set(reach["phases_ms"]) == {"distances", "residuals", "solve", "rest"}
     assert results["rivals"] == {}
     write_json(tmp_path / "profile.json", results)
     check(json.loads((tmp_path / "profile.json").read_text()))
-    assert len(profile_tables(results)) == 3
+    assert len(profile_tables(results)) == 4
 
 
 def test_baselines_solve_the_same_problems():
     pytest.importorskip("mink")
-    results = profile(ProfileConfig(updates=10, solves=1, growth=False, qps=0))
+    config = ProfileConfig(updates=10, solves=1, growth=False, qps=0, tasks="reach", robots="lekiwi")
+    results = profile(config)
     check(results)
     assert results["ratio_vs_ipopt"] > 0
     assert results["ratio_vs_mink"] > 0
