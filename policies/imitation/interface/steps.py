@@ -19,11 +19,18 @@ from lerobot.processor import ProcessorStep, ProcessorStepRegistry
 from lerobot.processor.normalize_processor import NormalizerProcessorStep
 
 from handrail.controllers.arrays import FloatArray
-from handrail.policies.imitation.interface.completion import Completion, PolicyCompletionStep
+from handrail.policies.imitation.interface.completion import COMPLETE, Completion, PolicyCompletionStep
 from handrail.policies.imitation.interface.interface import ACTION, PolicyInterface
-from handrail.policies.imitation.interface.view_step import Features, PolicyViewStep, policy_rows, seen_by
+from handrail.policies.imitation.interface.view_step import (
+    VIEW,
+    Features,
+    PolicyViewStep,
+    policy_rows,
+    seen_by,
+)
 
 ACT = "handrail_policy_action"
+NAMES = (VIEW, ACT, COMPLETE)
 
 
 @ProcessorStepRegistry.register(ACT)
