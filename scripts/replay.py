@@ -26,15 +26,20 @@ def main(config: ReplayConfig) -> int:
 
     root = config.dataset.folder
     episodes = range(len(read_episodes(root))) if config.episode < 0 else [config.episode]
-    rows = []
+    rows, clients = [], set[str]()
     for episode in episodes:
         video = Path(config.video).expanduser() if config.video else None
         replay, pictures = replay_episode(root, episode, _PICTURES if config.sheet else 0, video, config.said)
         rows.append(_row(replay))
+        clients.add(replay.robot_client)
         if pictures:
             save_sheet(pictures, Path(config.sheet).expanduser())
     console = Console(highlight=False, soft_wrap=True)
     console.print(Table(_HEADINGS, rows))
+    for client in sorted(filter(None, clients)):
+        console.print(
+            f"Recorded through the client of {client}: replayed here in simulation, so it deviates."
+        )
     for written in filter(None, (config.sheet, config.video)):
         console.print(f"Written: {written}")
     return 0

@@ -22,7 +22,7 @@ from handrail.collect.session.recorded_settings import settings_json
 from handrail.collect.session.recorder import Recorder
 from handrail.collect.session.rehearsal import Rehearsal
 from handrail.collect.session.session import Observer
-from handrail.datasets.format.columns import Scalar
+from handrail.datasets.format.columns import CLIENT, Scalar
 from handrail.datasets.format.manifest import Manifest
 from handrail.datasets.recording.writer import EpisodeWriter
 
@@ -122,7 +122,12 @@ def session_columns(config: RecordConfig) -> dict[str, Scalar]:
         "person": config.person,
         "participant": "",  # of a user study
         SETTINGS: settings_json(config),
-    }
+    } | ({CLIENT: _client(config)} if config.robot_client else {})
+
+
+def _client(config: RecordConfig) -> str:
+    """Return which robot of LeRobot's is driven, and whether its host is a simulation."""
+    return config.robot_client + (" (simulated)" if config.client.simulated else "")
 
 
 def open_writer(config: RecordConfig, env: HandrailEnv) -> EpisodeWriter:

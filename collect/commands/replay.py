@@ -20,6 +20,7 @@ from handrail.controllers.arrays import FloatArray
 from handrail.controllers.entries import is_count
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.intent import Intent
+from handrail.datasets.format.columns import CLIENT
 from handrail.datasets.reading.reader import read_episodes, read_frames, read_info
 from handrail.datasets.recording.frames import Frame
 from handrail.datasets.recording.piece import TRIMMED
@@ -39,6 +40,7 @@ class Replay:
         recorded_success: what the dataset says.
         success: what happened now.
         contacts: forbidden contacts that began now.
+        robot_client: the robot of LeRobot's that was driven through its client; empty if it was none.
     """
 
     episode: int
@@ -48,6 +50,7 @@ class Replay:
     recorded_success: bool
     success: bool
     contacts: int
+    robot_client: str = ""
 
     @property
     def largest(self) -> float:
@@ -108,6 +111,7 @@ def replay_episode(
         recorded_success=bool(row.get("success")),
         success=outcome.success,
         contacts=outcome.contacts,
+        robot_client=str(row.get(CLIENT) or ""),
     )
     return replay, camera.taken
 

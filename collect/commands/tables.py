@@ -21,6 +21,8 @@ def summary_table(root: Path) -> Table:
     rows = summarize(root)
     known = [row.success for row in rows if row.success is not None]
     caption = f"{len(rows)} episodes" + (f", {sum(known)} succeeded" if known else "")
+    clients = sorted({row.robot_client for row in rows if row.robot_client})
+    caption += f"; driven through the client of {', '.join(clients)}" if clients else ""
     tasks = {row.task for row in rows}
     left_out = (*CHATTERING, *(("task",) if len(tasks) == 1 else ()))
     title = f"{root}\n{tasks.pop()}" if len(tasks) == 1 else str(root)

@@ -5,8 +5,10 @@
     robot.type   handrail_sim
     teleop.type  handrail_scripted, handrail_cockpit, handrail_gamepad
     env.type     handrail
+    a step of processors: handrail_masked_mpc
 """
 
+import handrail.collect.processor.mpc_step  # noqa: F401  (registers the step)
 from handrail.collect.lerobot.config_cockpit import HandrailCockpitConfig
 from handrail.collect.lerobot.config_env import HandrailEnvConfig
 from handrail.collect.lerobot.config_gamepad import HandrailGamepadConfig

@@ -10,11 +10,13 @@ from numpy.typing import ArrayLike, NDArray
 from handrail.collect.config import SessionConfig
 from handrail.collect.envs.env import Observation
 from handrail.collect.envs.observation import box_space
+from handrail.collect.envs.obstacle_numbers import MOST, WIDTH, to_numbers
 from handrail.collect.lerobot.mode_action import ModeAction
 from handrail.collect.session.build import build_controller, build_env, build_mode
 from handrail.collect.session.driver import Driver
 from handrail.collect.simulation.rendering import Painter
 from handrail.controllers.baselines.direct import DirectController
+from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import Controller
 from handrail.controllers.interface.intent import Intent
@@ -53,12 +55,7 @@ class EvaluatedEnv(gymnasium.Wrapper[Observation, NDArray[np.float32], Observati
         self._channels = Channels.of(env.model.description)
         self._action, self._controller = self._steered(config, fps) if mode else (None, self._direct())
         self._joined = scene_in_state
-        if scene_in_state:
-            parts = dict(env.observation_space.spaces)  # pyright: ignore[reportAttributeAccessIssue]
-            parts.pop("environment_state")
-            self.observation_space = spaces.Dict(
-                parts | {"agent_pos": box_space(len(env.agent_names) + len(env.state_names))}
-            )
+        self.observation_space = self._space_shown(env.observation_space)
         size = len(self._action.names) if self._action else env.model.size + 1
         self.action_space = spaces.Box(-_MOST, _MOST, (size,), np.float32)
         self._max_episode_steps = env._max_episode_steps  # LeRobot asks for it
@@ -84,8 +81,18 @@ class EvaluatedEnv(gymnasium.Wrapper[Observation, NDArray[np.float32], Observati
         return self._shown(observation), _plain(info)
 
     def step(self, action: ArrayLike) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
-        """Do what an action asks for, for one period."""
-        self._driver.drive(self._steps, self._env.state(), self._intent(np.asarray(action, np.float64)))
+        """Do what an action asks for, for one period.
+
+        Raises:
+            HandrailError: it has another size.
+        """
+        numbers = np.asarray(action, np.float64)
+        if numbers.shape != self.action_space.shape:
+            raise HandrailError(
+                f"action of --env.type=handrail: expected {self._meant}, got {numbers.size} numbers;"
+                " --env.mode is for policies that write a mode's channels, and for no others"
+            )
+        self._driver.drive(self._steps, self._env.state(), self._intent(numbers))
         observation, reward, terminated, truncated, info = self._env.step(self._driver.action(self._steps))
         self._steps += 1
         return self._shown(observation), reward, terminated, truncated, _plain(info)
@@ -106,6 +113,11 @@ class EvaluatedEnv(gymnasium.Wrapper[Observation, NDArray[np.float32], Observati
             self._painter.close()
         self._painter = None
 
+    @property
+    def _meant(self) -> str:
+        names = self._action.names if self._action else (*self._env.model.joints, "gripper")
+        return ", ".join(names)
+
     def _intent(self, numbers: NDArray[np.float64]) -> Intent:
         time, gripper = self._env.state().time, float(numbers[-1] > _HALF)
         if self._action:
@@ -114,10 +126,26 @@ class EvaluatedEnv(gymnasium.Wrapper[Observation, NDArray[np.float32], Observati
         values[self._channels.joint_slice] = numbers[:-1]
         return Intent(values, self._channels.mask("joint"), gripper, time=time)
 
+    def _space_shown(self, plain: spaces.Space[Any]) -> spaces.Dict:
+        assert isinstance(plain, spaces.Dict)
+        shown: dict[str, spaces.Space[Any]] = dict(plain.spaces)
+        if self._joined:
+            del shown["environment_state"]
+            shown["agent_pos"] = box_space(len(self._env.agent_names) + len(self._env.state_names))
+        shapes = {"time": (1,), "sent": (self._env.model.size,), "obstacles": (MOST, WIDTH)}
+        told = {name: spaces.Box(-np.inf, np.inf, shape, np.float32) for name, shape in shapes.items()}
+        return spaces.Dict(shown | told)
+
     def _shown(self, observation: Observation) -> Observation:
-        if not self._joined:
-            return observation
-        return joined(observation)
+        """Return what policies see, and what completes their intents: LeRobot hands both on."""
+        shown, state = dict(observation), self._env.state()
+        if self._joined:
+            shown["agent_pos"] = np.concatenate([shown["agent_pos"], shown.pop("environment_state")])
+        return shown | {
+            "time": np.array([state.time], np.float32),
+            "sent": state.commanded.astype(np.float32),
+            "obstacles": to_numbers(self._env.obstacles()),
+        }
 
     def _direct(self) -> Controller:
         return DirectController(self._env.model, self._env.period)
@@ -125,13 +153,6 @@ class EvaluatedEnv(gymnasium.Wrapper[Observation, NDArray[np.float32], Observati
     def _steered(self, config: SessionConfig, fps: int) -> tuple[ModeAction, Controller]:
         mode = build_mode(config, self._env.model)
         return ModeAction(mode, self._channels), build_controller(mode, self._env.model, fps, config.task)
-
-
-def joined(observation: Observation) -> Observation:
-    """Return an observation with robot and scene in one vector, as `lerobot-record` records them."""
-    parts = dict(observation)
-    scene = parts.pop("environment_state")
-    return parts | {"agent_pos": np.concatenate([parts["agent_pos"], scene])}
 
 
 def _plain(info: dict[str, Any]) -> dict[str, Any]:

@@ -12,6 +12,7 @@ import pyarrow as pa
 from handrail.controllers.errors import HandrailError
 
 Scalar = str | bool | int | float
+CLIENT = "robot_client"  # which of LeRobot's robots was driven through its client; empty or missing for none
 ColumnTypes = dict[str, pa.DataType]
 
 RESERVED = ("episode_index", "tasks", "length", "dataset_from_index", "dataset_to_index")

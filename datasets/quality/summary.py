@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray
+from handrail.datasets.format.columns import CLIENT
 from handrail.datasets.quality import motion, safety
 from handrail.datasets.quality.demonstration import Demonstration, DoesNotApply
 from handrail.datasets.quality.load import read_demonstrations
@@ -43,6 +44,7 @@ class EpisodeSummary:
         high_frequency_content: Of the commanded velocities, see `metrics.high_frequency_content`.
         corrections: How often the command began or ceased to differ from what was asked, on the joints that
             the operator commanded one by one; None without any: what is not commanded is not corrected.
+        robot_client: The robot of LeRobot's that was driven through its client; None if it was none.
     """
 
     episode: int
@@ -57,6 +59,7 @@ class EpisodeSummary:
     rate_of_change: float | None
     high_frequency_content: float | None
     corrections: int | None
+    robot_client: str | None = None
 
     def cells(self) -> dict[str, str]:
         """Return the line as text, by heading."""
@@ -104,6 +107,7 @@ def _summary(episode: Demonstration) -> EpisodeSummary:
         rate_of_change=_known(rate_of_change(commands, episode.fps)),
         high_frequency_content=_known(high_frequency_content(commands, episode.fps)),
         corrections=_corrections(episode),
+        robot_client=episode.meta.get(CLIENT) or None,
     )
 
 

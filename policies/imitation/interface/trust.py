@@ -22,8 +22,9 @@ CONFIG, WEIGHTS = "config.json", "model.safetensors"
 PROCESSORS = ("policy_preprocessor.json", "policy_postprocessor.json")
 # notes, by which nothing is loaded
 _NOTES = ("pretrained_path", "pretrained_revision", "repo_id", "license", "tags")
-# what names no place: kinds are registered names, the device is the user's, a state file is checked by itself
-_NO_PLACE = ("type", "device", "registry_name", "state_file")
+# what names no place: kinds are registered names, the device is the user's, a state file is checked by
+# itself, the rest are names of numbers
+_NO_PLACE = ("type", "device", "registry_name", "state_file", "action_names", "action_feature_names")
 
 
 def check_links(folder: Path) -> None:
@@ -69,7 +70,8 @@ def check_policy_folder(folder: Path, asked: Iterable[Any] = ()) -> dict[str, An
     _check_places(folder / CONFIG, settings, known)
     for name in PROCESSORS:
         for step in _steps(folder / name, settings["type"]):
-            _check_places(folder / name, step, known)
+            if step["registry_name"] not in _ours():  # their settings are names, which they check themselves
+                _check_places(folder / name, step, known)
     if not (folder / WEIGHTS).is_file():
         raise HandrailError(f"policy {str(folder)!r}: expected weights in {WEIGHTS}, found none")
     return settings
@@ -132,6 +134,13 @@ def _registered_steps(policy: str) -> frozenset[str]:
     with contextlib.suppress(ImportError):  # what is missing for it is said when it is loaded
         importlib.import_module(module)  # where LeRobot looks for them; beside a registered policy
     return frozenset(ProcessorStepRegistry.list())
+
+
+def _ours() -> tuple[str, ...]:
+    """Return the names of the steps of handrail-train."""
+    from handrail.policies.imitation.interface.steps import NAMES
+
+    return NAMES
 
 
 def _defaults(kind: type) -> Iterator[Any]:

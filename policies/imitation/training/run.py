@@ -22,6 +22,7 @@ from torch.utils.data import BatchSampler
 
 from handrail.datasets.storage.atomic import publish_folder
 from handrail.policies.imitation.interface.checkpoint import MODEL, point_to
+from handrail.policies.imitation.interface.completion import Completion
 from handrail.policies.imitation.interface.interface import PolicyInterface
 from handrail.policies.imitation.interface.steps import with_steps
 from handrail.policies.imitation.training.curve import Curve
@@ -45,6 +46,7 @@ class Run:
         finish: called with the `pretrained_model` folder of every new checkpoint and its step.
         quiet: whether to show no progress.
         interface: what the policy reads and writes, for the checkpoints; None if that is what was recorded.
+        completion: what completes its intents.
     """
 
     settings: TrainPipelineConfig
@@ -53,6 +55,7 @@ class Run:
     finish: Callable[[Path, int], None]
     quiet: bool = False
     interface: PolicyInterface | None = None
+    completion: Completion | None = None
 
     def train(self) -> None:
         """Train to the end; one of the processes writes checkpoints and the curve, and shows the progress.
@@ -127,7 +130,7 @@ class Run:
         draft = folder.with_name(f".{folder.name}")
         shutil.rmtree(draft, ignore_errors=True)
         policy, processes = accelerator.unwrap_model(learner.policy), accelerator.num_processes
-        around = with_steps(learner.before, learner.after, self.interface)
+        around = with_steps(learner.before, learner.after, self.interface, self.completion)
         parts = (policy, learner.optimizer, learner.schedule, *around)
         save_checkpoint(draft, step, self.settings, *parts, processes, self.settings.batch_size)
         self.finish(draft / MODEL, step)

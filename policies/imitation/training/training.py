@@ -31,6 +31,8 @@ from handrail.policies.imitation.training.source import Source, read_source
 if TYPE_CHECKING:
     from lerobot.configs.train import TrainPipelineConfig
 
+    from handrail.policies.imitation.interface.completion import Completion
+
 _LOG_EVERY = 50  # updates
 _WARMUP = 500  # updates in which the learning rate rises, or a tenth of all if that is fewer
 
@@ -82,6 +84,7 @@ def _run(config: TrainConfig, source: Source, steps: int, checkpoint: Path | Non
         lambda folder, step: write_meta(folder, source.interface, _meta(source, step)),
         quiet,
         source.interface,
+        _completion(_meta(source, steps)),
     ).train()
 
 
@@ -161,6 +164,12 @@ def _meta(source: Source, steps: int) -> PolicyMeta:
         episodes=[int(row["episode_index"]) for row in rows],
         data=source.digest,
     )
+
+
+def _completion(meta: PolicyMeta) -> "Completion":
+    from handrail.policies.imitation.interface.completion import Completion
+
+    return Completion(meta.robot, meta.environment, meta.mode, meta.fps)
 
 
 def _robot(source: Source) -> str:

@@ -9,12 +9,15 @@ import pytest
 from command_helpers import command
 from lekiwi_helpers import ZERO, PlayedClient
 
+from handrail.collect.commands.replay import replay_episode
+from handrail.collect.commands.tables import summary_table
 from handrail.collect.lekiwi import client_env
 from handrail.collect.lekiwi.client_plant import ClientPlant
 from handrail.collect.lekiwi.link import Link
 from handrail.collect.simulation.scene import Scene, Viewpoint
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.robot.model import load_model
+from handrail.datasets.reading.reader import read_episodes
 
 FLAGS = ("--robot", "lekiwi", "--robot_client", "lekiwi", "--task", "reach", "--client.simulated")
 
@@ -48,6 +51,10 @@ def test_an_episode_through_the_client_reaches_its_goal(tmp_path):
     assert client.body.contacts == 0
     assert all(client.sent[-1][name] == 0.0 for name in ZERO)
     assert not client.connected
+    robots = {row["robot_client"] for row in read_episodes(tmp_path / "set")}
+    assert robots == {"lekiwi (simulated)"}
+    assert "driven through the client of lekiwi (simulated)" in summary_table(tmp_path / "set").caption
+    assert replay_episode(tmp_path / "set", 1)[0].robot_client == "lekiwi (simulated)"
 
 
 def test_a_robot_that_is_silent_for_a_moment_brakes_and_one_that_stays_so_ends_the_recording(tmp_path):

@@ -33,6 +33,23 @@ while True:
     print(client.get_observation()["x.vel"], flush=True)
 """
 
+CAMERAS = """
+import json, sys, time
+from lerobot.robots.lekiwi import LeKiwiClient, LeKiwiClientConfig
+ports = map(int, sys.argv[1:])
+client = LeKiwiClient(LeKiwiClientConfig("127.0.0.1", *ports, connect_timeout_s=60))
+client.connect()
+for _ in range(100):
+    said = client.get_observation()
+    if all(said[name].any() for name in ("front", "wrist")):
+        break
+    time.sleep(0.1)
+def told(picture):
+    return {"shape": picture.shape, "kind": str(picture.dtype), "spread": float(picture.std())}
+print(json.dumps({name: told(said[name]) for name in ("front", "wrist")}))
+client.disconnect()
+"""
+
 
 def free_ports() -> tuple[int, int]:
     with socket.socket() as one, socket.socket() as other:
@@ -84,6 +101,26 @@ def test_the_base_stops_when_its_client_is_killed(host):
     assert seen["base_stops"] >= 1
     assert seen["base_speed"] < 1e-3
     assert still[0] > -0.45  # it has come along
+
+
+@pytest.mark.needs_gl
+def test_lerobot_s_client_sees_what_the_cameras_paint(tmp_path):
+    """Two cameras of LeKiwi's own sizes, painted by the host, coded, sent and decoded."""
+    host = Host(tmp_path, "--cameras", "front,wrist")
+    driver = subprocess.run(
+        [sys.executable, "-c", CAMERAS, *map(str, host.ports)],
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE,
+    )
+    host.end()
+    assert driver.returncode == 0, driver.stderr
+    seen = json.loads(driver.stdout.splitlines()[-1])
+    assert seen["front"]["shape"] == [480, 640, 3]
+    assert seen["wrist"]["shape"] == [640, 480, 3]
+    for name, picture in seen.items():
+        assert picture["kind"] == "uint8"
+        assert picture["spread"] > 10.0, name  # something is to be seen
 
 
 def test_an_episode_is_recorded_through_the_network(tmp_path, host):

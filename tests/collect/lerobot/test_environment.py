@@ -28,8 +28,10 @@ def test_what_a_policy_reads_is_what_its_features_say(task):
     config, env = made(task=task)
     features = env_to_policy_features(config)
     observation, _ = env.reset(seed=[3])
+    told = {f"observation.{name}" for name in ("time", "sent", "obstacles")}  # to what completes intents
     seen = preprocess_observation(observation)
-    assert {key: values.shape[1:] for key, values in seen.items()} == {
+    assert told <= seen.keys()
+    assert {key: values.shape[1:] for key, values in seen.items() if key not in told} == {
         key: feature.shape for key, feature in features.items() if key != "action"
     }
     assert env.single_action_space.shape == features["action"].shape
@@ -72,7 +74,7 @@ def test_what_lerobot_records_of_our_robot_is_what_a_policy_reads_and_writes(mod
     assert observation["agent_pos"].shape == (1, len(robot.observation_features))
     after, *_ = env.step(np.zeros((1, *features["action"].shape), np.float32))
     assert after["agent_pos"].shape == observation["agent_pos"].shape
-    alone = build_env(config.session(), 20)
+    alone = build_env(SessionConfig(task="pick_place"), 20)
     expected, _ = alone.reset(seed=FIRST_SEED + 5)
     said = dict(zip(robot.observation_features, observation["agent_pos"][0], strict=True))
     for names, part in ((alone.agent_names, "agent_pos"), (alone.state_names, "environment_state")):

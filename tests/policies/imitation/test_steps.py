@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,8 +14,10 @@ from training_helpers import CHANNELS, ENVIRONMENT, STATE, frame, tiny, write_da
 
 from handrail.controllers.errors import HandrailError
 from handrail.policies.imitation.interface.checkpoint import load_policy
+from handrail.policies.imitation.interface.completion import PolicyCompletionStep
 from handrail.policies.imitation.interface.interface import PolicyInterface
-from handrail.policies.imitation.interface.steps import PolicyActionStep, PolicyViewStep, with_steps
+from handrail.policies.imitation.interface.steps import PolicyActionStep, with_steps
+from handrail.policies.imitation.interface.view_step import PolicyViewStep
 from handrail.policies.imitation.training.training import train
 
 MASKS = tuple(sorted(tuple(CHANNELS.mask(group).tolist()) for group in ("ee", "base")))
@@ -34,9 +37,14 @@ def dataset(tmp_path_factory):
 
 
 @pytest.fixture(scope="module", params=["realised", "intent"])
-def trained(request, dataset, tmp_path_factory):
+def checkpoint(request, dataset, tmp_path_factory):
     output = tmp_path_factory.mktemp(request.param) / "policy"
-    return train(tiny(dataset, output, actions=request.param, steps=3), quiet=True)
+    return request.param, train(tiny(dataset, output, actions=request.param, steps=3), quiet=True)
+
+
+@pytest.fixture
+def trained(checkpoint):
+    return checkpoint[1]
 
 
 def seen():
@@ -52,6 +60,9 @@ def test_plain_loading_acts_as_the_interface_does(trained):
     config = PreTrainedConfig.from_pretrained(trained)
     policy = get_policy_class(config.type).from_pretrained(trained, config=config)
     before, after = make_pre_post_processors(config, str(trained))
+    steps: list[Any] = list(after.steps)
+    if isinstance(steps[-1], PolicyCompletionStep):  # has a test of its own
+        after.steps = [*steps[:-1], PolicyActionStep(steps[-1].interface)]
     ours, raw = load_policy(trained), seen()
     state, environment = raw.values()
     for _ in range(3):
@@ -94,12 +105,24 @@ def test_nothing_is_added_where_the_policy_reads_what_is_recorded():
     assert with_steps(*around, None) == around
 
 
+def test_a_checkpoint_of_intents_says_what_completes_them(checkpoint):
+    actions, folder = checkpoint
+    steps = json.loads((folder / "policy_postprocessor.json").read_text())["steps"]
+    (completes,) = [step["config"]["completion"] for step in steps if "completion" in step["config"]] or [
+        None
+    ]
+    by = {"robot": "ridgeback_ur10", "task": "reach", "mode": "ee", "fps": 20}
+    assert completes == (by if actions == "intent" else None)
+
+
 @pytest.mark.slow
-def test_a_fresh_process_that_discovers_our_package_loads_it(trained):
+def test_a_fresh_process_that_discovers_our_package_loads_it(checkpoint):
+    actions, trained = checkpoint
     done = subprocess.run([sys.executable, "-c", FRESH, str(trained)], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     assert "handrail_policy_view" in done.stdout
-    assert "handrail_policy_action" in done.stdout
+    acts = {"intent": "handrail_policy_mpc", "realised": "handrail_policy_action"}
+    assert acts[actions] in done.stdout
 
 
 def test_a_training_that_goes_on_keeps_the_steps_and_adds_none(dataset, tmp_path):

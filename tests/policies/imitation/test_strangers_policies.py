@@ -65,6 +65,20 @@ def test_what_is_honest_is_loaded(policy):
     assert load_policy(policy).meta
 
 
+def test_files_that_are_called_like_what_a_policy_reads_do_no_harm(policy, tmp_path, monkeypatch):
+    """The names in a view are names of numbers, and lead nowhere."""
+    (home := tmp_path / "home").mkdir()
+    interface = json.loads((policy / "handrail.json").read_text())["interface"]
+    for name in ("ridgeback_ur10", "reach", "ee", *interface["state_names"], *interface["channels"]):
+        (home / name).touch()
+    monkeypatch.chdir(home)
+    assert load_policy(policy).meta
+    steps = json.loads((policy / PROCESSORS[0]).read_text())["steps"]
+    view = {"registry_name": "handrail_policy_view", "config": {"interface": interface}}
+    change(policy / PROCESSORS[0], steps=[view, *steps])
+    assert load_policy(policy).meta
+
+
 @pytest.mark.parametrize("file", PROCESSORS)
 @pytest.mark.parametrize(
     ("name", "config"),
