@@ -57,6 +57,15 @@ def one_scalar(value: str | bool | int | float | None, kind: pa.DataType) -> pa.
     return strings([str(value)]) if kind == pa.string() else numbers(np.array([value]), kind)
 
 
+def plain_values(column: pa.ChunkedArray) -> list:
+    """Return a column as Python values; equal texts are one object, since episodes repeat their settings."""
+    if column.type != pa.string():
+        return column.to_pylist()
+    encoded = column.combine_chunks().dictionary_encode()
+    texts = encoded.dictionary.to_pylist()
+    return [None if place is None else texts[place] for place in encoded.indices.to_pylist()]
+
+
 def to_numpy(values: pa.Array) -> np.ndarray:
     """Return an Arrow array of numbers or truth values as a numpy array, `(N,)`; nulls become NaN."""
     if values.null_count:

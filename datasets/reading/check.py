@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from handrail.controllers.errors import HandrailError
+from handrail.datasets.format.data_file import data_files
 from handrail.datasets.format.layout import Layout
 from handrail.datasets.format.manifest import read_manifest
 from handrail.datasets.format.metadata import ForeignLineError
@@ -93,11 +94,12 @@ def _files(info: DatasetInfo) -> Iterator[str]:
 def _unread(info: DatasetInfo) -> list[str]:
     """Return which episodes of a dataset without checksums cannot be read."""
     said = [f"{name}: missing" for name in sorted(set(_files(info))) if not (info.root / name).is_file()]
-    for row in read_episodes(info.root):
-        try:
-            read_rows_of(info, row)
-        except HandrailError as error:
-            said.append(f"episode {row['episode_index']}: {error}")
+    with data_files() as files:
+        for row in read_episodes(info.root):
+            try:
+                read_rows_of(info, row, files=files)
+            except HandrailError as error:
+                said.append(f"episode {row['episode_index']}: {error}")
     return said
 
 

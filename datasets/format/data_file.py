@@ -1,0 +1,105 @@
+"""The rows of an episode in a file that may hold many: opened once, its row groups found by halving.
+
+Episodes lie in a file in their order, so the statistics of `episode_index` say in log₂(groups) steps where
+one begins. A file whose statistics do not say, or say it wrongly, is read whole.
+"""
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from handrail.datasets.format.arrow import numbers, to_numpy
+
+_EPISODE = "episode_index"
+
+
+class DataFile:
+    """A parquet of rows, open until `close`."""
+
+    def __init__(self, path: Path):
+        """Open it.
+
+        Raises:
+            OSError, pyarrow.ArrowException, ValueError: It is not there, not whole, or has no episodes.
+        """
+        self.path = path
+        self._file = pq.ParquetFile(path)
+        self._groups = self._file.num_row_groups
+        leaves = [self._file.schema.column(place).path for place in range(len(self._file.schema))]
+        self._column = leaves.index(_EPISODE)
+
+    def rows(self, episode: int, length: int, columns: Sequence[str]) -> pa.Table:
+        """Return the rows of an episode, in their order.
+
+        Args:
+            episode: Its number.
+            length: How many rows it should have; another number is an error of the caller's to raise.
+            columns: Which columns.
+
+        Raises:
+            OSError, pyarrow.ArrowException, KeyError: A row group or a column cannot be read.
+        """
+        wanted = list(dict.fromkeys((_EPISODE, *columns)))
+        found = self._read(self._near(episode), episode, wanted)
+        return found if found.num_rows == length else self._read(range(self._groups), episode, wanted)
+
+    def close(self) -> None:
+        """Give the file free; safe to call twice."""
+        self._file.close()
+
+    def _read(self, groups: Sequence[int], episode: int, columns: list[str]) -> pa.Table:
+        table = self._file.read_row_groups(list(groups), columns=columns, use_threads=False)
+        mask = to_numpy(table.column(_EPISODE).combine_chunks()) == episode
+        return table if mask.all() else table.filter(numbers(mask, pa.bool_()))
+
+    def _near(self, episode: int) -> range:
+        """Return the row groups that may hold an episode, if the groups are in its order."""
+        return range(self._first(episode, after=False), self._first(episode, after=True))
+
+    def _first(self, episode: int, after: bool) -> int:
+        """Return the first row group with rows of this episode or a later one, or of a later one only."""
+        low, high = 0, self._groups
+        while low < high:
+            middle = (low + high) // 2
+            span = self._file.metadata.row_group(middle).column(self._column).statistics
+            if span is None or not span.has_min_max:
+                return self._groups if after else 0
+            if (span.min > episode) if after else (span.max >= episode):
+                high = middle
+            else:
+                low = middle + 1
+        return low
+
+
+class DataFiles:
+    """Hands out data files by their paths and keeps the last one open: episodes are mostly read in order."""
+
+    def __init__(self) -> None:
+        """Begin without an open file."""
+        self._last: DataFile | None = None
+
+    def open(self, path: Path) -> DataFile:
+        """Return a file, opened unless it was the last one asked for."""
+        if self._last is None or self._last.path != path:
+            self.close()
+            self._last = DataFile(path)
+        return self._last
+
+    def close(self) -> None:
+        """Close what is open."""
+        if self._last is not None:
+            self._last.close()
+        self._last = None
+
+
+@contextmanager
+def data_files() -> Iterator[DataFiles]:
+    """Provide data files that are closed in the end."""
+    files = DataFiles()
+    try:
+        yield files
+    finally:
+        files.close()
