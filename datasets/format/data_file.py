@@ -31,26 +31,34 @@ class DataFile:
         leaves = [self._file.schema.column(place).path for place in range(len(self._file.schema))]
         self._column = leaves.index(_EPISODE)
 
-    def rows(self, episode: int, length: int, columns: Sequence[str]) -> pa.Table:
+    def rows(self, episode: int, length: int, columns: Sequence[str] | None = None) -> pa.Table:
         """Return the rows of an episode, in their order.
 
         Args:
             episode: Its number.
             length: How many rows it should have; another number is an error of the caller's to raise.
-            columns: Which columns.
+            columns: Which columns; all of them without.
 
         Raises:
             OSError, pyarrow.ArrowException, KeyError: A row group or a column cannot be read.
         """
-        wanted = list(dict.fromkeys((_EPISODE, *columns)))
+        wanted = None if columns is None else list(dict.fromkeys((_EPISODE, *columns)))
         found = self._read(self._near(episode), episode, wanted)
         return found if found.num_rows == length else self._read(range(self._groups), episode, wanted)
+
+    def all(self) -> pa.Table:
+        """Return all rows.
+
+        Raises:
+            OSError, pyarrow.ArrowException: They cannot be read.
+        """
+        return self._file.read(use_threads=False)
 
     def close(self) -> None:
         """Give the file free; safe to call twice."""
         self._file.close()
 
-    def _read(self, groups: Sequence[int], episode: int, columns: list[str]) -> pa.Table:
+    def _read(self, groups: Sequence[int], episode: int, columns: list[str] | None) -> pa.Table:
         table = self._file.read_row_groups(list(groups), columns=columns, use_threads=False)
         mask = to_numpy(table.column(_EPISODE).combine_chunks()) == episode
         return table if mask.all() else table.filter(numbers(mask, pa.bool_()))
