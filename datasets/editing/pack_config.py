@@ -1,5 +1,6 @@
 """Settings of `handrail-pack` and `handrail-merge`; light to import."""
 
+import shlex
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -8,6 +9,8 @@ import tyro
 
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.lists import Words
+
+MANY = 500  # episodes in files of their own
 
 
 @dataclass(frozen=True)
@@ -72,6 +75,14 @@ class MergeConfig:
         if not self.output:
             raise HandrailError("merge: expected --output FOLDER for the new dataset, got none")
         return _apart(self.output, self.roots)
+
+
+def packing_advice(root: Path) -> str:
+    """Return how to pack a dataset that has become slow to open for its many files, or ""."""
+    count = sum(1 for _ in root.glob("data/*/*.parquet"))
+    if count <= MANY:
+        return ""
+    return f"{count} files of rows are slow to open: handrail-pack {shlex.quote(str(root))} makes few of them"
 
 
 def _apart(output: str, roots: tuple[Path, ...]) -> Path:

@@ -14,6 +14,7 @@ import pyarrow.parquet as pq
 from handrail.datasets.format.arrow import numbers, to_numpy
 
 _EPISODE = "episode_index"
+_MOST_OPEN = 16  # files; a file of a thousand episodes takes some 10 MB of memory
 
 
 class DataFile:
@@ -83,24 +84,24 @@ class DataFile:
 
 
 class DataFiles:
-    """Hands out data files by their paths and keeps the last one open: episodes are mostly read in order."""
+    """Hands out data files by their paths and keeps those that were asked for last open."""
 
     def __init__(self) -> None:
         """Begin without an open file."""
-        self._last: DataFile | None = None
+        self._open: dict[Path, DataFile] = {}
 
     def open(self, path: Path) -> DataFile:
-        """Return a file, opened unless it was the last one asked for."""
-        if self._last is None or self._last.path != path:
-            self.close()
-            self._last = DataFile(path)
-        return self._last
+        """Return a file, opened unless it is among the last few that were asked for."""
+        found = self._open.pop(path, None) or DataFile(path)
+        if len(self._open) == _MOST_OPEN:
+            self._open.pop(next(iter(self._open))).close()
+        self._open[path] = found
+        return found
 
     def close(self) -> None:
         """Close what is open."""
-        if self._last is not None:
-            self._last.close()
-        self._last = None
+        while self._open:
+            self._open.popitem()[1].close()
 
 
 @contextmanager

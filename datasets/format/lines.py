@@ -50,6 +50,7 @@ class Lines:
         files: Seals of the volume's data and video files by relative path.
         totals: What all episodes up to the last one here add up to; None where that was not kept.
         origin: SHA-256 of the line that the episode had before it was set aside and put back, or "".
+        table: All columns, where they were read at once.
     """
 
     path: Path
@@ -58,6 +59,7 @@ class Lines:
     files: Mapping[str, FileSeal]
     totals: Totals | None
     origin: str
+    table: pa.Table | None
 
     @classmethod
     def read(cls, path: Path) -> "Lines":
@@ -75,13 +77,16 @@ class Lines:
                     " dataset that another tool has appended to; record into another folder"
                 )
             names = tuple(name for name in file.schema_arrow.names if not name.startswith(_STATS))
-            table = file.read(columns=list(names), use_threads=False)
+            at_once = _TOTALS not in marks  # the statistics are needed, since no sum of them is there
+            table = file.read(columns=None if at_once else list(names), use_threads=False)
         rows = tuple(zip(*(plain_values(table.column(name)) for name in names), strict=True))
         if not rows:
             raise ValueError("no line")
         seals = {inside(name): FileSeal(*seal) for name, seal in parse_json(marks[_SEALS]).items()}
         totals = _totals(parse_json(marks[_TOTALS])) if _TOTALS in marks else None
-        return cls(path, names, rows, seals, totals, marks.get(_ORIGIN, b"").decode())
+        return cls(
+            path, names, rows, seals, totals, marks.get(_ORIGIN, b"").decode(), table if at_once else None
+        )
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -131,10 +136,10 @@ class Lines:
     def _stats(self) -> dict[str, dict[str, np.ndarray]]:
         """Statistics by column and name, `(E, d)`, or `(E, 3, 1, 1)` for cameras; what is not finite is 0."""
         found: dict[str, dict[str, np.ndarray]] = {}
-        with pq.ParquetFile(self.path) as file:
-            names = [name for name in file.schema_arrow.names if name.startswith(_STATS)]
-            table = file.read(columns=names, use_threads=False)
-        for name in names:
+        table = self.table
+        if table is None:
+            table = pq.read_table(self.path, use_threads=False, partitioning=None)
+        for name in [name for name in table.column_names if name.startswith(_STATS)]:
             key, statistic = name.removeprefix(_STATS).rsplit("/", 1)
             shape = (len(self), *_shape(table.schema.field(name).type))
             values = flat_numbers(table.column(name)).reshape(shape)

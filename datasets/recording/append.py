@@ -13,7 +13,7 @@ from handrail.datasets.format.lines import lines_bytes
 from handrail.datasets.format.manifest import Manifest
 from handrail.datasets.format.metadata import EpisodeRecord, FileSeal, Totals
 from handrail.datasets.format.stats import Stats
-from handrail.datasets.format.tables import parquet_bytes
+from handrail.datasets.format.tables import data_schema, parquet_bytes
 from handrail.datasets.recording.piece import Piece
 from handrail.datasets.recording.volume import pictures_of
 from handrail.datasets.storage.atomic import make_folder, move, remove, sync_file, write_synced
@@ -49,7 +49,7 @@ def append_episode(
     number, staging = totals.episodes, layout.staging
     streams = {layout.data(number): staging / "data.parquet"}
     with data_files() as files:
-        table, tasks, stats = piece.rows(manifest, totals, files)
+        table, tasks, stats = piece.rows(data_schema(manifest.features), manifest.fps, totals, files)
     write_synced(staging / "data.parquet", parquet_bytes(table))
     for key, video in piece.videos.items():
         streams[layout.video(key, number)] = staged = staging / f"{key}.mp4"

@@ -17,7 +17,6 @@ from handrail.datasets.format.manifest import Manifest
 from handrail.datasets.format.metadata import EpisodeRecord, Totals
 from handrail.datasets.format.schema import video_keys
 from handrail.datasets.format.stats import Stats, column_stats
-from handrail.datasets.format.tables import data_schema
 
 TRIMMED = "trimmed_start"  # episode column: how many frames were cut off at the beginning
 _SUCCESS, _DONE = "next.success", "next.done"
@@ -80,26 +79,26 @@ class Piece:
         return changed(self, sentences=dict(sentences))
 
     def rows(
-        self, manifest: Manifest, totals: Totals, files: DataFiles
+        self, schema: pa.Schema, fps: int, totals: Totals, files: DataFiles
     ) -> tuple[pa.Table, tuple[str, ...], Stats]:
         """Return the rows in their new place.
 
         Args:
-            manifest: The schema of both datasets.
+            schema: Of the data files of both datasets.
+            fps: Frames a second [Hz].
             totals: What the episodes before it add up to.
             files: Opens the file of the rows.
 
         Returns:
             The rows, their task sentences in order, and the statistics of the columns that have changed.
         """
-        schema = data_schema(manifest.features)
         whole = files.open(self.data).rows(self.record.episode, self.record.length)
         if whole.num_rows != self.record.length:
             raise ValueError(f"{self.data}: {whole.num_rows} rows instead of {self.record.length}")
         whole = whole.select(schema.names).cast(schema)
         table = whole.slice(self.first, self.length)
         tasks, places = self._tasks(whole, table, totals)
-        values = self._counters(manifest.fps, totals) | {"task_index": places} | self._ending(table)
+        values = self._counters(fps, totals) | {"task_index": places} | self._ending(table)
         for name, column in values.items():
             place = table.schema.get_field_index(name)
             kind = table.schema.field(place)

@@ -80,8 +80,9 @@ class _Volume:
         self._joins = {key: VideoJoin(path, manifest.fps) for key, path in streams.items()}
         self._paths = [*streams.values(), layout.data(self._slot)]
         self._sink = pa.OSFile(str(layout.data(self._slot)), "wb")
+        self._schema = data_schema(manifest.features)
         self._rows = pq.ParquetWriter(
-            self._sink, data_schema(manifest.features), compression="snappy", write_statistics=_SEARCHED
+            self._sink, self._schema, compression="snappy", write_statistics=_SEARCHED
         )
 
     def takes(self, stretches: Mapping[str, Stretch]) -> bool:
@@ -96,7 +97,7 @@ class _Volume:
         """Append an episode and return its line."""
         known: dict[str, Scalar] = {n: value for n, value in piece.columns.items() if value is not None}
         extras = fit_columns(known, self._types)
-        table, tasks, stats = piece.rows(self._manifest, totals, files)
+        table, tasks, stats = piece.rows(self._schema, self._manifest.fps, totals, files)
         for key, stretch in stretches.items():
             if piece.is_cut:
                 stats |= {key: pictures_of(piece, key, self._manifest)}

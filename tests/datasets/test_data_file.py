@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from handrail.datasets.format.data_file import data_files
+from handrail.datasets.format import data_file
 
 
 @st.composite
@@ -31,21 +31,24 @@ def test_an_episode_is_found_however_its_file_is_cut(made, tmp_path_factory):
     with pq.ParquetWriter(path, table.schema, write_statistics=statistics) as writer:
         for begin, end in zip([0, *cuts], cuts, strict=False):
             writer.write_table(table.slice(begin, end - begin))
-    with data_files() as opened:
+    with data_file.data_files() as opened:
         for episode in range(owner.min() - 1, owner.max() + 2):
             expected = np.flatnonzero(owner == episode).tolist()
             found = opened.open(path).rows(episode, len(expected), ["place"])
             assert found.column("place").to_pylist() == expected
 
 
-def test_a_file_is_opened_once_while_it_is_asked_for(tmp_path):
-    paths = [tmp_path / name for name in "ab"]
+def test_the_last_few_files_stay_open(tmp_path, monkeypatch):
+    monkeypatch.setattr(data_file, "_MOST_OPEN", 2)
+    one, two, three = paths = [tmp_path / name for name in "abc"]
     for path in paths:
         pq.write_table(pa.table({"episode_index": [0, 1]}), path)
-    with data_files() as files:
-        first = files.open(paths[0])
-        assert files.open(paths[0]) is first
-        assert files.open(paths[1]) is not first
-        assert files.open(paths[0]) is not first
-    with pytest.raises(ValueError, match="closed"):
-        files.open(paths[0]).close() or first.rows(0, 1, ["episode_index"])
+    with data_file.data_files() as files:
+        first, second = files.open(one), files.open(two)
+        assert files.open(one) is first
+        files.open(three)  # and the second, which was asked for least lately, is closed
+        assert files.open(one) is first
+        assert files.open(two) is not second
+    for closed in (first, second):
+        with pytest.raises(ValueError, match="closed"):
+            closed.rows(0, 1)

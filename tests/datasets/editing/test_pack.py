@@ -158,7 +158,7 @@ def test_damage_in_a_packed_file_is_named_and_can_be_set_aside(tmp_path, stream)
     root = record(tmp_path / "set", 4, cameras=True)
     merge_datasets([root], root)
     before = [frames for _, frames in content(root)]
-    (path, *_) = sorted(root.glob(f"{stream}/**/*.*"))
+    (path, *_) = sorted(path for path in (root / stream).rglob("*") if path.is_file())
     raw = bytearray(path.read_bytes())
     middle = len(raw) // 3
     raw[middle : middle + 200] = bytes(200)
@@ -188,7 +188,7 @@ def test_a_merge_that_fails_changes_nothing(tmp_path):
 
 def test_the_commands_say_what_they_wrote(whole, tmp_path):
     done = command(whole, "--output", tmp_path / "packed", name="pack")
-    assert done.stdout == f"{tmp_path / 'packed'}: 7 episodes, 77 frames (of 77)\n"
+    assert done.stdout == f"{tmp_path / 'packed'}: 7 episodes, 74 frames (of 74)\n"
     root = part(tmp_path / "set", 0, 3)
     assert command(root, name="pack").returncode == 0
     assert len(list(root.glob("data/*/*"))) == 1
