@@ -21,6 +21,7 @@ from handrail.collect.session.display import Display
 from handrail.collect.session.outcome import Outcome
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.registry import resolved
+from handrail.datasets.editing.pack_config import packing_advice
 from handrail.datasets.format.layout import Layout
 from handrail.datasets.recording.folder import check_target
 from handrail.datasets.recording.writer import EpisodeWriter
@@ -165,6 +166,8 @@ def _report(config: RecordConfig, writer: EpisodeWriter, log: _Log, console: Con
         highlight=False,
         soft_wrap=True,
     )
+    if advice := packing_advice(writer.root):
+        console.print(advice, **PLAIN)
     if OPERATORS.find(config.operator).interactive and writer.num_episodes:
         console.print(next_commands(writer.root), **PLAIN)
 

@@ -3,51 +3,25 @@
 A new dataset is written from episodes of old ones, in one pass; it has its name only when it is whole.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
-from itertools import chain
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import pyarrow as pa
 
-from handrail.controllers.errors import HandrailError, unknown_name
+from handrail.controllers.errors import unknown_name
 from handrail.datasets.editing.config import EditConfig
 from handrail.datasets.editing.idle import STATE, SUCCESS, moving_stretch
-from handrail.datasets.editing.merge import check_alike, merged_encodings, merged_types
+from handrail.datasets.editing.pack import Edited, check_free, merge_datasets, taken
 from handrail.datasets.editing.selection import chosen_episodes, split_parts
 from handrail.datasets.editing.source import Source
 from handrail.datasets.format.columns import ColumnTypes
 from handrail.datasets.quality.demonstration import Demonstration
 from handrail.datasets.reading.reader import read_rows_of
-from handrail.datasets.recording.checksums import Checksums
-from handrail.datasets.recording.drop import check_nothing_set_aside
 from handrail.datasets.recording.piece import TRIMMED, Piece
-from handrail.datasets.recording.repair import tidy_locked
-from handrail.datasets.recording.rewrite import settle, write_anew
+from handrail.datasets.recording.rewrite import write_anew
 from handrail.datasets.storage.atomic import explained
-from handrail.datasets.storage.lock import DatasetLock
 
 _LABELS = {"success": pa.bool_(), "failure_reason": pa.string()}
-
-
-@dataclass(frozen=True)
-class Edited:
-    """A dataset that was written.
-
-    Attributes:
-        root: Its folder.
-        episodes: Number of episodes.
-        frames: Number of frames.
-        before: Number of frames of the datasets that it came from.
-    """
-
-    root: Path
-    episodes: int
-    frames: int
-    before: int
-
-    def __str__(self) -> str:
-        return f"{self.root}: {self.episodes} episodes, {self.frames} frames (of {self.before})"
 
 
 def edit(config: EditConfig) -> list[Edited]:
@@ -63,52 +37,38 @@ def edit(config: EditConfig) -> list[Edited]:
 
 
 def _in_place(config: EditConfig) -> Edited:
-    root = config.target
-    if settle(root):
-        raise HandrailError(
-            f"dataset {str(root)!r}: an edit was cut short, and is finished now; look at it (handrail-inspect"
-            f" {root}) before the next"
-        )
-    source = Source.open(root)
-    check_nothing_set_aside(source.layout)
-    lock = DatasetLock(source.layout.staging)
-    try:
-        tidy_locked(source.layout, source.manifest, Checksums(root, anew=config.verify))
-        return _write(config, root, [source], _pieces(config, source))
-    finally:
-        lock.release()
+    with taken(config.target, config.verify) as source:
+        return _write(config, config.target, source, _pieces(config, source))
 
 
 def _anew(config: EditConfig) -> list[Edited]:
-    _check_free(config)
-    sources = [Source.open(root, config.verify) for root in config.roots]
-    for other in sources[1:]:
-        check_alike(sources[0], other)
     if config.verb == "merge":
-        everything = chain.from_iterable(source.pieces() for source in sources)
-        return [_write(config, config.target, sources, everything)]
+        return [merge_datasets(config.roots, config.target, config.name, config.verify)]
+    check_free(config.target)
+    source = Source.open(config.roots[0], config.verify)
     if config.verb == "split":
-        parts = split_parts(config.parts, sources[0].successes)
+        parts = split_parts(config.parts, source.successes)
         return [
-            _write(config, config.target / name, sources, sources[0].pieces(numbers), f"_{name}")
+            _write(config, config.target / name, source, source.pieces(numbers), f"_{name}")
             for name, numbers in parts.items()
         ]
-    return [_write(config, config.target, sources, _pieces(config, sources[0]))]
+    return [_write(config, config.target, source, _pieces(config, source))]
 
 
 def _write(
-    config: EditConfig, root: Path, sources: Sequence[Source], pieces: Iterable[Piece], suffix: str = ""
+    config: EditConfig, root: Path, source: Source, pieces: Iterable[Piece], suffix: str = ""
 ) -> Edited:
-    manifest = sources[0].manifest.named((config.name or sources[0].manifest.repo_id) + suffix)
+    manifest = source.manifest.named((config.name or source.manifest.repo_id) + suffix)
     manifest.check()
-    types = _types(config, sources)
-    totals = write_anew(root, manifest, pieces, types, merged_encodings(sources), config.in_place)
-    return Edited(root, totals.episodes, totals.frames, sum(source.info.frames for source in sources))
+    types = _types(config, source)
+    totals = write_anew(root, manifest, pieces, types, source.encodings, config.in_place)
+    return Edited(root, totals.episodes, totals.frames, source.info.frames)
 
 
-def _types(config: EditConfig, sources: Sequence[Source]) -> ColumnTypes:
-    new = {"trim": {TRIMMED: pa.int64()}, "relabel": _LABELS}.get(config.verb, {})
-    return {**new, **merged_types(sources)} if config.verb == "relabel" else merged_types(sources) | new
+def _types(config: EditConfig, source: Source) -> ColumnTypes:
+    if config.verb == "relabel":
+        return {**_LABELS, **source.types}
+    return {**source.types, **({TRIMMED: pa.int64()} if config.verb == "trim" else {})}
 
 
 def _pieces(config: EditConfig, source: Source) -> Iterator[Piece]:
@@ -148,10 +108,3 @@ def _renamed(config: EditConfig, source: Source, piece: Piece) -> Piece:
     old = piece.record.tasks
     known = {task for task in old if not config.old_task or task == config.old_task}
     return piece.renamed(dict.fromkeys(known, config.task))
-
-
-def _check_free(config: EditConfig) -> None:
-    """Check that nothing lies where a dataset is to be written."""
-    target = config.target
-    if target.exists() and (not target.is_dir() or any(target.iterdir())):
-        raise HandrailError(f"--output {config.output}: expected a missing or empty folder, found one in use")

@@ -1,5 +1,6 @@
 """A dataset that episodes are taken from: one that Handrail recorded, whole."""
 
+from bisect import bisect_right
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -7,14 +8,10 @@ from typing import Any
 
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.format.columns import ColumnTypes
-from handrail.datasets.format.layout import Layout
+from handrail.datasets.format.layout import Layout, episode_of
+from handrail.datasets.format.lines import ForeignLineError, Lines, read_column_types, rows_of_lines
 from handrail.datasets.format.manifest import Manifest, read_manifest
-from handrail.datasets.format.metadata import (
-    ForeignLineError,
-    read_column_types,
-    read_encodings,
-    read_record,
-)
+from handrail.datasets.format.metadata import read_encodings
 from handrail.datasets.reading.check import check_whole
 from handrail.datasets.reading.reader import DatasetInfo, read_episodes, read_info, with_success
 from handrail.datasets.recording.folder import check_folders
@@ -73,7 +70,7 @@ class Source:
         if not rows:
             raise HandrailError(f"dataset {str(root)!r}: expected an episode or more, found none")
         try:
-            read_record(layout.row(0), with_stats=False)
+            Lines.read(layout.row(0))
         except (ForeignLineError, FileNotFoundError) as error:
             raise _foreign(root, "its meta/episodes has been rewritten") from error
         types, encodings = read_column_types(layout.row(0)), read_encodings(layout.info, manifest)
@@ -85,13 +82,19 @@ class Source:
         Raises:
             HandrailError: A line of metadata cannot be read.
         """
+        slots = sorted(
+            number for path in rows_of_lines(self.layout) if (number := episode_of(path)) is not None
+        )
+        lines: Lines | None = None
         for number in range(len(self.rows)) if numbers is None else numbers:
-            row = self.layout.row(number)
+            slot = slots[bisect_right(slots, number) - 1]
+            path = self.layout.row(slot)
             try:
-                record = read_record(row, with_stats=True)
-            except (OSError, ValueError, KeyError) as error:
+                lines = lines if lines is not None and lines.path == path else Lines.read(path)
+                record = lines.record(number - slot, with_stats=True)
+            except (OSError, ValueError, KeyError, IndexError) as error:
                 raise HandrailError(
-                    f"{str(row)!r} cannot be read ({error}); the dataset is damaged"
+                    f"{str(path)!r} cannot be read ({error}); the dataset is damaged"
                 ) from error
             yield Piece.of(self.layout, self.manifest, record)
 

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
 
 
 def numbers(values: np.ndarray, kind: pa.DataType) -> pa.Array:
@@ -42,19 +43,34 @@ def fixed_lists(values: np.ndarray, kind: pa.DataType) -> pa.Array:
     return pa.FixedSizeListArray.from_arrays(flat, type=kind)
 
 
-def one_list(values: pa.Array, shape: tuple[int, ...]) -> pa.Array:
-    """Return values as an Arrow array with one entry: lists nested as in a numpy array of that shape."""
-    for size in reversed(shape):
-        offsets = numbers(np.arange(0, len(values) + 1, size), pa.int32())
-        values = pa.ListArray.from_arrays(offsets, values)
-    return values
+def lists(values: pa.Array, lengths: Sequence[int]) -> pa.Array:
+    """Return values as an Arrow array of lists.
+
+    Args:
+        values: Those of all lists, one after the other.
+        lengths: Of each list.
+    """
+    offsets = numbers(np.concatenate(([0], np.cumsum(lengths, dtype=int))), pa.int32())
+    return pa.ListArray.from_arrays(offsets, values)
 
 
-def one_scalar(value: str | bool | int | float | None, kind: pa.DataType) -> pa.Array:
-    """Return an Arrow array with one entry, which may be null."""
-    if value is None:
-        return pa.nulls(1, kind)
-    return strings([str(value)]) if kind == pa.string() else numbers(np.array([value]), kind)
+def scalars(values: Sequence[str | bool | int | float | None], kind: pa.DataType) -> pa.Array:
+    """Return numbers, truth values or strings of which any may be null as an Arrow array."""
+    if kind == pa.string():
+        known = strings(["" if value is None else str(value) for value in values])
+    else:
+        known = numbers(np.array([0 if value is None else value for value in values]), kind)
+    empty = np.array([value is None for value in values])
+    return pc.if_else(numbers(empty, pa.bool_()), pa.nulls(1, kind)[0], known) if empty.any() else known
+
+
+def plain_values(column: pa.ChunkedArray) -> list:
+    """Return a column as Python values; equal texts are one object, since episodes repeat their settings."""
+    if column.type != pa.string():
+        return column.to_pylist()
+    encoded = column.combine_chunks().dictionary_encode()
+    texts = encoded.dictionary.to_pylist()
+    return [None if place is None else texts[place] for place in encoded.indices.to_pylist()]
 
 
 def to_numpy(values: pa.Array) -> np.ndarray:

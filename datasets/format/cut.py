@@ -1,15 +1,12 @@
-"""Cutting pictures out of an mp4: packets are copied where that can be, else they are encoded anew.
-
-A stretch can be copied if it begins with a key frame and no picture in it needs one that is left out.
-"""
+"""Cutting pictures out of an mp4: packets are copied where that can be, else they are encoded anew."""
 
 from pathlib import Path
-from typing import Any
 
 import av
 import av.error
 
 from handrail.controllers.errors import HandrailError
+from handrail.datasets.format.join import VideoJoin, place_of, videos
 from handrail.datasets.format.schema import Feature
 from handrail.datasets.format.video import VideoEncoder
 
@@ -29,46 +26,33 @@ def cut_video(source: Path, first: int, count: int, target: Path, fps: int, feat
         HandrailError: The source is not a whole mp4, or has no such pictures.
         OSError: The disk does not take it.
     """
-    try:
-        if not _copied(source, first, count, target, fps):
-            _encoded(source, first, count, target, fps, feature)
-    except (av.error.FFmpegError, IndexError, ValueError) as error:
-        raise HandrailError(f"video {str(source)!r}: expected a whole mp4, got {error}") from error
+    with videos(fps) as opened:
+        stretch = opened.stretch(source, first, count)
+        if stretch is not None:
+            join = VideoJoin(target, fps)
+            join.add(stretch)
+            join.close()
+    if stretch is None:
+        encode_stretch(source, first, count, target, fps, feature)
 
 
-def _copied(source: Path, first: int, count: int, target: Path, fps: int) -> bool:
-    """Copy the packets of a stretch, if it stands on its own; return whether it did."""
-    with av.open(str(source)) as container:
-        stream = container.streams.video[0]
-        packets = [packet for packet in container.demux(stream) if packet.size]
-        places = [_place(packet, fps) for packet in packets]
-        wanted = [place for place, number in enumerate(places) if first <= number < first + count]
-        begin, end = wanted[0], wanted[-1] + 1
-        if not packets[begin].is_keyframe or end - begin != count:
-            return False
-        shift = packets[begin].pts or 0
-        with av.open(str(target), "w", format="mp4") as copy:
-            out = copy.add_stream_from_template(stream)
-            for packet in packets[begin:end]:
-                packet.pts, packet.dts = (packet.pts or 0) - shift, (packet.dts or 0) - shift
-                packet.stream = out
-                copy.mux(packet)
-    return True
-
-
-def _encoded(source: Path, first: int, count: int, target: Path, fps: int, feature: Feature) -> None:
+def encode_stretch(source: Path, first: int, count: int, target: Path, fps: int, feature: Feature) -> None:
+    """Write a stretch of a video as one of its own whose pictures are encoded anew; see `cut_video`."""
     encoder = VideoEncoder(target, fps, feature)
     try:
         with av.open(str(source)) as container:
-            for frame in container.decode(video=0):
-                if first <= _place(frame, fps) < first + count:
+            stream = container.streams.video[0]
+            container.seek(round(first / (fps * (stream.time_base or 1))), stream=stream)
+            for frame in container.decode(stream):
+                place = place_of(frame, fps)
+                if first <= place < first + count:
                     encoder.add(frame.to_ndarray(format="rgb24"))
+                if place >= first + count - 1:
+                    break
+    except (av.error.FFmpegError, IndexError, ValueError) as error:
+        encoder.cancel()
+        raise HandrailError(f"video {str(source)!r}: expected a whole mp4, got {error}") from error
     except BaseException:
         encoder.cancel()
         raise
     encoder.finish(count)
-
-
-def _place(shown: Any, fps: int) -> int:
-    """Return which picture of the video a packet or a frame is."""
-    return round((shown.pts or 0) * shown.time_base * fps)

@@ -1,8 +1,9 @@
-"""Where the files of a LeRobot v3.0 dataset lie when every episode has its own.
+"""Where the files of a LeRobot v3.0 dataset lie.
 
 Episode `i` is file `i % 1000` of chunk `i // 1000` in each of its streams: one parquet of rows, one mp4 a
-camera, one parquet that holds the episode's line of metadata. Two hidden folders are Handrail's own:
-`.handrail` (files being written, the lock) and `.damaged` (what `repair` set aside).
+camera, one parquet that holds the episode's line of metadata. Files of many episodes are named after the
+first of them. Two hidden folders are Handrail's own: `.handrail` (files being written, the lock) and
+`.damaged` (what `repair` set aside).
 """
 
 import re
@@ -24,12 +25,17 @@ def chunk_and_file(episode: int) -> tuple[int, int]:
     return divmod(episode, FILES_IN_A_CHUNK)
 
 
+def slot_of(chunk: int, file: int) -> int:
+    """Return the episode after which a file is named, the inverse of `chunk_and_file`."""
+    return chunk * FILES_IN_A_CHUNK + file
+
+
 def episode_of(path: Path) -> int | None:
     """Return which episode a data, video or metadata file belongs to, or None for a stray name."""
     match = _NUMBERED.fullmatch("/".join(path.parts[-2:]))
     if match is None or int(match[2]) >= FILES_IN_A_CHUNK:
         return None
-    return int(match[1]) * FILES_IN_A_CHUNK + int(match[2])
+    return slot_of(int(match[1]), int(match[2]))
 
 
 @dataclass(frozen=True)

@@ -47,12 +47,17 @@ def data_bytes(features: Mapping[str, Feature], columns: Mapping[str, Any]) -> b
         features: The schema.
         columns: For each stored feature `(N,)` or `(N, d)` values, or a list of N strings.
     """
+    schema = data_schema(features)
+    arrays = [_arrow_array(columns[field.name], field.type) for field in schema]
+    return parquet_bytes(pa.Table.from_arrays(arrays, schema=schema))
+
+
+def data_schema(features: Mapping[str, Feature]) -> pa.Schema:
+    """Return the columns of the data files, with what Hugging Face's `datasets` reads."""
     stored = stored_features(features)
     description = {"info": {"features": {key: _hf_feature(feature) for key, feature in stored.items()}}}
     fields = [pa.field(key, _arrow_type(feature)) for key, feature in stored.items()]
-    schema = pa.schema(fields, metadata={"huggingface": json.dumps(description)})  # what Hugging Face reads
-    arrays = [_arrow_array(columns[field.name], field.type) for field in schema]
-    return parquet_bytes(pa.Table.from_arrays(arrays, schema=schema))
+    return pa.schema(fields, metadata={"huggingface": json.dumps(description)})
 
 
 def tasks_bytes(tasks: Sequence[str]) -> bytes:
@@ -62,10 +67,29 @@ def tasks_bytes(tasks: Sequence[str]) -> bytes:
     return parquet_bytes(table.replace_schema_metadata({"pandas": json.dumps(_PANDAS_TASKS)}))
 
 
-def parquet_bytes(table: pa.Table, statistics: bool = True) -> bytes:
-    """Return a table as the bytes of a parquet file."""
+def parquet_bytes(
+    table: pa.Table, dictionary: bool | list[str] = True, statistics: bool = True, arrow_schema: bool = True
+) -> bytes:
+    """Return a table as the bytes of a parquet file.
+
+    Args:
+        table: The table.
+        dictionary: Columns whose values are numbered, each kept once.
+        statistics: Whether the least and the greatest value of each column are kept.
+        arrow_schema: Whether Arrow's own description is kept too; lists of one length need it.
+    """
     sink = pa.BufferOutputStream()
-    pq.write_table(table, sink, compression="snappy", use_dictionary=statistics, write_statistics=statistics)
+    with pq.ParquetWriter(
+        sink,
+        table.schema,
+        compression="snappy",
+        use_dictionary=dictionary,
+        write_statistics=statistics,
+        store_schema=arrow_schema,
+    ) as writer:
+        writer.write_table(table)
+        if not arrow_schema:  # which would carry them
+            writer.add_key_value_metadata(table.schema.metadata or {})
     return sink.getvalue().to_pybytes()
 
 

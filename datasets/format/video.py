@@ -57,8 +57,18 @@ def count_frames(path: Path) -> int:
         raise HandrailError(f"video {str(path)!r}: expected a whole mp4, got {error}") from error
 
 
-def decoded_stats(path: Path, frames: int, height: int, width: int) -> dict[str, np.ndarray]:
-    """Decode every picture of an mp4 and return their statistics.
+def decoded_stats(
+    path: Path, frames: int, height: int, width: int, first: int = 0, fps: int = 0
+) -> dict[str, np.ndarray]:
+    """Decode every picture of an mp4, or of a stretch of one, and return their statistics.
+
+    Args:
+        path: The mp4.
+        frames: Number of pictures.
+        height: Of a picture.
+        width: Of a picture.
+        first: The picture that the stretch begins with.
+        fps: Pictures a second [Hz]; 0 if these must be all pictures of the file.
 
     Raises:
         HandrailError: It does not decode to so many pictures of one size.
@@ -71,7 +81,14 @@ def decoded_stats(path: Path, frames: int, height: int, width: int) -> dict[str,
             if stream.codec_context is None:
                 raise ValueError("a codec that nobody knows")
             stream.codec_context.options = {"err_detect": "explode"}
+            if first:
+                container.seek(round(Fraction(first, fps) / (stream.time_base or 1)), stream=stream)
             for frame in container.decode(stream):
+                place = round((frame.pts or 0) * (frame.time_base or 1) * fps) if fps else 0
+                if place < first:
+                    continue
+                if fps and place >= first + frames:
+                    break
                 if frame.is_corrupt or (frame.height, frame.width) != (height, width):
                     raise ValueError(f"a broken picture {len(levels)}, or one of another size")
                 levels.append(image_levels(frame.to_ndarray(format="rgb24")))

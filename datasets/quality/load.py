@@ -1,7 +1,9 @@
 """Reading a dataset's episodes as demonstrations."""
 
+from collections.abc import Iterator
 from pathlib import Path
 
+from handrail.datasets.format.data_file import data_files
 from handrail.datasets.quality.columns import ColumnNames
 from handrail.datasets.quality.demonstration import Demonstration
 from handrail.datasets.reading.reader import DatasetInfo, read_episodes, read_info, read_rows_of, with_success
@@ -17,12 +19,17 @@ def read_demonstrations(root: str | Path, columns: ColumnNames | None = None) ->
     Raises:
         HandrailError: There is no dataset, or a file of it cannot be read.
     """
+    return list(each_demonstration(root, columns))
+
+
+def each_demonstration(root: str | Path, columns: ColumnNames | None = None) -> Iterator[Demonstration]:
+    """Yield the episodes that `read_demonstrations` returns, one in memory at a time."""
     columns, info = columns or ColumnNames(), read_info(root)
-    wanted = _wanted(info, columns)
-    return [
-        Demonstration(row["episode_index"], info, read_rows_of(info, row, wanted), row, columns)
-        for row in with_success(info, read_episodes(root))
-    ]
+    wanted, rows = _wanted(info, columns), with_success(info, read_episodes(root))
+    with data_files() as files:
+        for row in rows:
+            frames = read_rows_of(info, row, wanted, files)
+            yield Demonstration(row["episode_index"], info, frames, row, columns)
 
 
 def _wanted(info: DatasetInfo, columns: ColumnNames) -> list[str]:

@@ -12,7 +12,7 @@ from handrail.controllers.arrays import FloatArray
 from handrail.datasets.format.columns import CLIENT
 from handrail.datasets.quality import motion, safety
 from handrail.datasets.quality.demonstration import Demonstration, DoesNotApply
-from handrail.datasets.quality.load import read_demonstrations
+from handrail.datasets.quality.load import each_demonstration
 from handrail.datasets.quality.metric import Metric
 from handrail.datasets.quality.metrics import corrections, high_frequency_content, rate_of_change
 from handrail.datasets.quality.pool import Pool
@@ -89,7 +89,7 @@ def summarize(root: str | Path) -> list[EpisodeSummary]:
     Raises:
         HandrailError: There is no dataset, or a file of it cannot be read.
     """
-    return [_summary(episode) for episode in read_demonstrations(root)]
+    return [_summary(episode) for episode in each_demonstration(root)]
 
 
 def _summary(episode: Demonstration) -> EpisodeSummary:

@@ -4,9 +4,10 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from handrail.controllers.errors import HandrailError
+from handrail.datasets.format.data_file import data_files
 from handrail.datasets.format.layout import Layout
+from handrail.datasets.format.lines import ForeignLineError
 from handrail.datasets.format.manifest import read_manifest
-from handrail.datasets.format.metadata import ForeignLineError
 from handrail.datasets.format.path_pattern import fill
 from handrail.datasets.format.schema import video_keys
 from handrail.datasets.reading.reader import DatasetInfo, read_episodes, read_info, read_rows_of
@@ -30,7 +31,7 @@ def check_whole(root: str | Path, verify: bool = False) -> None:
     found = _surveyed(info, verify)
     if found is not None:
         require_whole(Layout(info.root), found)
-    missing = [info.root / name for name in _files(info) if not (info.root / name).is_file()]
+    missing = [info.root / name for name in dict.fromkeys(_files(info)) if not (info.root / name).is_file()]
     if missing:
         names = shortened([path.relative_to(info.root).as_posix() for path in missing], ", ")
         raise HandrailError(
@@ -49,7 +50,7 @@ def check_report(root: str | Path) -> list[str]:
     found = _surveyed(info, verify=True)
     if found is None:
         return [*_unread(info), *_statistics(info)]
-    differing = [name for state in found.rewritten for name in state.rewritten]
+    differing = dict.fromkeys(name for state in found.rewritten for name in state.rewritten)
     advice = f"if another tool wrote it on purpose, handrail-repair {info.root} takes it as it is"
     return [
         *found.faults(),
@@ -93,11 +94,12 @@ def _files(info: DatasetInfo) -> Iterator[str]:
 def _unread(info: DatasetInfo) -> list[str]:
     """Return which episodes of a dataset without checksums cannot be read."""
     said = [f"{name}: missing" for name in sorted(set(_files(info))) if not (info.root / name).is_file()]
-    for row in read_episodes(info.root):
-        try:
-            read_rows_of(info, row)
-        except HandrailError as error:
-            said.append(f"episode {row['episode_index']}: {error}")
+    with data_files() as files:
+        for row in read_episodes(info.root):
+            try:
+                read_rows_of(info, row, files=files)
+            except HandrailError as error:
+                said.append(f"episode {row['episode_index']}: {error}")
     return said
 
 

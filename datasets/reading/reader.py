@@ -13,7 +13,8 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from handrail.controllers.errors import HandrailError, unknown_name
-from handrail.datasets.format.arrow import flat_numbers, numbers, to_numpy
+from handrail.datasets.format.arrow import flat_numbers, plain_values
+from handrail.datasets.format.data_file import DataFiles, data_files
 from handrail.datasets.format.info_fields import MOST_EPISODES, MOST_FRAMES, features, rate, whole_number
 from handrail.datasets.format.layout import VIDEO_PATH, Layout
 from handrail.datasets.format.manifest import read_manifest
@@ -145,14 +146,23 @@ def read_frames(
 
 
 def read_rows_of(
-    info: DatasetInfo, episode: dict[str, Any], columns: Sequence[str] | None = None
+    info: DatasetInfo,
+    episode: dict[str, Any],
+    columns: Sequence[str] | None = None,
+    files: DataFiles | None = None,
 ) -> dict[str, np.ndarray]:
-    """Read the rows of one episode whose line of metadata is at hand; see `read_frames`."""
+    """Read the rows of one episode whose line of metadata is at hand; see `read_frames`.
+
+    Many episodes may share a file: whoever reads several gives `data_files()`, so that it is opened once.
+    """
+    if files is None:
+        with data_files() as files:
+            return read_rows_of(info, episode, columns, files)
     names = _chosen(info, columns)
     path = info.root / fill(info.data_path, episode["data/chunk_index"], episode["data/file_index"])
     number = episode["episode_index"]
     try:
-        table = _episode_table(path, number, names)
+        table = files.open(path).rows(number, episode["length"], names)
         frames = {name: _to_numpy(table.column(name), info.features[name]) for name in names}
     except FileNotFoundError as error:
         raise HandrailError(
@@ -186,9 +196,10 @@ def with_success(info: DatasetInfo, rows: Sequence[dict[str, Any]]) -> list[dict
     if feature is None or feature.dtype not in NUMBERS:
         return list(rows)
     found = [dict(row) for row in rows]
-    for row in found:
-        if row.get("success") is None:
-            row["success"] = bool(np.any(read_rows_of(info, row, [_SUCCESS])[_SUCCESS] > 0))
+    with data_files() as files:
+        for row in found:
+            if row.get("success") is None:
+                row["success"] = bool(np.any(read_rows_of(info, row, [_SUCCESS], files)[_SUCCESS] > 0))
     return found
 
 
@@ -202,23 +213,6 @@ def _chosen(info: DatasetInfo, columns: Sequence[str] | None) -> tuple[str, ...]
     return tuple(columns)
 
 
-def _episode_table(path: Path, episode: int, names: Sequence[str]) -> pa.Table:
-    """Read the rows of one episode; row groups that cannot hold any are skipped."""
-    with pq.ParquetFile(path) as file:
-        groups = [group for group in range(file.num_row_groups) if _may_hold(file.metadata, group, episode)]
-        wanted = list(dict.fromkeys(("episode_index", *names)))
-        table = file.read_row_groups(groups, columns=wanted)
-    mask = to_numpy(table.column("episode_index").combine_chunks()) == episode
-    return table.filter(numbers(mask, pa.bool_()))
-
-
-def _may_hold(metadata: pq.FileMetaData, group: int, episode: int) -> bool:
-    columns = [metadata.row_group(group).column(i) for i in range(metadata.num_columns)]
-    (column,) = [column for column in columns if column.path_in_schema == "episode_index"]
-    span = column.statistics
-    return span is None or not span.has_min_max or span.min <= episode <= span.max
-
-
 def _to_numpy(column: pa.ChunkedArray, feature: Feature) -> np.ndarray:
     if feature.dtype == "string":
         return np.array([value or "" for value in column.to_pylist()], dtype=str)
@@ -230,7 +224,9 @@ def _read_rows(path: Path) -> list[dict[str, Any]]:
     try:
         with pq.ParquetFile(path) as file:
             names = [name for name in file.schema_arrow.names if not name.startswith("stats/")]
-            rows = file.read(columns=names, use_threads=False).to_pylist()
+            table = file.read(columns=names, use_threads=False)
+        columns = [plain_values(table.column(place)) for place in range(len(names))]
+        rows = [dict(zip(names, values, strict=True)) for values in zip(*columns, strict=True)]
         for row in rows:
             for name in _PLACE:
                 whole_number(row, name, MOST_FRAMES)

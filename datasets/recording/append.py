@@ -1,9 +1,4 @@
-"""Saving an episode of this dataset or of one like it, or a stretch of one, under a dataset's next number.
-
-This is the one way in which what was recorded once gets into a dataset again: when a repair puts it back,
-when others are dropped, and when datasets are edited and merged. One pass; videos are not encoded anew unless
-a stretch begins between two key frames.
-"""
+"""Saving an episode that was recorded once under a dataset's next number, when a repair puts it back."""
 
 import os
 import shutil
@@ -12,14 +7,15 @@ from pathlib import Path
 
 from handrail.datasets.format.columns import ColumnTypes, Scalar, fit_columns
 from handrail.datasets.format.cut import cut_video
+from handrail.datasets.format.data_file import data_files
 from handrail.datasets.format.layout import Layout
+from handrail.datasets.format.lines import lines_bytes
 from handrail.datasets.format.manifest import Manifest
-from handrail.datasets.format.metadata import EpisodeRecord, FileSeal, Totals, row_bytes
-from handrail.datasets.format.schema import Feature
+from handrail.datasets.format.metadata import EpisodeRecord, FileSeal, Totals
 from handrail.datasets.format.stats import Stats
-from handrail.datasets.format.tables import parquet_bytes
-from handrail.datasets.format.video import decoded_stats
+from handrail.datasets.format.tables import data_schema, parquet_bytes
 from handrail.datasets.recording.piece import Piece
+from handrail.datasets.recording.volume import pictures_of
 from handrail.datasets.storage.atomic import make_folder, move, remove, sync_file, write_synced
 
 
@@ -30,7 +26,6 @@ def append_episode(
     types: ColumnTypes,
     totals: Totals,
     origin: str = "",
-    share: bool = True,
 ) -> EpisodeRecord:
     """Save a piece under the next number, in the order in which the writer saves an episode.
 
@@ -41,7 +36,6 @@ def append_episode(
         types: Of the dataset's extra columns.
         totals: What the dataset's episodes add up to.
         origin: What the new line says of the one that the episode had, or "".
-        share: Whether a video that stays as it is may be the same file under a second name.
 
     Returns:
         The new line.
@@ -54,11 +48,12 @@ def append_episode(
     extras = fit_columns(known, types)
     number, staging = totals.episodes, layout.staging
     streams = {layout.data(number): staging / "data.parquet"}
-    table, tasks, stats = piece.rows(manifest.fps, totals)
+    with data_files() as files:
+        table, tasks, stats = piece.rows(data_schema(manifest.features), manifest.fps, totals, files)
     write_synced(staging / "data.parquet", parquet_bytes(table))
     for key, video in piece.videos.items():
         streams[layout.video(key, number)] = staged = staging / f"{key}.mp4"
-        stats |= _pictures(piece, key, video, staged, manifest, share)
+        stats |= _pictures(piece, key, video, staged, manifest)
     record = changed(
         piece.record,
         episode=number,
@@ -68,33 +63,33 @@ def append_episode(
         stats={**(piece.record.stats or {}), **stats},
         columns=extras,
         files={layout.relative(path): FileSeal.of(staged) for path, staged in streams.items()},
+        slot=number,
+        offset=0,
+        alone=True,
     )
-    write_synced(staging / "row.parquet", row_bytes(manifest, record, types, origin))
+    write_synced(staging / "row.parquet", lines_bytes(manifest, [record], types, origin=origin))
     for path, staged in streams.items():
         move(staged, path)
     move(staging / "row.parquet", layout.row(number))  # the commit
     return record
 
 
-def _pictures(piece: Piece, key: str, video: Path, staged: Path, manifest: Manifest, share: bool) -> Stats:
+def _pictures(piece: Piece, key: str, video: Path, staged: Path, manifest: Manifest) -> Stats:
     """Stage a camera's video; return its statistics if they are others than before."""
-    if not piece.is_cut:
-        copy_file(video, staged, share)
+    if piece.record.alone and not piece.is_cut:
+        copy_file(video, staged)
         return {}
-    feature: Feature = manifest.features[key]
     remove(staged)
-    cut_video(video, piece.first, piece.length, staged, manifest.fps, feature)
+    cut_video(video, piece.first_picture, piece.length, staged, manifest.fps, manifest.features[key])
     sync_file(staged)
-    return {key: decoded_stats(staged, piece.length, *feature.shape[:2])}
+    return {key: pictures_of(piece, key, manifest)} if piece.is_cut else {}
 
 
-def copy_file(source: Path, target: Path, share: bool) -> None:
-    """Give a file a second name, or copy it where that may not be or the file system has no such thing."""
+def copy_file(source: Path, target: Path) -> None:
+    """Give a file a second name, or copy it where the file system has no such thing."""
     make_folder(target.parent)
     remove(target)
     try:
-        if not share:
-            raise OSError
         os.link(source, target)
     except OSError:
         shutil.copyfile(source, target)

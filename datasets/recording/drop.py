@@ -6,8 +6,9 @@ from pathlib import Path
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.format.columns import Scalar
 from handrail.datasets.format.layout import Layout
+from handrail.datasets.format.lines import each_line, read_column_types
 from handrail.datasets.format.manifest import Manifest, read_manifest
-from handrail.datasets.format.metadata import read_column_types, read_encodings, read_record
+from handrail.datasets.format.metadata import read_encodings
 from handrail.datasets.recording.checksums import Checksums
 from handrail.datasets.recording.folder import check_folders
 from handrail.datasets.recording.piece import Piece
@@ -58,14 +59,14 @@ def check_nothing_set_aside(layout: Layout) -> None:
 
 def _drop(layout: Layout, manifest: Manifest, dropped: Dropped) -> int:
     _, totals = tidy_locked(layout, manifest, Checksums(layout.root, anew=True))
-    rows = [layout.row(number) for number in range(totals.episodes)]
-    kept = [row for row in rows if not dropped(read_record(row, with_stats=False).columns)]
-    if len(kept) == len(rows):
+    kept = {record.episode for record in each_line(layout) if not dropped(record.columns)}
+    if len(kept) == totals.episodes:
         return 0
     if not kept:
         remove_whole(layout.root)
-        return len(rows)
-    pieces = (Piece.of(layout, manifest, read_record(row, with_stats=True)) for row in kept)
-    types, encodings = read_column_types(kept[0]), read_encodings(layout.info, manifest)
+        return totals.episodes
+    records = (record for record in each_line(layout, with_stats=True) if record.episode in kept)
+    pieces = (Piece.of(layout, manifest, record) for record in records)
+    types, encodings = read_column_types(layout.row(0)), read_encodings(layout.info, manifest)
     write_anew(layout.root, manifest, pieces, types, encodings, in_place=True)
-    return len(rows) - len(kept)
+    return totals.episodes - len(kept)

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.parquet as pq
 
 from handrail.datasets.format.arrow import flat_numbers, numbers, to_numpy
 from handrail.datasets.format.columns import Scalar
+from handrail.datasets.format.data_file import DataFiles
 from handrail.datasets.format.layout import Layout
 from handrail.datasets.format.manifest import Manifest
 from handrail.datasets.format.metadata import EpisodeRecord, Totals
@@ -49,13 +49,18 @@ class Piece:
     @classmethod
     def of(cls, folder: Layout, manifest: Manifest, record: EpisodeRecord) -> "Piece":
         """Return a whole episode, whose files are at the places of a dataset."""
-        videos = {key: folder.video(key, record.episode) for key in video_keys(manifest.features)}
-        return cls(folder.data(record.episode), videos, record, 0, record.length, record.columns)
+        videos = {key: folder.video(key, record.slot) for key in video_keys(manifest.features)}
+        return cls(folder.data(record.slot), videos, record, 0, record.length, record.columns)
 
     @property
     def is_cut(self) -> bool:
         """Whether some of the episode's frames are left out."""
         return self.length != self.record.length
+
+    @property
+    def first_picture(self) -> int:
+        """Which picture of its videos is the first."""
+        return self.record.offset + self.first
 
     def stretch(self, first: int, length: int) -> "Piece":
         """Return a part of it."""
@@ -73,19 +78,26 @@ class Piece:
         """Return it with other task sentences, by the old ones."""
         return changed(self, sentences=dict(sentences))
 
-    def rows(self, fps: int, totals: Totals) -> tuple[pa.Table, tuple[str, ...], Stats]:
+    def rows(
+        self, schema: pa.Schema, fps: int, totals: Totals, files: DataFiles
+    ) -> tuple[pa.Table, tuple[str, ...], Stats]:
         """Return the rows in their new place.
 
         Args:
+            schema: Of the data files of both datasets.
             fps: Frames a second [Hz].
             totals: What the episodes before it add up to.
+            files: Opens the file of the rows.
 
         Returns:
             The rows, their task sentences in order, and the statistics of the columns that have changed.
         """
-        with pq.ParquetFile(self.data) as file:
-            table = file.read(use_threads=False).slice(self.first, self.length)
-        tasks, places = self._tasks(table, totals)
+        whole = files.open(self.data).rows(self.record.episode, self.record.length)
+        if whole.num_rows != self.record.length:
+            raise ValueError(f"{self.data}: {whole.num_rows} rows instead of {self.record.length}")
+        whole = whole.select(schema.names).cast(schema)
+        table = whole.slice(self.first, self.length)
+        tasks, places = self._tasks(whole, table, totals)
         values = self._counters(fps, totals) | {"task_index": places} | self._ending(table)
         for name, column in values.items():
             place = table.schema.get_field_index(name)
@@ -103,10 +115,9 @@ class Piece:
         }
         return new | ({"frame_index": frames, "timestamp": frames / fps} if self.is_cut else {})
 
-    def _tasks(self, table: pa.Table, totals: Totals) -> tuple[tuple[str, ...], np.ndarray]:
+    def _tasks(self, whole: pa.Table, table: pa.Table, totals: Totals) -> tuple[tuple[str, ...], np.ndarray]:
         """Return the task sentences of rows, and which of the dataset's each row has, (N,)."""
-        whole = self._task_column() if self.is_cut else table.column("task_index")
-        numbers_of = dict.fromkeys(whole.to_pylist())
+        numbers_of = dict.fromkeys(whole.column("task_index").to_pylist())
         sentences = {
             number: self.sentences.get(sentence, sentence)
             for number, sentence in zip(numbers_of, self.record.tasks, strict=True)
@@ -115,10 +126,6 @@ class Piece:
         tasks = tuple(dict.fromkeys(said))
         places = {sentence: place for place, sentence in enumerate(totals.with_tasks(tasks))}
         return tasks, np.array([places[sentence] for sentence in said])
-
-    def _task_column(self) -> pa.ChunkedArray:
-        with pq.ParquetFile(self.data) as file:
-            return file.read(columns=["task_index"], use_threads=False).column("task_index")
 
     def _ending(self, table: pa.Table) -> dict[str, np.ndarray]:
         """Return how the episode ends, where that is not as it was: `next.done`, `next.success`."""

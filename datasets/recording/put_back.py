@@ -9,18 +9,13 @@ from pathlib import Path
 
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.format.layout import Layout, episode_of
+from handrail.datasets.format.lines import Lines, read_column_types, rows_of_lines
 from handrail.datasets.format.manifest import Manifest
-from handrail.datasets.format.metadata import (
-    EpisodeRecord,
-    FileSeal,
-    Totals,
-    read_column_types,
-    read_origin,
-    read_record,
-)
+from handrail.datasets.format.metadata import FileSeal, Totals
 from handrail.datasets.recording.append import append_episode
+from handrail.datasets.recording.content import UNREADABLE
 from handrail.datasets.recording.piece import Piece
-from handrail.datasets.recording.survey import UNREADABLE, EpisodeState, examine
+from handrail.datasets.recording.survey import examine
 from handrail.datasets.storage.atomic import move, remove, sync_folder
 
 
@@ -41,15 +36,15 @@ def restore(layout: Layout, counted: int) -> list[str]:
         The paths in the dataset of what was moved back.
     """
     restored: list[str] = []
-    start = 0
-    for number in range(counted if folders(layout) else 0):
-        row = layout.row(number)
-        place = row if row.exists() else _line_set_aside(layout, number, start)
-        record = None if place is None else _readable(place)
-        if place is None or record is None:
+    start = slot = 0
+    while slot < (counted if folders(layout) else 0):
+        row = layout.row(slot)
+        place = row if row.exists() else _line_set_aside(layout, slot, start)
+        lines = None if place is None else _readable(place)
+        if place is None or lines is None:
             break
-        start = record.start + record.length
-        for name, seal in record.files.items():
+        start, slot = start + lines.length, slot + len(lines)
+        for name, seal in lines.files.items():
             if not (layout.root / name).exists() and (source := _set_aside(layout, name, seal)):
                 move(source, layout.root / name)
                 restored.append(name)
@@ -71,37 +66,40 @@ def put_back(layout: Layout, manifest: Manifest, totals: Totals) -> tuple[Totals
         What they add up to then, and how many were put back.
     """
     before = totals.episodes
-    known = {read_origin(layout.row(number)) for number in range(totals.episodes)}
+    known = {Lines.read(row).origin for row in rows_of_lines(layout)}
+    types = read_column_types(layout.row(0)) if before else None
     for folder in folders(layout):
-        for row in sorted(folder.root.glob("meta/episodes/*/*.parquet")):
-            state = _candidate(folder, manifest, row)
-            if state is None:
-                continue
+        for row in rows_of_lines(folder):
             origin = hashlib.sha256(row.read_bytes()).hexdigest()
-            if origin not in known:
-                try:
-                    assert state.record is not None
-                    last = layout.row(totals.episodes - 1) if totals.episodes else row
-                    piece, types = Piece.of(folder, manifest, state.record), read_column_types(last)
-                    totals = totals.grown(append_episode(layout, manifest, piece, types, totals, origin))
-                except (HandrailError, ValueError):
-                    continue  # columns that this dataset does not have, or tasks that do not add up
-                known.add(origin)
-            _forget(folder, row, state)
+            lines, places = _whole_ones(folder, manifest, row)
+            left = len(lines) if lines else 0
+            for record in [lines.record(place, with_stats=True) for place in places] if lines else []:
+                mark = origin if record.alone else f"{origin}-{record.episode}"
+                if mark not in known:
+                    piece, kinds = Piece.of(folder, manifest, record), types or read_column_types(row)
+                    try:
+                        totals = totals.grown(append_episode(layout, manifest, piece, kinds, totals, mark))
+                    except (HandrailError, ValueError):
+                        continue  # columns that this dataset does not have, or tasks that do not add up
+                    types = kinds
+                    known.add(mark)
+                left -= 1
+            if lines and not left:
+                _forget(folder, row, lines)
     _remove_empty(layout.damaged)
     return totals, totals.episodes - before
 
 
-def _candidate(folder: Layout, manifest: Manifest, row: Path) -> EpisodeState | None:
-    """Return an episode that was set aside, if it is whole."""
-    number = episode_of(row)
-    if number is None:
-        return None
+def _whole_ones(folder: Layout, manifest: Manifest, row: Path) -> tuple[Lines | None, list[int]]:
+    """Return the lines of a volume that was set aside, and the places of its whole episodes in them."""
+    slot = episode_of(row)
+    if slot is None:
+        return None, []
     try:
-        state = examine(folder, manifest, number, None, FileSeal.of)
+        states, lines = examine(folder, manifest, slot, None, FileSeal.of)
     except HandrailError:
-        return None
-    return None if state.fault else state
+        return None, []
+    return lines, [state.number - slot for state in states if not state.fault]
 
 
 def _set_aside(layout: Layout, name: str, seal: FileSeal) -> Path | None:
@@ -110,14 +108,14 @@ def _set_aside(layout: Layout, name: str, seal: FileSeal) -> Path | None:
     return next((path for path in places if _has(path, seal)), None)
 
 
-def _line_set_aside(layout: Layout, number: int, start: int) -> Path | None:
-    """Return the line of an episode that was set aside, if all of the episode's files are to be had."""
+def _line_set_aside(layout: Layout, slot: int, start: int) -> Path | None:
+    """Return the lines of a volume that was set aside, if all of its files are to be had."""
     for folder in folders(layout):
-        record = _readable(folder.row(number))
-        if record and (record.episode, record.start) == (number, start):
-            files = record.files.items()
+        lines = _readable(folder.row(slot))
+        if lines and (lines.record(0).episode, lines.record(0).start) == (slot, start):
+            files = lines.files.items()
             if all(_has(layout.root / name, seal) or _set_aside(layout, name, seal) for name, seal in files):
-                return folder.row(number)
+                return folder.row(slot)
     return None
 
 
@@ -125,17 +123,17 @@ def _has(path: Path, seal: FileSeal) -> bool:
     return path.is_file() and FileSeal.of(path) == seal
 
 
-def _readable(row: Path) -> EpisodeRecord | None:
+def _readable(row: Path) -> Lines | None:
     try:
-        return read_record(row, with_stats=False)
+        lines = Lines.read(row)
+        return lines if lines.length else None  # each of them is read
     except (HandrailError, *UNREADABLE):
         return None
 
 
-def _forget(folder: Layout, row: Path, state: EpisodeState) -> None:
-    """Remove an episode from `.damaged/` that is in the dataset again; its line goes last."""
-    assert state.record is not None
-    for path in (*(folder.root / name for name in state.record.files), row):
+def _forget(folder: Layout, row: Path, lines: Lines) -> None:
+    """Remove a volume from `.damaged/` whose episodes are in the dataset again; its lines go last."""
+    for path in (*(folder.root / name for name in lines.files), row):
         remove(path)
         sync_folder(path.parent) if path.parent.is_dir() else None
 

@@ -15,8 +15,9 @@ from typing import Any
 
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.format.layout import Layout
+from handrail.datasets.format.lines import resealed_bytes
 from handrail.datasets.format.manifest import Manifest, read_manifest
-from handrail.datasets.format.metadata import Totals, info_bytes, read_encodings, resealed_bytes, stats_bytes
+from handrail.datasets.format.metadata import Totals, info_bytes, read_encodings, stats_bytes
 from handrail.datasets.format.schema import video_keys
 from handrail.datasets.format.tables import tasks_bytes
 from handrail.datasets.recording.checksums import Checksums
@@ -187,7 +188,7 @@ def _without_damaged(layout: Layout, manifest: Manifest, found: Survey, sums: Ch
     Lines of metadata go last and from the end: cut short, `restore` undoes this. From when `info.json` counts
     only the episodes that stay, `put_back` finishes it.
     """
-    first = found.damaged[0].number if found.damaged else len(found.states)
+    first = found.damaged[0].slot if found.damaged else len(found.states)
     streams, rows = [], []
     for number in range(first, len(found.states)):
         videos = [layout.video(key, number) for key in video_keys(manifest.features)]
@@ -207,7 +208,7 @@ def _clear(layout: Layout, found: Survey) -> dict[str, tuple[str, ...]]:
         sync_folder(folder)
     removed = [*clear_staging(layout), *map(layout.relative, found.leftovers)]
     return {
-        "rewritten": tuple(name for state in found.rewritten for name in state.rewritten),
+        "rewritten": tuple(dict.fromkeys(name for state in found.rewritten for name in state.rewritten)),
         "removed": tuple(removed),
         "moved": tuple(set_aside(layout, list(found.strays))),
     }
@@ -215,9 +216,9 @@ def _clear(layout: Layout, found: Survey) -> dict[str, tuple[str, ...]]:
 
 def _reseal(layout: Layout, found: Survey) -> None:
     """Renew the checksums of files that another tool wrote anew and that are whole."""
-    for state in found.rewritten:
+    for state in {state.slot: state for state in found.rewritten}.values():
         assert state.record is not None
-        row, files = layout.row(state.number), {**state.record.files, **state.rewritten}
+        row, files = layout.row(state.slot), {**state.record.files, **state.rewritten}
         replace(row, resealed_bytes(row, files), layout.staging)
 
 

@@ -16,8 +16,9 @@ from handrail.datasets.format.layout import DAMAGED, STAGING, Layout
 from handrail.datasets.format.manifest import Manifest
 from handrail.datasets.format.metadata import Totals, info_bytes, stats_bytes
 from handrail.datasets.format.tables import tasks_bytes
-from handrail.datasets.recording.append import append_episode, copy_file
+from handrail.datasets.recording.append import copy_file
 from handrail.datasets.recording.piece import Piece
+from handrail.datasets.recording.volume import write_volumes
 from handrail.datasets.storage.atomic import publish_folder, remove, replace, sync_folder
 from handrail.datasets.storage.lock import LOCK_NAME, DatasetLock
 
@@ -33,7 +34,7 @@ def write_anew(
     encodings: Encodings,
     in_place: bool = False,
 ) -> Totals:
-    """Write a dataset in one pass over its pieces.
+    """Write a dataset in one pass over its pieces, in files of many episodes.
 
     Args:
         root: Its folder; what is there is replaced.
@@ -41,8 +42,7 @@ def write_anew(
         pieces: Its episodes, in order.
         types: Of its extra columns.
         encodings: How its videos are encoded, where that is not as Handrail does it.
-        in_place: Whether the pieces are of the dataset that is replaced: what lies beside its files stays,
-            and videos are not copied.
+        in_place: Whether the pieces are of the dataset that is replaced: what lies beside its files stays.
 
     Returns:
         What the episodes add up to.
@@ -56,10 +56,7 @@ def write_anew(
     lock = DatasetLock(draft.staging)
     try:
         _clear(draft)
-        totals = Totals()
-        for piece in pieces:
-            record = append_episode(draft, manifest, piece, types, totals, share=in_place)
-            totals = totals.grown(record)
+        totals = write_volumes(draft, manifest, pieces, types)
         if not totals.episodes:
             raise HandrailError(
                 f"{str(root)!r}: expected at least one episode, got none; nothing was written"
@@ -136,7 +133,7 @@ def _carry_over(root: Path, draft: Path) -> None:
         elif path.is_symlink():
             os.symlink(os.readlink(path), draft / path.name)
         else:
-            copy_file(path, draft / path.name, share=True)
+            copy_file(path, draft / path.name)
 
 
 def _draft(root: Path) -> Path:

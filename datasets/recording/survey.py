@@ -6,30 +6,21 @@ A file with the checksum that it had when it was saved is whole. One with anothe
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from pathlib import Path
 
-import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
-
 from handrail.controllers.errors import HandrailError
-from handrail.datasets.format.arrow import flat_numbers
 from handrail.datasets.format.layout import Layout, episode_of
+from handrail.datasets.format.lines import Lines, count_lines, rows_of_lines
 from handrail.datasets.format.manifest import Manifest
-from handrail.datasets.format.metadata import EpisodeRecord, FileSeal, Totals, read_record
-from handrail.datasets.format.schema import AUTOMATIC, video_keys
-from handrail.datasets.format.stats import column_stats
-from handrail.datasets.format.tables import stored_features
-from handrail.datasets.format.video import decoded_stats
+from handrail.datasets.format.metadata import EpisodeRecord, FileSeal, Totals
+from handrail.datasets.format.schema import video_keys
+from handrail.datasets.recording.content import UNREADABLE, content_faults, first_line
 from handrail.datasets.storage.strict_json import read_json
 
-UNREADABLE = (OSError, pa.ArrowException, ValueError, KeyError, TypeError, AttributeError, OverflowError)
 Seals = Callable[[Path], FileSeal]
-_KEPT = ("min", "max", "mean", "std")
-_SHADE = 0.03  # of full brightness: how far encoding anew may move the mean of a colour
 _STREAMS = ("videos/*/*/*.mp4", "data/*/*.parquet")
 _GAP = 10_000  # episodes; more that nothing is left of are a name made up
-_ROWS = "meta/episodes/*/*.parquet"
 
 
 @dataclass(frozen=True)
@@ -38,12 +29,14 @@ class EpisodeState:
 
     Attributes:
         number: Of the episode.
+        slot: Of its volume.
         record: Its line of metadata; None if that is missing or cannot be read.
         fault: Why it is not whole, or "".
         rewritten: Files with another checksum that decode to the right frames, with their seals now.
     """
 
     number: int
+    slot: int
     record: EpisodeRecord | None
     fault: str = ""
     rewritten: dict[str, FileSeal] = field(default_factory=dict)
@@ -100,17 +93,18 @@ def survey(layout: Layout, manifest: Manifest, seal_of: Seals) -> Survey:
     Raises:
         HandrailError: Another tool has added episodes, or a file has the number of an absurd one.
     """
-    rows, streams = _found(layout, _ROWS), [p for pattern in _STREAMS for p in _found(layout, pattern)]
+    rows, streams = rows_of_lines(layout), [p for pattern in _STREAMS for p in _found(layout, pattern)]
     saved, counted = _saved_by_lines(rows), _saved_in_info(layout)
     beyond = {number for number in map(episode_of, streams) if number is not None and number >= saved}
     interrupted = beyond == {saved} and counted is not None and counted <= saved  # a crash: the next one's
     count = saved if interrupted or not beyond else max(beyond) + 1
-    if count > 10 * len({*map(episode_of, (*rows, *streams))}) + _GAP:
+    slots = {number for number in map(episode_of, (*rows, *streams)) if number is not None and number < count}
+    if count > 10 * len(slots) + _GAP and count > 10 * sum(map(count_lines, rows)) + _GAP:
         raise HandrailError(
             f"dataset {str(layout.root)!r}: a file says that it is of episode {count - 1}, with next to none"
             " before it; move it away"
         )
-    states, totals = _states(layout, manifest, count, seal_of)
+    states, totals = _states(layout, manifest, sorted(slots), count, seal_of)
     return Survey(
         states,
         totals,
@@ -122,11 +116,12 @@ def survey(layout: Layout, manifest: Manifest, seal_of: Seals) -> Survey:
 
 def said_to_be_saved(layout: Layout) -> int:
     """Return how many episodes there should be, by their lines of metadata and by `info.json`."""
-    return max(_saved_by_lines(_found(layout, _ROWS)), _saved_in_info(layout) or 0)
+    return max(_saved_by_lines(rows_of_lines(layout)), _saved_in_info(layout) or 0)
 
 
 def _saved_by_lines(rows: list[Path]) -> int:
-    return max((number + 1 for number in map(episode_of, rows) if number is not None), default=0)
+    slots = {number: path for path in rows if (number := episode_of(path)) is not None}
+    return max(slots) + count_lines(slots[max(slots)]) if slots else 0
 
 
 def _saved_in_info(layout: Layout) -> int | None:
@@ -138,21 +133,41 @@ def _saved_in_info(layout: Layout) -> int | None:
 
 
 def _states(
-    layout: Layout, manifest: Manifest, count: int, seal_of: Seals
+    layout: Layout, manifest: Manifest, slots: list[int], count: int, seal_of: Seals
 ) -> tuple[tuple[EpisodeState, ...], Totals]:
+    """Return the states of all episodes, volume by volume, and what those before the first gap add up to."""
     states: list[EpisodeState] = []
     totals, start = Totals(), 0
-    for number in range(count):
-        state = examine(layout, manifest, number, start, seal_of)
-        record = state.record
+    for slot, after in pairwise([*slots, count]):
+        while len(states) < slot:
+            states.append(_missing(layout, len(states)))
+            start = None
+        found, lines = examine(layout, manifest, slot, start, seal_of)
+        found = found[: after - slot]
         try:
-            totals = totals.grown(record) if record and totals.episodes == number else totals
+            totals = _grown(totals, lines) if lines and totals.episodes == slot else totals
         except UNREADABLE:
-            row = layout.relative(layout.row(number))
-            state = replace(state, fault=state.fault or f"the statistics in {row} do not fit the others")
-        start = record.start + record.length if record else None
-        states.append(replace(state, record=replace(record, stats=None) if record else None))
+            row = layout.relative(layout.row(slot))
+            fault = f"the statistics in {row} do not fit the others"
+            found = tuple(replace(state, fault=state.fault or fault) for state in found)
+        last = found[-1].record
+        start = last.start + last.length if last else None
+        states += found
+    states += [_missing(layout, number) for number in range(len(states), count)]
     return tuple(states), totals
+
+
+def _grown(totals: Totals, lines: Lines) -> Totals:
+    """Return the totals with the episodes of one more volume, as the volume says or one by one."""
+    if lines.totals is not None:
+        return lines.totals
+    for record in lines.records(with_stats=True):
+        totals = totals.grown(record)
+    return totals
+
+
+def _missing(layout: Layout, number: int) -> EpisodeState:
+    return EpisodeState(number, number, None, f"{layout.relative(layout.row(number))} is missing")
 
 
 def _found(layout: Layout, pattern: str) -> list[Path]:
@@ -162,116 +177,81 @@ def _found(layout: Layout, pattern: str) -> list[Path]:
 def examine(
     layout: Layout,
     manifest: Manifest,
-    number: int,
+    slot: int,
     start: int | None,
     seal_of: Seals,
-) -> EpisodeState:
-    """Return the state of one episode.
+) -> tuple[tuple[EpisodeState, ...], Lines | None]:
+    """Return the states of the episodes of one volume, one at least, and their lines if these can be read.
 
     Args:
         layout: The dataset, or a folder that holds its files at the same places.
         manifest: The dataset's schema.
-        number: Of the episode.
+        slot: Of the volume.
         start: Index of its first frame; None if the episode before does not tell.
         seal_of: Gives the seal of a file.
 
     Raises:
-        HandrailError: Another tool wrote its line of metadata.
+        HandrailError: Another tool wrote its lines of metadata.
     """
-    row = layout.row(number)
+    row = layout.row(slot)
     try:
-        record = read_record(row, with_stats=True)
+        lines = Lines.read(row)
+        records = list(lines.records())
     except FileNotFoundError:
-        return EpisodeState(number, None, f"{layout.relative(row)} is missing")
+        return (_missing(layout, slot),), None
     except UNREADABLE as error:
-        return EpisodeState(number, None, f"{layout.relative(row)} cannot be read ({_first_line(error)})")
-    fault = _line_fault(layout, manifest, record, number, start)
+        fault = f"{layout.relative(row)} cannot be read ({first_line(error)})"
+        return (EpisodeState(slot, slot, None, fault),), None
+    faults = _line_faults(layout, manifest, records, slot, start)
     rewritten: dict[str, FileSeal] = {}
-    for name, seal in record.files.items():
-        if not fault:
-            fault = _file_fault(layout.root / name, name, manifest, record, seal, seal_of, rewritten)
-    return EpisodeState(number, record, fault, rewritten)
+    for name, seal in lines.files.items():
+        if not all(faults):
+            found = _file_faults(layout.root / name, name, manifest, lines, seal, seal_of, rewritten)
+            faults = [fault or more for fault, more in zip(faults, found, strict=True)]
+    states = (
+        EpisodeState(slot + place, slot, record, fault, rewritten)
+        for place, (record, fault) in enumerate(zip(records, faults, strict=True))
+    )
+    return tuple(states), lines
 
 
-def _first_line(error: BaseException) -> str:
-    """Return the first line of what an error says."""
-    return str(error).partition("\n")[0]
+def _line_faults(
+    layout: Layout, manifest: Manifest, records: list[EpisodeRecord], slot: int, start: int | None
+) -> list[str]:
+    """Return what is wrong with each line, or ""."""
+    row, faults = layout.relative(layout.row(slot)), []
+    expected = {layout.data(slot), *(layout.video(key, slot) for key in video_keys(manifest.features))}
+    named = {layout.root / name for name in records[0].files} == expected
+    start = records[0].start if start is None else start
+    for number, record in enumerate(records, slot):
+        fault = "" if named else f"{row} names files that are not those of episode {slot}"
+        if (record.episode, record.start, record.slot) != (number, start, slot) or record.length < 1:
+            fault = f"{row} is not the line of episode {number}, frame {start} on"
+        faults.append(fault)
+        start = record.start + record.length
+    return faults
 
 
-def _line_fault(
-    layout: Layout, manifest: Manifest, record: EpisodeRecord, number: int, start: int | None
-) -> str:
-    row = layout.relative(layout.row(number))
-    place = (number, record.start if start is None else start)
-    if (record.episode, record.start) != place or record.length < 1:
-        return f"{row} is not the line of episode {number}, frame {place[1]} on"
-    expected = {layout.data(number), *(layout.video(key, number) for key in video_keys(manifest.features))}
-    if {layout.root / name for name in record.files} != expected:
-        return f"{row} names files that are not those of episode {number}"
-    return ""
-
-
-def _file_fault(
+def _file_faults(
     path: Path,
     name: str,
     manifest: Manifest,
-    record: EpisodeRecord,
+    lines: Lines,
     seal: FileSeal,
     seal_of: Seals,
     rewritten: dict[str, FileSeal],
-) -> str:
-    """Return what is wrong with a file, or ""; one that is whole though rewritten is added to those."""
+) -> list[str]:
+    """Return what is wrong with each episode in a file, or ""; whole files are added to `rewritten`."""
+    size = ""
     try:
         found = seal_of(path)
         if found == seal:
-            return ""
-        fault = _content_fault(path, name, manifest, record)
-    except FileNotFoundError:
-        return f"{name} is missing"
-    except (HandrailError, *UNREADABLE) as error:
-        fault = _first_line(error)
-    if fault:
-        size = path.stat().st_size
-        said = f"has {size} bytes, expected {seal.size}" if size != seal.size else "has other content"
-        return f"{name} {said} ({fault})"
-    rewritten[name] = found
-    return ""
-
-
-def _content_fault(path: Path, name: str, manifest: Manifest, record: EpisodeRecord) -> str:
-    if name.startswith("data/"):
-        return _rows_fault(path, manifest, record)
-    key = name.split("/")[1]
-    height, width, _ = manifest.features[key].shape
-    now, saved = decoded_stats(path, record.length, height, width), (record.stats or {})[key]
-    same = all(np.abs(now[name] - saved[name]).max() < _SHADE for name in ("mean", "std"))
-    return "" if same else "it shows other pictures than were saved"
-
-
-def _rows_fault(path: Path, manifest: Manifest, record: EpisodeRecord) -> str:
-    """Return how rows that can be read differ from those that were saved, or ""."""
-    with pq.ParquetFile(path) as file:
-        table = file.read(use_threads=False)
-    lacking = [name for name in stored_features(manifest.features) if name not in table.column_names]
-    if lacking or table.num_rows != record.length:
-        return f"{table.num_rows} rows instead of {record.length}" + "".join(f", no {n}" for n in lacking[:1])
-    frames = np.arange(record.length)
-    expected = {"frame_index": frames, "index": frames + record.start, "episode_index": record.episode}
-    for name, values in expected.items():
-        if not np.array_equal(_values(table, name), np.broadcast_to(values, frames.shape)):
-            return f"{name} is not that of episode {record.episode}"
-    for name, saved in (record.stats or {}).items():
-        if name in table.column_names and name not in AUTOMATIC and _differ(_values(table, name), saved):
-            return f"{name} holds other numbers than were saved"
-    return ""
-
-
-def _values(table: pa.Table, name: str) -> np.ndarray:
-    """Return a column of numbers, (N,) or (N, d)."""
-    flat = flat_numbers(table.column(name))
-    return flat if len(flat) == table.num_rows else flat.reshape(table.num_rows, -1)
-
-
-def _differ(values: np.ndarray, saved: dict[str, np.ndarray]) -> bool:
-    now = column_stats(values)
-    return not all(np.allclose(now[name], saved[name].ravel(), rtol=1e-5, atol=1e-8) for name in _KEPT)
+            return [""] * len(lines)
+        size = f"has {found.size} bytes, expected {seal.size}" if found.size != seal.size else ""
+    except OSError as error:
+        missing = isinstance(error, FileNotFoundError)
+        return [f"{name} is missing" if missing else f"{name} ({first_line(error)})"] * len(lines)
+    faults = content_faults(path, name, manifest, lines)
+    if not any(faults):
+        rewritten[name] = found
+    return [f"{name} {size or 'has other content'} ({fault})" if fault else "" for fault in faults]

@@ -19,15 +19,14 @@ from typing import Any, Self
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.format.columns import ColumnTypes, Scalar, column_types, fit_columns, plain_columns
 from handrail.datasets.format.layout import Layout
+from handrail.datasets.format.lines import lines_bytes, read_column_types, rows_of_lines
 from handrail.datasets.format.manifest import Manifest, read_manifest
 from handrail.datasets.format.metadata import (
     EpisodeRecord,
     FileSeal,
     Totals,
     info_bytes,
-    read_column_types,
     read_encodings,
-    row_bytes,
     stats_bytes,
 )
 from handrail.datasets.format.schema import Feature, video_keys
@@ -116,7 +115,7 @@ class EpisodeWriter:
             lock = DatasetLock(layout.staging)
             with lock.released_on_error():
                 report, totals = tidy_locked(layout, existing, Checksums(layout.root, anew=verify))
-                types = read_column_types(layout.row(totals.episodes - 1)) if totals.episodes else None
+                types = read_column_types(rows_of_lines(layout)[-1]) if totals.episodes else None
         return cls(layout, manifest, totals, lock, types, report)
 
     @property
@@ -222,9 +221,10 @@ class EpisodeWriter:
             stats=numeric_stats(columns) | stats,
             columns=extras,
             files={self._layout.relative(path): FileSeal.of(staged) for staged, path in self._streams()},
+            slot=self.num_episodes,
         )
         totals = self._totals.grown(record)
-        write_synced(staging / "row.parquet", row_bytes(self._manifest, record, types))
+        write_synced(staging / "row.parquet", lines_bytes(self._manifest, [record], types))
         write_synced(staging / "tasks.parquet", tasks_bytes(totals.tasks))
         write_synced(staging / "info.json", info_bytes(self._manifest, totals, self._encodings))
         write_synced(staging / "stats.json", stats_bytes(totals.stats or {}))

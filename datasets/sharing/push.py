@@ -14,6 +14,7 @@ import numpy as np
 from huggingface_hub.errors import HfHubHTTPError
 
 from handrail.controllers.errors import HandrailError, message_of
+from handrail.datasets.format.data_file import DataFiles, data_files
 from handrail.datasets.reading.check import check_whole
 from handrail.datasets.reading.reader import DatasetInfo, read_episodes, read_info, read_rows_of
 from handrail.datasets.sharing.card import CARD, TAGS, write_card
@@ -132,7 +133,9 @@ def check_nobody(root: Path) -> None:
             f"dataset {str(root)!r}: episodes {_few(people)} are of participants of a user study, which are"
             f" never sent; {advice}"
         )
-    unknown = [row["episode_index"] for row in rows if _PARTICIPANT not in row and _driven(info, row)]
+    with data_files() as files:
+        driven = [row for row in rows if _PARTICIPANT not in row and _driven(info, row, files)]
+    unknown = [row["episode_index"] for row in driven]
     if unknown:
         raise HandrailError(
             f"dataset {str(root)!r}: people drove episodes {_few(unknown)}, and another tool has dropped who,"
@@ -140,11 +143,11 @@ def check_nobody(root: Path) -> None:
         )
 
 
-def _driven(info: DatasetInfo, row: dict[str, Any]) -> bool:
+def _driven(info: DatasetInfo, row: dict[str, Any], files: DataFiles) -> bool:
     """Return whether a person drove an episode."""
     if _DEVICE not in info.features:
         return False
-    return bool(np.any(read_rows_of(info, row, [_DEVICE])[_DEVICE] != ""))
+    return bool(np.any(read_rows_of(info, row, [_DEVICE], files)[_DEVICE] != ""))
 
 
 def _few(numbers: Sequence[int]) -> str:

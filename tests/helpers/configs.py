@@ -13,6 +13,7 @@ from handrail.collect.teleop_config import CalibrateConfig
 from handrail.collect.user_study.config import StudySessionConfig
 from handrail.datasets.comparison.config import CompareConfig
 from handrail.datasets.editing.config import EditConfig
+from handrail.datasets.editing.pack_config import MergeConfig, PackConfig
 from handrail.policies.imitation.config import TrainConfig
 from handrail.policies.imitation.evaluation.config import EvaluateConfig
 from handrail.policies.rl.config import TrainRlConfig
@@ -27,6 +28,8 @@ CONFIGS = {
     "handrail-inspect": InspectConfig,
     "handrail-repair": RepairConfig,
     "handrail-edit": EditConfig,
+    "handrail-pack": PackConfig,
+    "handrail-merge": MergeConfig,
     "handrail-push": PushConfig,
     "handrail-demo": DemoConfig,
     "handrail-showcase": ShowcaseConfig,

@@ -28,7 +28,8 @@ from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.intent import Intent
 from handrail.controllers.robot.model import RobotModel
-from handrail.datasets.reading.reader import read_episodes, read_frames, read_info
+from handrail.datasets.format.data_file import data_files
+from handrail.datasets.reading.reader import read_episodes, read_info, read_rows_of
 from handrail.datasets.recording.piece import TRIMMED
 
 _COLUMNS = ("action", "teleop.values", "teleop.mask", "teleop.raw", "teleop.mode", "teleop.device")
@@ -89,16 +90,17 @@ def read_steered(root: Path, participant: str = "", device: str = "") -> Iterato
     missing = [name for name in _COLUMNS if name not in info.features]
     if missing:
         raise HandrailError(f"dataset {str(root)!r}: expected the column {missing[0]!r} of handrail-record")
-    for row in read_episodes(root):
-        name = f"{root.name}, episode {row['episode_index']}"
-        if participant and row.get("participant") != participant:
-            continue
-        frames = read_frames(root, row["episode_index"], _COLUMNS)
-        held = Counter(frames["teleop.device"].tolist()).most_common(1)[0][0]
-        if device and held != device:
-            continue
-        reason = _unfit(row, frames, info.fps)
-        yield f"{name}: {reason}" if reason else _steered(name, row, frames, info.fps, held)
+    with data_files() as files:
+        for row in read_episodes(root):
+            name = f"{root.name}, episode {row['episode_index']}"
+            if participant and row.get("participant") != participant:
+                continue
+            frames = read_rows_of(info, row, _COLUMNS, files)
+            held = Counter(frames["teleop.device"].tolist()).most_common(1)[0][0]
+            if device and held != device:
+                continue
+            reason = _unfit(row, frames, info.fps)
+            yield f"{name}: {reason}" if reason else _steered(name, row, frames, info.fps, held)
 
 
 def check_alike(episodes: Sequence[Steered]) -> None:

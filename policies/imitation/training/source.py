@@ -11,6 +11,7 @@ import torch
 
 from handrail.collect.operators.modes import MODES
 from handrail.controllers.errors import HandrailError
+from handrail.datasets.format.data_file import data_files
 from handrail.datasets.format.schema import Feature
 from handrail.datasets.format.stats import column_stats
 from handrail.datasets.reading.check import check_whole
@@ -191,7 +192,7 @@ def _interpreted(
             f"--actions {actions}: expected the columns that handrail-record writes, found no"
             f" {', '.join(missing)}; for other datasets say --actions recorded"
         )
-    episodes = [read_rows_of(info, dict(row), COLUMNS) for row in selection.rows]
+    episodes = _rows(info, selection, COLUMNS)
     interface = PolicyInterface.of_dataset(info.features, episodes, actions)
     observed = [interface.observe(episode[STATE], episode[ENVIRONMENT]) for episode in episodes]
     columns = {
@@ -216,13 +217,19 @@ def _recorded(
         raise HandrailError(
             f"dataset {str(info.root)!r}: expected a column 'action', got {', '.join(keys) or 'none'}"
         )
-    episodes = [read_rows_of(info, dict(row), keys) for row in selection.rows]
+    episodes = _rows(info, selection, keys)
     columns = {key: np.concatenate([episode[key] for episode in episodes]) for key in keys}
     columns = {key: v.astype(np.float32) if v.dtype == np.float64 else v for key, v in columns.items()}
     features = {key: _feature(f.dtype, f.shape, f.names) for key in keys for f in (info.features[key],)}
     if config.policy in _READ_SCENE and STATE in columns and not (ENVIRONMENT in columns or _pictured(info)):
         features[ENVIRONMENT], columns[ENVIRONMENT] = features[STATE], columns[STATE]
     return features, columns
+
+
+def _rows(info: DatasetInfo, selection: Selection, columns: Sequence[str]) -> list[dict[str, np.ndarray]]:
+    """Return columns of the selected episodes."""
+    with data_files() as files:
+        return [read_rows_of(info, dict(row), columns, files) for row in selection.rows]
 
 
 def _check_inputs(config: TrainConfig, info: DatasetInfo, features: Mapping[str, Any]) -> None:

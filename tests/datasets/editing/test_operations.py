@@ -28,6 +28,7 @@ OURS = {
     "relabel": "relabel SET --episodes 0 --label failure --output NEW",
     "rename": "rename SET --task touch --output NEW",
 }
+PACKED = {"pack": "SET --output NEW", "merge": "SET MORE --output NEW"}
 LEROBOTS = {
     "delete_episodes": "--root SET --new_repo_id me/new --new_root NEW --operation.episode_indices [1]",
     "split": '--root SET --new_root NEW --operation.splits {"part":[0,1],"rest":[2]}',
@@ -70,11 +71,11 @@ def sets(tmp_path_factory):
 
 def edited(sets: dict[str, Path], whose: str, operation: str, new: Path) -> Path:
     """Return the dataset that an operation makes."""
-    line = (OURS if whose == "ours" else LEROBOTS)[operation]
+    line = {"ours": OURS, "packed": PACKED, "lerobot's": LEROBOTS}[whose][operation]
     for name, place in {**sets, "NEW": new}.items():
         line = line.replace(name, str(place))
-    if whose == "ours":
-        done = command(*line.split(), name="edit")
+    if whose != "lerobot's":
+        done = command(*line.split(), name="edit" if whose == "ours" else operation)
         assert done.returncode == 0, done.stderr
     else:
         if operation in IN_PLACE:
@@ -115,9 +116,13 @@ def used(use: str, root: Path, original: Path, output: Path):
 
 def table() -> str:
     """Return what works after which operation, as the page shows it."""
-    tools = (("ours", "handrail-edit", OURS), ("lerobot's", "lerobot-edit-dataset", LEROBOTS))
+    tools = (
+        ("packed", "handrail-{}", PACKED),
+        ("ours", "handrail-edit {}", OURS),
+        ("lerobot's", "lerobot-edit-dataset {}", LEROBOTS),
+    )
     rows = [
-        [f"`{tool}` {each}", *(WORDS[REFUSED.get((whose, each, use))] for use in USES)]
+        [f"`{tool.format(each)}`", *(WORDS[REFUSED.get((whose, each, use))] for use in USES)]
         for whose, tool, operations in tools
         for each in operations
     ]
@@ -132,7 +137,12 @@ def test_the_page_says_what_is_tested():
 @pytest.mark.slow
 @pytest.mark.needs_gl
 @pytest.mark.parametrize(
-    ("whose", "operation"), [*(("ours", each) for each in OURS), *(("lerobot's", each) for each in LEROBOTS)]
+    ("whose", "operation"),
+    [
+        *(("packed", each) for each in PACKED),
+        *(("ours", each) for each in OURS),
+        *(("lerobot's", each) for each in LEROBOTS),
+    ],
 )
 def test_every_use_works_or_says_why_not(sets, tmp_path, whose, operation):
     root, found = edited(sets, whose, operation, tmp_path / "new"), {}

@@ -247,10 +247,9 @@ def test_an_episode_put_back_comes_once(root):
 
 
 def test_chunks_roll_over(tmp_path, monkeypatch):
-    from handrail.datasets.format import layout, metadata
+    from handrail.datasets.format import layout
 
     monkeypatch.setattr(layout, "FILES_IN_A_CHUNK", 3)
-    monkeypatch.setattr(metadata, "FILES_IN_A_CHUNK", 3)
     root = record(tmp_path / "set", 5)
     with resume(root) as writer:
         for _ in range(3):

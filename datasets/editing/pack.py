@@ -1,0 +1,107 @@
+"""Packing and merging: whole datasets become one, in files of many episodes, in one pass."""
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from itertools import chain
+from pathlib import Path
+
+from handrail.controllers.errors import HandrailError
+from handrail.datasets.editing.merge import check_alike, merged_encodings, merged_types
+from handrail.datasets.editing.source import Source
+from handrail.datasets.recording.checksums import Checksums
+from handrail.datasets.recording.drop import check_nothing_set_aside
+from handrail.datasets.recording.repair import tidy_locked
+from handrail.datasets.recording.rewrite import settle, write_anew
+from handrail.datasets.storage.atomic import explained
+from handrail.datasets.storage.lock import DatasetLock
+
+
+@dataclass(frozen=True)
+class Edited:
+    """A dataset that was written.
+
+    Attributes:
+        root: Its folder.
+        episodes: Number of episodes.
+        frames: Number of frames.
+        before: Number of frames of the datasets that it came from.
+    """
+
+    root: Path
+    episodes: int
+    frames: int
+    before: int
+
+    def __str__(self) -> str:
+        return f"{self.root}: {self.episodes} episodes, {self.frames} frames (of {self.before})"
+
+
+def merge_datasets(
+    roots: Sequence[str | Path], output: str | Path, name: str = "", verify: bool = False
+) -> Edited:
+    """Write the episodes of datasets, in their order, as one dataset with files of many episodes.
+
+    Args:
+        roots: Their folders, one or more.
+        output: Folder of the new dataset, missing or empty; or one of `roots`, which is replaced at once when
+            the new dataset is whole.
+        name: Of the new dataset, `owner/name`; that of the first folder when empty.
+        verify: Read every file of the datasets anew, also those that have not changed since the last check.
+
+    Raises:
+        HandrailError: Robot, rate or columns differ, a dataset is not Handrail's, is damaged or in use, or
+            the disk does not take it. Nothing has been changed then.
+    """
+    places = [Path(root).expanduser().absolute() for root in roots]
+    target = Path(output).expanduser().absolute()
+    with explained(f"cannot write {str(target)!r}"):
+        if target not in places:
+            check_free(target)
+            return _merged([Source.open(place, verify) for place in places], target, name, in_place=False)
+        with taken(target, verify) as own:
+            sources = [own if place == target else Source.open(place, verify) for place in places]
+            return _merged(sources, target, name, in_place=True)
+
+
+def check_free(target: Path) -> None:
+    """Check that nothing lies where a dataset is to be written.
+
+    Raises:
+        HandrailError: Something does.
+    """
+    if target.exists() and (not target.is_dir() or any(target.iterdir())):
+        raise HandrailError(f"--output {target}: expected a missing or empty folder, found one in use")
+
+
+@contextmanager
+def taken(root: Path, verify: bool) -> Iterator[Source]:
+    """Provide a dataset that is to be replaced, with the sole right to write to it.
+
+    Raises:
+        HandrailError: It is not Handrail's, is damaged or in use, or an edit of it was cut short.
+    """
+    if settle(root):
+        raise HandrailError(
+            f"dataset {str(root)!r}: an edit was cut short, and is finished now; look at it (handrail-inspect"
+            f" {root}) before the next"
+        )
+    source = Source.open(root)
+    check_nothing_set_aside(source.layout)
+    lock = DatasetLock(source.layout.staging)
+    try:
+        tidy_locked(source.layout, source.manifest, Checksums(root, anew=verify))
+        yield source
+    finally:
+        lock.release()
+
+
+def _merged(sources: Sequence[Source], target: Path, name: str, in_place: bool) -> Edited:
+    for other in sources[1:]:
+        check_alike(sources[0], other)
+    manifest = sources[0].manifest.named(name or sources[0].manifest.repo_id)
+    manifest.check()
+    pieces = chain.from_iterable(source.pieces() for source in sources)
+    types, encodings = merged_types(sources), merged_encodings(sources)
+    totals = write_anew(target, manifest, pieces, types, encodings, in_place)
+    return Edited(target, totals.episodes, totals.frames, sum(source.info.frames for source in sources))

@@ -1,0 +1,93 @@
+"""Settings of `handrail-pack` and `handrail-merge`; light to import."""
+
+import shlex
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from handrail.controllers.errors import HandrailError
+from handrail.datasets.lists import Words
+
+MANY = 500  # episodes in files of their own
+
+
+@dataclass(frozen=True)
+class PackConfig:
+    """Write a dataset's episodes into few large files, as LeRobot does; nothing is encoded anew."""
+
+    folder: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="FOLDER")]
+    """Folder of the dataset."""
+    output: str = ""
+    """Folder of the packed dataset; when empty, it takes the place of the old one."""
+    name: str = ""
+    """Name of the packed dataset, owner/name; that of the old one when empty."""
+    verify: bool = False
+    """Read every file of the dataset anew, not only those that have changed since they were checked."""
+
+    @property
+    def roots(self) -> tuple[Path, ...]:
+        """The folders of the datasets."""
+        return (Path(self.folder).expanduser().absolute(),)
+
+    @property
+    def target(self) -> Path:
+        """The folder of what is written.
+
+        Raises:
+            HandrailError: It lies in the dataset's folder, or around it.
+        """
+        return _apart(self.output, self.roots) if self.output else self.roots[0]
+
+
+@dataclass(frozen=True)
+class MergeConfig:
+    """Write the episodes of several datasets, in their order, into one, in few large files."""
+
+    folders: Annotated[tyro.conf.Positional[Words], tyro.conf.arg(metavar="FOLDER FOLDER [FOLDER …]")]
+    """Folders of the datasets."""
+    output: str = ""
+    """Folder of the new dataset; or one of the folders, which the new dataset replaces."""
+    name: str = ""
+    """Name of the new dataset, owner/name; that of the first folder when empty."""
+    verify: bool = False
+    """Read every file of the datasets anew, not only those that have changed since they were checked."""
+
+    @property
+    def roots(self) -> tuple[Path, ...]:
+        """The folders of the datasets.
+
+        Raises:
+            HandrailError: There are fewer than two.
+        """
+        if len(self.folders) < 2:
+            raise HandrailError(f"merge: expected two folders or more, got {len(self.folders)}")
+        return tuple(Path(folder).expanduser().absolute() for folder in self.folders)
+
+    @property
+    def target(self) -> Path:
+        """The folder of what is written.
+
+        Raises:
+            HandrailError: There is none, or it lies in a dataset's folder, or around it.
+        """
+        if not self.output:
+            raise HandrailError("merge: expected --output FOLDER for the new dataset, got none")
+        return _apart(self.output, self.roots)
+
+
+def packing_advice(root: Path) -> str:
+    """Return how to pack a dataset that has become slow to open for its many files, or ""."""
+    count = sum(1 for _ in root.glob("data/*/*.parquet"))
+    if count <= MANY:
+        return ""
+    return f"{count} files of rows are slow to open: handrail-pack {shlex.quote(str(root))} makes few of them"
+
+
+def _apart(output: str, roots: tuple[Path, ...]) -> Path:
+    target = Path(output).expanduser().absolute()
+    for root in roots:
+        if root in target.parents or target in root.parents:
+            raise HandrailError(f"--output {output}: expected a folder apart from {root}")
+    return target

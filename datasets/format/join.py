@@ -1,0 +1,160 @@
+"""Joining stretches of mp4s into one: packets are copied with new times, no picture is encoded anew.
+
+A stretch can be copied if it begins with a key frame and no picture in it needs one that is left out; it can
+be joined to another if both are encoded alike, since a file describes its pictures once.
+"""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+from typing import Any, NoReturn
+
+import av
+import av.error
+
+from handrail.controllers.errors import HandrailError
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """Packets that stand on their own.
+
+    Attributes:
+        packets: In the order in which they are decoded.
+        stream: The video that they are of, open.
+        first: Which of its pictures is shown first.
+        count: Number of pictures.
+    """
+
+    packets: list[Any]
+    stream: Any
+    first: int
+    count: int
+
+
+class Videos:
+    """Reads stretches of mp4s and keeps the last one of each camera open: episodes are read in order."""
+
+    def __init__(self, fps: int):
+        """Begin without an open file; pictures a second `fps` [Hz] of all of them."""
+        self._fps = fps
+        self._open: dict[str, tuple[Path, Any]] = {}
+
+    def stretch(self, path: Path, first: int, count: int, camera: str = "") -> Stretch | None:
+        """Return some pictures of a video; None if they cannot be copied.
+
+        Args:
+            path: An mp4.
+            first: The picture that it begins with.
+            count: Number of pictures.
+            camera: Whose last video stays open until the next.
+
+        Raises:
+            HandrailError: It is not a whole mp4, or has no such pictures.
+        """
+        try:
+            container = self._opened(path, camera)
+            stream = container.streams.video[0]
+            if stream.codec_context is None:
+                raise ValueError("a codec that nobody knows")
+            container.seek(round(Fraction(first, self._fps) / stream.time_base), stream=stream)
+            packets, begun = [], False
+            for packet in container.demux(stream):
+                place = place_of(packet, self._fps) if packet.size else first + count
+                inside = first <= place < first + count
+                if inside:
+                    packets.append(packet)
+                elif begun and len(packets) < count:
+                    return None if packet.size else self._short(path, first, count)
+                begun = begun or inside
+                if len(packets) == count:
+                    return Stretch(packets, stream, first, count) if packets[0].is_keyframe else None
+            return self._short(path, first, count)
+        except (av.error.FFmpegError, IndexError, ValueError) as error:
+            raise HandrailError(f"video {str(path)!r}: expected a whole mp4, got {error}") from error
+
+    def close(self) -> None:
+        """Close what is open."""
+        for camera in tuple(self._open):
+            self.forget(camera)
+
+    def forget(self, camera: str) -> None:
+        """Close the video of a camera, if one is open."""
+        if camera in self._open:
+            self._open.pop(camera)[1].close()
+
+    def _opened(self, path: Path, camera: str) -> Any:
+        if camera not in self._open or self._open[camera][0] != path:
+            self.forget(camera)
+            self._open[camera] = path, av.open(str(path))
+        return self._open[camera][1]
+
+    def _short(self, path: Path, first: int, count: int) -> NoReturn:
+        raise HandrailError(
+            f"video {str(path)!r}: expected the pictures {first} to {first + count - 1}, got fewer"
+        )
+
+
+@contextmanager
+def videos(fps: int) -> Iterator[Videos]:
+    """Provide a reader of mp4s that is closed in the end."""
+    opened = Videos(fps)
+    try:
+        yield opened
+    finally:
+        opened.close()
+
+
+class VideoJoin:
+    """One mp4 that grows by stretches of others."""
+
+    def __init__(self, target: Path, fps: int):
+        """Begin a video.
+
+        Args:
+            target: The new mp4; it appears with the first stretch.
+            fps: Pictures a second [Hz].
+        """
+        self._target, self._fps = target, fps
+        self._container: Any = None
+        self._out: Any = None
+        self._like: tuple = ()
+        self._pictures = self.size = 0
+
+    def fits(self, stretch: Stretch) -> bool:
+        """Return whether a stretch is encoded as what is there."""
+        return self._container is None or self._like == _encoding(stretch.stream)
+
+    def add(self, stretch: Stretch) -> None:
+        """Append a stretch that fits."""
+        if self._container is None:
+            self._container = av.open(str(self._target), "w", format="mp4")
+            self._out = self._container.add_stream_from_template(stretch.stream)
+            self._like = _encoding(stretch.stream)
+        base = stretch.stream.time_base
+        shift = round(Fraction(self._pictures - stretch.first, self._fps) / base)
+        for packet in stretch.packets:
+            packet.pts, packet.dts = (packet.pts or 0) + shift, (packet.dts or 0) + shift
+            packet.stream = self._out
+            self.size += packet.size
+            self._container.mux(packet)
+        self._pictures += stretch.count
+
+    def close(self) -> None:
+        """Finish the file; safe to call twice."""
+        if self._container is not None:
+            self._container.close()
+        self._container = None
+
+
+def place_of(shown: Any, fps: int) -> int:
+    """Return which picture of the video a packet or a frame is."""
+    return round((shown.pts or 0) * shown.time_base * fps)
+
+
+def _encoding(stream: Any) -> tuple:
+    """Return what two videos must have in common to be one file."""
+    codec = stream.codec_context
+    return codec.name, codec.width, codec.height, codec.pix_fmt, codec.extradata, stream.time_base

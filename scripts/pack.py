@@ -1,0 +1,17 @@
+"""`handrail-pack`: write a dataset into few large files."""
+
+from handrail.datasets.editing.pack_config import PackConfig
+from handrail.scripts import cli
+
+
+@cli.command("handrail-pack", PackConfig)
+def main(config: PackConfig) -> None:
+    """Run the command."""
+    roots, target = config.roots, config.target
+    from handrail.datasets.editing.pack import merge_datasets
+
+    print(merge_datasets(roots, target, config.name, config.verify))
+
+
+if __name__ == "__main__":
+    main()

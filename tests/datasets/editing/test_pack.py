@@ -1,0 +1,206 @@
+"""Packed or not, in shards or not: the same rows, pictures, lines and summaries, for us and for LeRobot."""
+
+import os
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from command_helpers import command
+from datasets_helpers import (
+    CAMERAS,
+    TASKS,
+    check_pictures,
+    create,
+    frame_of,
+    length_of,
+    open_with_lerobot,
+    record,
+    record_one,
+    resume,
+    tree,
+)
+from editing_helpers import record_episodes
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from handrail.controllers.errors import HandrailError
+from handrail.datasets.editing.pack import merge_datasets
+from handrail.datasets.format.layout import Layout
+from handrail.datasets.reading.check import check_report
+from handrail.datasets.reading.reader import read_episodes, read_frames
+from handrail.datasets.recording import volume
+from handrail.datasets.recording.repair import repair
+
+SUMMARIES = ("meta/info.json", "meta/stats.json", "meta/tasks.parquet", "meta/handrail.json")
+
+
+def part(root, first: int, end: int):
+    """Record some of the episodes that `record` makes."""
+    with create(root) as writer:
+        for episode in range(first, end):
+            for index in range(length_of(episode)):
+                writer.add_frame(frame_of(episode, index, cameras=False), TASKS[episode // 2 % 2])
+            said = {"success": episode % 2 == 0, "failure_reason": None, "seed": episode}
+            writer.save_episode(said)
+    return root
+
+
+def content(root) -> list[tuple[dict, dict]]:
+    """Return line and rows of every episode; where they lie does not count."""
+    return [
+        (
+            {
+                name: value
+                for name, value in row.items()
+                if "chunk_index" not in name and "file_index" not in name
+            },
+            {name: values.tolist() for name, values in read_frames(root, row["episode_index"]).items()},
+        )
+        for row in read_episodes(root)
+    ]
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """Seven episodes recorded one after the other."""
+    return part(tmp_path_factory.mktemp("whole") / "set", 0, 7)
+
+
+@settings(max_examples=6, deadline=None)
+@given(cuts=st.sets(st.integers(1, 6), max_size=3), most=st.integers(1, 8))
+def test_shards_become_what_one_recording_is(whole, tmp_path_factory, cuts, most):
+    """To the byte in all that summarises; whatever the shards and however large a file may grow."""
+    folder = tmp_path_factory.mktemp("shards")
+    bounds = [0, *sorted(cuts), 7]
+    roots = [part(folder / str(a), a, b) for a, b in pairwise(bounds)]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(volume, "MOST_EPISODES", most)
+        merge_datasets(roots, folder / "all")
+        merge_datasets([folder / "all"], folder / "again")
+    assert content(folder / "all") == content(whole)
+    files, recorded = tree(folder / "all"), tree(whole)
+    assert {name: files[name] for name in SUMMARIES} == {name: recorded[name] for name in SUMMARIES}
+    assert len([name for name in files if name.startswith("data/")]) == -(-7 // most)
+    assert tree(folder / "again") == files
+    assert repair(folder / "all").clean
+    assert not check_report(folder / "all")
+
+
+def test_shards_are_added_to_a_dataset_in_its_place(whole, tmp_path):
+    first, second = part(tmp_path / "first", 0, 3), part(tmp_path / "second", 3, 7)
+    (first / "notes.txt").write_text("mine")
+    assert merge_datasets([first, second], first).episodes == 7
+    assert content(first) == content(whole)
+    assert (first / "notes.txt").read_text() == "mine"
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["first", "second"]
+
+
+def test_a_packed_dataset_goes_on_and_is_packed_again(whole, tmp_path, monkeypatch):
+    monkeypatch.setattr(volume, "MOST_EPISODES", 3)
+    root = part(tmp_path / "set", 0, 4)
+    merge_datasets([root], root)
+    with resume(root) as writer:
+        for _ in range(2):
+            record_one(writer, cameras=False)
+    assert content(root) == content(whole)[:6]
+    assert repair(root).clean
+    merge_datasets([root], root)
+    assert content(root) == content(whole)[:6]
+    assert len(list(root.glob("data/*/*"))) == 2
+
+
+def test_lerobot_sees_the_same_items(tmp_path):
+    root, other = record(tmp_path / "one", 3, cameras=True), record(tmp_path / "two", 2, cameras=True)
+    merge_datasets([root, other], tmp_path / "all")
+    assert {path.name for path in (tmp_path / "all").rglob("*.mp4")} == {"file-000.mp4"}
+    found, place = open_with_lerobot(tmp_path / "all"), 0
+    for each in (root, other):
+        dataset = open_with_lerobot(each)
+        for index in range(len(dataset)):
+            mine, theirs = found[place], dataset[index]
+            assert mine.keys() == theirs.keys()
+            for key in theirs.keys() - {"index", "episode_index", "task_index", "task"}:
+                assert np.array_equal(mine[key], theirs[key]), key
+            assert mine["task"] == theirs["task"]
+            place += 1
+    assert place == len(found)
+    with resume(tmp_path / "all", cameras=True) as writer:
+        record_one(writer, cameras=True)
+    again = open_with_lerobot(tmp_path / "all")
+    check_pictures(again, [len(again) - 1])
+
+
+def test_a_packed_episode_is_cut_as_it_would_be_alone(tmp_path):
+    """Also one that begins between two key frames: its pictures are encoded anew, in a file of their own."""
+    root = record_episodes(tmp_path / "set", cameras=True)
+    merge_datasets([root], tmp_path / "packed")
+    for name in ("set", "packed"):
+        for words in (["trim"], ["delete", "--episodes", "1"]):
+            done = command(
+                *words[:1],
+                tmp_path / name,
+                *words[1:],
+                "--output",
+                tmp_path / f"{words[0]}_{name}",
+                name="edit",
+            )
+            assert done.returncode == 0, done.stderr
+    for verb in ("trim", "delete"):
+        alone, packed = tmp_path / f"{verb}_set", tmp_path / f"{verb}_packed"
+        assert content(alone) == content(packed)
+        one, other = open_with_lerobot(alone), open_with_lerobot(packed)
+        for index in range(0, len(one), 7):
+            assert all(np.allclose(one[index][key], other[index][key], atol=0.02) for key in CAMERAS)
+
+
+@pytest.mark.parametrize("stream", ["data", "videos"])
+def test_damage_in_a_packed_file_is_named_and_can_be_set_aside(tmp_path, stream):
+    root = record(tmp_path / "set", 4, cameras=True)
+    merge_datasets([root], root)
+    before = [frames for _, frames in content(root)]
+    (path, *_) = sorted(path for path in (root / stream).rglob("*") if path.is_file())
+    raw = bytearray(path.read_bytes())
+    middle = len(raw) // 3
+    raw[middle : middle + 200] = bytes(200)
+    path.write_bytes(raw)
+    with pytest.raises(HandrailError, match="is damaged"):
+        resume(root, cameras=True)
+    report = repair(root, set_aside_damaged=True)
+    assert 0 < len(report.lost) <= 4
+    assert report.put_back == 4 - len(report.lost)
+    kept = [int(frames["observation.state"][0][0]) // 1000 for _, frames in content(root)]
+    lost = [int(fault.split(":")[0].removeprefix("episode ")) for fault in report.lost]
+    assert sorted(kept + lost) == [0, 1, 2, 3]
+    for (_, frames), episode in zip(content(root), kept, strict=True):
+        assert frames["action"] == before[episode]["action"]
+    assert repair(root, set_aside_damaged=True).put_back == 0
+
+
+def test_a_merge_that_fails_changes_nothing(tmp_path):
+    root, other = part(tmp_path / "one", 0, 2), part(tmp_path / "two", 2, 4)
+    os.truncate(Layout(other).data(1), 30)
+    before = tree(tmp_path)
+    for output in (tmp_path / "new", root):
+        with pytest.raises(HandrailError, match=r"two.*damaged"):
+            merge_datasets([root, other], output)
+        assert tree(tmp_path) == before
+
+
+def test_the_commands_say_what_they_wrote(whole, tmp_path):
+    done = command(whole, "--output", tmp_path / "packed", name="pack")
+    assert done.stdout == f"{tmp_path / 'packed'}: 7 episodes, 74 frames (of 74)\n"
+    root = part(tmp_path / "set", 0, 3)
+    assert command(root, name="pack").returncode == 0
+    assert len(list(root.glob("data/*/*"))) == 1
+    done = command(root, whole, "--output", tmp_path / "both", name="merge")
+    assert done.returncode == 0, done.stderr
+    assert len(read_episodes(tmp_path / "both")) == 10
+    for words, said in (
+        ((root,), "two folders"),
+        ((root, whole), "--output"),
+        ((root, whole, "--output", root / "in"), "apart"),
+        ((root, whole, "--output", tmp_path / "both"), "in use"),
+    ):
+        done = command(*words, name="merge")
+        assert (done.returncode, done.stderr.count("\n")) == (2, 1)
+        assert said in done.stderr
