@@ -10,6 +10,7 @@ import tyro
 
 from handrail.collect.client_config import ClientConfig
 from handrail.collect.cockpit_config import CockpitConfig
+from handrail.collect.execution.config import ExecutionConfig
 from handrail.collect.flags import one_of, only_one
 from handrail.collect.operators.catalogue import OPERATORS
 from handrail.collect.operators.human.human import HumanSettings
@@ -195,7 +196,7 @@ class FoundDatasetConfig(DatasetConfig):
 
 
 @dataclass(frozen=True)
-class RecordConfig(SessionConfig):
+class RecordConfig(SessionConfig, ExecutionConfig):
     """Record demonstrations of a robot steered through the masked MPC as a LeRobot dataset."""
 
     dataset: DatasetConfig = field(default_factory=DatasetConfig)
@@ -233,6 +234,7 @@ class RecordConfig(SessionConfig):
                 f"--robot_client {self.robot_client}: expected neither --moving_obstacles nor --no_physics"
             )
         self._check_rates()
+        self._check_sharing()
         if self.resume and self.overwrite:
             raise HandrailError("--resume and --overwrite: expected one of them, got both")
         if self.display_data and self.display_web:
@@ -241,6 +243,20 @@ class RecordConfig(SessionConfig):
             raise HandrailError(f"--display_save {self.display_save}: expected a file that ends in .rrd")
         if self.display_save and not Path(self.display_save).parent.is_dir():
             raise HandrailError(f"--display_save {self.display_save}: expected a file in an existing folder")
+
+    def _check_sharing(self) -> None:
+        """Check that the episodes may be recorded anywhere and in any order, if they are to be."""
+        self.check_execution()
+        if not self.is_shared:
+            return
+        flag = f"--ray {self.ray}" if self.ray else f"--workers {self.workers}"
+        if OPERATORS.find(self.operator).interactive:
+            raise HandrailError(
+                f"{flag}: expected --operator scripted, got a person: --operator {self.operator}"
+            )
+        for name in ("robot_client", "realtime", "display_data", "display_web", "display_save"):
+            if getattr(self, name):
+                raise HandrailError(f"{flag}: expected a recording without --{name}, which is of one process")
 
     def _check_rates(self) -> None:
         fps = self.dataset.fps

@@ -73,8 +73,8 @@ def run(main: Callable[[], int | None]) -> NoReturn:
         fail(str(error), BAD_INPUT)
     except BrokenPipeError:
         sys.exit(FAILED)
-    except KeyboardInterrupt:
-        fail("interrupted", INTERRUPTED)
+    except KeyboardInterrupt as interrupt:
+        fail(str(interrupt) or "interrupted", INTERRUPTED)
 
 
 def fail(message: str, code: int) -> NoReturn:

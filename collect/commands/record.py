@@ -1,65 +1,30 @@
 """Records episodes into a dataset, with a progress bar, and says what came of it."""
 
-from collections import Counter
-from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
 from rich.console import Console
-from rich.table import Table
 
-from handrail.collect.commands.interrupts import Interrupts
+from handrail.collect.commands.account import PLAIN, RecordingLog, report
 from handrail.collect.commands.progress import recording_bar
-from handrail.collect.commands.recording import Recording, come_first, open_writer
-from handrail.collect.commands.target import located, next_commands
+from handrail.collect.commands.recording import Recording, come_first, episode_seed, open_writer
+from handrail.collect.commands.shards import Shards
+from handrail.collect.commands.shared import record_shared
+from handrail.collect.commands.target import located
 from handrail.collect.config import RecordConfig
 from handrail.collect.envs.env import HandrailEnv
+from handrail.collect.execution.interrupts import Interrupts
 from handrail.collect.operators.catalogue import OPERATORS
 from handrail.collect.operators.operator import EpisodeEvent
 from handrail.collect.session.build import build_env, build_modes, build_session
 from handrail.collect.session.display import Display
-from handrail.collect.session.outcome import Outcome
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.registry import resolved
-from handrail.datasets.editing.pack_config import packing_advice
 from handrail.datasets.format.layout import Layout
 from handrail.datasets.recording.folder import check_target
 from handrail.datasets.recording.writer import EpisodeWriter
 
 INTERRUPTED = 130
 FAILED = 1
-_DROPPED: dict[EpisodeEvent | None, str] = {
-    None: "practice",
-    EpisodeEvent.DISCARD: "thrown away",
-    EpisodeEvent.RESTART: "begun again",
-    EpisodeEvent.QUIT: "not finished",
-}
-PLAIN: dict[str, Any] = {"highlight": False, "markup": False, "soft_wrap": True}
-
-
-@dataclass
-class _Log:
-    """What has been recorded in this run, and what the operator did not want to keep."""
-
-    outcomes: list[Outcome] = field(default_factory=list)
-    dropped: list[Outcome] = field(default_factory=list)
-    attempt: int = 0
-    trouble: str = ""
-    exit_code: int = 0
-
-    def add(self, outcome: Outcome) -> None:
-        """Count an episode; one thrown away is tried again elsewhere, one begun again is not."""
-        (self.outcomes if outcome.kept else self.dropped).append(outcome)
-        another = outcome.practice or outcome.ended_by is EpisodeEvent.DISCARD
-        self.attempt = 0 if outcome.kept else self.attempt + another
-
-    @property
-    def words(self) -> str:
-        """How it stands."""
-        successes = sum(outcome.success for outcome in self.outcomes)
-        counts = Counter(None if outcome.practice else outcome.ended_by for outcome in self.dropped)
-        dropped = (f", {counts[event]} {word}" for event, word in _DROPPED.items() if counts[event])
-        return f"{successes}/{len(self.outcomes)} succeeded" + "".join(dropped)
 
 
 def record(config: RecordConfig) -> int:
@@ -72,6 +37,8 @@ def record(config: RecordConfig) -> int:
         HandrailError: a setting is wrong; nothing has been written then.
     """
     console = Console(stderr=True)
+    if config.is_shared or Shards(config).begun:
+        return record_shared(config, console)
     interactive = OPERATORS.find(config.operator).interactive
     if interactive or config.robot_client:
         come_first()
@@ -95,9 +62,9 @@ def record(config: RecordConfig) -> int:
                 console.print("Getting ready; the first time on a computer takes about a minute.", **PLAIN)
                 recording.warm_up(config.seed)
                 console.print("Ready.", **PLAIN)
-            log = _Log()
+            log = RecordingLog()
             _record_all(config, recording, writer, log, console)
-            _report(config, writer, log, console)
+            report(config, writer.root, writer.num_episodes, writer.num_frames, log, console)
     finally:
         for display in [*displays, *people]:
             display.close()
@@ -116,19 +83,8 @@ def _opened(config: RecordConfig, interactive: bool) -> tuple[HandrailEnv, Any]:
     return open_client(config)
 
 
-def episode_seed(seed: int, episode: int, attempt: int = 0) -> int:
-    """Return the seed of an episode: far apart for every seed and number.
-
-    Args:
-        seed: of the recording.
-        episode: its number.
-        attempt: how many with this number the operator has thrown away.
-    """
-    return int(np.random.SeedSequence([seed, episode, attempt]).generate_state(1)[0])
-
-
 def _record_all(
-    config: RecordConfig, recording: Recording, writer: EpisodeWriter, log: _Log, console: Console
+    config: RecordConfig, recording: Recording, writer: EpisodeWriter, log: RecordingLog, console: Console
 ) -> None:
     """Record until the number is reached, the operator interrupts, or the disk or an encoder fails."""
     with recording_bar(console, recording.people) as progress, Interrupts() as interrupts:
@@ -151,49 +107,6 @@ def _record_all(
             )
         except HandrailError as error:
             log.trouble, log.exit_code = str(error), FAILED
-
-
-def _report(config: RecordConfig, writer: EpisodeWriter, log: _Log, console: Console) -> None:
-    if log.trouble:
-        console.print(f"error: {log.trouble}", style="bold red", **PLAIN)
-    if log.outcomes:
-        console.print(_summary(config, log))
-    for outcome in log.dropped:
-        why = _DROPPED[None if outcome.practice else outcome.ended_by]
-        console.print(f"not saved: {why}, seed {outcome.seed}", **PLAIN)
-    console.print(
-        f"{writer.num_episodes} episodes, {writer.num_frames} frames in {writer.root}",
-        highlight=False,
-        soft_wrap=True,
-    )
-    if advice := packing_advice(writer.root):
-        console.print(advice, **PLAIN)
-    if OPERATORS.find(config.operator).interactive and writer.num_episodes:
-        console.print(next_commands(writer.root), **PLAIN)
-
-
-def _summary(config: RecordConfig, log: _Log) -> Table:
-    outcomes = log.outcomes
-    simulated = sum(outcome.seconds for outcome in outcomes)
-    wall = sum(outcome.wall_time for outcome in outcomes)
-    distance = min(outcome.smallest_distance for outcome in outcomes)
-    contacts = sum(outcome.contacts for outcome in outcomes)
-    periods = sum(outcome.contact_periods for outcome in outcomes)
-    rows = {
-        "task, mode": f"{config.task}, {config.mode_name}",
-        "success": log.words,
-        "recorded": f"{simulated:.1f} s in {wall:.1f} s: {simulated / wall:.1f} × real time",
-        "smallest distance": f"{distance:.3f} m",
-        "contacts begun": f"{contacts}, {periods} periods in contact",
-        "braked updates": str(sum(outcome.brakes for outcome in outcomes)),
-    }
-    spent = {part: sum(outcome.spent.get(part, 0.0) for outcome in outcomes) for part in outcomes[0].spent}
-    frames = sum(outcome.frames for outcome in outcomes)
-    rows["time a frame"] = ", ".join(f"{part} {1e3 * time / frames:.2f} ms" for part, time in spent.items())
-    table = Table(show_header=False, box=None)
-    for name, value in rows.items():
-        table.add_row(name, value)
-    return table
 
 
 def _displays(config: RecordConfig, console: Console) -> list[Display]:

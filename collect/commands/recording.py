@@ -6,9 +6,11 @@ from contextlib import closing, suppress
 from dataclasses import replace
 from typing import Any, Protocol
 
-from handrail.collect.commands.interrupts import Interrupts
+import numpy as np
+
 from handrail.collect.config import RecordConfig
 from handrail.collect.envs.env import HandrailEnv
+from handrail.collect.execution.interrupts import Interrupts
 from handrail.collect.session.build import (
     build_env,
     build_modes,
@@ -109,6 +111,17 @@ class Recording:
                 observer.end(outcome)
             note(outcome)
         return outcome
+
+
+def episode_seed(seed: int, episode: int, attempt: int = 0) -> int:
+    """Return the seed of an episode: far apart for every seed and number.
+
+    Args:
+        seed: of the recording.
+        episode: its number.
+        attempt: how many with this number the operator has thrown away.
+    """
+    return int(np.random.SeedSequence([seed, episode, attempt]).generate_state(1)[0])
 
 
 def session_columns(config: RecordConfig) -> dict[str, Scalar]:

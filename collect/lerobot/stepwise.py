@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from handrail.collect.commands.record import episode_seed
+from handrail.collect.commands.recording import episode_seed
 from handrail.collect.config import SessionConfig
 from handrail.collect.lerobot.mode_action import ModeAction
 from handrail.collect.operators.modes import MODES

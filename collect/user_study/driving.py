@@ -4,9 +4,9 @@ from typing import Self
 
 from handrail.collect.cockpit.cockpit import Cockpit
 from handrail.collect.cockpit.process import ServerProcess
-from handrail.collect.commands.interrupts import Interrupts
 from handrail.collect.commands.recording import Recording, come_first, open_writer
 from handrail.collect.envs.env import HandrailEnv
+from handrail.collect.execution.interrupts import Interrupts
 from handrail.collect.operators.modes import TeleopMode
 from handrail.collect.session.build import build_env, build_modes
 from handrail.collect.session.outcome import Outcome

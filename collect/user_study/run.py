@@ -8,7 +8,7 @@ from rich.console import Console
 
 from handrail.collect.cockpit.cards import Cards
 from handrail.collect.cockpit.process import ServerProcess
-from handrail.collect.commands.interrupts import Interrupts
+from handrail.collect.execution.interrupts import Interrupts
 from handrail.collect.user_study.conduct import Conductor, Ending
 from handrail.collect.user_study.config import StudySessionConfig
 from handrail.collect.user_study.design import UserStudy

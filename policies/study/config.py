@@ -1,22 +1,23 @@
 """Settings of `handrail-study`; light to import."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
+from handrail.collect.execution.config import ExecutionConfig
 from handrail.collect.flags import check_page
 from handrail.controllers.errors import HandrailError
 
 
 @dataclass(frozen=True)
-class StudyConfig:
+class StudyConfig(ExecutionConfig):
     """Collect, train, evaluate and compare: teleop modes × tasks × training seeds, from one design."""
 
     preset: str = "quick"
     """Which study: quick, full, or a file of your own that ends in .toml (see policies/study/presets)."""
     output: str = "outputs/study"
     """Folder of datasets, policies, evaluations and report; what is done there is not done again."""
-    workers: int = 2
-    """Jobs at a time, one core each."""
+    workers: int = field(default=2, kw_only=True)
+    """Jobs at a time, one core each; 0 for as many as there are cores."""
     page: str = ""
     """Also write tables and figures into this Markdown file (.md), between marks."""
     report_only: bool = False
@@ -33,8 +34,7 @@ class StudyConfig:
         Raises:
             HandrailError: one is wrong.
         """
-        if not 1 <= self.workers <= 256:
-            raise HandrailError(f"--workers {self.workers}: expected a whole number from 1 to 256")
+        self.check_execution()
         if self.folder.exists() and not self.folder.is_dir():
             raise HandrailError(f"--output {self.output}: expected a folder, found a file")
         if self.report_only and not any((self.folder / name).is_dir() for name in ("begun", "done")):

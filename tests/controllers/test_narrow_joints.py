@@ -4,7 +4,7 @@ from contextlib import closing
 
 import numpy as np
 
-from handrail.collect.commands.record import episode_seed
+from handrail.collect.commands.recording import episode_seed
 from handrail.collect.config import SessionConfig
 from handrail.collect.operators.modes import MODES
 from handrail.collect.session.build import build_controller, build_env, build_session

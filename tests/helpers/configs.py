@@ -6,6 +6,7 @@ from handrail.collect.experiments.benchmark.config import BenchmarkConfig
 from handrail.collect.experiments.latency.config import LatencyConfig
 from handrail.collect.experiments.operator_fit.config import FitOperatorConfig
 from handrail.collect.experiments.profiling.config import ProfileConfig
+from handrail.collect.experiments.scaling.config import ScalingConfig
 from handrail.collect.experiments.showcase.config import ShowcaseConfig
 from handrail.collect.experiments.trials.config import TrialsConfig
 from handrail.collect.lekiwi.host_config import HostConfig
@@ -35,6 +36,7 @@ CONFIGS = {
     "handrail-showcase": ShowcaseConfig,
     "handrail-profile": ProfileConfig,
     "handrail-latency": LatencyConfig,
+    "handrail-scaling": ScalingConfig,
     "handrail-train": TrainConfig,
     "handrail-train-rl": TrainRlConfig,
     "handrail-benchmark": BenchmarkConfig,

@@ -47,6 +47,7 @@ MINUTES = (
     "handrail-study",
     "handrail-profile",
     "handrail-latency",
+    "handrail-scaling",
     "handrail-train-rl",
     "handrail-benchmark",
 )

@@ -2,20 +2,20 @@
 
 import dataclasses
 import functools
-import multiprocessing
 import shutil
-import sys
 import tempfile
 from pathlib import Path
 
 import numpy as np
 from datasets_helpers import create, frame_of
 
+from handrail.controllers.errors import HandrailError
 from handrail.datasets.comparison.evaluations import FORMAT
 from handrail.policies.study.design.jobs import Layout, jobs
 from handrail.policies.study.design.load import load_design
 from handrail.policies.study.design.progress import write_json
 from handrail.policies.study.design.settings import evaluations, fingerprint
+from handrail.policies.study.execution.run import run_study
 
 DESIGN = """
 modes = ["ee", "direct"]
@@ -91,31 +91,25 @@ def make(job, design, layout):
     write_json(layout.done(job), {"settings": fingerprint(job, design), "result": result, "seconds": 0.0})
 
 
-class Ended:
-    """What is left of a process that did its job."""
-
-    exitcode = 0
-
-    def is_alive(self):
-        return False
-
-
 class Starter:
-    """Begins jobs that only leave their files, and remembers which; one may fail, as a real process."""
+    """Does jobs that only leave their files, and remembers which; one may fail."""
 
     def __init__(self, failing=""):
         self.begun, self.failing = [], failing
 
-    def __call__(self, job, design, layout):
+    def __call__(self, job, design, root):
+        layout = Layout(root)
         needed = [layout.root / "done" / f"{name}.json" for name in job.needs]
         assert all(path.is_file() for path in needed), f"{job.name} began before what it needs"
         self.begun.append(job.name)
-        if job.name != self.failing:
-            make(job, design, layout)
-            return Ended()
-        process = multiprocessing.get_context("spawn").Process(target=sys.exit, args=(1,))
-        process.start()
-        return process
+        if job.name == self.failing:
+            raise HandrailError("of today")
+        make(job, design, layout)
+
+
+def run_here(config, work):
+    """Run a study in this process."""
+    return run_study(dataclasses.replace(config, workers=1), work, isolated=False)
 
 
 def everything(tmp_path, preset):

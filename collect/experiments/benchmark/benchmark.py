@@ -5,14 +5,13 @@ from pathlib import Path
 from typing import Any
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from handrail.collect.experiments.benchmark.catalogue import Baseline
 from handrail.collect.experiments.benchmark.config import BenchmarkConfig
 from handrail.collect.experiments.benchmark.figures import figures
 from handrail.collect.experiments.benchmark.report import write_page, write_report
 from handrail.collect.experiments.benchmark.results import summarise
-from handrail.collect.experiments.benchmark.run import Episode, available, goals, run, trace_of
+from handrail.collect.experiments.benchmark.run import available, goals, run, trace_of
 from handrail.collect.experiments.benchmark.video import Example
 from handrail.collect.simulation.gl import graphics_trouble
 from handrail.datasets.presentation.drawing import png
@@ -26,7 +25,7 @@ def benchmark(config: BenchmarkConfig, baselines: Mapping[str, Baseline], consol
     Args:
         config: what to run and write.
         baselines: all that there are, by name.
-        console: for the progress bar and what was left out.
+        console: to show how far it is, and what was left out.
 
     Raises:
         HandrailError: a setting is wrong, a controller cannot take part, or a folder cannot be written.
@@ -39,7 +38,7 @@ def benchmark(config: BenchmarkConfig, baselines: Mapping[str, Baseline], consol
     present, skipped = available(baselines, config)
     for name, reason in skipped.items():
         console.print(f"without {name}: {reason}", highlight=False)
-    episodes = _run(config, present, console)
+    episodes = run(config, present, console)
     results = summarise([episode.row for episode in episodes], config, present, skipped)
     if config.json:
         write_json(Path(config.json).expanduser(), results)
@@ -57,18 +56,6 @@ def benchmark(config: BenchmarkConfig, baselines: Mapping[str, Baseline], consol
         pictures |= {"example": example.strip()} if example else {}
         write_page(results, pictures, Path(config.page).expanduser(), config)
     return results
-
-
-def _run(config: BenchmarkConfig, present: tuple[Baseline, ...], console: Console) -> list[Episode]:
-    total = config.goals * len(config.profile_names) * len(present)
-    columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
-    episodes: list[Episode] = []
-    with Progress(*columns, console=console) as progress:
-        task = progress.add_task("episodes", total=total)
-        for some in run(config, present):
-            episodes += some
-            progress.advance(task, len(some))
-    return sorted(episodes, key=lambda episode: episode.row["goal"])
 
 
 def _example(config: BenchmarkConfig, present: tuple[Baseline, ...], console: Console) -> Example | None:

@@ -4,17 +4,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
+from handrail.collect.execution.config import ExecutionConfig
 from handrail.collect.experiments.benchmark.catalogue import BASELINES
 from handrail.collect.flags import check_json, check_names, check_page, check_whole, names, one_of
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.lists import Names
 
 PROFILES = ("nominal", "fast15", "fast2", "fast3", "steps", "noise", "delay", "dropouts", "quantised")
-MOST_WORKERS = 64
 
 
 @dataclass(frozen=True)
-class BenchmarkConfig:
+class BenchmarkConfig(ExecutionConfig):
     """Run the paper's goal-reaching benchmark: every controller on the same goals, with the same planner."""
 
     controllers: Annotated[Names, one_of(BASELINES)] = "all"
@@ -34,8 +34,6 @@ class BenchmarkConfig:
     """End an episode at its success, as the protocol says; else 4 s after the planner's last step."""
     closed_loop: bool = False
     """The planner sees the hand and corrects its errors, instead of running open loop."""
-    workers: int = 1
-    """Processes that share the goals."""
     json: str = ""
     """Write everything measured, every episode too, to this file."""
     report: str = ""
@@ -72,9 +70,8 @@ class BenchmarkConfig:
         """
         check_names("controller", "--controllers", self.controller_names, BASELINES)
         check_names("profile", "--profile", self.profile_names, PROFILES)
-        check_whole(self, goals=1, seed=0, workers=1)
-        if self.workers > MOST_WORKERS:
-            raise HandrailError(f"--workers {self.workers}: expected at most {MOST_WORKERS}")
+        check_whole(self, goals=1, seed=0)
+        self.check_execution()
         check_json(self.json)
         check_page(self.page)
         if self.report and Path(self.report).expanduser().is_file():

@@ -1,14 +1,15 @@
-"""Runs the benchmark: every controller on every goal under every profile, goal by goal, in some processes."""
+"""Runs the benchmark: every controller on every goal under every profile, goal by goal."""
 
-import multiprocessing
-from collections.abc import Iterator, Mapping
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
+from rich.console import Console
 
+from handrail.collect.execution.execution import Execution
+from handrail.collect.execution.job import Job
 from handrail.collect.experiments.benchmark.catalogue import Baseline
 from handrail.collect.experiments.benchmark.config import BenchmarkConfig
 from handrail.collect.experiments.benchmark.episode import Conditions, run_episode
@@ -23,6 +24,7 @@ from handrail.controllers.interface.controller import Controller
 from handrail.controllers.numerics.threads import single_threaded
 from handrail.controllers.robot.model import Pose, load_model
 
+_PRELOAD = ("handrail.collect.experiments.benchmark.run",)
 _PATHS = 12  # goals whose paths are kept, for drawing
 _EVERY = 5  # steps between two points of a path
 
@@ -76,32 +78,34 @@ def available(
     return tuple(present), skipped
 
 
-def run(config: BenchmarkConfig, baselines: tuple[Baseline, ...]) -> Iterator[list[Episode]]:
-    """Run everything; yield the episodes of a goal under a profile as they are done, in any order.
+def run(
+    config: BenchmarkConfig, baselines: tuple[Baseline, ...], console: Console | None = None
+) -> list[Episode]:
+    """Run everything and return the episodes, by goal.
 
     Args:
         config: what to run.
         baselines: who takes part.
+        console: to show how far it is; nothing without one.
+
+    Raises:
+        HandrailError: an episode cannot be run.
     """
     jobs = [
-        (config, baselines, index, profile)
+        Job(f"goal {index} {profile}", run_goal, (config, baselines, index, profile), size=len(baselines))
         for index in range(config.goals)
         for profile in config.profile_names
     ]
-    if config.workers == 1:
-        yield from (_run_goal(*job) for job in jobs)
-        return
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(config.workers, context) as pool:
-        try:
-            for done in as_completed([pool.submit(_run_goal, *job) for job in jobs]):
-                yield done.result()
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
+    found: dict[str, list[Episode]] = {}
+    with Execution(config, "episodes", console, _PRELOAD) as execution:
+        for result in execution.run(jobs):
+            if result.error:
+                raise HandrailError(f"{result.job.name}: {result.error}")
+            found[result.job.name] = result.value
+    return [episode for job in jobs for episode in found[job.name]]
 
 
-def _run_goal(
+def run_goal(
     config: BenchmarkConfig, baselines: tuple[Baseline, ...], index: int, profile: str
 ) -> list[Episode]:
     """Run all controllers on one goal, one after the other, so that noise hits all alike."""

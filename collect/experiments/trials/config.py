@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from handrail.collect.execution.config import ExecutionConfig
 from handrail.collect.flags import check_names, check_page, check_whole, names
 from handrail.collect.operators.modes import MODES
 from handrail.collect.tasks.catalogue import TASKS
@@ -13,7 +14,7 @@ SLOW_LIMITS = {"drawer": 180.0, "pick_place": 180.0, "reach": 60.0, "tray": 180.
 
 
 @dataclass(frozen=True)
-class TrialsConfig:
+class TrialsConfig(ExecutionConfig):
     """Let the scripted operators do every task in every mode, and count how it went."""
 
     tasks: Names = "all"
@@ -59,3 +60,4 @@ class TrialsConfig:
         if not self.json.endswith(".json"):
             raise HandrailError(f"--json {self.json}: expected a file that ends in .json")
         check_page(self.page)
+        self.check_execution()

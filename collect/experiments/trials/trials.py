@@ -1,75 +1,92 @@
-"""Lets scripted operators do tasks in teleop modes, one episode after the other, and keeps how each went."""
+"""Lets scripted operators do tasks in teleop modes, and keeps how each episode went."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable
+from dataclasses import replace
+from functools import lru_cache
 from pathlib import Path
 from typing import cast
 
-from handrail.collect.commands.record import episode_seed
+from rich.console import Console
+
+from handrail.collect.commands.recording import episode_seed
 from handrail.collect.config import SessionConfig
 from handrail.collect.envs.env import HandrailEnv
+from handrail.collect.execution.execution import Execution
+from handrail.collect.execution.job import Job
 from handrail.collect.experiments.trials.config import SLOW_LIMITS, SLOW_MODE, TrialsConfig
 from handrail.collect.experiments.trials.file import Trial, TrialsFile
 from handrail.collect.operators.scripts.scripted import ScriptedOperator
 from handrail.collect.session.build import build_controller, build_env, build_mode, build_operator
 from handrail.collect.session.session import Session
+from handrail.controllers.errors import HandrailError
 from handrail.datasets.recording.frames import Frame
 
+_PRELOAD = ("handrail.collect.experiments.trials.trials",)
 _FPS = 20  # [Hz]
 _OF_OUTCOME = (
     *("success", "failure_reason", "seconds", "frames", "contacts", "smallest_distance", "brakes"),
 )
 
 
-def run_trials(config: TrialsConfig, told: Callable[[Trial], None]) -> list[Trial]:
+def run_trials(
+    config: TrialsConfig, told: Callable[[Trial], None], console: Console | None = None
+) -> list[Trial]:
     """Run what is not in the file yet, and return every episode that was asked for, in order.
 
     Args:
         config: of the trials.
         told: of each episode that was run.
+        console: to show how far it is; nothing without one.
 
     Raises:
-        HandrailError: a setting is wrong, or the file is of other settings.
+        HandrailError: a setting is wrong, the file is of other settings, or an episode cannot be run.
     """
     config.check()
     file = TrialsFile(Path(config.json).expanduser(), config)
-    for task in config.task_names:
-        for mode in config.mode_names:
-            missing = file.missing(task, mode, config.episodes)
-            for trial in _run(config, task, mode, missing):
-                file.add(trial)
-                told(trial)
+    settings = replace(config, workers=1, ray="", json="trials.json", page="")  # what an episode depends on
+    jobs = [
+        Job(f"{task} {mode} {episode}", run_trial, (settings, task, mode, episode))
+        for task in config.task_names
+        for mode in config.mode_names
+        for episode in file.missing(task, mode, config.episodes)
+    ]
+    with Execution(config, "episodes", console, _PRELOAD) as execution:
+        for result in execution.run(jobs):
+            if result.error:
+                raise HandrailError(f"{result.job.name}: {result.error}")
+            file.add(result.value)
+            told(result.value)
     return file.trials(config.task_names, config.mode_names, config.episodes)
 
 
-def _run(config: TrialsConfig, task: str, mode: str, episodes: Sequence[int]) -> Iterator[Trial]:
-    """Yield how the episodes of a task in a mode went; person `i mod persons` does episode i."""
-    if not episodes:
-        return
+def run_trial(config: TrialsConfig, task: str, mode: str, episode: int) -> Trial:
+    """Return how one episode went; person `i mod persons` does episode i."""
+    person = episode % config.persons
+    session, hands = _watched(config, task, mode, person)
+    outcome = session.run(episode_seed(config.seed, episode))
+    went = {name: getattr(outcome, name) for name in _OF_OUTCOME}
+    own = {"switches": hands.switches, "switching": hands.away / _FPS}
+    return Trial(task, mode, episode, person, **went, **own)
+
+
+@lru_cache(maxsize=16)
+def _watched(config: TrialsConfig, task: str, mode: str, person: int) -> "tuple[Session, _Hands]":
+    """Return the session of a person, built once a process."""
     limit = SLOW_LIMITS.get(task, 0.0) if mode == SLOW_MODE else 0.0
-    settings = [
-        SessionConfig(
-            task=task, mode=mode, robot=config.robot, noise=config.noise, person=person, time_limit=limit
-        )
-        for person in range(config.persons)
-    ]
-    env = build_env(settings[0], _FPS)
-    try:
-        watched = [_watched(each, env) for each in settings]
-        for episode in episodes:
-            session, hands = watched[episode % config.persons]
-            outcome = session.run(episode_seed(config.seed, episode))
-            went = {name: getattr(outcome, name) for name in _OF_OUTCOME}
-            own = {"switches": hands.switches, "switching": hands.away / _FPS}
-            yield Trial(task, mode, episode, episode % config.persons, **went, **own)
-    finally:
-        env.close()
-
-
-def _watched(config: SessionConfig, env: HandrailEnv) -> "tuple[Session, _Hands]":
-    mode = build_mode(config, env.model)
-    operator = cast(ScriptedOperator, build_operator(config, mode, env.model))
+    settings = SessionConfig(
+        task=task, mode=mode, robot=config.robot, noise=config.noise, person=person, time_limit=limit
+    )
+    env = _env(replace(settings, person=0))
+    taken = build_mode(settings, env.model)
+    operator = cast(ScriptedOperator, build_operator(settings, taken, env.model))
     hands = _Hands(operator)
-    return Session(env, build_controller(mode, env.model, env.fps, config.task), operator, [hands]), hands
+    return Session(env, build_controller(taken, env.model, env.fps, task), operator, [hands]), hands
+
+
+@lru_cache(maxsize=2)
+def _env(config: SessionConfig) -> HandrailEnv:
+    """Return the environment of a task in a mode, built once a process."""
+    return build_env(config, _FPS)
 
 
 class _Hands:

@@ -7,6 +7,7 @@ from typing import Annotated
 import tyro
 
 from handrail.collect.config import FIRST_SEED, FPS_RANGE, MOST_TIME
+from handrail.collect.execution.config import ExecutionConfig
 from handrail.collect.flags import one_of, only_one
 from handrail.collect.perturbations.perturbations import Perturbation
 from handrail.collect.tasks.catalogue import TASKS
@@ -14,12 +15,11 @@ from handrail.controllers.errors import HandrailError, unknown_name
 from handrail.datasets.lists import Names, Words
 
 PROTECTIONS = ("own", "none", "mpc", "filter")
-MOST_WORKERS = 64
 MOST_EPISODES = 1_000_000
 
 
 @dataclass(frozen=True)
-class EvaluateConfig:
+class EvaluateConfig(ExecutionConfig):
     """Run trained policies on declared seeds, with and without the MPC's protection, undisturbed or not."""
 
     policy: Words = ()
@@ -49,8 +49,6 @@ class EvaluateConfig:
     """Decisions a second of such policies: the rate of their dataset [Hz]."""
     time_limit: float = 0.0
     """Time after which a rollout is given up [s]; the task's own when 0."""
-    workers: int = 1
-    """Processes that share the rollouts."""
     video: str = ""
     """Also film the first rollout to this .mp4 file (needs OpenGL)."""
     checkpoints: Annotated[tyro.conf.Positional[Words], tyro.conf.arg(metavar="FOLDER [FOLDER …]")] = ()
@@ -100,13 +98,13 @@ class EvaluateConfig:
         for name, least, most in (
             ("episodes", 1, MOST_EPISODES),
             ("seed", 0, 10**9),
-            ("workers", 1, MOST_WORKERS),
             ("fps", *FPS_RANGE),
         ):
             if not least <= getattr(self, name) <= most:
                 raise HandrailError(
                     f"--{name} {getattr(self, name)}: expected a whole number from {least} to {most}"
                 )
+        self.check_execution()
         if self.task:
             TASKS.check(self.task)
         for name in self.protections:

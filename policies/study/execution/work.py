@@ -1,17 +1,8 @@
-"""Does one job of a study, in a process of its own; whatever is killed goes on where it was.
+"""Does one job of a study; whatever is killed goes on where it was."""
 
-The processes are forked from a server that has loaded LeRobot, PyTorch and the simulator once (`preload.py`):
-that takes longer than many a job.
-"""
-
-import os
-import signal
-import sys
-import threading
 import time
 from collections.abc import Mapping
 from dataclasses import replace
-from multiprocessing import connection, parent_process
 from pathlib import Path
 from typing import Any
 
@@ -25,46 +16,20 @@ from handrail.policies.study.design.jobs import CONDITIONS, Cell, Job, Layout, S
 from handrail.policies.study.design.progress import StudyProgress, read_json, write_json
 from handrail.policies.study.design.settings import evaluations, fingerprint, recording, training
 
-FAILED = 1
 _MOST_ATTEMPTS = 6  # for each success that is wanted
 
 
 def do(job: Job, design: StudyDesign, root: Path) -> None:
-    """Do a job of a study, write that it is done, and leave the process with 0, or 1 and a line."""
-    layout = Layout(root)
-    _end_with_parent()
-    _say_into(layout.log(job))
-    start = time.time()
-    try:
-        begin(job, design, layout)
-        result = work(job, design, layout)
-        settings, seconds = fingerprint(job, design), round(time.time() - start, 1)
-        write_json(layout.done(job), {"settings": settings, "result": result, "seconds": seconds})
-    except (HandrailError, OSError) as error:
-        print(f"error: {error}", file=sys.stderr)
-        sys.exit(FAILED)
+    """Do a job of a study and write that it is done.
 
-
-def _say_into(log: Path) -> None:
-    """Send everything that this process says into a file."""
-    log.parent.mkdir(parents=True, exist_ok=True)
-    file = os.open(log, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o644)
-    for stream in (sys.stdout, sys.stderr):
-        os.dup2(file, stream.fileno())
-    os.close(file)
-
-
-def _end_with_parent() -> None:
-    """End this process when the study ends, also when that was killed; the server may outlive it."""
-    study = parent_process()
-    if study is None:
-        return
-
-    def watch() -> None:
-        connection.wait([study.sentinel])
-        os.kill(os.getpid(), signal.SIGTERM)
-
-    threading.Thread(target=watch, daemon=True).start()
+    Raises:
+        HandrailError, OSError: it cannot be done.
+    """
+    layout, start = Layout(root), time.time()
+    begin(job, design, layout)
+    result = work(job, design, layout)
+    settings, seconds = fingerprint(job, design), round(time.time() - start, 1)
+    write_json(layout.done(job), {"settings": settings, "result": result, "seconds": seconds})
 
 
 def begin(job: Job, design: StudyDesign, layout: Layout) -> None:

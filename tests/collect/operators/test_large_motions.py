@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from device_helpers import HOME, MODEL, drive, first_view
 
-from handrail.collect.commands.record import episode_seed
+from handrail.collect.commands.recording import episode_seed
 from handrail.collect.config import SessionConfig
 from handrail.collect.operators.devices.arm_solutions import REACHED, arm_solutions, straight_solution
 from handrail.collect.operators.human.human import HumanSettings

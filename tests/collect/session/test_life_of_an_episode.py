@@ -5,7 +5,8 @@ import time
 import numpy as np
 import pytest
 
-from handrail.collect.commands.record import episode_seed, record
+from handrail.collect.commands.record import record
+from handrail.collect.commands.recording import episode_seed
 from handrail.collect.config import DatasetConfig, RecordConfig, SessionConfig
 from handrail.collect.operators.operator import EpisodeEvent
 from handrail.collect.session import build

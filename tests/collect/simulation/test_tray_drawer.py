@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from collect_helpers import action, environment, moved
 
-from handrail.collect.commands.record import episode_seed
+from handrail.collect.commands.recording import episode_seed
 from handrail.collect.config import SessionConfig
 from handrail.collect.envs.env import HandrailEnv
 from handrail.collect.session.build import build_env, build_session, build_task

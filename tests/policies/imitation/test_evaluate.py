@@ -13,7 +13,7 @@ from handrail.controllers.errors import HandrailError
 from handrail.datasets.comparison.evaluations import read_evaluations
 from handrail.policies.imitation.evaluation.conditions import policy_conditions
 from handrail.policies.imitation.evaluation.config import FIRST_SEED, EvaluateConfig
-from handrail.policies.imitation.evaluation.evaluation import evaluate
+from handrail.policies.imitation.evaluation.evaluation import UnevaluatedError, evaluate
 from handrail.policies.imitation.evaluation.table import evaluation_table
 
 
@@ -52,7 +52,7 @@ def untimed(content):
 
 
 def test_seeds_are_never_those_of_a_recording():
-    from handrail.collect.commands.record import episode_seed
+    from handrail.collect.commands.recording import episode_seed
 
     recorded = [episode_seed(seed, episode) for seed in (0, 1, 10**6) for episode in range(200)]
     assert max(recorded) < FIRST_SEED
@@ -128,7 +128,7 @@ def test_what_was_done_is_kept_when_a_rollout_fails(folder, tmp_path):
         return Breaking(whole.interface, "still")
 
     file = tmp_path / "e.json"
-    with pytest.raises(RuntimeError):
+    with pytest.raises(UnevaluatedError, match="RuntimeError: broken"):
         evaluate(config(folder, "short", json=str(file), episodes=5, time_limit=0.5), load=breaking)
     assert len(rollouts(json.loads(file.read_text()), "ee intent")) == 2
 

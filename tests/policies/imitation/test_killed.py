@@ -136,7 +136,7 @@ def kept_of(study: Path) -> set[str]:
     return found
 
 
-def nothing_left(job, design, layout):
+def nothing_left(job, design, root):
     raise AssertionError(f"{job.name} is not done")
 
 
@@ -157,5 +157,5 @@ def test_a_study_killed_while_it_writes(tmp_path):
             kept = now
         assert layout.done(job).is_file(), job.name
     assert kills >= KILLS
-    assert run_study(StudyConfig(preset=str(preset), output=str(study), workers=2), start=nothing_left) == 0
+    assert run_study(StudyConfig(preset=str(preset), output=str(study), workers=2), nothing_left) == 0
     assert (study / "report.html").is_file()

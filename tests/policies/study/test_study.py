@@ -5,20 +5,13 @@ import json
 from pathlib import Path
 
 import pytest
-from study_helpers import DESIGN, Starter
+from study_helpers import DESIGN, Starter, run_here
 
 from handrail.controllers.errors import HandrailError
 from handrail.policies.study.config import StudyConfig
 from handrail.policies.study.design.jobs import jobs
 from handrail.policies.study.design.load import design_names, load_design
 from handrail.policies.study.design.progress import read_json, write_json
-from handrail.policies.study.execution.run import run_study
-
-
-@pytest.fixture(autouse=True)
-def impatient(monkeypatch):
-    """Made-up jobs end at once: look at them more often than at real ones."""
-    monkeypatch.setattr("handrail.policies.study.execution.run.LOOK_PERIOD", 0.005)
 
 
 @pytest.fixture
@@ -31,19 +24,19 @@ def preset(tmp_path):
 def test_every_job_once_then_none_again(tmp_path, preset):
     config = StudyConfig(preset, str(tmp_path / "study"), workers=3)
     first, second = Starter(), Starter()
-    assert run_study(config, first) == 0
+    assert run_here(config, first) == 0
     assert sorted(first.begun) == sorted(job.name for job in jobs(load_design(preset)))
     assert len(set(first.begun)) == len(first.begun)
-    assert run_study(config, second) == 0
+    assert run_here(config, second) == 0
     assert second.begun == []
 
 
 def test_changed_settings_are_done_again_and_nothing_else(tmp_path, preset):
     config = StudyConfig(preset, str(tmp_path / "study"))
-    assert run_study(config, Starter()) == 0
+    assert run_here(config, Starter()) == 0
     Path(preset).write_text(DESIGN.replace("steps = 10", "steps = 20"))
     again = Starter()
-    assert run_study(config, again) == 0
+    assert run_here(config, again) == 0
     expected = [job.name for job in jobs(load_design(preset)) if not job.cell]
     assert sorted(again.begun) == sorted(expected)
 
@@ -51,7 +44,7 @@ def test_changed_settings_are_done_again_and_nothing_else(tmp_path, preset):
 def test_a_failure_stops_only_what_needs_it(tmp_path, preset, capsys):
     config = StudyConfig(preset, str(tmp_path / "study"))
     starter = Starter(failing="collect/reach/direct")
-    assert run_study(config, starter) == 1
+    assert run_here(config, starter) == 1
     done = {
         path.relative_to(tmp_path / "study/done").with_suffix("").as_posix()
         for path in (tmp_path / "study/done").rglob("*.json")
@@ -59,14 +52,14 @@ def test_a_failure_stops_only_what_needs_it(tmp_path, preset, capsys):
     assert "policy/reach/ee/intent-time-1" in done
     assert not any("reach/direct/" in name for name in done)
     assert "collect/reach/direct" in capsys.readouterr().err
-    assert run_study(config, Starter()) == 0
+    assert run_here(config, Starter()) == 0
 
 
 def test_report_says_what_is_in_the_files(tmp_path, preset):
     page = tmp_path / "page.md"
     page.write_text("# Ours\n\nBefore.\n\n<!-- study small -->\nold\n<!-- end of study small -->\n\nAfter.\n")
     config = StudyConfig(preset, str(tmp_path / "study"), page=str(page))
-    assert run_study(config, Starter()) == 0
+    assert run_here(config, Starter()) == 0
     content = json.loads((tmp_path / "study/study.json").read_text())
     arms = {arm["label"]: arm for arm in content["tasks"]["reach"]["policies"]["conditions"]}
     assert set(arms) == {"ee", "ee intent", "direct"}
@@ -91,10 +84,10 @@ def test_report_says_what_is_in_the_files(tmp_path, preset):
 def test_report_of_a_study_that_has_hardly_begun(tmp_path, preset):
     config = StudyConfig(preset, str(tmp_path / "study"), report_only=True)
     with pytest.raises(HandrailError, match=r"--report_only: expected a study in .*study, found none"):
-        run_study(config, Starter())
+        run_here(config, Starter())
     assert not (tmp_path / "study").exists()
     (tmp_path / "study" / "begun").mkdir(parents=True)
-    assert run_study(config, Starter()) == 0
+    assert run_here(config, Starter()) == 0
     assert (tmp_path / "study/report.html").is_file()
 
 

@@ -4,7 +4,7 @@ import dataclasses
 from pathlib import Path
 
 import pytest
-from study_helpers import DESIGN, Starter
+from study_helpers import DESIGN, Starter, run_here
 
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.presentation.markdown import with_part
@@ -13,7 +13,6 @@ from handrail.policies.study.config import StudyConfig
 from handrail.policies.study.design import design as design_module
 from handrail.policies.study.design.design import Robustness, StudyDesign, Sweep, TaskDesign
 from handrail.policies.study.design.load import load_design
-from handrail.policies.study.execution.run import last_words, run_study
 from handrail.scripts.study import main
 
 
@@ -79,7 +78,7 @@ def test_a_policy_that_cannot_be_built_is_known_before_anything_begins(change, w
     Path(preset).write_text(DESIGN.replace(*change))
     starter = Starter()
     with pytest.raises(HandrailError, match=words):
-        run_study(StudyConfig(preset, str(tmp_path / "study")), starter)
+        run_here(StudyConfig(preset, str(tmp_path / "study")), starter)
     assert starter.begun == []
 
 
@@ -95,10 +94,11 @@ def test_a_failed_job_is_told_by_what_it_said_this_time(tmp_path, preset, capsys
     log = tmp_path / "study/logs/collect/reach/ee.log"
     log.parent.mkdir(parents=True)
     log.write_text("error: disk full, last week\n")
-    run_study(StudyConfig(preset, str(tmp_path / "study")), Starter(failing="collect/reach/ee"))
-    assert "collect/reach/ee: without a word (exit code 1" in capsys.readouterr().err.replace("\n", " ")
-    log.write_text("warning\nerror: of today\nlast\n")
-    assert last_words(log, 1).startswith("of today (exit code 1")
+    assert run_here(StudyConfig(preset, str(tmp_path / "study")), Starter(failing="collect/reach/ee")) == 1
+    said = capsys.readouterr().err.replace("\n", " ")
+    assert "failed: collect/reach/ee: of today" in said
+    assert "failed: compare/reach: what it needs failed" in said
+    assert "last week" not in said
 
 
 @pytest.mark.parametrize("marks", ["{0}\nold", "old\n{1}", "{1}\nold\n{0}", "{0}\n{0}\n{1}", "{0}\n{1}\n{1}"])
@@ -109,7 +109,7 @@ def test_a_page_whose_marks_are_no_pair_is_left_alone_before_anything_begins(mar
     )
     page.write_text(text)
     with pytest.raises(HandrailError, match="--page: expected"):
-        run_study(StudyConfig(preset, str(tmp_path / "study"), page=str(page)), starter)
+        run_here(StudyConfig(preset, str(tmp_path / "study"), page=str(page)), starter)
     assert page.read_text() == text
     assert starter.begun == []
 
@@ -127,14 +127,14 @@ def test_a_page_keeps_all_that_is_not_between_the_marks():
 def test_a_folder_that_cannot_be_is_one_line(place, tmp_path, preset):
     (tmp_path / "file").touch()
     with pytest.raises(HandrailError, match=r"--output .*: expected a folder"):
-        run_study(StudyConfig(preset, str(tmp_path / place)), Starter())
+        run_here(StudyConfig(preset, str(tmp_path / place)), Starter())
 
 
 def test_a_second_study_in_a_folder_is_told_what_the_first_is(tmp_path, preset):
     lock = DatasetLock(tmp_path / "study" / ".study")
     try:
         with pytest.raises(HandrailError, match=r"study .* another handrail-study"):
-            run_study(StudyConfig(preset, str(tmp_path / "study")), Starter())
+            run_here(StudyConfig(preset, str(tmp_path / "study")), Starter())
     finally:
         lock.release()
 
@@ -146,7 +146,7 @@ def test_what_is_not_installed_is_said_before_anything_begins(missing, tmp_path,
     )
     starter = Starter()
     with pytest.raises(HandrailError, match=f"handrail-study: expected {missing}"):
-        run_study(StudyConfig(preset, str(tmp_path / "study")), starter)
+        run_here(StudyConfig(preset, str(tmp_path / "study")), starter)
     assert starter.begun == []
 
 
@@ -154,7 +154,7 @@ def test_what_is_not_installed_is_said_before_anything_begins(missing, tmp_path,
     ("flags", "words"),
     [
         (["--preset", "huge"], "unknown study 'huge'"),
-        (["--workers", "0"], "--workers 0"),
+        (["--workers", "-1"], "--workers -1"),
         (["--page", "nowhere/page.md"], "--page"),
     ],
 )

@@ -6,7 +6,7 @@ import shutil
 from pathlib import Path
 
 import pytest
-from study_helpers import DESIGN, Starter, changed, everything
+from study_helpers import DESIGN, Starter, changed, everything, run_here
 
 from handrail.controllers.errors import HandrailError
 from handrail.policies.imitation.training import presets
@@ -15,7 +15,6 @@ from handrail.policies.study.design.jobs import jobs
 from handrail.policies.study.design.load import load_design
 from handrail.policies.study.design.progress import StudyProgress, is_done, read_json, write_json
 from handrail.policies.study.design.settings import fingerprint
-from handrail.policies.study.execution.run import run_study
 from handrail.policies.study.execution.work import begin
 
 
@@ -146,7 +145,7 @@ def test_the_report_has_nothing_of_other_settings_and_counts_what_is_missing(tmp
     def report(text):
         Path(preset).write_text(text)
         config = StudyConfig(preset, str(layout.root), page=str(page), report_only=True)
-        assert run_study(config, Starter()) == 0
+        assert run_here(config, Starter()) == 0
         content = json.loads((layout.root / "study.json").read_text())
         return content["tasks"]["reach"], content["missing"]
 

@@ -1,20 +1,26 @@
-"""Ctrl-C and SIGTERM while something is recorded."""
+"""Ctrl-C and SIGTERM while something is recorded or run."""
 
 import contextlib
 import signal
+import threading
 from collections.abc import Iterator
 from types import FrameType
 from typing import Self
 
 
 class Interrupts:
-    """Ends a recording on Ctrl-C or SIGTERM: at once between saves, after it during one."""
+    """Ends what runs on Ctrl-C or SIGTERM: at once between saves, after it during one.
+
+    Outside of the main thread, which alone hears signals, it changes nothing.
+    """
 
     _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
     def __enter__(self) -> Self:
         self._deferring = self._asked = False
-        self._previous = {number: signal.signal(number, self._interrupt) for number in self._SIGNALS}
+        hears = threading.current_thread() is threading.main_thread()
+        signals = self._SIGNALS if hears else ()
+        self._previous = {number: signal.signal(number, self._interrupt) for number in signals}
         return self
 
     def __exit__(self, *_: object) -> None:

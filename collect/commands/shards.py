@@ -1,0 +1,178 @@
+"""The shards of a recording that is shared: datasets of a few episodes each, and the plan that they follow.
+
+They lie beside the dataset, in `.NAME.shards`, until all are whole and become one dataset. Which episodes a
+shard has does not depend on who records it: whatever is cut short goes on with any number of workers.
+"""
+
+import json
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import chain
+from pathlib import Path
+from typing import Any
+
+from handrail.collect.config import RecordConfig
+from handrail.collect.session.recorded_settings import settings_json
+from handrail.controllers.errors import HandrailError
+from handrail.datasets.editing.merge import check_alike, merged_encodings, merged_types
+from handrail.datasets.editing.source import Source
+from handrail.datasets.format.layout import Layout
+from handrail.datasets.recording.rewrite import settle, write_anew
+from handrail.datasets.storage.atomic import explained, make_folder, remove, write_whole
+from handrail.datasets.storage.lock import DatasetLock
+from handrail.datasets.storage.strict_json import read_json
+
+FORMAT = "handrail.shards/1"
+_FEW = 5  # episodes of a shard at least
+_MANY = 1000  # shards of a recording at most
+
+
+@dataclass(frozen=True)
+class Shard:
+    """A part of a recording.
+
+    Attributes:
+        folder: of its dataset.
+        first: number that its first episode will have in the whole dataset.
+        episodes: how many it has.
+        log: what is said while it is recorded.
+    """
+
+    folder: Path
+    first: int
+    episodes: int
+    log: Path
+
+    @property
+    def name(self) -> str:
+        """Which episodes they are."""
+        return f"episodes {self.first} to {self.first + self.episodes - 1}"
+
+
+class Shards:
+    """Where the shards of a recording lie, and which there are.
+
+    Args:
+        config: of the recording.
+    """
+
+    def __init__(self, config: RecordConfig) -> None:
+        self.root = config.dataset.folder.absolute()
+        self.folder = self.root.with_name(f".{self.root.name}.shards")
+        self._episodes = config.dataset.num_episodes
+        dataset = {name: getattr(config.dataset, name) for name in ("name", "fps", "single_task")}
+        self._settings = json.loads(settings_json(config)) | dataset | {"num_episodes": self._episodes}
+
+    @property
+    def begun(self) -> bool:
+        """Whether there are any, of this recording or another."""
+        return self._plan.is_file()
+
+    def begin(self, first: int) -> None:
+        """Take note of what is to be recorded.
+
+        Args:
+            first: how many episodes the dataset has already.
+        """
+        with explained(f"cannot record beside dataset {str(self.root)!r}"):
+            content = {"format": FORMAT, "first": first, "settings": self._settings}
+            write_whole(self._plan, (json.dumps(content, indent=1) + "\n").encode())
+
+    def check(self) -> None:
+        """Check that they are of this recording; finish a merge that was cut short.
+
+        Raises:
+            HandrailError: they are of another one.
+        """
+        with explained(f"cannot go on with dataset {str(self.root)!r}"):
+            settle(self.root)
+        before = self._content["settings"]
+        for name, now in self._settings.items():
+            if before.get(name) != now:
+                raise HandrailError(
+                    f"{str(self.folder)!r} holds episodes of a recording that was cut short, with {name}"
+                    f" {before.get(name)!r}, got {now!r}: the same flags as then finish it;"
+                    " remove the folder to give them up"
+                )
+
+    @cached_property
+    def first(self) -> int:
+        """How many episodes the dataset had before."""
+        return int(self._content["first"])
+
+    def are_in(self, episodes: int) -> bool:
+        """Return whether a dataset with so many episodes has them, and not only what was there before.
+
+        Raises:
+            HandrailError: it is neither.
+        """
+        if episodes not in (self.first, self.first + self._episodes):
+            raise HandrailError(
+                f"dataset {str(self.root)!r}: expected {self.first} episodes, as when {str(self.folder)!r}"
+                f" was begun, found {episodes}; remove the one or the other"
+            )
+        return episodes > self.first
+
+    @property
+    def all(self) -> list[Shard]:
+        """The shards, in order."""
+        size, end = max(_FEW, -(-self._episodes // _MANY)), self.first + self._episodes
+        return [
+            Shard(
+                self.folder / f"shard-{first:07d}",
+                first,
+                min(size, end - first),
+                self.folder / f"shard-{first:07d}.log",
+            )
+            for first in range(self.first, end, size)
+        ]
+
+    def merge(self) -> None:
+        """Make one dataset of what was there before and of all shards, in order; nothing is encoded anew.
+
+        Raises:
+            HandrailError: one is not whole, or the disk does not take it; nothing has changed then.
+        """
+        with explained(f"cannot write dataset {str(self.root)!r}"):
+            make_folder(self.root)
+            lock = DatasetLock(Layout(self.root).staging)
+            try:
+                roots = [self.root] * bool(self.first) + [shard.folder for shard in self.all]
+                sources = [Source.open(root) for root in roots]
+                self._check_whole(sources)
+                pieces = chain.from_iterable(source.pieces() for source in sources)
+                manifest, types = sources[0].manifest, merged_types(sources)
+                write_anew(self.root, manifest, pieces, types, merged_encodings(sources), in_place=True)
+            finally:
+                lock.release()
+
+    def remove(self) -> None:
+        """Remove them; the plan first, so that nobody goes on with a part."""
+        with explained(f"cannot remove {str(self.folder)!r}"):
+            remove(self._plan)
+            remove(self.folder)
+
+    def _check_whole(self, sources: list[Source]) -> None:
+        for other in sources[1:]:
+            check_alike(sources[0], other)
+        wanted = [self.first] * bool(self.first) + [shard.episodes for shard in self.all]
+        for source, number in zip(sources, wanted, strict=True):
+            if len(source.rows) != number:
+                name, found = str(source.layout.root), len(source.rows)
+                raise HandrailError(f"dataset {name!r}: expected {number} episodes, found {found}")
+
+    @property
+    def _plan(self) -> Path:
+        return self.folder / "plan.json"
+
+    @cached_property
+    def _content(self) -> dict[str, Any]:
+        try:
+            content = read_json(self._plan)
+            if content["format"] == FORMAT and isinstance(content["settings"], dict):
+                return content
+        except (OSError, ValueError, KeyError, TypeError) as error:
+            raise HandrailError(
+                f"{str(self._plan)!r}: expected the plan of a recording, got {error}"
+            ) from error
+        raise HandrailError(f"{str(self._plan)!r}: expected format {FORMAT}, got {content['format']!r}")

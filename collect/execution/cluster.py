@@ -1,0 +1,75 @@
+"""Runs jobs on a Ray cluster; Ray runs again what is lost with a process or a computer."""
+
+from contextlib import suppress
+from dataclasses import replace
+from typing import Any
+
+import ray
+from ray.exceptions import RayError
+
+from handrail.collect.execution.engine import TRIES
+from handrail.collect.execution.job import Job, Result
+from handrail.collect.execution.worker import alone
+from handrail.controllers.errors import HandrailError, message_of
+
+_MOMENT = 0.2  # [s]
+_AHEAD = 2  # jobs given to the cluster for each of its cores, so that none waits for the next
+
+
+class Cluster:
+    """Runs jobs on the cores of a cluster, one each.
+
+    Args:
+        address: of the cluster, or auto: the one that runs on this computer.
+
+    Raises:
+        HandrailError: there is none.
+    """
+
+    def __init__(self, address: str) -> None:
+        self._joined = not ray.is_initialized()
+        if self._joined:
+            try:
+                ray.init(address=address, log_to_driver=False, configure_logging=False)
+            except Exception as error:  # Ray says it in many ways
+                raise HandrailError(
+                    f"--ray {address}: expected a running cluster (`ray start --head`), got"
+                    f" {message_of(error)}"
+                ) from error
+        self._attempt: Any = ray.remote(num_cpus=1, max_retries=TRIES - 1)(alone)
+        self._running: dict[Any, Job] = {}
+
+    @property
+    def capacity(self) -> int:
+        """How many jobs it takes at a time; computers may come and go."""
+        return max(1, _AHEAD * int(ray.cluster_resources().get("CPU", 1)))
+
+    def start(self, job: Job) -> None:
+        """Give a job to the cluster."""
+        self._running[self._attempt.remote(job)] = job
+
+    def wait(self) -> list[Result]:
+        """Wait a moment; return what has finished."""
+        ready, _ = ray.wait(list(self._running), num_returns=1, timeout=_MOMENT)
+        return [self._result(each) for each in ready]
+
+    def close(self) -> None:
+        """End everything that still runs, at once, and leave the cluster."""
+        for each in self._running:
+            with suppress(RayError):
+                ray.cancel(each, force=True)
+        self._running.clear()
+        if self._joined:
+            ray.shutdown()
+
+    def _result(self, reference: Any) -> Result:
+        job = self._running.pop(reference)
+        try:
+            result: Any = ray.get(reference)
+        except RayError as error:
+            return Result(
+                job,
+                error=f"lost {TRIES} times with its process or computer; what was done is kept, and the same"
+                f" command goes on: {message_of(error)}",
+            )
+        return replace(result, job=job)

@@ -1,0 +1,47 @@
+"""Where jobs run, as typed settings; light to import."""
+
+import os
+from dataclasses import dataclass
+from importlib.util import find_spec
+
+from handrail.controllers.errors import HandrailError, not_installed
+
+MOST_WORKERS = 256
+
+
+@dataclass(frozen=True, kw_only=True)
+class ExecutionConfig:
+    """Where the work is done: in this process, in several, or on a Ray cluster; the results are the same."""
+
+    workers: int = 1
+    """Processes that share the work, one core each; 0 for as many as there are cores."""
+    ray: str = ""
+    """Share the work over a Ray cluster instead: auto, or the cluster's address (see docs/cluster.md)."""
+
+    @property
+    def processes(self) -> int:
+        """How many processes share the work on this computer."""
+        return self.workers or len(os.sched_getaffinity(0))
+
+    @property
+    def is_shared(self) -> bool:
+        """Whether the work leaves this process."""
+        return bool(self.ray) or self.processes > 1
+
+    def check_execution(self) -> None:
+        """Check the settings.
+
+        Raises:
+            HandrailError: one is wrong, or Ray is not installed.
+        """
+        if not 0 <= self.workers <= MOST_WORKERS:
+            raise HandrailError(
+                f"--workers {self.workers}: expected a whole number from 1 to {MOST_WORKERS},"
+                " or 0 for all cores"
+            )
+        if self.ray and self.workers != 1:
+            raise HandrailError(
+                f"--ray {self.ray} and --workers {self.workers}: expected one of them, got both"
+            )
+        if self.ray and find_spec("ray") is None:
+            raise not_installed(f"--ray {self.ray}", "ray", "cluster")

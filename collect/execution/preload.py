@@ -1,0 +1,7 @@
+"""What the server that processes are forked from loads first: one thread each, as they share the cores."""
+
+import os
+
+for _name in ("OMP", "MKL", "OPENBLAS"):
+    os.environ[f"{_name}_NUM_THREADS"] = "1"
+os.environ.setdefault("HF_HUB_OFFLINE", "1")

@@ -1,0 +1,57 @@
+"""What `handrail-scaling` measures, as typed settings; light to import."""
+
+from dataclasses import dataclass
+from typing import Annotated
+
+from handrail.collect.execution.config import MOST_WORKERS
+from handrail.collect.flags import check_json, check_names, check_whole, one_of
+from handrail.collect.operators.modes import MODES
+from handrail.collect.tasks.catalogue import TASKS
+from handrail.controllers.errors import HandrailError
+from handrail.datasets.lists import Names
+
+
+@dataclass(frozen=True)
+class ScalingConfig:
+    """Measure how many episodes a second some workers record, against one, and that the rows are the same."""
+
+    task: Annotated[str, one_of(TASKS)] = "reach"
+    """What is recorded."""
+    mode: Annotated[str, one_of(MODES)] = "ee"
+    """In which teleop mode."""
+    cameras: Names = ""
+    """With which cameras: wrist, scene or both; none by default."""
+    episodes: int = 60
+    """Episodes of each recording."""
+    workers: Names = "1,2"
+    """Numbers of workers, each a recording of its own; the first is what the others are compared with."""
+    seed: int = 0
+    """Of the recordings."""
+    json: str = ""
+    """Write everything measured to this file."""
+
+    @property
+    def counts(self) -> tuple[int, ...]:
+        """The numbers of workers.
+
+        Raises:
+            HandrailError: one is no such number.
+        """
+        words = [word.strip() for word in self.workers.split(",")]
+        if not all(word.isdecimal() and 1 <= int(word) <= MOST_WORKERS for word in words):
+            raise HandrailError(
+                f"--workers {self.workers}: expected whole numbers from 1 to {MOST_WORKERS}, such as 1,2"
+            )
+        return tuple(map(int, words))
+
+    def check(self) -> None:
+        """Check the settings.
+
+        Raises:
+            HandrailError: one is wrong.
+        """
+        check_names("task", "--task", (self.task,), TASKS)
+        check_names("mode", "--mode", (self.mode,), MODES)
+        check_whole(self, episodes=1, seed=0)
+        _ = self.counts
+        check_json(self.json)

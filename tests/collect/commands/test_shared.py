@@ -1,0 +1,159 @@
+"""A shared recording is the one-core recording, whoever records what, and whatever dies on the way."""
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+
+import pytest
+from command_helpers import command
+from execution_helpers import is_alive
+from shared_helpers import content, saved, started, wait_until, workers_of
+
+from handrail.collect.commands.shards import Shards
+from handrail.collect.config import DatasetConfig, RecordConfig
+from handrail.datasets.reading.reader import read_info
+
+FLAGS = [
+    "--task",
+    "reach",
+    "--time_limit",
+    "1.0",
+    "--seed",
+    "3",
+]  # a second each: most fail, which is no matter
+EPISODES = 15  # three shards
+
+
+def record(root, *flags, episodes=EPISODES):
+    done = command(root, *FLAGS, "--dataset.num_episodes", episodes, *flags)
+    assert done.returncode == 0, done.stderr
+    return done
+
+
+@pytest.fixture(scope="module")
+def alone(tmp_path_factory):
+    """What one core records."""
+    root = tmp_path_factory.mktemp("alone") / "d"
+    record(root)
+    return content(root)
+
+
+@pytest.mark.parametrize("workers", [2, 3])
+def test_any_number_of_workers_records_the_same(workers, alone, tmp_path):
+    done = record(tmp_path / "d", "--workers", workers)
+    assert content(tmp_path / "d") == alone
+    assert os.listdir(tmp_path) == ["d"]
+    assert f"{EPISODES} episodes, " in done.stderr
+
+
+def test_episodes_are_added_to_those_that_one_core_recorded(alone, tmp_path):
+    root = tmp_path / "d"
+    record(root, episodes=4)
+    first = started(root)
+    (root / "notes.txt").write_text("mine")
+    record(root, "--resume", "--workers", "2", episodes=EPISODES - 4)
+    assert content(root) == alone
+    assert started(root)[:4] == first
+    assert (root / "notes.txt").read_text() == "mine"
+
+
+def begin(root, *flags):
+    words = [sys.executable, "-m", "handrail.scripts.record", str(root), *FLAGS, *map(str, flags)]
+    return subprocess.Popen(
+        [*words, "--dataset.num_episodes", str(EPISODES)],
+        stderr=subprocess.PIPE,
+        stdout=subprocess.DEVNULL,
+        text=True,
+    )
+
+
+def test_killed_workers_and_a_killed_recording_lose_nothing_and_record_nothing_twice(alone, tmp_path):
+    root, shards = tmp_path / "d", tmp_path / ".d.shards"
+    process = begin(root, "--workers", 2)
+    wait_until(lambda: saved(shards) or process.poll() is not None)
+    workers = workers_of(process.pid)
+    assert len(workers) == 2
+    os.kill(workers[0], signal.SIGKILL)
+    before = len(saved(shards))
+    wait_until(lambda: len(saved(shards)) >= before + 4)
+    workers = workers_of(process.pid)
+    os.kill(process.pid, signal.SIGKILL)
+    process.communicate()
+    wait_until(lambda: not any(map(is_alive, workers)))
+    kept = {path: path.read_bytes() for path in saved(shards)}
+    assert 5 <= len(kept) < EPISODES
+    done = command(root, *FLAGS, "--dataset.num_episodes", EPISODES, "--seed", 4)
+    assert done.returncode == 2
+    assert "with seed 3, got 4: the same flags as then finish it" in done.stderr
+    times = {time for path in kept for time in started(path.parents[3])}
+    record(root, "--workers", 3)
+    assert content(root) == alone
+    assert times <= set(started(root))
+    assert not shards.exists()
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.slow)])
+def test_an_interrupt_ends_all_workers_and_one_core_goes_on(number, alone, tmp_path):
+    root, shards = tmp_path / "d", tmp_path / ".d.shards"
+    process = begin(root, "--workers", 2)
+    wait_until(lambda: saved(shards) or process.poll() is not None)
+    workers = workers_of(process.pid)
+    process.send_signal(number)
+    _, said = process.communicate(timeout=120)
+    assert process.returncode == 130
+    assert "interrupted; what was recorded is kept, and the same flags go on" in said
+    assert "Traceback" not in said
+    assert workers
+    assert not any(map(is_alive, workers))
+    kept = len(saved(shards))
+    assert kept < EPISODES
+    assert read_info(root).episodes == 0
+    assert f"{EPISODES - kept}/{EPISODES - kept}" not in record(root).stderr
+    assert content(root) == alone
+
+
+def test_a_merge_that_was_done_is_not_done_again(alone, tmp_path):
+    root, shards = tmp_path / "d", tmp_path / ".d.shards"
+    config = RecordConfig(
+        task="reach", time_limit=1.0, seed=3, dataset=DatasetConfig(root=str(root), num_episodes=EPISODES)
+    )
+    record(root, "--workers", "2")
+    Shards(config).begin(first=0)  # as if it was killed before they were removed
+    times = started(root)
+    record(root)
+    assert started(root) == times
+    assert not shards.exists()
+
+
+def test_a_dataset_that_has_changed_meanwhile_is_left_alone(alone, tmp_path):
+    root, shards = tmp_path / "d", tmp_path / ".d.shards"
+    record(root, episodes=2)
+    config = RecordConfig(
+        task="reach", time_limit=1.0, seed=3, dataset=DatasetConfig(root=str(root), num_episodes=EPISODES)
+    )
+    Shards(config).begin(first=1)
+    done = command(root, *FLAGS, "--dataset.num_episodes", EPISODES)
+    assert done.returncode == 2
+    assert "expected 1 episodes, as when" in done.stderr
+    assert read_info(root).episodes == 2
+    assert shards.exists()
+    shutil.rmtree(shards)
+
+
+@pytest.mark.parametrize(
+    ("flags", "words"),
+    [
+        (["--realtime"], "--workers 2: expected a recording without --realtime"),
+        (["--operator", "browser"], "--workers 2: expected --operator scripted, got a person"),
+        (["--display_save", "x.rrd"], "--workers 2: expected a recording without --display_save"),
+        (["--ray", "auto"], "--ray auto and --workers 2: expected one of them"),
+    ],
+)
+def test_what_cannot_be_shared_is_one_line(flags, words, tmp_path):
+    done = command(tmp_path / "d", *FLAGS, "--workers", "2", *flags)
+    assert done.returncode == 2
+    assert words in done.stderr
+    assert done.stderr.count("\n") == 1
+    assert not os.listdir(tmp_path)

@@ -1,0 +1,205 @@
+"""Jobs give the same results wherever they run; what fails says why, what dies runs again, nothing stays."""
+
+import io
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+from execution_helpers import broken, dying, is_alive, leaving, noted, refusing, sleeping, squared, threads
+from places import ROOT
+from rich.console import Console
+
+from handrail.collect.execution.config import ExecutionConfig
+from handrail.collect.execution.engine import TRIES
+from handrail.collect.execution.execution import Execution
+from handrail.collect.execution.job import Job
+from handrail.controllers.errors import HandrailError
+
+EVERYWHERE = [ExecutionConfig(), ExecutionConfig(workers=2)]
+
+
+def run(jobs, config=ExecutionConfig(), fresh=False, **settings):  # noqa: B008
+    """Return what came of jobs, by name, in the order in which they were done."""
+    with Execution(config, "jobs", fresh=fresh) as execution:
+        return {result.job.name: result for result in execution.run(jobs, **settings)}
+
+
+@pytest.mark.parametrize("workers", [1, 2, 3])
+def test_results_do_not_depend_on_how_many_work(workers):
+    jobs = [Job(str(number), squared, (number,)) for number in range(12)]
+    found = run(jobs, ExecutionConfig(workers=workers))
+    assert {name: result.value for name, result in found.items()} == {str(n): n * n for n in range(12)}
+    assert not any(result.error for result in found.values())
+
+
+@pytest.mark.parametrize("config", EVERYWHERE)
+def test_a_job_begins_when_what_it_needs_is_done(config, tmp_path):
+    jobs = [
+        Job("last", noted, (tmp_path, "last"), needs=("middle", "first")),
+        Job("middle", noted, (tmp_path, "middle"), needs=("first", "done before")),
+        Job("first", noted, (tmp_path, "first")),
+    ]
+    assert list(run(jobs, config)) == ["first", "middle", "last"]
+
+
+@pytest.mark.parametrize("config", EVERYWHERE)
+def test_a_failure_says_why_and_stops_only_what_needs_it(config):
+    jobs = [
+        Job("refused", refusing, ("the disk is full",)),
+        Job("ours", broken),
+        Job("left", leaving),
+        Job("after", squared, (2,), needs=("refused",)),
+        Job("long after", squared, (2,), needs=("after",)),
+        Job("other", squared, (3,)),
+    ]
+    found = run(jobs, config)
+    assert {name: result.error for name, result in found.items()} == {
+        "refused": "the disk is full",
+        "ours": "RuntimeError: a mistake of ours",
+        "left": "SystemExit: enough",
+        "after": "what it needs failed",
+        "long after": "what it needs failed",
+        "other": "",
+    }
+    assert found["other"].value == 9
+
+
+@pytest.mark.parametrize("config", EVERYWHERE)
+def test_what_is_no_longer_wanted_does_not_begin(config, tmp_path):
+    jobs = [Job(str(number), noted, (tmp_path, str(number))) for number in range(6)]
+    found = run(jobs, config, wanted=lambda job: int(job.name) % 2 == 0)
+    assert set(found) == {"0", "2", "4"}
+    assert sorted(path.stem for path in tmp_path.iterdir()) == ["0", "2", "4"]
+
+
+def test_a_killed_worker_s_job_runs_again_and_no_other_does(tmp_path):
+    jobs = [Job(str(number), noted, (tmp_path, str(number), number)) for number in range(8)]
+    jobs.insert(3, Job("dying", dying, (tmp_path, "dying", TRIES - 1, 7)))
+    found = run(jobs, ExecutionConfig(workers=2))
+    assert found["dying"].value == 7
+    assert {name: result.value for name, result in found.items() if name != "dying"} == {
+        str(number): number for number in range(8)
+    }
+    times = {job.name: len(list(tmp_path.glob(f"{job.name}.*"))) for job in jobs}
+    assert times == {**{str(number): 1 for number in range(8)}, "dying": TRIES}
+
+
+def test_a_job_that_always_kills_its_worker_is_given_up_and_named(tmp_path):
+    said = io.StringIO()
+    console = Console(file=said, width=300)
+    jobs = [Job("poison", dying, (tmp_path, "poison", 99)), Job("fine", squared, (3,))]
+    with Execution(ExecutionConfig(workers=2), "jobs", console) as execution:
+        found = {result.job.name: result for result in execution.run(jobs)}
+    assert f"a worker was killed {TRIES} times while it did this (SIGKILL)" in found["poison"].error
+    assert found["fine"].value == 9
+    assert len(list(tmp_path.iterdir())) == TRIES
+    assert "failed: poison: a worker was killed" in said.getvalue()
+    assert "failed: fine" not in said.getvalue()
+
+
+def test_every_job_has_one_thread_and_the_workers_are_few():
+    found = run([Job(str(number), threads) for number in range(6)], ExecutionConfig(workers=2))
+    assert {result.value[0] for result in found.values()} == {1}
+    assert os.getpid() not in {result.value[1] for result in found.values()}
+    assert len({result.value[1] for result in found.values()}) <= 2
+
+
+def test_a_fresh_process_for_each_job_also_where_there_is_one_worker():
+    found = run([Job(str(number), threads) for number in range(3)], fresh=True)
+    processes = {result.value[1] for result in found.values()}
+    assert len(processes - {os.getpid()}) == 3
+    assert not any(map(is_alive, processes - {os.getpid()}))
+
+
+def test_what_a_job_says_is_in_its_log(tmp_path):
+    log = tmp_path / "logs" / "refused.log"
+    said = io.StringIO()
+    console = Console(file=said, width=300)
+    with Execution(ExecutionConfig(workers=2), "jobs", console) as execution:
+        list(execution.run([Job("refused", refusing, ("no",), log=log), Job("ours", broken, log=log)]))
+    assert "about to fail" in log.read_text()
+    assert "error: no" in log.read_text()
+    assert "Traceback" in log.read_text()
+    assert f"failed: refused: no ({log})" in said.getvalue()
+
+
+def test_leaving_early_ends_what_runs(tmp_path):
+    jobs = [Job("sleeping", sleeping, (tmp_path, "sleeping")), Job("quick", squared, (2,))]
+    with Execution(ExecutionConfig(workers=2), "jobs") as execution:
+        for result in execution.run(jobs):
+            assert result.value == 4
+            wait_for(tmp_path / "sleeping.pid")
+            break
+    assert not is_alive(int((tmp_path / "sleeping.pid").read_text()))
+
+
+def wait_for(*paths):
+    deadline = time.monotonic() + 120
+    while not all(path.exists() and path.read_text() for path in paths):
+        assert time.monotonic() < deadline, f"{paths} did not come"
+        time.sleep(0.02)
+
+
+SLEEPERS = """
+import sys
+from execution_helpers import sleeping
+from handrail.collect.execution.config import ExecutionConfig
+from handrail.collect.execution.execution import Execution
+from handrail.collect.execution.job import Job
+
+def main():
+    jobs = [Job(name, sleeping, (sys.argv[1], name)) for name in "ab"]
+    with Execution(ExecutionConfig(workers=2), "jobs") as execution:
+        list(execution.run(jobs))
+
+if __name__ == "__main__":
+    main()
+"""
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
+def test_no_worker_outlives_whoever_gave_it_work(number, tmp_path):
+    script = tmp_path / "sleepers.py"
+    script.write_text(SLEEPERS)
+    paths = [str(ROOT / ".links"), str(ROOT / "tests" / "helpers"), os.environ.get("PYTHONPATH", "")]
+    process = subprocess.Popen(
+        [sys.executable, script, tmp_path],
+        stderr=subprocess.PIPE,
+        text=True,
+        env=os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, paths))},
+    )
+    pids = [tmp_path / "a.pid", tmp_path / "b.pid"]
+    wait_for(*pids)
+    process.send_signal(number)
+    _, said = process.communicate(timeout=60)
+    assert ("KeyboardInterrupt" in said) == (number != signal.SIGKILL)
+    deadline = time.monotonic() + 60
+    while any(is_alive(int(path.read_text())) for path in pids):
+        assert time.monotonic() < deadline, "a worker lives on"
+        time.sleep(0.02)
+
+
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [
+        ({"workers": -1}, "--workers -1: expected a whole number from 1 to 256, or 0 for all cores"),
+        ({"workers": 1000}, "--workers 1000"),
+        ({"workers": 2, "ray": "auto"}, "--ray auto and --workers 2: expected one of them"),
+    ],
+)
+def test_wrong_settings_are_one_line(settings, words):
+    with pytest.raises(HandrailError, match=words):
+        ExecutionConfig(**settings).check_execution()
+
+
+def test_all_cores_are_those_that_this_process_may_use():
+    assert ExecutionConfig(workers=0).processes == len(os.sched_getaffinity(0))
+
+
+def test_a_cluster_without_ray_says_how_to_install_it(monkeypatch):
+    monkeypatch.setattr("handrail.collect.execution.config.find_spec", lambda name: None)
+    with pytest.raises(HandrailError, match=r"--ray auto: expected ray, found none; .* '.\[cluster\]'"):
+        ExecutionConfig(ray="auto").check_execution()
