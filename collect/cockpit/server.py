@@ -193,12 +193,12 @@ async def serve(pipe: Pipe, settings: dict[str, Any]) -> None:
     pipe.send_surely(
         NOTE, json.dumps({"address": f"{scheme}://{shown}:{port}/{door}", "port": port}).encode()
     )
-    loop = asyncio.get_running_loop()
     gone = asyncio.Event()
-    loop.add_reader(pipe.fileno(), _noticing(gone, pipe, hub.hear))
-    beside = asyncio.gather(_note(gone, pipe, hub, guard), _end(server, gone, hub))
+    asyncio.get_running_loop().add_reader(pipe.fileno(), _noticing(gone, pipe, hub.hear))
+    beside = [asyncio.create_task(task) for task in (_note(gone, pipe, hub, guard), _end(server, gone, hub))]
     await server.serve(sockets=[listener])
-    beside.cancel()
+    for task in beside:
+        task.cancel()
 
 
 def _uvicorn(site: Site, config: CockpitConfig) -> uvicorn.Config:

@@ -9,7 +9,6 @@ from handrail.datasets.reading.reader import read_frames, read_info
 
 WIDER = ("ACTION_STATE_DIVERGENCE_CRASHED", "ACTION_RANGE_MISMATCH_CRASHED")
 HARMLESS = ("SATURATED_JOINT", "LOW_DIVERSITY")  # warnings: a joint that rests, few episodes
-SWAY = 1e-3  # of a quaternion: a hand that keeps its turn sways by 0.1° when it begins to move
 ROUNDING = 1e-5  # of a gripper that is open, in single precision and under gravity
 
 
@@ -53,7 +52,7 @@ def is_defect(root, finding):
     if finding.check == "DEAD_JOINT":
         return not does_as_told(root, finding)
     if finding.check == "DISCONTINUITY":
-        return not within_acceleration(root, finding)
+        return not is_motion(root, finding)
     return finding.check not in HARMLESS
 
 
@@ -70,16 +69,17 @@ def does_as_told(root, finding):
     return np.abs(moved - frames["action"][:-1, action.index(f"v_{joint}")]).max() < 0.1
 
 
-def within_acceleration(root, finding):
-    """Return whether a jump is rounding, or a velocity that changes as fast as the robot may."""
+def is_motion(root, finding):
+    """Return whether a jump is rounding, or motion as fast as the robot may move; joints move the tool."""
     joint, _, kind = state_name(root, finding).partition(".")
-    jump, model = abs(finding.data["delta"]), load_model(read_info(root).robot_type)
-    if joint == "tool" and kind.startswith("q"):
-        return jump < SWAY
-    if kind != "vel":
-        return jump < ROUNDING
-    most = model.description.limits.acceleration[model.joints.index(joint)] / read_info(root).fps
-    return jump < 1.5 * most
+    info, model = read_info(root), load_model(read_info(root).robot_type)
+    limits, jump = model.description.limits, abs(finding.data["delta"])
+    if joint == "tool":
+        moved = np.abs(np.diff(read_frames(root, finding.episode)["observation.state"], axis=0))
+        return bool(np.all(moved[:, : model.size] <= 1.1 * limits.velocity / info.fps))
+    if kind == "vel":
+        return jump < 1.5 * limits.acceleration[model.joints.index(joint)] / info.fps
+    return jump < ROUNDING
 
 
 def state_name(root, finding):
