@@ -60,6 +60,7 @@ MINUTES_TOO = (
     "moving",
     "watched",
     "film",
+    "--video",
     "trials",
     "showcase",
     "demo",
