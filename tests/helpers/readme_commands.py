@@ -61,6 +61,7 @@ MINUTES_TOO = (
     "moving",
     "watched",
     "film",
+    "--video",
     "trials",
     "showcase",
     "demo",

@@ -4,6 +4,7 @@ python tests/helpers/rooms.py    draw it anew in docs/architecture.md
 """
 
 import ast
+import functools
 import re
 from pathlib import Path
 
@@ -32,6 +33,7 @@ def imported(path: Path) -> set[str]:
     return names
 
 
+@functools.cache
 def rooms() -> dict[str, list[Path]]:
     """Return the files of every room; what lies at a floor's root is a room of the floor's name."""
     found: dict[str, list[Path]] = {}
@@ -42,6 +44,7 @@ def rooms() -> dict[str, list[Path]]:
     return found
 
 
+@functools.cache
 def arrows() -> networkx.DiGraph:
     """Return the graph of rooms: an arrow from a room to each that it imports."""
     graph = networkx.DiGraph()

@@ -8,6 +8,7 @@ import warnings
 from collections.abc import Sequence
 from dataclasses import fields, is_dataclass
 from pathlib import Path
+from typing import Any
 
 import pytest
 from command_helpers import command
@@ -88,7 +89,9 @@ def test_lerobot_s_own_parser_takes_the_training_commands():
         from lerobot.policies.act import configuration_act  # noqa: F401  (registered by their import)
         from lerobot.policies.diffusion import configuration_diffusion  # noqa: F401
 
-        policies = [draccus.parse(TrainPipelineConfig, args=arguments).policy for arguments in training]
+        policies: list[Any] = [
+            draccus.parse(TrainPipelineConfig, args=arguments).policy for arguments in training
+        ]
     for policy in policies:
         assert "ENV" in policy.normalization_mapping, "the environment's state would not be normalised"
         assert not policy.push_to_hub

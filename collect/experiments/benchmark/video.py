@@ -27,7 +27,7 @@ _SMALL = (252, 336)  # of one in a strip [px]
 _MOMENTS = 5  # of a strip
 _COLOURS = 256  # of a strip
 _BAR = 44  # height of the caption [px]
-_EVERY = 3  # steps between pictures
+EVERY = 3  # steps between pictures
 _REST = 10  # pictures after the end
 
 
@@ -50,8 +50,8 @@ class Example:
             HandrailError: there is no OpenGL on this machine.
         """
         size = (_SIZE[0] + _BAR, _SIZE[1] * len(self.runs))
-        rate = 1 / (_EVERY * Fraction(STEP).limit_denominator(1000))
-        steps = range(0, self._longest + _REST * _EVERY, _EVERY)
+        rate = 1 / (EVERY * Fraction(STEP).limit_denominator(1000))
+        steps = range(0, self._longest + _REST * EVERY, EVERY)
         with VideoFile(path, size, rate) as video:
             for pictures in self._pictures(steps, _SIZE):
                 video.add(np.hstack(pictures))

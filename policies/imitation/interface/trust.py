@@ -9,6 +9,7 @@ its policies fetch networks and tokenizers, with code, from where their settings
 """
 
 import contextlib
+import functools
 import importlib
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import MISSING, fields
@@ -89,12 +90,19 @@ def _check_places(path: Path, settings: Any, known: Iterable[str]) -> None:
 
 def registered_policies() -> Mapping[str, type]:
     """Return the policies that LeRobot knows, by name; those of installed plugins too."""
-    import lerobot.policies  # noqa: F401  (registers its own)
     from lerobot.configs.policies import PreTrainedConfig
+
+    _register()
+    return PreTrainedConfig.get_known_choices()
+
+
+@functools.cache
+def _register() -> None:
+    """Import what registers policies, once: LeRobot looks through all installed packages."""
+    import lerobot.policies  # noqa: F401  (registers its own)
     from lerobot.utils.import_utils import register_third_party_plugins
 
     register_third_party_plugins()
-    return PreTrainedConfig.get_known_choices()
 
 
 def _steps(path: Path, policy: str) -> list[dict[str, Any]]:

@@ -259,7 +259,7 @@ def test_wrong_input_is_one_clear_line(case):
 
 @pytest.mark.needs_gl
 def test_the_report_has_a_video(tmp_path, monkeypatch):
-    monkeypatch.setattr(video, "_EVERY", 30)  # steps between pictures: ten times as few
+    monkeypatch.setattr(video, "EVERY", 30)  # steps between pictures: ten times as few
     config = replace(QUICK, goals=1, video=True, report=str(tmp_path / "report"))
     benchmark(config, BASELINES, QUIET)
     html = (tmp_path / "report" / "benchmark.html").read_text()

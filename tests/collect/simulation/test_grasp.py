@@ -154,9 +154,9 @@ def test_the_operator_closes_the_gripper_around_the_cube(robot, mode):
     env, watch = build_env(config, 20), Closing()
     try:
         session = build_session(config, env, [watch])
-        outcomes = [session.run(seed) for seed in (100, 101)]
-        assert [outcome.success for outcome in outcomes] == [True, True]
-        assert mode == "direct" or not any(outcome.contacts for outcome in outcomes)
+        outcome = session.run(100)
+        assert outcome.success
+        assert mode == "direct" or not outcome.contacts
     finally:
         env.close()
     tips = {"ridgeback_ur10": 0.015, "ridgeback_panda": 0.0095}[robot]  # beyond the tool point

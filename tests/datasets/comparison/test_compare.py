@@ -155,13 +155,14 @@ def evaluations(path: Path, **shares) -> Path:
 
 def test_policies_come_first(ours, tmp_path):
     given = evaluations(tmp_path / "evaluations.json", quick=0.9, slow=0.5)
-    comparison, content, _ = report(ours, tmp_path / "out", evaluations=(str(given),))
+    comparison = compare(CompareConfig(tuple(ours), evaluations=(str(given),)))
     found = findings(comparison)
+    content = as_json(comparison, found)
     assert found[0].kind == "outcome"
     assert "Policies trained on quick succeeded more often" in headline(found)
     assert content["outcomes"]["differences"][0]["nested"][1] < 0
     assert any("training seeds" in text["text"] for text in content["findings"])
-    assert as_json(comparison, found)["outcomes"]["conditions"][0]["label"] == "quick"
+    assert content["outcomes"]["conditions"][0]["label"] == "quick"
     wrong = evaluations(tmp_path / "wrong.json", telepathy=0.9)
     with pytest.raises(HandrailError, match="unknown condition 'telepathy', expected one of quick, slow"):
         compare(CompareConfig(tuple(ours), evaluations=(str(wrong),)))

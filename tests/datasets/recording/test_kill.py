@@ -1,6 +1,7 @@
 """Killed at any moment, a recording loses at most the open episode, and nothing it had reported as saved."""
 
 import gc
+import itertools
 import json
 import os
 import random
@@ -97,21 +98,22 @@ def _check_after_kill(root: Path, saved: dict[int, str]) -> None:
     assert not any(LOCK_NAME in path for path in tree(root))
 
 
-def _kill_session_everywhere(folder: Path, is_torn: Callable[[int], bool]) -> None:
-    lived, k = False, 0
-    while not lived:
-        k += 1
+def _kill_session_everywhere(folder: Path, is_torn: Callable[[int], bool], every: int = 1) -> None:
+    for k in itertools.count(1, every):
         root, saved = folder / str(k), {}
         lived = GUILLOTINE.run(root, k, lambda root=root, saved=saved: _session(root, saved))
         if is_torn(k):
             tear_staged_files(root)
         _check_after_kill(root, saved)
+        if lived:
+            break
     assert len(saved) == 4
     assert k > 60  # the hook really saw the changes
 
 
-def test_killed_at_every_change_to_the_disk(tmp_path, quick_disk):
-    _kill_session_everywhere(tmp_path, lambda k: k % 2 == 0)
+@pytest.mark.parametrize("every", [3, pytest.param(1, marks=pytest.mark.slow)])
+def test_killed_at_every_change_to_the_disk(every, tmp_path, quick_disk):
+    _kill_session_everywhere(tmp_path, lambda k: k % 2 == 0, every)
 
 
 @pytest.mark.slow
@@ -156,20 +158,23 @@ def _check_nothing_lost(root: Path, kept: list[bytes]) -> None:
         assert record_one(writer, cameras=False) == 3
 
 
-@pytest.mark.parametrize("torn", [False, pytest.param(True, marks=pytest.mark.slow)])
-def test_repair_killed_at_every_change(tmp_path, quick_disk, torn):
+@pytest.mark.parametrize(
+    ("torn", "every"),
+    [(False, 3), *(pytest.param(each, 1, marks=pytest.mark.slow) for each in (False, True))],
+)
+def test_repair_killed_at_every_change(tmp_path, quick_disk, torn, every):
     original = record(tmp_path / "original", 4, features=TINY_FEATURES)
     kept = _damage(original)
     if torn:
         Layout(original).info.write_bytes(b"{torn")
-    lived, k = False, 0
-    while not lived:
-        k += 1
+    for k in itertools.count(1, every):
         root = shutil.copytree(original, tmp_path / str(k))
         lived = GUILLOTINE.run(root, k, lambda root=root: repair(root, set_aside_damaged=True))
         if k % 2:
             tear_staged_files(root)
         _check_nothing_lost(root, kept)
+        if lived:
+            break
     assert k > 30
 
 

@@ -163,7 +163,7 @@ def test_an_intent_meets_the_controller_of_its_mode(folder):
 
 @pytest.mark.parametrize(("name", "protection"), [("bold", "mpc"), ("bold", "filter"), ("bold_hand", "own")])
 def test_protected_policies_touch_nothing_whatever_they_do(folder, name, protection):
-    asked = config(folder, name, protection=protection, episodes=3, time_limit=5.0)
+    asked = config(folder, name, protection=protection, episodes=2, time_limit=5.0)
     label = policy_conditions(asked)[0][0].label
     for row in rollouts(evaluate(asked, load=load), label):
         assert row["contacts"] == 0

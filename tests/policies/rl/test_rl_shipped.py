@@ -37,18 +37,18 @@ def reaches(controller, goal, speed=1.0) -> bool:
 
 
 def test_the_shipped_actor_reaches_goals():
-    goals = evaluation_goals(20, seed=40_000)
+    goals = evaluation_goals(10, seed=40_000)
     controller = RlController(MODEL)
-    assert sum(reaches(controller, goal) for goal in goals) >= 18
+    assert sum(reaches(controller, goal) for goal in goals) >= 9
 
 
 def test_the_record_is_the_actor_s():
     """Law: what the record says of goals reached is true of goals drawn in the same way."""
     record = json.loads((SHIPPED / "actor.json").read_text())
     said = record["final"]
-    scores = evaluate(Actor.load(), evaluation_goals(30, FINAL_SEED), record["settings"]["physics"])
+    scores = evaluate(Actor.load(), evaluation_goals(20, FINAL_SEED), record["settings"]["physics"])
     assert said["success"]["mean"] >= 0.9
-    assert sum(score["success"] for score in scores) >= 27
+    assert sum(score["success"] for score in scores) >= 18
     lengths = [score["length"] for score in scores]
     assert said["length"]["min"] <= min(lengths)
     assert max(lengths) <= said["length"]["max"]
