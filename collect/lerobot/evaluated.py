@@ -29,7 +29,8 @@ class EvaluatedEnv(gymnasium.Wrapper[Observation, NDArray[np.float32], Observati
     """A task in which a policy's actions mean what they mean in `handrail-evaluate`.
 
     An action of joint velocities is clipped to the limits; one of a mode's channels is completed by its
-    controller. A gripper beyond a half closes. An action that is not finite brakes.
+    controller. With a mode both are taken: a policy may complete its channels itself. A gripper beyond a half
+    closes. An action that is not finite brakes.
 
     Args:
         config: of the session.
@@ -53,7 +54,8 @@ class EvaluatedEnv(gymnasium.Wrapper[Observation, NDArray[np.float32], Observati
         super().__init__(env)
         self._env, self._first_seed, self._painter = env, first_seed, None
         self._channels = Channels.of(env.model.description)
-        self._action, self._controller = self._steered(config, fps) if mode else (None, self._direct())
+        self._direct = DirectController(env.model, env.period)
+        self._action, self._controller = self._steered(config, fps) if mode else (None, self._direct)
         self._joined = scene_in_state
         self.observation_space = self._space_shown(env.observation_space)
         size = len(self._action.names) if self._action else env.model.size + 1
@@ -76,7 +78,9 @@ class EvaluatedEnv(gymnasium.Wrapper[Observation, NDArray[np.float32], Observati
         """Begin an episode."""
         self._put_away()
         observation, info = self._env.reset(seed=None if seed is None else seed + self._first_seed)
-        self._driver = Driver(self._controller, self._env, self._env.period)
+        self._driver, self._whole = (
+            Driver(each, self._env, self._env.period) for each in (self._controller, self._direct)
+        )
         self._steps = 0
         return self._shown(observation), _plain(info)
 
@@ -87,13 +91,16 @@ class EvaluatedEnv(gymnasium.Wrapper[Observation, NDArray[np.float32], Observati
             HandrailError: it has another size.
         """
         numbers = np.asarray(action, np.float64)
-        if numbers.shape != self.action_space.shape:
+        whole = numbers.shape == (self._env.model.size + 1,)
+        if not whole and numbers.shape != self.action_space.shape:
             raise HandrailError(
                 f"action of --env.type=handrail: expected {self._meant}, got {numbers.size} numbers;"
                 " --env.mode is for policies that write a mode's channels, and for no others"
             )
-        self._driver.drive(self._steps, self._env.state(), self._intent(numbers))
-        observation, reward, terminated, truncated, info = self._env.step(self._driver.action(self._steps))
+        channels = self._action is not None and numbers.shape == self.action_space.shape
+        driver = self._driver if channels else self._whole
+        driver.drive(self._steps, self._env.state(), self._intent(numbers, channels))
+        observation, reward, terminated, truncated, info = self._env.step(driver.action(self._steps))
         self._steps += 1
         return self._shown(observation), reward, terminated, truncated, _plain(info)
 
@@ -118,9 +125,9 @@ class EvaluatedEnv(gymnasium.Wrapper[Observation, NDArray[np.float32], Observati
         names = self._action.names if self._action else (*self._env.model.joints, "gripper")
         return ", ".join(names)
 
-    def _intent(self, numbers: NDArray[np.float64]) -> Intent:
+    def _intent(self, numbers: NDArray[np.float64], channels: bool) -> Intent:
         time, gripper = self._env.state().time, float(numbers[-1] > _HALF)
-        if self._action:
+        if self._action and channels:
             return self._action.decided(numbers, time)
         values = np.zeros(self._channels.size)
         values[self._channels.joint_slice] = numbers[:-1]
@@ -146,9 +153,6 @@ class EvaluatedEnv(gymnasium.Wrapper[Observation, NDArray[np.float32], Observati
             "sent": state.commanded.astype(np.float32),
             "obstacles": to_numbers(self._env.obstacles()),
         }
-
-    def _direct(self) -> Controller:
-        return DirectController(self._env.model, self._env.period)
 
     def _steered(self, config: SessionConfig, fps: int) -> tuple[ModeAction, Controller]:
         mode = build_mode(config, self._env.model)

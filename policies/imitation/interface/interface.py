@@ -81,6 +81,11 @@ class PolicyInterface:
         flags = tuple(f"mask.{index}" for index in range(len(self.masks))) if len(self.masks) > 1 else ()
         return (*(self.channels[index] for index in self.commanded), *flags, _GRIPPER)
 
+    @property
+    def is_partial(self) -> bool:
+        """Whether it writes less than the motion of the whole robot."""
+        return self.actions == "intent" and len(self.commanded) < len(self._known.joints)
+
     def observe(self, state: FloatArray, environment: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return what the policy reads, ([T,] s') and ([T,] e') float32, of what is recorded."""
         if state.ndim == 1:

@@ -102,7 +102,7 @@ def with_steps(
     view, steps = PolicyViewStep(described), list(before.steps)
     normalisers = [i for i, step in enumerate(steps) if isinstance(step, NormalizerProcessorStep)]
     steps.insert(normalisers[0] if normalisers else len(steps), view)
-    if interface.actions == "intent" and completion is not None and completion.is_installed:
+    if completion is not None and completion.is_installed and interface.is_partial:
         act: ProcessorStep = PolicyCompletionStep(described, asdict(completion))
     else:
         act = PolicyActionStep(described)

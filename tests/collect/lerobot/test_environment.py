@@ -63,6 +63,15 @@ def test_actions_of_a_mode_are_completed():
     env.close()
 
 
+def test_an_action_of_another_size_is_said():
+    _, env = made(task="reach", mode="ee")
+    env.reset(seed=[5])
+    env.step(np.zeros((1, 10), np.float32))  # the whole robot's
+    with pytest.raises(HandrailError, match=r"expected ee\.vx, .*, gripper, got 3 numbers"):
+        env.step(np.zeros((1, 3), np.float32))
+    env.close()
+
+
 @pytest.mark.parametrize("mode", ["ee", "switching"])
 def test_what_lerobot_records_of_our_robot_is_what_a_policy_reads_and_writes(mode):
     config, env = made(task="pick_place", mode=mode, scene_in_state=True)

@@ -43,7 +43,9 @@ def steps(interface, by=BY):
 def driven(interface, completes, seeds=(5,), fail_at=None):
     """Return the robot's states while a policy asks for the same twist all the time."""
     view, acts, completion = steps(interface)
-    config = make_env_config("handrail", task=BY.task, mode="" if completes else "ee")
+    config = make_env_config(
+        "handrail", task=BY.task, mode="ee"
+    )  # from which LeRobot takes the policy's size
     env = make_env(config, n_envs=len(seeds), use_async_envs=False)["handrail"][0]
     assert isinstance(env, SyncVectorEnv)
     seen, _ = env.reset(seed=list(seeds))
