@@ -14,7 +14,7 @@ import pyarrow.parquet as pq
 from handrail.datasets.format.arrow import numbers, to_numpy
 
 _EPISODE = "episode_index"
-_MOST_OPEN = 16  # files; a file of a thousand episodes takes some 10 MB of memory
+MOST_OPEN = 16  # files; one of a thousand episodes takes some 20 MB of memory
 
 
 class DataFile:
@@ -93,7 +93,7 @@ class DataFiles:
     def open(self, path: Path) -> DataFile:
         """Return a file, opened unless it is among the last few that were asked for."""
         found = self._open.pop(path, None) or DataFile(path)
-        if len(self._open) == _MOST_OPEN:
+        if len(self._open) == MOST_OPEN:
             self._open.pop(next(iter(self._open))).close()
         self._open[path] = found
         return found

@@ -181,6 +181,18 @@ def test_damage_in_a_packed_file_is_named_and_can_be_set_aside(tmp_path, stream)
     assert repair(root, set_aside_damaged=True).put_back == 0
 
 
+def test_a_file_named_after_an_episode_of_a_packed_file_is_no_episode(tmp_path):
+    root = part(tmp_path / "set", 0, 4)
+    merge_datasets([root], root)
+    before = content(root)
+    shutil.copy(Layout(root).data(0), Layout(root).data(2))
+    assert check_report(root) == ["data/chunk-000/file-002.parquet: no file of a LeRobot dataset"]
+    report = repair(root)
+    assert report.moved == ("data/chunk-000/file-002.parquet",)
+    assert report.complete
+    assert content(root) == before
+
+
 def test_a_merge_that_fails_changes_nothing(tmp_path):
     root, other = part(tmp_path / "one", 0, 2), part(tmp_path / "two", 2, 4)
     os.truncate(Layout(other).data(1), 30)
