@@ -177,7 +177,7 @@ def _states(
 
 def _grown(totals: Totals, lines: Lines) -> Totals:
     """Return the totals with the episodes of one more volume, as the volume says or one by one."""
-    if lines.totals is not None:
+    if lines.totals is not None and lines.totals.episodes == totals.episodes + len(lines):
         return lines.totals
     for record in lines.records(with_stats=True):
         totals = totals.grown(record)
