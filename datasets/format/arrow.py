@@ -8,7 +8,6 @@ from collections.abc import Sequence
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.compute as pc
 
 
 def numbers(values: np.ndarray, kind: pa.DataType) -> pa.Array:
@@ -60,8 +59,8 @@ def scalars(values: Sequence[str | bool | int | float | None], kind: pa.DataType
         known = strings(["" if value is None else str(value) for value in values])
     else:
         known = numbers(np.array([0 if value is None else value for value in values]), kind)
-    empty = np.array([value is None for value in values])
-    return pc.if_else(numbers(empty, pa.bool_()), pa.nulls(1, kind)[0], known) if empty.any() else known
+    there = numbers(np.array([value is not None for value in values]), pa.bool_())
+    return pa.Array.from_buffers(kind, len(known), [there.buffers()[1], *known.buffers()[1:]])
 
 
 def plain_values(column: pa.ChunkedArray) -> list:

@@ -14,7 +14,7 @@ import pyarrow.parquet as pq
 from handrail.datasets.format.arrow import numbers, to_numpy
 
 _EPISODE = "episode_index"
-_MOST_OPEN = 16  # files; a file of a thousand episodes takes some 10 MB of memory
+MOST_OPEN = 4  # files; one of a thousand episodes takes some 25 MB of memory
 
 
 class DataFile:
@@ -29,8 +29,7 @@ class DataFile:
         self.path = path
         self._file = pq.ParquetFile(path)
         self._groups = self._file.num_row_groups
-        leaves = [self._file.schema.column(place).path for place in range(len(self._file.schema))]
-        self._column = leaves.index(_EPISODE)
+        self._column = _leaves(self._file.metadata).index(_EPISODE) if self._groups else 0
 
     def rows(self, episode: int, length: int, columns: Sequence[str] | None = None) -> pa.Table:
         """Return the rows of an episode, in their order.
@@ -83,6 +82,12 @@ class DataFile:
         return low
 
 
+def _leaves(metadata: pq.FileMetaData) -> list[str]:
+    """Return the paths of the columns; not by `schema`, which would keep the metadata in memory."""
+    group = metadata.row_group(0)
+    return [group.column(place).path_in_schema for place in range(group.num_columns)]
+
+
 class DataFiles:
     """Hands out data files by their paths and keeps those that were asked for last open."""
 
@@ -93,7 +98,7 @@ class DataFiles:
     def open(self, path: Path) -> DataFile:
         """Return a file, opened unless it is among the last few that were asked for."""
         found = self._open.pop(path, None) or DataFile(path)
-        if len(self._open) == _MOST_OPEN:
+        if len(self._open) == MOST_OPEN:
             self._open.pop(next(iter(self._open))).close()
         self._open[path] = found
         return found

@@ -138,7 +138,8 @@ class Lines:
         found: dict[str, dict[str, np.ndarray]] = {}
         table = self.table
         if table is None:
-            table = pq.read_table(self.path, use_threads=False, partitioning=None)
+            with pq.ParquetFile(self.path) as file:
+                table = file.read(use_threads=False)
         for name in [name for name in table.column_names if name.startswith(_STATS)]:
             key, statistic = name.removeprefix(_STATS).rsplit("/", 1)
             shape = (len(self), *_shape(table.schema.field(name).type))

@@ -83,7 +83,7 @@ def parquet_bytes(
         sink,
         table.schema,
         compression="snappy",
-        use_dictionary=dictionary,
+        use_dictionary=dictionary,  # type: ignore[arg-type]
         write_statistics=statistics,
         store_schema=arrow_schema,
     ) as writer:

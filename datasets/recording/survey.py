@@ -4,6 +4,7 @@ A file with the checksum that it had when it was saved is whole. One with anothe
 `reencode_videos` for instance, or is damaged: it is whole if it still decodes to the episode's frames.
 """
 
+from bisect import bisect_right
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
@@ -93,7 +94,9 @@ def survey(layout: Layout, manifest: Manifest, seal_of: Seals) -> Survey:
     Raises:
         HandrailError: Another tool has added episodes, or a file has the number of an absurd one.
     """
-    rows, streams = rows_of_lines(layout), [p for pattern in _STREAMS for p in _found(layout, pattern)]
+    rows, found = rows_of_lines(layout), [p for pattern in _STREAMS for p in _found(layout, pattern)]
+    within = _within_volumes(rows, found)
+    streams = [path for path in found if path not in within]
     saved, counted = _saved_by_lines(rows), _saved_in_info(layout)
     beyond = {number for number in map(episode_of, streams) if number is not None and number >= saved}
     interrupted = beyond == {saved} and counted is not None and counted <= saved  # a crash: the next one's
@@ -110,8 +113,23 @@ def survey(layout: Layout, manifest: Manifest, seal_of: Seals) -> Survey:
         totals,
         absent=max(0, (counted or 0) - count),
         leftovers=tuple(path for path in streams if interrupted and episode_of(path) == saved),
-        strays=tuple(path for path in (*streams, *rows) if episode_of(path) is None),
+        strays=tuple(path for path in (*found, *rows) if episode_of(path) is None or path in within),
     )
+
+
+def _within_volumes(rows: list[Path], streams: list[Path]) -> set[Path]:
+    """Return the files named after an episode that is in the files of another: they are of no volume."""
+    slots = {number: path for path in rows if (number := episode_of(path)) is not None}
+    begins = sorted(slots)
+    found: set[Path] = set()
+    for path in streams:
+        number = episode_of(path)
+        if number is None or number in slots or not begins or number < begins[0]:
+            continue
+        begin = begins[bisect_right(begins, number) - 1]
+        if number < begin + count_lines(slots[begin]):
+            found.add(path)
+    return found
 
 
 def said_to_be_saved(layout: Layout) -> int:
@@ -159,7 +177,7 @@ def _states(
 
 def _grown(totals: Totals, lines: Lines) -> Totals:
     """Return the totals with the episodes of one more volume, as the volume says or one by one."""
-    if lines.totals is not None:
+    if lines.totals is not None and lines.totals.episodes == totals.episodes + len(lines):
         return lines.totals
     for record in lines.records(with_stats=True):
         totals = totals.grown(record)

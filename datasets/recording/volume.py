@@ -82,7 +82,10 @@ class _Volume:
         self._sink = pa.OSFile(str(layout.data(self._slot)), "wb")
         self._schema = data_schema(manifest.features)
         self._rows = pq.ParquetWriter(
-            self._sink, self._schema, compression="snappy", write_statistics=_SEARCHED
+            self._sink,
+            self._schema,
+            compression="snappy",
+            write_statistics=_SEARCHED,  # type: ignore[arg-type]
         )
 
     def takes(self, stretches: Mapping[str, Stretch]) -> bool:

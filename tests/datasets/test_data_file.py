@@ -39,7 +39,7 @@ def test_an_episode_is_found_however_its_file_is_cut(made, tmp_path_factory):
 
 
 def test_the_last_few_files_stay_open(tmp_path, monkeypatch):
-    monkeypatch.setattr(data_file, "_MOST_OPEN", 2)
+    monkeypatch.setattr(data_file, "MOST_OPEN", 2)
     one, two, three = paths = [tmp_path / name for name in "abc"]
     for path in paths:
         pq.write_table(pa.table({"episode_index": [0, 1]}), path)

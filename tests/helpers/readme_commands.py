@@ -5,7 +5,8 @@ import shlex
 
 from places import ROOT
 
-MAIN = ("README.md", *(f"docs/{name}.md" for name in ("recording", "training", "evaluation", "comparison")))
+_READ_ON = ("recording", "large_datasets", "training", "evaluation", "comparison")
+MAIN = ("README.md", *(f"docs/{name}.md" for name in _READ_ON))
 PAGES = (*MAIN, *(f"docs/{name}.md" for name in ("concepts", "lekiwi", "study", "benchmark", "api")))
 LESS = {  # flag → the value that it gets where a page gives it
     "handrail-demo": {"--episodes": "1"},

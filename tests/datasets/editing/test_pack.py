@@ -1,14 +1,17 @@
 """Packed or not, in shards or not: the same rows, pictures, lines and summaries, for us and for LeRobot."""
 
 import os
+import shutil
 from itertools import pairwise
 
 import numpy as np
 import pytest
 from command_helpers import command
+from datasets_guillotine import Guillotine
 from datasets_helpers import (
     CAMERAS,
     TASKS,
+    TINY_FEATURES,
     check_pictures,
     create,
     frame_of,
@@ -30,7 +33,9 @@ from handrail.datasets.reading.check import check_report
 from handrail.datasets.reading.reader import read_episodes, read_frames
 from handrail.datasets.recording import volume
 from handrail.datasets.recording.repair import repair
+from handrail.datasets.recording.rewrite import settle
 
+GUILLOTINE = Guillotine()
 SUMMARIES = ("meta/info.json", "meta/stats.json", "meta/tasks.parquet", "meta/handrail.json")
 
 
@@ -176,6 +181,18 @@ def test_damage_in_a_packed_file_is_named_and_can_be_set_aside(tmp_path, stream)
     assert repair(root, set_aside_damaged=True).put_back == 0
 
 
+def test_a_file_named_after_an_episode_of_a_packed_file_is_no_episode(tmp_path):
+    root = part(tmp_path / "set", 0, 4)
+    merge_datasets([root], root)
+    before = content(root)
+    shutil.copy(Layout(root).data(0), Layout(root).data(2))
+    assert check_report(root) == ["data/chunk-000/file-002.parquet: no file of a LeRobot dataset"]
+    report = repair(root)
+    assert report.moved == ("data/chunk-000/file-002.parquet",)
+    assert report.complete
+    assert content(root) == before
+
+
 def test_a_merge_that_fails_changes_nothing(tmp_path):
     root, other = part(tmp_path / "one", 0, 2), part(tmp_path / "two", 2, 4)
     os.truncate(Layout(other).data(1), 30)
@@ -184,6 +201,34 @@ def test_a_merge_that_fails_changes_nothing(tmp_path):
         with pytest.raises(HandrailError, match=r"two.*damaged"):
             merge_datasets([root, other], output)
         assert tree(tmp_path) == before
+
+
+@pytest.mark.parametrize("in_place", [False, True])
+def test_a_merge_killed_at_every_change_to_the_disk(tmp_path, monkeypatch, in_place):
+    """The sources stay whole, the new dataset is there whole or not at all, and doing it again does it."""
+    monkeypatch.setattr(os, "fsync", lambda descriptor: None)  # a killed process needs no wait for the disk
+    made = tmp_path / "made"
+    one, other = (record(made / name, 2, features=TINY_FEATURES) for name in ("one", "other"))
+    shard = tree(other)
+    merge_datasets([one, other], tmp_path / "wanted")
+    wanted, before = content(tmp_path / "wanted"), content(one)
+    lived, k = False, 0
+    while not lived:
+        k += 1
+        folder = shutil.copytree(made, tmp_path / str(k))
+        roots = [folder / "one", folder / "other"]
+        target = roots[0] if in_place else folder / "both"
+        lived = GUILLOTINE.run(folder, k, lambda roots=roots, target=target: merge_datasets(roots, target))
+        assert tree(roots[1]) == shard
+        settle(target)  # as the next edit in its place would
+        assert in_place or content(roots[0]) == before
+        found = content(target) if target.exists() else None
+        assert found in ((before, wanted) if in_place else (None, wanted))
+        if found != wanted:
+            merge_datasets(roots, target)
+        assert content(target) == wanted
+        assert repair(target).clean
+    assert k > 8
 
 
 def test_the_commands_say_what_they_wrote(whole, tmp_path):
