@@ -4,7 +4,7 @@ from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
-import ray
+import ray  # pyright: ignore[reportMissingImports]  (an extra)
 from ray.exceptions import RayError
 
 from handrail.collect.execution.engine import TRIES
