@@ -2,6 +2,8 @@
 
 import json
 import time
+from itertools import chain
+from operator import itemgetter
 from pathlib import Path
 
 import numpy as np
@@ -11,14 +13,19 @@ from handrail.datasets.reading.reader import read_episodes, read_frames
 
 CLOCKS = ("wall_clock", "controller.solve_time")  # of frames
 EPISODE_CLOCKS = ("started", "wall_time")
+PLACES = ("data/", "meta/")  # in which file
 
 
 def content(root):
-    """Return every row, every line of metadata and every summary of a dataset, without the clocks."""
+    """Return every row, every line of metadata and every summary of a dataset, without clocks and places."""
     numbers = [row["episode_index"] for row in read_episodes(root)]
     found = {f"frames {number}": _frames(root, number) for number in numbers}
-    lines = [pq.read_table(path).to_pylist()[0] for path in sorted(root.glob("meta/episodes/*/*.parquet"))]
-    found["lines"] = [{key: line[key] for key in line if not _is_clock(key)} for line in lines]
+    files = [pq.read_table(path).to_pylist() for path in sorted(root.glob("meta/episodes/*/*.parquet"))]
+    lines = sorted(chain.from_iterable(files), key=itemgetter("episode_index"))
+    found["lines"] = [
+        {key: line[key] for key in line if not _is_clock(key) and not key.startswith(PLACES)}
+        for line in lines
+    ]
     for name in ("info", "stats"):
         summary = json.loads((root / f"meta/{name}.json").read_text())
         found[name] = {key: summary[key] for key in summary if not _is_clock(key)}
