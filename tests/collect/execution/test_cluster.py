@@ -2,6 +2,7 @@
 
 import os
 import threading
+from unittest import mock
 
 import pytest
 from command_helpers import command
@@ -13,20 +14,24 @@ from handrail.collect.execution.engine import TRIES
 from handrail.collect.execution.execution import Execution
 from handrail.collect.execution.job import Job
 
+os.environ["RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER"] = "0"  # else Ray looks for 127.0.0.1 at another address
 utils = pytest.importorskip("ray.cluster_utils", reason="needs Ray: pip install '.[cluster]'")
 pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("ignore")]
 NODE = {"num_cpus": 1, "object_store_memory": 100_000_000, "node_ip_address": "127.0.0.1"}
-EPISODES = 60
+EPISODES = 40
 FLAGS = ["--task", "reach", "--time_limit", "1.0", "--seed", "3", "--dataset.num_episodes", str(EPISODES)]
 
 
 @pytest.fixture(scope="module")
 def cluster():
-    made = utils.Cluster(initialize_head=True, head_node_args={**NODE, "include_dashboard": False})
-    made.add_node(**NODE)
-    made.wait_for_nodes()
-    yield made
-    made.shutdown()
+    with mock.patch.dict(
+        os.environ, {"RAY_USAGE_STATS_ENABLED": "0", "RAY_agent_register_timeout_ms": "300000"}
+    ):
+        made = utils.Cluster(initialize_head=True, head_node_args={**NODE, "include_dashboard": False})
+        made.add_node(**NODE)
+        made.wait_for_nodes(60)
+        yield made
+        made.shutdown()
 
 
 def run(jobs, cluster):
