@@ -5,7 +5,7 @@ from dataclasses import replace
 from typing import Any
 
 import ray
-from ray.exceptions import RayError
+from ray.exceptions import RayError, RayTaskError
 
 from handrail.collect.execution.engine import TRIES
 from handrail.collect.execution.job import Job, Result
@@ -66,6 +66,9 @@ class Cluster:
         job = self._running.pop(reference)
         try:
             result: Any = ray.get(reference)
+        except RayTaskError as error:  # nothing that the job did: that is in its result
+            why = message_of(getattr(error, "cause", None) or error)
+            return Result(job, error=f"could not begin ({why}); every computer needs the same packages")
         except RayError as error:
             return Result(
                 job,

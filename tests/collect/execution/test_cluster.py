@@ -7,6 +7,7 @@ from unittest import mock
 import pytest
 from command_helpers import command
 from execution_helpers import dying, noted, refusing, squared, threads
+from places import HELPERS
 from shared_helpers import content, saved, started, wait_until
 
 from handrail.collect.execution.config import ExecutionConfig
@@ -24,9 +25,13 @@ FLAGS = ["--task", "reach", "--time_limit", "1.0", "--seed", "3", "--dataset.num
 
 @pytest.fixture(scope="module")
 def cluster():
-    with mock.patch.dict(
-        os.environ, {"RAY_USAGE_STATS_ENABLED": "0", "RAY_agent_register_timeout_ms": "300000"}
-    ):
+    paths = [str(HELPERS), os.environ.get("PYTHONPATH", "")]  # where the nodes find this test's jobs
+    settings = {
+        "PYTHONPATH": os.pathsep.join(filter(None, paths)),
+        "RAY_USAGE_STATS_ENABLED": "0",
+        "RAY_agent_register_timeout_ms": "300000",  # others may compute here too
+    }
+    with mock.patch.dict(os.environ, settings):
         made = utils.Cluster(initialize_head=True, head_node_args={**NODE, "include_dashboard": False})
         made.add_node(**NODE)
         made.wait_for_nodes(60)
