@@ -21,9 +21,13 @@ from handrail.collect.session.outcome import Outcome
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.format.layout import Layout
 from handrail.datasets.reading.reader import read_info
+from handrail.datasets.recording.writer import EpisodeWriter
+from handrail.datasets.storage.lock import HeldError
 
 INTERRUPTED = 130
 FAILED = 1
+_DYING = 60.0  # of a worker whose parent or computer is lost [s]
+_MOMENT = 0.1  # [s]
 _PRELOAD = ("handrail.collect.commands.shared",)
 
 
@@ -44,7 +48,10 @@ def record_shared(config: RecordConfig, console: Console) -> int:
     if going_on:
         shards.check()
         config = replace(config, resume=Layout(shards.root).manifest.is_file(), overwrite=False)
-    with closing(build_env(config, config.dataset.fps)) as env:
+    with (
+        Execution(config, "recording", console, _PRELOAD) as execution,
+        closing(build_env(config, config.dataset.fps)) as env,
+    ):
         build_session(config, env)  # a wrong mask, or cameras without GL, show before anything is written
         env.reset(seed=config.seed)
         with open_writer(config, env) as writer:  # nobody else writes there meanwhile
@@ -54,7 +61,7 @@ def record_shared(config: RecordConfig, console: Console) -> int:
                 shards.begin(writer.num_episodes)
             merged = shards.are_in(writer.num_episodes)
             if not merged:
-                _record_all(config, shards, log, console)
+                _record_all(config, shards, log, execution)
     _finish(shards, merged, log)
     log.wall_time = time.monotonic() - start
     info = read_info(shards.root)
@@ -62,7 +69,7 @@ def record_shared(config: RecordConfig, console: Console) -> int:
     return log.exit_code
 
 
-def _record_all(config: RecordConfig, shards: Shards, log: RecordingLog, console: Console) -> None:
+def _record_all(config: RecordConfig, shards: Shards, log: RecordingLog, execution: Execution) -> None:
     """Record all shards, until that is done, one fails, or an interrupt comes."""
     jobs = [
         Job(
@@ -77,13 +84,12 @@ def _record_all(config: RecordConfig, shards: Shards, log: RecordingLog, console
     ]
     goes_on = "what was recorded is kept, and the same flags go on"
     try:
-        with Execution(config, "recording", console, _PRELOAD) as execution:
-            for result in execution.run(jobs):
-                if result.error:
-                    raise HandrailError(f"{result.job.name}: {result.error}; {goes_on}")
-                for outcome in result.value:
-                    log.add(outcome)
-                execution.say(log.words)
+        for result in execution.run(jobs):
+            if result.error:
+                raise HandrailError(f"{result.job.name}: {result.error}; {goes_on}")
+            for outcome in result.value:
+                log.add(outcome)
+            execution.say(log.words)
     except KeyboardInterrupt:
         log.trouble, log.exit_code = f"interrupted; {goes_on}", INTERRUPTED
     except HandrailError as error:
@@ -116,16 +122,27 @@ def record_shard(config: RecordConfig, folder: Path, first: int, episodes: int) 
     Raises:
         HandrailError: the disk or an encoder failed; the saved episodes are whole.
     """
-    there = Layout(folder).manifest.is_file()
-    dataset = replace(config.dataset, place=str(folder), root="")
-    own = replace(config, dataset=dataset, resume=there, overwrite=False, verify=False)
+    own = replace(config, dataset=replace(config.dataset, place=str(folder), root=""))
     env, outcomes = _env(config), list[Outcome]()
-    with open_writer(own, env) as writer, Interrupts() as interrupts:
+    with _opened(own, folder, env) as writer, Interrupts() as interrupts:
         recording = Recording(own, env, writer)
         while writer.num_episodes < episodes:
             seed = episode_seed(config.seed, first + writer.num_episodes)
             outcomes.append(recording.episode(seed, interrupts))
     return outcomes
+
+
+def _opened(config: RecordConfig, folder: Path, env: HandrailEnv) -> EpisodeWriter:
+    """Return the writer of a part; whoever had it, and was given up for dead, gets a moment to die."""
+    given_up = time.monotonic() + _DYING
+    while True:
+        there = Layout(folder).manifest.is_file()
+        try:
+            return open_writer(replace(config, resume=there, overwrite=False, verify=False), env)
+        except HeldError:
+            if time.monotonic() > given_up:
+                raise
+            time.sleep(_MOMENT)
 
 
 @lru_cache(maxsize=1)

@@ -1,11 +1,12 @@
 """Runs jobs on a Ray cluster; Ray runs again what is lost with a process or a computer."""
 
+import socket
 from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
 import ray  # pyright: ignore[reportMissingImports]  (an extra)
-from ray.exceptions import RayError
+from ray.exceptions import RayError, RayTaskError  # pyright: ignore[reportMissingImports]
 
 from handrail.collect.execution.engine import TRIES
 from handrail.collect.execution.job import Job, Result
@@ -13,6 +14,7 @@ from handrail.collect.execution.worker import alone
 from handrail.controllers.errors import HandrailError, message_of
 
 _MOMENT = 0.2  # [s]
+_PATIENCE = 10.0  # [s]
 _AHEAD = 2  # jobs given to the cluster for each of its cores, so that none waits for the next
 
 
@@ -30,6 +32,7 @@ class Cluster:
         self._joined = not ray.is_initialized()
         if self._joined:
             try:
+                _knock(address)
                 ray.init(address=address, log_to_driver=False, configure_logging=False)
             except Exception as error:  # Ray says it in many ways
                 raise HandrailError(
@@ -66,6 +69,9 @@ class Cluster:
         job = self._running.pop(reference)
         try:
             result: Any = ray.get(reference)
+        except RayTaskError as error:  # nothing that the job did: that is in its result
+            why = message_of(getattr(error, "cause", None) or error)
+            return Result(job, error=f"could not begin ({why}); every computer needs the same packages")
         except RayError as error:
             return Result(
                 job,
@@ -73,3 +79,14 @@ class Cluster:
                 f" command goes on: {message_of(error)}",
             )
         return replace(result, job=job)
+
+
+def _knock(address: str) -> None:
+    """Check that something listens at an address that has a port; Ray would look for it for minutes.
+
+    Raises:
+        OSError, ValueError: nothing does.
+    """
+    host, colon, port = address.rpartition(":")
+    if colon and "/" not in address:
+        socket.create_connection((host, int(port)), _PATIENCE).close()

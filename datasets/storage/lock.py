@@ -13,6 +13,10 @@ from handrail.datasets.storage.atomic import make_folder
 LOCK_NAME = "lock"
 
 
+class HeldError(HandrailError):
+    """Somebody else has the right to change it."""
+
+
 class DatasetLock:
     """The right to change one dataset, held from construction to `release`."""
 
@@ -25,7 +29,7 @@ class DatasetLock:
             holder: Who else may hold it, in words.
 
         Raises:
-            HandrailError: Another process, or another writer in this one, holds it.
+            HeldError: Another process, or another writer in this one, holds it.
             OSError: The folder cannot be written.
         """
         self._path = staging / LOCK_NAME
@@ -61,7 +65,7 @@ class DatasetLock:
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except OSError as error:
                 file.close()
-                raise HandrailError(
+                raise HeldError(
                     f"{self._thing} {str(self._path.parent.parent)!r} is being written by another"
                     f" {self._holder}: expected to be the only one; close the other, or choose another folder"
                 ) from error

@@ -37,6 +37,7 @@ OTHERS = {  # flags of other programs, by the word that the same text must say
     "`--flag`": {"--flag"},
     "--config_path=": {"--config_path"},  # what LeRobot's training is given
     "accelerate launch": {"--multi_gpu"},
+    "ray start": {"--head", "--port", "--address", "--disable-usage-stats"},
 }
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 FOREIGN = {ROOT / "collect/session/viewer.py", ROOT / "collect/experiments/latency/measure.py"}
