@@ -7,7 +7,7 @@ from places import ROOT
 
 _READ_ON = ("recording", "large_datasets", "training", "evaluation", "comparison")
 MAIN = ("README.md", *(f"docs/{name}.md" for name in _READ_ON))
-PAGES = (*MAIN, *(f"docs/{name}.md" for name in ("concepts", "lekiwi", "study", "benchmark", "api")))
+PAGES = (*MAIN, *(f"docs/{name}.md" for name in ("cluster", "concepts", "lekiwi", "study", "benchmark", "api")))
 LESS = {  # flag → the value that it gets where a page gives it
     "handrail-demo": {"--episodes": "1"},
     "handrail-record": {"--dataset.num_episodes": "2"},
@@ -16,6 +16,7 @@ LESS = {  # flag → the value that it gets where a page gives it
     "handrail-trials": {"--episodes": "1"},
     "handrail-study": {"--workers": "2"},
     "handrail-benchmark": {"--goals": "2", "--workers": "1"},
+    "handrail-scaling": {"--episodes": "2"},
     "lerobot-train": {"--steps": "4", "--batch_size": "4", "--num_workers": "0"},
 }
 MORE = {  # what is added where a page leaves it out
