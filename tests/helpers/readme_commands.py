@@ -7,7 +7,8 @@ from places import ROOT
 
 _READ_ON = ("recording", "large_datasets", "training", "evaluation", "comparison")
 MAIN = ("README.md", *(f"docs/{name}.md" for name in _READ_ON))
-PAGES = (*MAIN, *(f"docs/{name}.md" for name in ("cluster", "concepts", "lekiwi", "study", "benchmark", "api")))
+_BESIDE = ("cluster", "concepts", "lekiwi", "study", "benchmark", "api")
+PAGES = (*MAIN, *(f"docs/{name}.md" for name in _BESIDE))
 LESS = {  # flag → the value that it gets where a page gives it
     "handrail-demo": {"--episodes": "1"},
     "handrail-record": {"--dataset.num_episodes": "2"},
