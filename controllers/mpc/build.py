@@ -5,6 +5,7 @@ from functools import lru_cache
 import numpy as np
 
 from handrail.controllers.arrays import BoolArray, FloatArray
+from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import State
 from handrail.controllers.interface.intent import Intent
@@ -48,10 +49,17 @@ class ProblemBuilder:
         self._weights_of = lru_cache(_MASKS)(self._weights)
 
     def build(self, loop: LoopState, state: State, intent: Intent) -> Problem:
-        """Return the optimal control problem of a state and an intent, which a loop is facing."""
+        """Return the optimal control problem of a state and an intent, which a loop is facing.
+
+        Raises:
+            HandrailError: the prediction does not say one value a channel and stage.
+        """
         settings = self._settings
         parameters = loop.parameters.copy()
         predicted = np.asarray(loop.predict(intent, self._times), dtype=np.float64)
+        expected = len(self._times), self._channels.size
+        if predicted.shape != expected:
+            raise HandrailError(f"prediction: expected values of shape {expected}, got {predicted.shape}")
         reference = _asked(self._reference, predicted, intent.mask, self._largest)
         parameters[self._residuals.parameter_slice("tracking")] = intent.frames.parameters
         return Problem(

@@ -161,6 +161,12 @@ def test_any_callable_predicts():
     np.testing.assert_allclose(v, 0.0, atol=1e-3)
 
 
+def test_a_prediction_of_another_shape_is_refused_before_anything_moves():
+    mpc = MaskedMpc(MODEL, predict=lambda now, times: np.zeros((1, 18)))
+    with pytest.raises(HandrailError, match=r"expected values of shape \(\d+, 18\), got \(1, 18\)"):
+        mpc.update(State(HOME, np.zeros(MODEL.size)), intent(np.zeros(18), "ee"))
+
+
 def test_only_the_tracked_stages_are_tracked():
     settings = MpcSettings(tracked_stages=4, decay=0.5)
     np.testing.assert_allclose(settings.discounts, [1, 0.5, 0.25, 0.125, 0, 0, 0, 0, 0, 0])
