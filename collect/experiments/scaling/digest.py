@@ -3,7 +3,8 @@
 import hashlib
 from pathlib import Path
 
-from handrail.datasets.reading.reader import read_episodes, read_frames, read_info
+from handrail.datasets.format.data_file import data_files
+from handrail.datasets.reading.reader import read_episodes, read_info, read_rows_of
 
 CLOCKS = ("wall_clock", "controller.solve_time")  # columns that no two recordings share
 
@@ -15,12 +16,13 @@ def digest_of_rows(root: Path) -> str:
         HandrailError: there is no dataset, or it cannot be read.
     """
     digest = hashlib.sha256()
-    features = read_info(root).features
-    names = [name for name in features if name not in CLOCKS and features[name].dtype != "video"]
-    for row in read_episodes(root):
-        frames = read_frames(root, row["episode_index"], names)
-        for name in sorted(frames):
-            digest.update(f"{name} {frames[name].shape} ".encode())
-            values = frames[name]
-            digest.update(repr(values.tolist()).encode() if values.dtype == object else values.tobytes())
+    info = read_info(root)
+    names = [name for name, each in info.features.items() if name not in CLOCKS and each.dtype != "video"]
+    with data_files() as files:
+        for row in read_episodes(root):
+            frames = read_rows_of(info, row, names, files)
+            for name in sorted(frames):
+                values = frames[name]
+                digest.update(f"{name} {values.shape} ".encode())
+                digest.update(repr(values.tolist()).encode() if values.dtype == object else values.tobytes())
     return digest.hexdigest()[:16]
