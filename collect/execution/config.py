@@ -39,7 +39,7 @@ class ExecutionConfig:
                 f"--workers {self.workers}: expected a whole number from 1 to {MOST_WORKERS},"
                 " or 0 for all cores"
             )
-        if self.ray and self.workers != 1:
+        if self.ray and self.workers != type(self).workers:
             raise HandrailError(
                 f"--ray {self.ray} and --workers {self.workers}: expected one of them, got both"
             )

@@ -8,7 +8,18 @@ import sys
 import time
 
 import pytest
-from execution_helpers import broken, dying, is_alive, leaving, noted, refusing, sleeping, squared, threads
+from execution_helpers import (
+    awaiting,
+    broken,
+    dying,
+    is_alive,
+    leaving,
+    noted,
+    refusing,
+    sleeping,
+    squared,
+    threads,
+)
 from places import ROOT
 from rich.console import Console
 
@@ -73,6 +84,22 @@ def test_what_is_no_longer_wanted_does_not_begin(config, tmp_path):
     found = run(jobs, config, wanted=lambda job: int(job.name) % 2 == 0)
     assert set(found) == {"0", "2", "4"}
     assert sorted(path.stem for path in tmp_path.iterdir()) == ["0", "2", "4"]
+
+
+def test_the_bar_shows_how_far_the_running_jobs_are(tmp_path):
+    said, asked = io.StringIO(), []
+
+    def part(job):
+        asked.append(job.name)
+        (tmp_path / "asked").touch()
+        return 3
+
+    console = Console(file=said, width=100, force_terminal=True)
+    with Execution(ExecutionConfig(workers=2), "jobs", console) as execution:
+        list(execution.run([Job("long", awaiting, (tmp_path / "asked",), size=10)], part=part))
+    assert set(asked) == {"long"}
+    assert " 3/10" in said.getvalue()
+    assert "10/10" in said.getvalue()
 
 
 def test_a_killed_worker_s_job_runs_again_and_no_other_does(tmp_path):
