@@ -5,6 +5,8 @@ import shutil
 import signal
 import subprocess
 import sys
+from errno import ENOSPC
+from unittest import mock
 
 import pytest
 from command_helpers import command
@@ -125,6 +127,20 @@ def test_a_merge_that_was_done_is_not_done_again(alone, tmp_path):
     record(root)
     assert started(root) == times
     assert not shards.exists()
+
+
+def test_a_disk_that_is_full_when_the_shards_are_put_together_costs_no_episode(alone, tmp_path):
+    root = tmp_path / "d"
+    with mock.patch("handrail.collect.commands.shards.write_anew", side_effect=OSError(ENOSPC, "it is full")):
+        done = command(root, *FLAGS, "--dataset.num_episodes", EPISODES, "--workers", 2)
+    assert done.returncode == 1
+    assert f"cannot write dataset {str(root)!r}: it is full" in done.stderr
+    assert read_info(root).episodes == 0
+    times = {each for path in saved(tmp_path / ".d.shards") for each in started(path.parents[3])}
+    assert len(times) >= 5
+    record(root)
+    assert content(root) == alone
+    assert times <= set(started(root))
 
 
 def test_a_dataset_that_has_changed_meanwhile_is_left_alone(alone, tmp_path):
