@@ -69,13 +69,13 @@ def record_with_a_loss(cluster, root, episodes, *flags):
         begun.extend(time for path in saved(shards) for time in started(path.parents[3])[_place(path)])
         cluster.remove_node(node, allow_graceful=False)
 
-    losing = threading.Thread(target=lose)
+    losing = threading.Thread(target=lose, daemon=True)
     losing.start()
     start = time.monotonic()
     done = command(root, *flags, "--dataset.num_episodes", episodes, "--ray", cluster.address)
     seconds = time.monotonic() - start
-    losing.join()
     assert done.returncode == 0, done.stderr
+    losing.join()
     return Loss(len(begun), len(set(begun) - set(started(root))), seconds)
 
 
