@@ -13,7 +13,8 @@ from contextlib import suppress
 from pathlib import Path
 
 HOOK = Path(__file__).parent / "hook"
-_LAST = ("chrt", "-i", "0") if shutil.which("chrt") else ("nice", "-n", "19")
+_MODEST = ("setpriv", "--bounding-set=-sys_nice", "--inh-caps=-sys_nice")  # stays so, also as root
+_LAST = (*(_MODEST if os.geteuid() == 0 and shutil.which("setpriv") else ()), "nice", "-n", "19")
 _MOMENT = 0.02  # [s]
 _SHOWN = 300  # letters of what a command said last
 _REAPED = 90.0  # workers of a killed command end by themselves within this [s]

@@ -31,6 +31,7 @@ def main() -> None:
     says.add_argument("--drive", action="store_true", help="also drive in the browser, all the time")
     given = says.parse_args()
     out = given.out.absolute()
+    os.nice(19)
     driving = [sys.executable, str(Path(__file__).with_name("driving.py")), str(out)]
     if given.drive:
         subprocess.Popen([*driving, "--hours", str(given.hours)], start_new_session=True)
