@@ -1,5 +1,6 @@
 """The faults: what befalls a command at some moment, and what of it is taken back afterwards."""
 
+import json
 import os
 import resource
 import signal
@@ -15,6 +16,7 @@ from child import Child, members
 
 KILLED, HUNG_UP, ASKED = {-signal.SIGKILL}, {-signal.SIGHUP}, {130, -signal.SIGTERM}
 FINE, FAILED = {0}, {0, 1, 2}  # a failure that comes too late for the command to notice is none
+CLUSTER = "cluster.json"  # in the folder of work that is done on a cluster
 _DAY = 86_400.0  # [s]
 
 
@@ -29,6 +31,7 @@ class Fault:
         heal: takes it back, once the command has ended.
         workers: whether it needs a command with workers.
         disk: whether it needs a small disk of its own.
+        cluster: whether it needs work on a cluster.
     """
 
     name: str
@@ -37,6 +40,7 @@ class Fault:
     heal: Callable[[Path], None] = lambda folder: None
     workers: bool = False
     disk: bool = False
+    cluster: bool = False
 
 
 def _send(pid: int, number: int) -> None:
@@ -143,11 +147,16 @@ def _folders(folder: Path) -> list[Path]:
     return [folder, *(path for path in folder.rglob("*") if path.is_dir())]
 
 
+def _lose_node(child: Child, folder: Path, rng: np.random.Generator) -> None:
+    _send(json.loads((folder / CLUSTER).read_text())["pid"], signal.SIGUSR1)
+
+
 FAULTS = (
     Fault("SIGKILL of the command", _kill, KILLED),
     Fault("SIGKILL of the command and all its workers", _kill_all, KILLED),
     Fault("SIGKILL while the disk is slow", _kill_slowly, KILLED),
     Fault("SIGKILL of one worker", _kill_worker, FINE, workers=True),
+    Fault("a lost Ray node", _lose_node, FINE, cluster=True),
     Fault("SIGTERM", _terminate, ASKED),
     Fault("the terminal is closed (SIGHUP)", _hang_up, HUNG_UP),
     Fault("Ctrl-C", _interrupt, {130}),

@@ -6,6 +6,7 @@ import subprocess
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,7 @@ from faults import FAULTS, Fault
 from works import Work, any_work
 from workshop import Workshop
 
-_PATIENCE = 420.0  # for the end of a command [s]
+_PATIENCE = 600.0  # for the end of a command [s]
 _ARRIVAL = 240.0  # for the moment of the fault [s]
 _STARTS = 12.0  # a command has begun to work by then [s]
 _EPISODE = 1.5  # [s]
@@ -39,7 +40,7 @@ def run_round(
         work: the only kind of work wanted; any when empty.
     """
     rng = np.random.default_rng([seed, number])
-    chosen = [each for each in FAULTS if fault in each.name and (_can_mount() or not each.disk)]
+    chosen = [each for each in FAULTS if fault in each.name and _is_possible(each)]
     struck = chosen[int(rng.integers(len(chosen)))]
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
@@ -47,9 +48,12 @@ def run_round(
     with _disk(folder / "disk", struck.disk) as disk:
         place = disk / "work"
         place.mkdir()
-        piece = any_work(place, workshop, rng, struck.workers, work)
+        piece = any_work(place, workshop, rng, struck, work)
         row = {"round": number, "seed": seed, "fault": struck.name, "work": piece.name}
-        row |= _Round(piece, struck, folder, rng).run()
+        try:
+            row |= _Round(piece, struck, folder, rng).run()
+        finally:
+            piece.close()
     row["seconds"] = round(time.monotonic() - begun, 1)
     if not row["complaints"]:
         shutil.rmtree(folder, ignore_errors=True)
@@ -190,5 +194,7 @@ def _disk(path: Path, small: bool) -> Iterator[Path]:
                 subprocess.run(["umount", "-l", str(path)], check=True)
 
 
-def _can_mount() -> bool:
-    return os.geteuid() == 0 and shutil.which("mount") is not None
+def _is_possible(fault: Fault) -> bool:
+    """Return whether a fault can be made here: a disk of its own needs root, a cluster needs Ray."""
+    can_mount = os.geteuid() == 0 and shutil.which("mount") is not None
+    return (can_mount or not fault.disk) and (find_spec("ray") is not None or not fault.cluster)

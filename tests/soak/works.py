@@ -1,16 +1,26 @@
 """The pieces of work: what is done, what of it is saved, and what it is to be in the end."""
 
+import json
+import os
 import shutil
+import signal
+import subprocess
+import sys
 from abc import ABC, abstractmethod
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
-from child import command
+from child import command, members, wait_until
+from faults import CLUSTER, KILLED, Fault
 from whole import Saved, lines_of, rollouts_of, saved_by, saved_in
 from workshop import EPISODES, RECIPES, Recipe, Workshop
 
 from handrail.datasets.format.layout import Layout
 from handrail.datasets.format.lines import count_lines, rows_of_lines
+
+_RAY = 0.2  # share of the kills that befall a recording on a cluster
+_CLUSTER_STARTS, _CLUSTER_ENDS = 600.0, 120.0  # [s]
 
 
 class Work(ABC):
@@ -50,6 +60,9 @@ class Work(ABC):
     @abstractmethod
     def saved(self) -> Saved:
         """Return what is saved now; raises if a saved piece cannot be read."""
+
+    def close(self) -> None:  # noqa: B027  (most have nothing)
+        """End what it needs."""
 
     @property
     def steps(self) -> int:
@@ -118,6 +131,35 @@ class Recording(Work):
 
     def saved(self) -> Saved:
         return saved_by(self._place)
+
+
+class RayRecording(Recording):
+    """`handrail-record --ray` on a cluster of two computers, both here."""
+
+    def __init__(self, folder: Path, workshop: Workshop, recipe: Recipe) -> None:
+        said = folder / CLUSTER
+        self._cluster = subprocess.Popen(
+            [sys.executable, str(Path(__file__).with_name("ray_nodes.py")), str(said)],
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            start_new_session=True,
+        )
+        if not wait_until(said.exists, _CLUSTER_STARTS):
+            self.close()
+            raise TimeoutError("no Ray cluster")
+        address = json.loads(said.read_text())["address"]
+        super().__init__(folder, workshop, recipe, ("--ray", address))
+        self.name = "record --ray"
+
+    def close(self) -> None:
+        self._cluster.terminate()
+        try:
+            self._cluster.wait(_CLUSTER_ENDS)
+        except subprocess.TimeoutExpired:
+            for pid in (*members(self._cluster.pid), self._cluster.pid):
+                with suppress(ProcessLookupError):
+                    os.kill(pid, signal.SIGKILL)
+            self._cluster.wait()
 
 
 class Editing(Work):
@@ -240,7 +282,7 @@ class Replaying(Work):
 
 
 def any_work(
-    folder: Path, workshop: Workshop, rng: np.random.Generator, workers: bool, only: str = ""
+    folder: Path, workshop: Workshop, rng: np.random.Generator, fault: Fault, only: str = ""
 ) -> Work:
     """Return a piece of work.
 
@@ -248,20 +290,22 @@ def any_work(
         folder: for it, empty.
         workshop: that it takes from.
         rng: chooses.
-        workers: whether it must have workers.
+        fault: that it must be fit for.
         only: the only kind that is wanted; any when empty.
     """
     recipe = RECIPES[int(rng.integers(len(RECIPES)))]
     kinds = {"record": 5, "record_2": 4, "resume": 2, "packed": 2, "edit": 4, "evaluate": 2, "replay": 1}
-    if workers:
+    if fault.workers:
         kinds = {"record_2": 3, "evaluate_2": 1}
+    if fault.cluster or (not only and rng.random() < _RAY and fault.codes >= KILLED):
+        return RayRecording(folder, workshop, recipe)
     names = [only] if only else list(kinds)
     share = np.array([kinds.get(name, 1) for name in names], float)
     kind = str(rng.choice(names, p=share / share.sum()))
     if kind == "edit":
         return _any_edit(folder, workshop, rng, recipe)
     if kind.startswith("evaluate"):
-        return Evaluation(folder, workshop, 2 if workers or rng.random() < 0.5 else 1)
+        return Evaluation(folder, workshop, 2 if fault.workers or rng.random() < 0.5 else 1)
     if kind == "replay":
         return Replaying(folder, workshop, recipe)
     shared = ("--workers", "2") if kind == "record_2" or rng.random() < 0.2 else ()
