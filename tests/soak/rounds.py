@@ -16,6 +16,8 @@ from faults import FAULTS, Fault
 from works import Work, any_work
 from workshop import Workshop
 
+from handrail.datasets.recording.repair import repair
+
 _PATIENCE = 600.0  # for the end of a command [s]
 _ARRIVAL = 240.0  # for the moment of the fault [s]
 _STARTS = 12.0  # a command has begun to work by then [s]
@@ -66,7 +68,7 @@ class _Round:
     def __init__(self, work: Work, fault: Fault, folder: Path, rng: np.random.Generator) -> None:
         self._work, self._fault, self._folder, self._rng = work, fault, folder, rng
         self._complaints: list[str] = []
-        self._mended = self._said = ""
+        self._mended = ""
         self._count = 0
 
     def run(self) -> dict[str, Any]:
@@ -91,8 +93,8 @@ class _Round:
         final = self._look(after, "in the end")
         if final != work.wanted:
             self._complain(f"in the end {len(final)} of {len(work.wanted)} pieces are as they should be")
-        if work.root and not self._repair(must_be_clean=True):
-            self._complain(f"in the end a repair says: {self._said}")
+        if work.root and not (report := repair(work.root)).clean:
+            self._complain(f"in the end a repair says: {report}")
         self._check_left_over()
         return {
             "struck": struck,
@@ -147,17 +149,15 @@ class _Round:
             self._complain(f"{when} {each}")
         return now
 
-    def _repair(self, must_be_clean: bool = False) -> bool:
-        """Let Handrail repair the dataset; return whether there was nothing to complain of."""
+    def _repair(self) -> None:
+        """Let Handrail repair the dataset."""
         self._count += 1
         child = Child([command("repair"), str(self._work.root)], self._folder, f"{self._count}")
         code = child.end(_PATIENCE)
-        self._said = child.last_words
-        if not must_be_clean and _CLEAN not in self._said:
-            self._mended = self._said
         if code != 0 or _TRACE in child.said:
-            self._complain(f"handrail-repair ended with {code}: {self._said}")
-        return _CLEAN in self._said or not must_be_clean
+            self._complain(f"handrail-repair ended with {code}: {child.last_words}")
+        elif _CLEAN not in child.said:
+            self._mended = child.last_words
 
     def _go_on(self) -> tuple[int, int | None]:
         """Do what a user does: the same work again, until it is done; return how often, and the last code."""
