@@ -11,6 +11,7 @@ import numpy as np
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.format.data_file import data_files
 from handrail.datasets.format.layout import Layout
+from handrail.datasets.format.lines import count_lines
 from handrail.datasets.reading.reader import DatasetInfo, read_episodes, read_info, read_rows_of
 
 CLOCKS = ("wall_clock", "controller.solve_time")  # columns that no two recordings share
@@ -73,9 +74,9 @@ def saved_by(root: Path) -> Saved:
 
 
 def lines_of(root: Path) -> int:
-    """Return how many files of metadata a recording has written: quick, and whatever runs."""
+    """Return how many episodes a recording has saved: quick, and whatever runs."""
     shards = root.parent.glob(f".{root.name}.shards/shard-*/meta/episodes/*/*.parquet")
-    return len(list(shards)) + len(list(root.glob("meta/episodes/*/*.parquet")))
+    return sum(map(count_lines, [*shards, *root.glob("meta/episodes/*/*.parquet")]))
 
 
 def rollouts_of(file: Path) -> Saved:
