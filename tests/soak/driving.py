@@ -22,7 +22,7 @@ from page import Page
 ROUNDS, MEMORY = "driving.jsonl", "memory.jsonl"
 _EVERY = 20.0  # between two looks at the memory [s]
 _BETWEEN = (40.0, 100.0)  # from one fault to the next [s]
-_BACK = 120.0  # after a fault it drives again within this [s]
+_BACK = 300.0  # after a fault it drives again within this [s]
 _START = 1800.0  # [s]
 _PATIENCE = 120.0  # [s]
 

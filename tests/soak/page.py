@@ -11,7 +11,7 @@ from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Origin
 
 _PERIOD = 0.04  # between two inputs [s]
-_EPISODE = (3.0, 8.0)  # [s]
+_EPISODE = (2.0, 6.0)  # [s]
 _ARMED = 0.4  # everything is let go for so long first [s]
 _AGAIN = 0.5  # between two asks [s]
 _RETRY = 0.7  # as the real page [s]
@@ -80,7 +80,7 @@ class Page:
         if self._socket is None:
             parts = urlsplit(self._address)
             self._socket = connect(
-                f"ws://{parts.netloc}/drive?page=soak",
+                f"ws://{parts.netloc}/drive?page=soak-of-handrail",
                 origin=Origin(f"{parts.scheme}://{parts.netloc}"),
                 compression=None,
                 open_timeout=20,
