@@ -25,6 +25,12 @@ def command(name: str) -> str:
     return str(Path(sys.executable).with_name(f"handrail-{name}"))
 
 
+def hear_signals() -> None:
+    """Let commands hear Ctrl-C and the end of a terminal, also where this runs in the background without one."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
+
+
 class Child:
     """A command that runs.
 

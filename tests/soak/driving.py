@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from child import Child, children, command, wait_until
+from child import Child, children, command, hear_signals, wait_until
 from notes import commit, next_number, note
 from page import Page
 
@@ -33,6 +33,7 @@ def main() -> None:
     says.add_argument("out", type=Path)
     says.add_argument("--hours", type=float, default=2.0)
     given = says.parse_args()
+    hear_signals()
     out = given.out.absolute()
     out.mkdir(parents=True, exist_ok=True)
     first = next_number(out / ROUNDS)

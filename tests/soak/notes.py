@@ -22,9 +22,10 @@ def read(file: Path) -> list[dict[str, Any]]:
     return [json.loads(line) for line in file.read_text().splitlines()] if file.exists() else []
 
 
-def next_number(file: Path) -> int:
-    """Return the number of the next round."""
-    return 1 + max((row["round"] for row in read(file)), default=-1)
+def next_number(file: Path, seed: int | None = None) -> int:
+    """Return the number of the next round; of a seed, if it is of one."""
+    rows = [row for row in read(file) if seed is None or row["seed"] == seed]
+    return 1 + max((row["round"] for row in rows), default=-1)
 
 
 @lru_cache(maxsize=1)

@@ -13,6 +13,7 @@ import traceback
 from datetime import UTC, datetime
 from pathlib import Path
 
+from child import hear_signals
 from notes import commit, next_number, note
 from rounds import run_round
 from workshop import Workshop
@@ -29,22 +30,25 @@ def main() -> None:
     says.add_argument("--fault", default="", help="only faults with this in their name")
     says.add_argument("--work", default="", help="only this kind of work")
     says.add_argument("--drive", action="store_true", help="also drive in the browser, all the time")
+    says.add_argument("--seed", type=int, default=0, help="of the rounds; two may run at once")
     given = says.parse_args()
+    hear_signals()
     out = given.out.absolute()
     os.nice(19)
     driving = [sys.executable, str(Path(__file__).with_name("driving.py")), str(out)]
     if given.drive:
         subprocess.Popen([*driving, "--hours", str(given.hours)], start_new_session=True)
     workshop = Workshop(out / "workshop")
-    until, first = time.monotonic() + 3600.0 * given.hours, next_number(out / ROUNDS)
+    until, first = time.monotonic() + 3600.0 * given.hours, next_number(out / ROUNDS, given.seed)
     for number in range(first, first + given.rounds):
         if time.monotonic() > until:
             break
+        scratch = out / f"round-{given.seed}-{number}"
         begun = datetime.now(UTC).isoformat(timespec="seconds")
         try:
-            row = run_round(number, 0, out / f"round-{number}", workshop, given.fault, given.work)
+            row = run_round(number, given.seed, scratch, workshop, given.fault, given.work)
         except Exception:  # of the soak itself: said, and on it goes
-            row = {"round": number, "broken": traceback.format_exc(limit=4)}
+            row = {"round": number, "seed": given.seed, "broken": traceback.format_exc(limit=4)}
         row |= {"begun": begun, "commit": commit(), "load": round(os.getloadavg()[0], 1)}
         note(out / ROUNDS, row)
         print(json.dumps(row), flush=True)

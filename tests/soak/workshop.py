@@ -1,7 +1,10 @@
 """What rounds begin with, each made once and undisturbed: recordings, packed ones, a policy."""
 
+import fcntl
 import shutil
 import subprocess
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -75,13 +78,14 @@ class Workshop:
             result: the name there of what is made.
         """
         place = self._folder / name
-        if not (place / "done").exists():
-            shutil.rmtree(place, ignore_errors=True)
-            place.mkdir()
-            for each, source in copied.items():
-                shutil.copytree(source, place / each)
-            self._run(name, tuple(word.format(place) for word in words))
-            (place / "done").touch()
+        with self._alone(name):
+            if not (place / "done").exists():
+                shutil.rmtree(place, ignore_errors=True)
+                place.mkdir()
+                for each, source in copied.items():
+                    shutil.copytree(source, place / each)
+                self._run(name, tuple(word.format(place) for word in words))
+                (place / "done").touch()
         return place / result
 
     def saved(self, root: Path) -> Saved:
@@ -92,11 +96,19 @@ class Workshop:
 
     def _made(self, name: str, words) -> Path:
         root, done = self._folder / name, self._folder / f"{name}.done"
-        if not done.exists():
-            shutil.rmtree(root, ignore_errors=True)
-            self._run(name, words(str(root)))
-            done.touch()
+        with self._alone(name):
+            if not done.exists():
+                shutil.rmtree(root, ignore_errors=True)
+                self._run(name, words(str(root)))
+                done.touch()
         return root
+
+    @contextmanager
+    def _alone(self, name: str) -> Iterator[None]:
+        """Let nobody else make the same thing meanwhile."""
+        with open(self._folder / f"{name}.lock", "w") as file:
+            fcntl.flock(file, fcntl.LOCK_EX)
+            yield
 
     def _run(self, name: str, words: tuple[str, ...]) -> None:
         child = Child([command(words[0]), *words[1:]], self._folder, name)
