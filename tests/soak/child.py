@@ -26,7 +26,7 @@ def command(name: str) -> str:
 
 
 def hear_signals() -> None:
-    """Let commands hear Ctrl-C and the end of a terminal, also where this runs in the background without one."""
+    """Let commands hear Ctrl-C and the end of a terminal, also where this runs in the background."""
     signal.signal(signal.SIGINT, signal.default_int_handler)
     signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
