@@ -160,7 +160,7 @@ FAULTS = (
     Fault("SIGTERM", _terminate, ASKED),
     Fault("the terminal is closed (SIGHUP)", _hang_up, HUNG_UP),
     Fault("Ctrl-C", _interrupt, {130}),
-    Fault("Ctrl-C twice", _interrupt_twice, {130}),
+    Fault("Ctrl-C twice", _interrupt_twice, {130, -signal.SIGINT}),
     Fault("frozen for seconds (SIGSTOP)", _freeze, FINE),
     Fault("slow disk", _slow_disk, FINE),
     Fault("clock jumps forwards", _clock_forwards, FINE),
