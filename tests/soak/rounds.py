@@ -12,8 +12,9 @@ from typing import Any
 
 import numpy as np
 from child import Child, command, wait_until
+from choice import any_work
 from faults import FAULTS, Fault
-from works import Work, any_work
+from work import Work
 from workshop import Workshop
 
 from handrail.datasets.recording.repair import repair
