@@ -45,6 +45,7 @@ def recording(cell: Cell, design: StudyDesign, root: Path, so_far: int = 0) -> R
             fps=_FPS,
         ),
         resume=root.exists(),
+        workers=1,  # a job has one core
     )
 
 
@@ -82,6 +83,7 @@ def evaluations(job: Job, design: StudyDesign, folder: str = "policy") -> dict[s
         "seed": design.seed,
         "label": policy.label,
         "time_limit": design.tasks[policy.cell.task].rollout_limit,
+        "workers": 1,  # a job has one core
     }
     found = {"nominal": EvaluateConfig(episodes=design.rollouts, **common)}
     if job.robust and more:

@@ -23,16 +23,16 @@ from execution_helpers import (
 from places import ROOT
 from rich.console import Console
 
-from handrail.collect.execution.config import ExecutionConfig
+from handrail.collect.execution.config import ExecutionConfig, cores
 from handrail.collect.execution.engine import TRIES
 from handrail.collect.execution.execution import Execution
 from handrail.collect.execution.job import Job
 from handrail.controllers.errors import HandrailError
 
-EVERYWHERE = [ExecutionConfig(), ExecutionConfig(workers=2)]
+EVERYWHERE = [ExecutionConfig(workers=1), ExecutionConfig(workers=2)]
 
 
-def run(jobs, config=ExecutionConfig(), fresh=False, **settings):  # noqa: B008
+def run(jobs, config=ExecutionConfig(workers=1), fresh=False, **settings):  # noqa: B008
     """Return what came of jobs, by name, in the order in which they were done."""
     with Execution(config, "jobs", fresh=fresh) as execution:
         return {result.job.name: result for result in execution.run(jobs, **settings)}
@@ -222,8 +222,23 @@ def test_wrong_settings_are_one_line(settings, words):
         ExecutionConfig(**settings).check_execution()
 
 
-def test_all_cores_are_those_that_this_process_may_use():
-    assert ExecutionConfig(workers=0).processes == len(os.sched_getaffinity(0))
+@pytest.mark.parametrize(
+    ("files", "expected"),
+    [
+        ({}, 8),
+        ({"cpu.max": "max 100000\n"}, 8),
+        ({"cpu.max": "250000 100000\n"}, 2),
+        ({"cpu.max": "50000 100000\n"}, 1),
+        ({"cpu/cpu.cfs_quota_us": "-1\n", "cpu/cpu.cfs_period_us": "100000\n"}, 8),
+        ({"cpu/cpu.cfs_quota_us": "300000\n", "cpu/cpu.cfs_period_us": "100000\n"}, 3),
+    ],
+)
+def test_all_cores_are_those_that_this_process_may_use(files, expected, tmp_path, monkeypatch):
+    monkeypatch.setattr(os, "sched_getaffinity", lambda process: range(8))
+    (tmp_path / "cpu").mkdir()
+    for name, content in files.items():
+        (tmp_path / name).write_text(content)
+    assert cores(tmp_path) == expected
 
 
 def test_a_cluster_without_ray_says_how_to_install_it(monkeypatch):
