@@ -6,7 +6,7 @@ from typing import ClassVar
 import numpy as np
 
 from handrail.collect.operators.human.hidden import Hidden
-from handrail.collect.operators.human.human import HumanSettings
+from handrail.collect.operators.human.human import MOOD, HumanSettings
 from handrail.collect.operators.human.wander import Wander
 from handrail.controllers.arrays import FloatArray
 
@@ -40,6 +40,7 @@ class HumanHand:
     """
 
     HIDDEN: ClassVar = {
+        "_settings": MOOD,
         "_seen": _LATE,
         **dict.fromkeys(("_left", "_held", "_moved"), _MOVEMENT),
         "_wander": _SHAKE,
