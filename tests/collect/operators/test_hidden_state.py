@@ -94,7 +94,7 @@ def test_everything_that_an_operator_remembers_is_declared(task, mode):
 
 
 def test_nothing_is_declared_that_is_not_there():
-    """Every piece is of attributes that exist, and one of them changes, or is another one in another episode."""
+    """Every piece is of attributes that exist, and one of them changes, or is another in another episode."""
     there, moved = set(), set()
     for run in RUNS:
         operator, changed = lived(*run)
