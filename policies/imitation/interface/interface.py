@@ -1,7 +1,9 @@
 """What a policy reads and writes, and how both come from and go to what Handrail records.
 
 It writes the joint velocities that came about, or the operator's own command: both are values on channels, in
-the base's axes like what the policy sees.
+the base's axes like what the policy sees. Or it writes positions that all joints shall go to, as a leader arm
+says them: `q* = q + v / k`, from which the same velocity comes back, `v = k (q* − q)`, and another one where
+the robot is elsewhere. Whatever comes out, the robot's limits bound it.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -11,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from handrail.collect.operators.human.steering import FOLLOW
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.entries import Entry, is_text, lists
 from handrail.controllers.errors import HandrailError, unknown_name
@@ -22,7 +25,7 @@ from handrail.policies.imitation.interface.relative import RelativeView
 
 Columns = Mapping[str, np.ndarray]
 Mask = tuple[bool, ...]
-ACTIONS = ("realised", "intent")
+ACTIONS = ("realised", "targets", "intent")
 STATE, ENVIRONMENT, ACTION = "observation.state", "observation.environment_state", "action"
 MASK = "teleop.mask"
 COLUMNS = (STATE, ENVIRONMENT, ACTION, "teleop.values", MASK)
@@ -37,11 +40,13 @@ class PolicyInterface:
     """Between what is recorded and what a policy reads and writes; saved beside every checkpoint.
 
     Attributes:
-        actions: `realised`, the joint velocities that came about, or `intent`, the operator's own command.
+        actions: `realised`, the joint velocities that came about, `targets`, joint positions that lead there,
+            or `intent`, the operator's own command.
         state_names: of `observation.state` as recorded, (s,).
         environment_names: of `observation.environment_state` as recorded, (e,).
         channels: names of the command channels as recorded, (m,).
-        masks: the sets of channels that the operator owned, (m,) each; none for `realised`.
+        masks: the sets of channels that the operator owned, (m,) each; of `intent` alone.
+        base_pose: whether it sees where the base is; older checkpoints do not say, and do not.
     """
 
     actions: str
@@ -49,27 +54,35 @@ class PolicyInterface:
     environment_names: tuple[str, ...]
     channels: tuple[str, ...]
     masks: tuple[Mask, ...] = ()
+    base_pose: bool = False
 
     @classmethod
     def of_dataset(
-        cls, features: Mapping[str, Feature], episodes: Iterable[Columns], actions: str
+        cls,
+        features: Mapping[str, Feature],
+        episodes: Iterable[Columns],
+        actions: str,
+        base_pose: bool = True,
     ) -> "PolicyInterface":
         """Return the interface of a policy that is trained on some episodes.
 
         Args:
             features: of the dataset.
             episodes: `MASK` of each; read only where the operator's own commands are learnt.
-            actions: `realised` or `intent`.
+            actions: one of `ACTIONS`.
+            base_pose: whether it shall see where the base is.
 
         Raises:
             HandrailError: no such action space, or a dataset that does not say what is needed.
         """
         if actions not in ACTIONS:
             raise unknown_name("action space", actions, ACTIONS)
+        if actions == "targets" and not base_pose:
+            raise HandrailError("--actions targets: expected a policy that sees where the base is, got none")
         state, environment, asked = (_names(features, key) for key in (STATE, ENVIRONMENT, "teleop.values"))
         names = tuple(name for name in asked if name != _GRIPPER)
         masks = _masks_of(_channels(names), episodes) if actions == "intent" else ()
-        return cls(actions, state, environment, names, masks)
+        return cls(actions, state, environment, names, masks, base_pose)
 
     @property
     def observation_names(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
@@ -79,6 +92,8 @@ class PolicyInterface:
     @property
     def action_names(self) -> tuple[str, ...]:
         """Names of what the policy writes: channels, a number for each mask if several, the gripper, (a,)."""
+        if self.actions == "targets":
+            return (*(f"{joint.removeprefix('joint.')}.pos" for joint in self._known.joints), _GRIPPER)
         flags = tuple(f"mask.{index}" for index in range(len(self.masks))) if len(self.masks) > 1 else ()
         return (*(self.channels[index] for index in self.commanded), *flags, _GRIPPER)
 
@@ -98,6 +113,10 @@ class PolicyInterface:
         """Return the actions of a recorded episode, (T, a) float32, from its `COLUMNS`."""
         state = columns[STATE].astype(float)
         values, gripper = self._asked(columns) if self.masks else self._realised(state, columns)
+        if self.actions == "targets":
+            values[:, self._known.joint_slice] = (
+                self._view.positions(state) + values[:, self._known.joint_slice] / FOLLOW
+            )
         pose = self._view.pose(state)
         for pair in self._pairs:
             values[:, pair] = pose.turned(values[:, pair])
@@ -107,11 +126,14 @@ class PolicyInterface:
 
     def decode(self, action: FloatArray, state: FloatArray) -> Intent:
         """Return what an action (a,) asks for, on the likeliest mask, in an observed state (s,)."""
-        action, pose = np.asarray(action, float), self._view.pose(np.asarray(state, float)[None])
+        action, state = np.asarray(action, float), np.asarray(state, float)[None]
+        pose = self._view.pose(state)
         values, count = np.zeros((1, len(self.channels))), len(self.commanded)
         values[0, self.commanded] = action[:count]
         for pair in self._pairs:
             values[:, pair] = pose.turned_back(values[:, pair])
+        if self.actions == "targets":
+            values[0, self._known.joint_slice] = self._toward(action[:count], self._view.positions(state)[0])
         flags = action[count:-1]
         mask = np.array(self._sets[int(np.argmax(flags)) if len(flags) else 0], dtype=bool)
         return Intent(values[0], mask, gripper=float(action[-1] > _HALF))
@@ -135,7 +157,9 @@ class PolicyInterface:
                 f"policy interface: expected masks of {len(channels)} channels for an intent and none else,"
                 f" got {content['masks']!r:.80} for {content['actions']}"
             )
-        return cls(content["actions"], state, environment, channels, masks)
+        return cls(
+            content["actions"], state, environment, channels, masks, bool(content.get("base_pose", False))
+        )
 
     def _asked(self, columns: Columns) -> tuple[FloatArray, FloatArray]:
         """Return what the operator asked for, (T, m), and of the gripper, (T,)."""
@@ -149,6 +173,13 @@ class PolicyInterface:
         values[:, self._known.joint_slice] = np.concatenate([velocities[1:], velocities[-1:]])
         return values, columns[ACTION][:, -1]
 
+    def _toward(self, target: FloatArray, q: FloatArray) -> FloatArray:
+        """Return the velocities that take the joints to a target, (n,); a base turns the shorter way."""
+        way = target - q
+        if self._known.base:
+            way[2] = (way[2] + np.pi) % (2.0 * np.pi) - np.pi
+        return FOLLOW * way
+
     @cached_property
     def _known(self) -> Channels:
         return _channels(self.channels)
@@ -156,7 +187,9 @@ class PolicyInterface:
     @cached_property
     def _view(self) -> RelativeView:
         joints = tuple(name.removeprefix("joint.") for name in self._known.joints)
-        return RelativeView(self.state_names, self.environment_names, joints, bool(self._known.base))
+        return RelativeView(
+            self.state_names, self.environment_names, joints, bool(self._known.base), self.base_pose
+        )
 
     @property
     def _sets(self) -> tuple[Mask, ...]:
@@ -170,7 +203,9 @@ class PolicyInterface:
 
     @cached_property
     def _pairs(self) -> list[list[int]]:
-        """(x, y) pairs along the world's axes; one that a mask splits stays so."""
+        """(x, y) pairs of velocities along the world's axes; one that a mask splits stays so."""
+        if self.actions == "targets":
+            return []
         tool, joint = self._known.tool_slice.start, self._known.joint_slice.start
         starts = (tool, tool + 3, joint) if self._known.base else (tool, tool + 3)
         whole = [start for start in starts if all(mask[start] == mask[start + 1] for mask in self._sets)]

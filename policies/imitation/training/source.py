@@ -151,7 +151,7 @@ def read_source(config: TrainConfig, began: PolicyMeta | None = None) -> Source:
         interface, features, columns = None, *_recorded(info, selection, config)
         _check_inputs(config, info, features)
     else:
-        interface, features, columns = _interpreted(info, selection, config.actions)
+        interface, features, columns = _interpreted(info, selection, config.actions, config.base_pose)
     if config.images:
         features |= _cameras(info)
     return Source(config, info, selection, interface, features, columns | _counters(selection, info.fps))
@@ -185,7 +185,7 @@ def steadied(stats: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
 
 
 def _interpreted(
-    info: DatasetInfo, selection: Selection, actions: str
+    info: DatasetInfo, selection: Selection, actions: str, base_pose: bool
 ) -> tuple[PolicyInterface, dict[str, dict[str, Any]], Columns]:
     missing = [key for key in COLUMNS if key not in info.features]
     if missing:
@@ -194,7 +194,7 @@ def _interpreted(
             f" {', '.join(missing)}; for other datasets say --actions recorded"
         )
     masks = _each(info, selection, [MASK])
-    interface = PolicyInterface.of_dataset(info.features, masks, actions)
+    interface = PolicyInterface.of_dataset(info.features, masks, actions, base_pose)
     columns = _joined(
         dict(zip((STATE, ENVIRONMENT), interface.observe(episode[STATE], episode[ENVIRONMENT]), strict=True))
         | {ACTION: interface.encode(episode)}

@@ -10,9 +10,9 @@ from scipy.spatial.transform import Rotation
 from handrail.collect.operators.devices.input_map import StickMap
 from handrail.collect.operators.human.hand import HumanHand, minimum_jerk
 from handrail.collect.operators.human.human import HumanSettings
-from handrail.collect.operators.human.motion_goal import MotionGoal
+from handrail.collect.operators.human.motion_goal import MotionGoal, Target
 from handrail.collect.operators.human.perception import Perception
-from handrail.collect.operators.human.steering import Gains, base_twist, hand_twist
+from handrail.collect.operators.human.steering import Gains, base_twist, hand_errors, hand_twist
 from handrail.collect.operators.modes import MODES
 from handrail.collect.operators.scripts.base_placement import (
     standing_point,
@@ -21,6 +21,7 @@ from handrail.collect.operators.scripts.base_placement import (
 )
 from handrail.collect.operators.scripts.drawer import handle_rotation
 from handrail.collect.operators.scripts.pick_place import grasp_rotation
+from handrail.collect.operators.scripts.scripted import gains_of
 from handrail.collect.tasks.cabinet import HANDLE, inward
 from handrail.collect.tasks.drawer import Drawer
 from handrail.collect.tasks.reach import Reach
@@ -156,6 +157,27 @@ def test_what_is_near_is_judged_well():
         assert np.all(seen[:, 3:] == 0.0)
     assert np.all(errors[0.5] != 0.0)
     np.testing.assert_allclose(errors[0.5], 10.0 * errors[0.05])
+
+
+def test_who_thinks_of_joints_errs_as_who_steers_the_hand():
+    """The pose that is seen is as far off as the way that is seen; what is meant stays what it was."""
+    tool, rng = MODEL.pose(HOME), np.random.default_rng(3)
+    for _ in range(5):
+        turn = Rotation.from_rotvec(rng.uniform(-0.8, 0.8, 3)).as_matrix()
+        goal = Pose(tool.position + rng.uniform(-0.5, 0.5, 3), turn @ tool.rotation)
+        wanted = MotionGoal(hand_errors(tool, goal), np.zeros(3), target=Target(goal, HOME[:3]))
+        seen = Perception(human(misjudgement=0.1), rng).see(wanted, tool, 0.0)
+        assert np.linalg.norm(seen.hand - wanted.hand) > 0.01
+        np.testing.assert_allclose(hand_errors(tool, seen.target.hand), seen.hand, atol=1e-9)
+        assert seen.target.identity == wanted.target.identity
+        assert seen.target.meant == goal
+
+
+def test_full_deflection_is_the_same_in_every_mode():
+    """But for one axis at a time, which has its own."""
+    human = HumanSettings()
+    gains = {name: gains_of(MODEL, mode, human) for name, mode in MODES.items()}
+    assert {name for name, each in gains.items() if each != gains["ee"]} == {"direct_single"}
 
 
 def state(q=HOME, time=0.0):

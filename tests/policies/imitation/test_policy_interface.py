@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from handrail.collect.operators.human.steering import FOLLOW
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.robot.description import load_description
@@ -82,11 +83,11 @@ def moved(columns, shift, angle):
 
 @pytest.mark.parametrize("actions", ["realised", "intent"])
 def test_same_everywhere(actions):
-    """A policy sees and writes the same wherever in the world the same thing happens."""
+    """A policy sees and writes the same wherever in the world the same thing happens, but for where it is."""
     rng = np.random.default_rng(0)
     columns = episode(rng, [("ee",), ("base", "joint")])
     other = moved(columns, np.array([3.0, -2.0]), 2.1)
-    interface = PolicyInterface.of_dataset(FEATURES, [columns], actions)
+    interface = PolicyInterface.of_dataset(FEATURES, [columns], actions, base_pose=False)
     for seen in zip(
         interface.observe(columns["observation.state"], columns["observation.environment_state"]),
         interface.observe(other["observation.state"], other["observation.environment_state"]),
@@ -94,6 +95,53 @@ def test_same_everywhere(actions):
     ):
         np.testing.assert_allclose(seen[0], seen[1], atol=1e-5)
     np.testing.assert_allclose(interface.encode(columns), interface.encode(other), atol=1e-5)
+
+
+def test_a_policy_sees_where_the_base_is():
+    """Its place and heading, after all else; who sees nothing of it sees the same otherwise."""
+    columns = episode(np.random.default_rng(2), [("ee",)])
+    parts = columns["observation.state"], columns["observation.environment_state"]
+    placed = PolicyInterface.of_dataset(FEATURES, [columns], "realised")
+    without = dataclasses.replace(placed, base_pose=False)
+    (state, around), (less, same) = placed.observe(*parts), without.observe(*parts)
+    x, y, yaw = columns["observation.state"][:, :3].T
+    names = placed.observation_names[0]
+    assert names == (*without.observation_names[0], "base.x", "base.y", "base.cos", "base.sin")
+    np.testing.assert_allclose(state[:, -4:], np.column_stack([x, y, np.cos(yaw), np.sin(yaw)]), atol=1e-6)
+    np.testing.assert_array_equal(state[:, :-4], less)
+    np.testing.assert_array_equal(around, same)
+
+
+def test_a_target_gives_the_velocity_back_and_pulls_from_elsewhere():
+    """From where it was recorded the velocity that came about; from elsewhere the way to the same place."""
+    columns = episode(np.random.default_rng(4), [("joint",)])
+    state, n = columns["observation.state"], len(JOINTS)
+    state[:, 2] = np.linspace(3.0, 3.3, len(state))  # past half a turn
+    interface = PolicyInterface.of_dataset(FEATURES, [columns], "targets")
+    assert interface.action_names == (*(f"{joint}.pos" for joint in JOINTS), "gripper")
+    targets = interface.encode(columns)
+    for t, target in enumerate(targets):
+        after = state[min(t + 1, len(state) - 1), n : 2 * n]
+        intent = interface.decode(target, state[t])
+        np.testing.assert_array_equal(intent.mask, CHANNELS.mask("joint"))
+        np.testing.assert_allclose(intent.values[CHANNELS.joint_slice], after, atol=1e-5)
+        elsewhere = state[t] + np.where(np.arange(len(STATE)) < n, 0.1, 0.0)
+        elsewhere[2] -= 2.0 * np.pi  # the same heading
+        pulled = interface.decode(target, elsewhere).values[CHANNELS.joint_slice]
+        np.testing.assert_allclose((after - pulled) / 0.1, np.full(n, FOLLOW), atol=1e-3)
+    with pytest.raises(HandrailError, match="sees where the base is"):
+        PolicyInterface.of_dataset(FEATURES, [columns], "targets", base_pose=False)
+
+
+def test_an_older_checkpoint_keeps_its_view():
+    """It does not say whether it sees where the base is: then it does not."""
+    interface = PolicyInterface.of_dataset(FEATURES, [episode(np.random.default_rng(3), [("ee",)])], "intent")
+    content = json.loads(json.dumps(dataclasses.asdict(interface)))
+    assert PolicyInterface.from_dict(content) == interface
+    del content["base_pose"]
+    assert PolicyInterface.from_dict(content) == dataclasses.replace(interface, base_pose=False)
+    with pytest.raises(HandrailError, match="base_pose: expected true or false"):
+        PolicyInterface.from_dict(content | {"base_pose": "yes"})
 
 
 def test_a_policy_does_not_see_how_fast_the_robot_moves():
