@@ -19,7 +19,7 @@ import numpy as np
 
 from handrail.collect.config import FPS_RANGE
 from handrail.controllers.arrays import FloatArray
-from handrail.controllers.entries import Entry, is_count, is_name, is_table
+from handrail.controllers.entries import Entry, is_count, is_name, is_number, is_table
 from handrail.controllers.errors import HandrailError, message_of
 from handrail.controllers.fields import check_fields
 from handrail.datasets.storage.atomic import sync_folder, write_whole
@@ -40,6 +40,7 @@ _CHECKED = {  # what more has to hold of `PolicyMeta` than the types of its fiel
     ),
     "actions": Entry(f"one of {', '.join(ACTION_SPACES)}", lambda value: value in ACTION_SPACES),
     "sizes": Entry("settings by name", lambda value: _are_sizes(value), needed=False),
+    "validation": Entry("losses by update", lambda value: _are_losses(value), needed=False),
 }
 
 
@@ -63,6 +64,7 @@ class PolicyMeta:
         sizes: what the training really used where its settings say 0, a preset's (`Preset`).
         episodes: numbers of the episodes that it learnt from, in order.
         data: digest of what it learnt from.
+        validation: loss on the episodes that were held out, by update.
     """
 
     environment: str
@@ -80,6 +82,7 @@ class PolicyMeta:
     sizes: Mapping[str, Any] = field(default_factory=dict)
     episodes: Sequence[int] = ()
     data: str = ""
+    validation: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -199,6 +202,10 @@ def read_meta(folder: Path) -> tuple[PolicyInterface | None, PolicyMeta]:
             f" got {meta.actions} of mode {meta.mode!r}"
         )
     return described, meta
+
+
+def _are_losses(value: Any) -> bool:
+    return is_table(value) and all(step.isdecimal() and is_number(loss) for step, loss in value.items())
 
 
 def _are_sizes(value: Any) -> bool:
