@@ -75,7 +75,7 @@ class Source:
     def trained_on(self) -> dict[str, float]:
         """How many episodes it learns from, how many attempts all took, and how long those were [s]."""
         chosen, (_, held_out) = self.selection, self.split
-        numbers = {
+        numbers: dict[str, float] = {
             "episodes": len(chosen.rows) - len(held_out),
             "attempts": chosen.attempts,
             "operator_time": chosen.operator_time,

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 import torch
@@ -46,8 +47,8 @@ class Validation:
                 for batch in (send_to_device(self.dataset.batch(indices), accelerator.device),)
             ]
         policy.train()
-        mean = torch.tensor(sum(losses) / len(self._frames), device=accelerator.device)
-        loss = float(accelerator.reduce(mean, reduction="mean").item())
+        mean: Any = torch.tensor(sum(losses) / len(self._frames), device=accelerator.device)
+        loss = float(accelerator.reduce(mean, reduction="mean"))
         if not np.isfinite(loss):
             raise HandrailError(
                 f"training: expected a finite loss on held-out episodes, got {loss} after {step} updates"
