@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from handrail.collect.experiments.benchmark.catalogue import TAKE_UP
 from handrail.collect.tasks.goal_reaching import STEP
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.baselines.arm_completion import WeldedBaseCompletion
@@ -19,7 +20,6 @@ from handrail.controllers.mpc.masked_mpc import MaskedMpc
 from handrail.controllers.ocp.settings import MpcSettings
 from handrail.controllers.robot.model import RobotModel
 
-TAKE_UP, TAKE_UP_TURN = 1.0, 0.65  # time constants of the masked MPC's hand [s]
 _NOW = np.zeros(1)  # no time ahead [s]
 
 Asks = Callable[[FloatArray, State, float], Intent]
@@ -77,8 +77,8 @@ def goal_reaching_prediction(channels: Channels) -> Prediction:
     Args:
         channels: of the robot.
     """
-    time_constant = np.full(channels.size, TAKE_UP)
-    time_constant[channels.tool_slice][3:] = TAKE_UP_TURN
+    time_constant = np.full(channels.size, TAKE_UP[0])
+    time_constant[channels.tool_slice][3:] = TAKE_UP[1]
     return Smoothed(Bounded(channels), time_constant)
 
 

@@ -12,6 +12,7 @@ _CBF = "handrail.controllers.baselines.cbf_filter:CbfFilter"
 _FILTER = "handrail.controllers.mpc.safety_filter:safety_filter"
 _MINK = "handrail.collect.experiments.benchmark.mink:MinkController"
 _RL = "handrail.policies.rl.controller:RlController"
+TAKE_UP = (1.0, 0.65)  # time constants of the low-pass, of the hand's translation and turn [s]
 _JOINTS, _SMOOTHED = f"{_HERE}:joint_intent", f"{_HERE}:smoothed_hand_intent"
 
 
@@ -29,6 +30,8 @@ class Baseline:
             every episode.
         period: between two updates [s]; None: the planner's.
         aims: whether the controller needs to know the goal; then it has `aim(goal)`.
+        lag: time constants of a low-pass before it, of the hand's translation and turn [s]; a planner that
+            sees the hand knows them.
     """
 
     name: str
@@ -37,6 +40,7 @@ class Baseline:
     operator: Callable[..., Any] | str = f"{_HERE}:hand_intent"
     period: float | None = None
     aims: bool = False
+    lag: tuple[float, float] = (0.0, 0.0)
 
     def controller(self, model: Any) -> Any:
         """Return the controller of a robot."""
@@ -49,12 +53,12 @@ BASELINES = Registry(
     "baseline",
     Baseline,
     (
-        Baseline("mpc", "masked MPC", f"{_HERE}:mpc", period=0.1),
+        Baseline("mpc", "masked MPC", f"{_HERE}:mpc", period=0.1, lag=TAKE_UP),
         Baseline("rl", "reinforcement-learning baseline (SAC)", _RL, aims=True),
         Baseline("mink", "differential IK with collision avoidance (mink)", _MINK),
         Baseline("mpc_paper", "masked MPC, the paper's horizon", f"{_HERE}:mpc_paper", period=0.1),
-        Baseline("rl_low_pass", "SAC behind the MPC's low-pass", _RL, _SMOOTHED, aims=True),
-        Baseline("mink_low_pass", "mink behind the MPC's low-pass", _MINK, _SMOOTHED),
+        Baseline("rl_low_pass", "SAC behind the MPC's low-pass", _RL, _SMOOTHED, aims=True, lag=TAKE_UP),
+        Baseline("mink_low_pass", "mink behind the MPC's low-pass", _MINK, _SMOOTHED, lag=TAKE_UP),
         Baseline("dls", "damped least squares, whole body", f"{_HERE}:whole_body"),
         Baseline("dls_arm", "damped least squares on the arm, nominal base", f"{_HERE}:nominal_base"),
         Baseline("decoupled", "decoupled base and arm", f"{_HERE}:base_following"),

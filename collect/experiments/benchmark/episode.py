@@ -27,7 +27,7 @@ from handrail.controllers.registry import resolved
 from handrail.controllers.robot.model import Pose, RobotModel
 from handrail.datasets.recording.frames import Frame
 
-_GAIN = 1.0  # of a planner that sees the hand [1/s]
+_GAIN = 2.0  # of a planner that sees the hand [1/s]
 _SETTLING = 134  # steps after the planner's last one, without early stop (4 s)
 
 
@@ -62,7 +62,7 @@ def run_episode(
         conditions: goal, scene, commands.
     """
     start = process_time()
-    operator = _Planner(conditions, resolved(baseline.operator)(model))
+    operator = _Planner(conditions, resolved(baseline.operator)(model), baseline.lag)
     begin = Start(conditions.scene, model.description.home)
     judge = partial(_judged, given=conditions, planner=operator)
     task = FixedTask(begin, judge, horizon=(T_MAX - 0.5) * STEP)
@@ -77,8 +77,13 @@ class _Planner:
 
     name = "planner"
 
-    def __init__(self, conditions: Conditions, ask: Callable[[FloatArray, State, float], Intent]) -> None:
-        self._conditions, self._ask = conditions, ask
+    def __init__(
+        self,
+        conditions: Conditions,
+        ask: Callable[[FloatArray, State, float], Intent],
+        lag: tuple[float, float] = (0.0, 0.0),
+    ) -> None:
+        self._conditions, self._ask, self._lead = conditions, ask, np.repeat(lag, 3)
 
     def reset(self, view: View, rng: np.random.Generator) -> None:
         """Plan the way from here."""
@@ -87,6 +92,7 @@ class _Planner:
         self._planner = StraightPlanner.plan(tool.position, tool.rotation, given.goal, speed=speed)
         self._commands = profile_commands(given.profile, self._planner, np.random.default_rng(given.seed))
         self._sent: list[tuple[FloatArray, State]] = []
+        self._error: FloatArray | None = None
 
     @property
     def end(self) -> int:
@@ -104,13 +110,18 @@ class _Planner:
         return self._ask(twist, state, index * STEP)
 
     def _twist(self, step: int, tool: Pose) -> FloatArray:
-        """Return a step's twist; with closed loop, on top of it `k` times the pose error, (6,)."""
+        """Return a step's twist; in closed loop with a correction `k (e + T ė)` by the pose error e, (6,).
+
+        T is the lag of what is steered: the correction leads by it. A planner that does not know it rings.
+        """
         twist = self._commands.twists[step]
         if not self._conditions.config.closed_loop:
             return twist
         position, rotation = self._planner.pose(self._commands.progress[step])
-        turn = rotation_vector(rotation @ tool.rotation.T)
-        return twist + _GAIN * np.concatenate([position - tool.position, turn])
+        error = np.concatenate([position - tool.position, rotation_vector(rotation @ tool.rotation.T)])
+        change = np.zeros(6) if self._error is None else (error - self._error) / STEP
+        self._error = error
+        return twist + _GAIN * (error + self._lead * change)
 
 
 def _judged(state: TaskState, given: Conditions, planner: _Planner) -> Verdict:

@@ -8,13 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from handrail.collect.experiments.benchmark.baselines import (
-    TAKE_UP,
-    TAKE_UP_TURN,
-    goal_reaching_settings,
-    paper_settings,
-)
-from handrail.collect.experiments.benchmark.catalogue import Baseline
+from handrail.collect.experiments.benchmark.baselines import goal_reaching_settings, paper_settings
+from handrail.collect.experiments.benchmark.catalogue import TAKE_UP, Baseline
 from handrail.collect.experiments.benchmark.config import BenchmarkConfig
 from handrail.collect.experiments.benchmark.metrics import (
     AIM,
@@ -59,7 +54,7 @@ def summarise(
         "titles": {baseline.name: baseline.help for baseline in baselines},
         "skipped": dict(skipped),
         "config": {name: value for name, value in asdict(config).items() if name not in _PLACES},
-        "mpc_settings": asdict(goal_reaching_settings()) | {"take_up": TAKE_UP, "take_up_turn": TAKE_UP_TURN},
+        "mpc_settings": asdict(goal_reaching_settings()) | {"take_up": TAKE_UP},
         "mpc_paper_settings": asdict(paper_settings()),
         "physics": dict(PHYSICS) if config.physics else {},
         "machine": {"cores": os.cpu_count(), "load": os.getloadavg()[0]},

@@ -6,13 +6,11 @@ import numpy as np
 import pytest
 
 from handrail.collect.experiments.benchmark.baselines import (
-    TAKE_UP,
-    TAKE_UP_TURN,
     goal_reaching_prediction,
     hand_intent,
     smoothed_hand_intent,
 )
-from handrail.collect.experiments.benchmark.catalogue import BASELINES
+from handrail.collect.experiments.benchmark.catalogue import BASELINES, TAKE_UP
 from handrail.collect.experiments.benchmark.config import BenchmarkConfig
 from handrail.collect.experiments.benchmark.run import trace_of
 from handrail.collect.tasks.goal_reaching import STEP
@@ -51,7 +49,7 @@ def test_the_low_pass_takes_a_step_up_in_its_time_and_keeps_the_way():
     smooth = smoothed_hand_intent(MODEL)
     sent = np.array([smooth(np.ones(6) * (k < held), STATE, k * STEP).values for k in range(steps)])
     hand = sent[:, CHANNELS.tool_slice]
-    constants = np.array([TAKE_UP] * 3 + [TAKE_UP_TURN] * 3)
+    constants = np.array([TAKE_UP[0]] * 3 + [TAKE_UP[1]] * 3)
     for k in (0, 20, 100):
         np.testing.assert_allclose(hand[k], 1.0 - np.exp(-k * STEP / constants), atol=1e-9)
     np.testing.assert_allclose(hand.sum(0), held, rtol=0.01)
@@ -62,7 +60,8 @@ def test_who_has_the_low_pass_differs_from_their_twin_in_nothing_else():
         bare, smooth = BASELINES[name], BASELINES[f"{name}_low_pass"]
         assert resolved(smooth.operator) is smoothed_hand_intent
         assert resolved(bare.operator) is hand_intent
-        assert replace(smooth, name=bare.name, help=bare.help, operator=bare.operator) == bare
+        own = {"name": bare.name, "help": bare.help, "operator": bare.operator, "lag": bare.lag}
+        assert replace(smooth, **own) == bare
 
 
 def test_behind_the_low_pass_keys_jerk_less():
