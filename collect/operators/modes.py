@@ -88,6 +88,12 @@ MODES = Registry(
     TeleopMode,
     (
         TeleopMode("ee", always("ee"), "mpc", "steer the hand; the base comes along by itself"),
+        TeleopMode(
+            "ee_dls",
+            always("ee"),
+            "dls",
+            "steer the hand; base and arm follow by damped least squares: ee without the MPC",
+        ),
         TeleopMode("base", always("base"), "mpc", "steer the base; the arm keeps clear by itself"),
         TeleopMode("base+ee", always("base", "ee"), "mpc", "steer base and hand at once"),
         TeleopMode("joints", always("joint"), "mpc", "steer every joint, kept safe by the MPC"),

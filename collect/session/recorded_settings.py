@@ -18,6 +18,7 @@ COLUMN = "settings"
 _OLDER = {"environment": "task"} | {  # what an episode said before it kept every setting, and its name now
     name: name for name in ("robot", "operator", "mode", "noise", "person", "moving_obstacles")
 }
+_GONE = ("inner_error", "tremor")  # of a person, whom older episodes say more of than there is now
 _KINDS: Mapping[type, tuple[str, Callable[[Any], bool]]] = {
     str: ("a text", lambda value: isinstance(value, str)),
     bool: ("true or false", lambda value: isinstance(value, bool)),
@@ -58,6 +59,7 @@ def recorded_settings(row: Mapping[str, Any], said: Collection[str] = ()) -> Ses
     settings = _parsed(row[COLUMN]) if row.get(COLUMN) else _older(row)
     check_entries(settings, _ENTRIES, _WHERE)
     human = settings.pop("human", {})
+    human = {name: value for name, value in human.items() if name not in _GONE}
     check_entries(human, _HUMAN, f"{_WHERE}: human")
     config = SessionConfig(**settings, human=HumanSettings(**human))
     for name, registry in _NAMES.items():

@@ -42,6 +42,12 @@ CONTROLLERS = Registry(
         ControllerSpec("mpc", _masked_mpc, "the masked MPC", completes=True, protects=True, objectives=True),
         ControllerSpec("direct", f"{_HERE}.baselines.direct:DirectController", "clipped to joint limits"),
         ControllerSpec(
+            "dls",
+            f"{_HERE}.baselines.twist_completion:least_squares_controller",
+            "damped least squares of the whole body, clipped to joint limits",
+            completes=True,
+        ),
+        ControllerSpec(
             "filter", f"{_HERE}.mpc.safety_filter:safety_filter", "multi-step safety filter", protects=True
         ),
         ControllerSpec(

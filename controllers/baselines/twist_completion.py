@@ -91,6 +91,18 @@ def twist_controller(
     return ReactiveController(model, ask, period, intent_timeout, channels.mask("ee"))
 
 
+def least_squares_controller(model: RobotModel, period: float = 0.05) -> ReactiveController:
+    """Return the controller of the hand alone: `WholeBodyCompletion`, clipped as `DirectController` clips.
+
+    It looks neither ahead nor at obstacles.
+
+    Args:
+        model: of the robot.
+        period: of the control loop [s].
+    """
+    return twist_controller(model, WholeBodyCompletion(model), period)
+
+
 def base_velocity(intent: Intent, channels: Channels, q: FloatArray) -> FloatArray:
     """Return the commanded base twist as the base's joint velocities in the world, (3,), or (0,)."""
     if not channels.base:

@@ -48,6 +48,11 @@ def matrix_from_quaternion(quaternion: ArrayLike) -> FloatArray:
     return Rotation.from_quat([x, y, z, w]).as_matrix()
 
 
+def matrix_from_vector(vector: ArrayLike) -> FloatArray:
+    """Return the rotation matrix of a rotation vector (axis times angle) [rad], (3, 3)."""
+    return Rotation.from_rotvec(np.asarray(vector, dtype=float)).as_matrix()
+
+
 def rotation_vector(matrix: ArrayLike) -> FloatArray:
     """Return the rotation vector (axis times angle) [rad] of a rotation matrix, (3,)."""
     return Rotation.from_matrix(np.asarray(matrix)).as_rotvec()

@@ -36,6 +36,8 @@ class TrainConfig:
     actions: Literal["realised", "intent", "recorded"] = "realised"
     """What the policy writes: the joint velocities that came about; the operator's own command, which the
     controller completes when the policy drives; or `recorded`, all columns as they are in any dataset."""
+    base_pose: bool = True
+    """Let the policy see where the base is, as operators do who plan where to stand."""
     images: bool = False
     """Let the policy see the cameras too."""
     mode: str = ""

@@ -69,11 +69,6 @@ class Steered:
     inputs: FloatArray
     owned: BoolArray
 
-    @property
-    def mode_has_joints(self) -> bool:
-        """Whether joints were steered one by one."""
-        return bool(self.owned[:, Channels.of(self.model.description).joint_slice].any())
-
 
 def read_steered(root: Path, participant: str = "", device: str = "") -> Iterator[Steered | str]:
     """Yield the episodes of a dataset, or why one is left out.

@@ -36,12 +36,10 @@ PARAMETERS = (
     Parameter("switch_time", "s", 0.05, 1.5, pressed=True),
     Parameter("movement", "s", 0.05, 0.5),
     Parameter("misjudgement", "", 0.01, 0.3),
-    Parameter("inner_error", "rad", 0.01, 0.5),
     Parameter("briskness", "", 0.3, 3.0, pressed=True),
 )
 _KEYS = "keys are on or off: they do not tell how far an input is meant to be pushed"
 _ELSEWHERE = {
-    "tremor": "only a leader arm shows it",
     "persons": "it is between persons: fit each of several, and compare them",
     "moods": "it is between episodes of one person, and is kept as it is",
 }
@@ -53,8 +51,6 @@ def untold(episodes: Sequence[Steered]) -> dict[str, str]:
     reasons = {entry.name: "" for entry in fields(HumanSettings)} | _ELSEWHERE
     if not any((each.owned[1:] != each.owned[:-1]).any() for each in episodes):
         reasons["switch_time"] = "the operator never changed to other channels"
-    if not any(each.mode_has_joints for each in episodes):
-        reasons["inner_error"] = "no joints were steered"
     if any(each.keys for each in episodes):
         reasons |= {name: _KEYS for name, each in known.items() if not (each.pressed or reasons[name])}
     return {name: reason for name, reason in reasons.items() if reason}

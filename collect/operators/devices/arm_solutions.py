@@ -1,6 +1,4 @@
-"""The joint angles that put the tool at a pose: the nearest ones first, then others of the same arm."""
-
-from collections.abc import Iterator
+"""The joint angles that put the tool at a pose: the nearest first."""
 
 import numpy as np
 
@@ -14,26 +12,31 @@ _TURNS = (1.5, -1.5)  # of one joint from where it is, to look for another solut
 _WAY = np.linspace(0.1, 1.0, 10)[:, None]  # where on a straight way one looks whether something is hit
 
 
-def arm_solutions(model: RobotModel, q: FloatArray, goal: Pose) -> Iterator[tuple[FloatArray, float]]:
-    """Yield configurations that bring the tool to the goal, (n,), and the error that each leaves.
+def arm_solutions(model: RobotModel, q: FloatArray, goal: Pose) -> list[tuple[FloatArray, float]]:
+    """Return configurations that bring the tool to the goal, (n,), and the error that each leaves.
+
+    By `‖q_ik − q‖`, the smallest first; those that do not reach the goal come last. A joint that can turn
+    more than once around is taken the shorter way.
 
     Args:
         model: of the robot.
-        q: to begin with, (n,); later searches begin with one arm joint turned by 1.5 rad either way.
+        q: to begin with, (n,); searches begin there, with each arm joint turned by 1.5 rad either way, and at
+            home.
         goal: of the tool.
     """
-    yield arm_configuration(model, q, goal)
-    for joint in range(len(model.description.base_joints), model.size):
-        for angle in _TURNS:
-            start = q.copy()
-            start[joint] += angle
-            yield arm_configuration(model, start, goal)
+    base = len(model.description.base_joints)
+    starts = [q, np.concatenate([q[:base], model.description.home[base:]])]
+    for joint in range(base, model.size):
+        starts += [q + angle * (np.arange(model.size) == joint) for angle in _TURNS]
+    found = [arm_configuration(model, start, goal) for start in starts]
+    unwound = [(_unwound(model, q, there), error) for there, error in found]
+    return sorted(unwound, key=lambda each: (each[1] >= REACHED, float(np.linalg.norm(each[0] - q))))
 
 
 def straight_solution(
     model: RobotModel, collision: CollisionModel, q: FloatArray, goal: Pose, clear: float
 ) -> FloatArray:
-    """Return the first solution that all joints can go straight to at once, hitting nothing, (n,).
+    """Return the nearest solution that all joints can go straight to at once, hitting nothing, (n,).
 
     The one whose way keeps the largest distance if none keeps `clear`; the nearest configuration if the arm
     does not reach the goal.
@@ -45,11 +48,20 @@ def straight_solution(
         goal: of the tool.
         clear: distance kept on the way [m].
     """
-    best, widest = None, -np.inf
-    for there, error in arm_solutions(model, q, goal):
+    solutions = arm_solutions(model, q, goal)
+    best, widest = solutions[0][0], -np.inf
+    for there, error in solutions:
         kept = float(np.min(collision.values(q + _WAY * (there - q)))) if error < REACHED else -np.inf
-        if best is None or kept > widest:
+        if kept > widest:
             best, widest = there, kept
         if kept >= clear:
             break
-    return q if best is None else best
+    return best
+
+
+def _unwound(model: RobotModel, q: FloatArray, there: FloatArray) -> FloatArray:
+    """Return the same pose of the arm with each joint turned the shorter way, where its limits allow that."""
+    limits, base = model.description.limits, len(model.description.base_joints)
+    shorter = q + (there - q + np.pi) % (2.0 * np.pi) - np.pi
+    allowed = (limits.position_lower <= shorter) & (shorter <= limits.position_upper)
+    return np.where(allowed & (np.arange(model.size) >= base), shorter, there)

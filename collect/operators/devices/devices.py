@@ -48,8 +48,6 @@ DEVICES = Registry(
             "leader_arm",
             "a small copy of the arm, and a stick for the base",
             LeaderArmMap,
-            Gains(gain=1.2, joint_rate=1.2),
-            drives=True,
             refractory=_POSITION_ORDER,
         ),
     ),

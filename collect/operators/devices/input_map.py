@@ -1,10 +1,13 @@
 """Input maps: how a goal becomes values on the channels of a mode; nothing else differs between modes."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from typing import ClassVar
 
 import numpy as np
 
 from handrail.collect.operators.devices.large_turn import LargeTurn
+from handrail.collect.operators.human.hidden import Hidden
 from handrail.collect.operators.human.human import HumanSettings
 from handrail.collect.operators.human.motion_goal import MotionGoal
 from handrail.collect.operators.human.steering import Gains
@@ -46,6 +49,8 @@ class InputMap(ABC):
         joints[: self._base] = base
         self.full: FloatArray = np.concatenate([base, gains.full[:6], joints])
 
+    HIDDEN: ClassVar[Mapping[str, Hidden]] = {}
+
     @abstractmethod
     def reset(self, view: View, settings: HumanSettings, rng: np.random.Generator) -> None:
         """Begin an episode with a person."""
@@ -66,19 +71,17 @@ class InputMap(ABC):
 class StickMap(InputMap):
     """Velocity sticks on all channels of a mode at once.
 
-    Where the mode has joint channels, the operator solves for them, as an expert would, with the arm's angles
-    as they imagine them, q + δ:
-    `min ‖J(q + δ) v - hand‖² + w_b ‖v_base - base‖² + w_p ‖v_arm - k (q_home - q)‖² + λ ‖v / v_max‖²`.
+    Where the mode has joint channels, the operator solves for them, as an expert would, who sees the goal no
+    better than who steers the hand, but knows the arm:
+    `min ‖J v - hand‖² + w_b ‖v_base - base‖² + w_p ‖v_arm - k (q_home - q)‖² + λ ‖v / v_max‖²`.
     A large turn would fold the arm into itself that way; there they bring the arm's joints straight to where
     these belong (`LargeTurn`), while the base drives.
     """
 
     def reset(self, view: View, settings: HumanSettings, rng: np.random.Generator) -> None:
-        """Draw the error of the arm's angles as this operator imagines them."""
-        self._imagined = settings.inner_error * rng.standard_normal(self._model.size)
-        self._imagined[: self._base] = 0.0
+        """Begin with nothing thought of."""
         if self.mask("hand")[self.channels.joint_slice].any():
-            self._turn = LargeTurn(self._model, self._gains, _LARGE, view, settings.misjudgement, rng)
+            self._turn = LargeTurn(self._model, self._gains, _LARGE, view)
 
     def mask(self, focus: Focus) -> BoolArray:
         """Return the channels that the operator owns, (m,)."""
@@ -103,7 +106,7 @@ class StickMap(InputMap):
 
     def _inner_kinematics(self, goal: MotionGoal, q: FloatArray) -> FloatArray:
         """Return the expert's inner inverse kinematics, (n,): the hand first, the base when it can."""
-        jacobian = self._model.jacobian(q + self._imagined)
+        jacobian = self._model.jacobian(q)
         base = self._base_world(goal, q)
         weights = np.full(self._model.size, _DAMPING) / self._model.description.limits.velocity
         home = self._model.description.home - q

@@ -1,46 +1,50 @@
 """Large turns by joints: the operator thinks of where the joints belong, and brings them straight there."""
 
+from typing import ClassVar
+
 import numpy as np
 
 from handrail.collect.operators.devices.arm_solutions import straight_solution
+from handrail.collect.operators.human.hidden import Hidden
 from handrail.collect.operators.human.motion_goal import Target
 from handrail.collect.operators.human.steering import Gains
 from handrail.collect.operators.operator import View
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.numerics.rotation import rotation_vector
+from handrail.controllers.robot.inverse_kinematics import arm_configuration
 from handrail.controllers.robot.model import RobotModel
 
 _CLEAR = 0.03  # what the motion shall keep clear [m]
+_EXACTLY = 1e-3  # how well one knows where joints belong [m, rad]
+
+_SOLUTION = Hidden(
+    "which of the arm's solutions they bring it to, where the hand has to turn far",
+    "one of up to eight",
+    "never",
+    "the arm's angles: the nearest that is clear, chosen once a target",
+)
 
 
 class LargeTurn:
     """Turns the hand by joints, where following the hand would fold the arm into itself.
 
-    `q̇ = s k_h (q* − q)`, `q* = q₀ + (q_ik − q₀)(1 + σ z)`, with s such that neither hand nor joints move
-    faster than at full stick, σ the operator's misjudgement, thought of once a target.
+    `q̇ = s k_h (q_ik − q)`, with s such that neither hand nor joints move faster than at full stick. Which of
+    the inverse kinematics' solutions it is, is thought of once a target: the nearest that is clear. Where
+    it is follows the pose as the operator sees it from moment to moment.
 
     Args:
         model: of the robot.
         gains: full stick of hand and joints.
         large: turn of the hand from which on it matters how the arm gets there [rad].
         view: of the scene, at the beginning of an episode.
-        misjudgement: σ.
-        rng: of the operator's errors.
     """
 
-    def __init__(
-        self,
-        model: RobotModel,
-        gains: Gains,
-        large: float,
-        view: View,
-        misjudgement: float,
-        rng: np.random.Generator,
-    ) -> None:
+    HIDDEN: ClassVar = dict.fromkeys(("_goal", "_thought"), _SOLUTION)
+
+    def __init__(self, model: RobotModel, gains: Gains, large: float, view: View) -> None:
         self._model, self._gains, self._large = model, gains, large
         self._base = len(model.description.base_joints)
-        self._rng, self._error = rng, misjudgement
         self._collision = CollisionModel(model, view.task.obstacles)
         self._goal = view.state.q.copy()
         self._thought = b""
@@ -54,15 +58,17 @@ class LargeTurn:
         """Return the velocity straight to where the arm's joints belong, (n − b,) [rad/s].
 
         Args:
-            target: where the goal leads.
+            target: where the goal leads, as it is seen.
             q: joint positions, (n,).
             base: of the base, from where the operator thinks the hand reaches the target, (b,).
         """
         if target.identity != self._thought:
             start = np.concatenate([base, q[self._base :]])
-            way = straight_solution(self._model, self._collision, start, target.hand, _CLEAR) - start
-            self._goal = start + way * (1.0 + self._error * self._rng.standard_normal(len(way)))
+            self._goal = straight_solution(self._model, self._collision, start, target.hand, _CLEAR)
             self._thought = target.identity
+        else:
+            before = np.concatenate([base, self._goal[self._base :]])
+            self._goal = arm_configuration(self._model, before, target.hand, _EXACTLY)[0]
         velocity = self._gains.gain * (self._goal - q)[self._base :]
         hand = self._model.jacobian(q)[:, self._base :] @ velocity
         fastest = target.pace * self._gains.full[[0, 3]]  # of the hand, and how fast it may turn

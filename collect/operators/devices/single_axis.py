@@ -1,9 +1,12 @@
 """One axis at a time: the operator picks a joint, drives it where it seems to belong, picks the next."""
 
+from typing import ClassVar
+
 import numpy as np
 
 from handrail.collect.operators.devices.input_map import InputMap
 from handrail.collect.operators.devices.joint_order import plan_joints, sweep_clearance
+from handrail.collect.operators.human.hidden import Hidden
 from handrail.collect.operators.human.human import HumanSettings
 from handrail.collect.operators.human.motion_goal import MotionGoal, Target
 from handrail.collect.operators.operator import View
@@ -19,19 +22,30 @@ _SHARES = (1.0, 0.5, 0.25)  # of an axis' way that the operator considers
 _SMALL_SHARES = (1.0, 0.5, 0.25, 0.12, 0.06)  # the same where the hand must not lean
 _CLEAR = 0.03  # what a sweep shall keep clear [m]
 
+_AXIS = Hidden("which axis is steered, and how far this time", "until it is there", "never", "no")
+_PLAN = Hidden(
+    "where the joints belong, in which order they go, how exactly",
+    "until all are near",
+    "never",
+    "the arm's angles when it was thought of",
+)
+
 
 class SingleAxisMap(InputMap):
     """A single stick on the base's axes and the arm's joints, one at a time; changing is a mode switch.
 
-    The operator knows which joints would put the hand there, but not exactly: `q* = q + (q_ik − q)(1 + σ z)`.
-    They move one joint after the other, in an order in which nothing is hit, and think anew when all are near
-    q*. The base likewise, axis by axis.
+    The operator knows which joints would put the hand where it seems to belong. They move one joint after the
+    other, in an order in which nothing is hit, and think anew when all are near. The base likewise, axis by
+    axis.
     """
+
+    HIDDEN: ClassVar = {
+        **dict.fromkeys(("_axis", "_axis_holds", "_left"), _AXIS),
+        **dict.fromkeys(("_goal", "_thought", "_thinks_at", "_order", "_care"), _PLAN),
+    }
 
     def reset(self, view: View, settings: HumanSettings, rng: np.random.Generator) -> None:
         """Begin with no axis chosen and nothing thought."""
-        self._rng = rng
-        self._error = settings.misjudgement
         self._least = 1.2 * settings.threshold
         self._collision = CollisionModel(self._model, view.task.obstacles)
         self._axis: int | None = None
@@ -122,9 +136,7 @@ class SingleAxisMap(InputMap):
         done = np.all(self._goal_error(target, state.q) < 1.0) and state.time >= self._thinks_at
         if target.identity == self._thought and not done:
             return
-        there, order = plan_joints(self._model, self._collision, state.q, target.hand, _CLEAR)
-        way = there - state.q
-        self._goal = state.q + way * (1.0 + self._error * self._rng.standard_normal(len(way)))
+        self._goal, order = plan_joints(self._model, self._collision, state.q, target.hand, _CLEAR)
         self._order = [self.channels.joint_slice.start + joint for joint in order]
         self._care = 1.0 if target.identity != self._thought else max(0.5 * self._care, _MOST_CARE)
         self._thought, self._axis_holds = target.identity, False

@@ -23,9 +23,7 @@ class HumanSettings:
         switch_time: hands off the stick while changing to other inputs [s]; makes switching 17.4 % of the
             time when steering joint by joint.
         movement: of the hand from one deflection to the next, minimum jerk [s].
-        misjudgement: standard deviation of a distance to go as it is seen, over that distance.
-        inner_error: standard deviation of a joint angle as an operator of all joints imagines it [rad].
-        tremor: standard deviation of a hand that holds a leader arm, at the joints [rad].
+        misjudgement: standard deviation of a distance to go, or to turn, as it is seen, over that distance.
         persons: how much people differ, standard deviation of the logarithm of each number above.
         moods: the same for the same person from episode to episode.
         briskness: how briskly they steer, over what the device's gains say: a throughput of
@@ -41,8 +39,6 @@ class HumanSettings:
     switch_time: float = 0.3
     movement: float = 0.15
     misjudgement: float = 0.05
-    inner_error: float = 0.08
-    tremor: float = 0.003
     persons: float = 0.15
     moods: float = 0.08
     briskness: float = 1.0

@@ -20,6 +20,7 @@ class Target:
         angle: the same for orientation [rad].
         pace: share of the full stick.
         tilt: how far the hand may lean from the pose's axis on the way there [rad].
+        meant: the pose itself where `hand` is as somebody sees it, who misjudges; None where it is the same.
     """
 
     hand: Pose
@@ -28,11 +29,12 @@ class Target:
     angle: float = 0.2
     pace: float = 1.0
     tilt: float = np.inf
+    meant: Pose | None = None
 
     @property
     def identity(self) -> bytes:
         """What stays the same while the operator only sees better how far the hand has to go."""
-        numbers = [self.base, self.hand.rotation.ravel(), [self.distance, self.pace]]
+        numbers = [self.base, (self.meant or self.hand).rotation.ravel(), [self.distance, self.pace]]
         return np.concatenate(numbers).tobytes()
 
 

@@ -1,25 +1,40 @@
-"""Perception: people misjudge how far it is, more the farther it is."""
+"""Perception: people misjudge how far it is, more the farther it is; nothing else is imagined wrongly."""
 
 from dataclasses import replace
+from typing import ClassVar
 
 import numpy as np
 
+from handrail.collect.operators.human.hidden import Hidden
 from handrail.collect.operators.human.human import HumanSettings
 from handrail.collect.operators.human.motion_goal import MotionGoal
+from handrail.collect.operators.human.steering import hand_errors
 from handrail.collect.operators.human.wander import Wander
 from handrail.controllers.arrays import FloatArray
+from handrail.controllers.numerics.rotation import matrix_from_vector
 from handrail.controllers.robot.model import Pose
+
+_MISJUDGED = Hidden(
+    "how far they think it is, of hand and base, to go and to turn",
+    "5 % of the way (`misjudgement`)",
+    "all the time",
+    "no; forgotten within 0.5 s",
+)
 
 
 class Perception:
     """Adds `σ ‖x‖ a` to each distance to go x, where a is an Ornstein–Uhlenbeck process (Weber's law).
 
-    It is the same in every teleop mode: what is misjudged is the task, not the input.
+    x is the way of the hand, its turn, the way of the base, its turn. It is the same in every teleop mode:
+    what is misjudged is the task, not the input. An operator who thinks of joints thinks of those that would
+    put the hand where it seems to belong: the error at the hand is that of who steers the hand.
 
     Args:
         settings: of the person.
         rng: of the episode.
     """
+
+    HIDDEN: ClassVar = {"_wander": _MISJUDGED}
 
     def __init__(self, settings: HumanSettings, rng: np.random.Generator) -> None:
         self._share = settings.misjudgement
@@ -34,8 +49,10 @@ class Perception:
         base = np.concatenate([_off(goal.base[:2], wander[6:8]), _off(goal.base[2:], wander[8:])])
         target = goal.target
         if target is not None:
-            away = _off(target.hand.position - tool.position, wander[:3])
-            target = replace(target, hand=Pose(tool.position + away, target.hand.rotation))
+            errors = hand_errors(tool, target.hand)
+            away, turn = _off(errors[:3], wander[:3]), _off(errors[3:], wander[3:6])
+            seen = Pose(tool.position + away, matrix_from_vector(turn) @ tool.rotation)
+            target = replace(target, hand=seen, meant=target.hand)
         return replace(goal, hand=hand, base=base, target=target)
 
 

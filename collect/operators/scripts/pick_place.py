@@ -1,12 +1,13 @@
 """How an operator carries a cube from one table to a bin on another."""
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
 from handrail.collect.operators.human.steering import pose_errors
 from handrail.collect.operators.operator import View
-from handrail.collect.operators.scripts.phases import Phase, PhasedScript, from_phase
+from handrail.collect.operators.scripts.phases import PLANNED, Phase, PhasedScript, from_phase
 from handrail.collect.operators.scripts.route import Route
 from handrail.collect.simulation.scene import SceneObject
 from handrail.controllers.arrays import FloatArray
@@ -29,6 +30,8 @@ class _Place:
 
 class PickPlaceScript(PhasedScript):
     """Approach, grasp, lift, carry, place for `handrail/PickPlace-v0`; a script."""
+
+    HIDDEN: ClassVar = {"_route": PLANNED}
 
     def replan(self, view: View, name: str) -> list[Phase] | None:
         """Grasp again when the cube stayed behind."""

@@ -1,12 +1,13 @@
 """The scripted operator: a script that knows what it wants, seen and steered as a person would."""
 
 from dataclasses import replace
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 import numpy as np
 
 from handrail.collect.operators.devices.devices import DEVICES
 from handrail.collect.operators.human.hand import HumanHand
+from handrail.collect.operators.human.hidden import Hidden
 from handrail.collect.operators.human.human import HumanSettings
 from handrail.collect.operators.human.motion_goal import MotionGoal
 from handrail.collect.operators.human.perception import Perception
@@ -18,6 +19,20 @@ from handrail.controllers.arrays import BoolArray
 from handrail.controllers.interface.intent import Intent, RawInput
 from handrail.controllers.registry import resolved
 from handrail.controllers.robot.model import RobotModel
+
+_PERSON = Hidden(
+    "who steers: delay, pauses, noise, misjudgement",
+    "each by a factor of e^0.15z (`persons`)",
+    "once a recording",
+    "no; the same in every mode of a `--person`",
+)
+_MOOD = Hidden(
+    "how they are today: the same numbers again",
+    "each by a factor of e^0.08z (`moods`)",
+    "as an episode begins",
+    "no; the same in every mode of a seed",
+)
+_CHANGE = Hidden("hands off while they change to other channels", "0.3 s", "never", "no")
 
 
 class Script(Protocol):
@@ -51,6 +66,10 @@ class ScriptedOperator:
     Attributes:
         free_at: when the hand is back on the input after the last change of channels [s]; −∞ before any.
     """
+
+    HIDDEN: ClassVar = {"_human": _PERSON, "_settings": _MOOD, "_mask": _CHANGE, "_switches": _CHANGE} | {
+        "free_at": _CHANGE
+    }
 
     def __init__(
         self,

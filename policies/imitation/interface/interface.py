@@ -41,6 +41,7 @@ class PolicyInterface:
         environment_names: of `observation.environment_state` as recorded, (e,).
         channels: names of the command channels as recorded, (m,).
         masks: the sets of channels that the operator owned, (m,) each; none for `realised`.
+        base_pose: whether it sees where the base is; older checkpoints do not say, and do not.
     """
 
     actions: str
@@ -48,10 +49,15 @@ class PolicyInterface:
     environment_names: tuple[str, ...]
     channels: tuple[str, ...]
     masks: tuple[Mask, ...] = ()
+    base_pose: bool = False
 
     @classmethod
     def of_dataset(
-        cls, features: Mapping[str, Feature], episodes: Sequence[Columns], actions: str
+        cls,
+        features: Mapping[str, Feature],
+        episodes: Sequence[Columns],
+        actions: str,
+        base_pose: bool = True,
     ) -> "PolicyInterface":
         """Return the interface of a policy that is trained on some episodes.
 
@@ -59,6 +65,7 @@ class PolicyInterface:
             features: of the dataset.
             episodes: `COLUMNS` of each.
             actions: `realised` or `intent`.
+            base_pose: whether it shall see where the base is.
 
         Raises:
             HandrailError: no such action space, or a dataset that does not say what is needed.
@@ -68,7 +75,7 @@ class PolicyInterface:
         state, environment, asked = (_names(features, key) for key in (STATE, ENVIRONMENT, "teleop.values"))
         names = tuple(name for name in asked if name != _GRIPPER)
         masks = _masks_of(_channels(names), episodes) if actions == "intent" else ()
-        return cls(actions, state, environment, names, masks)
+        return cls(actions, state, environment, names, masks, base_pose)
 
     @property
     def observation_names(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
@@ -134,7 +141,9 @@ class PolicyInterface:
                 f"policy interface: expected masks of {len(channels)} channels for an intent and none else,"
                 f" got {content['masks']!r:.80} for {content['actions']}"
             )
-        return cls(content["actions"], state, environment, channels, masks)
+        return cls(
+            content["actions"], state, environment, channels, masks, bool(content.get("base_pose", False))
+        )
 
     def _asked(self, columns: Columns) -> tuple[FloatArray, FloatArray]:
         """Return what the operator asked for, (T, m), and of the gripper, (T,)."""
@@ -155,7 +164,9 @@ class PolicyInterface:
     @cached_property
     def _view(self) -> RelativeView:
         joints = tuple(name.removeprefix("joint.") for name in self._known.joints)
-        return RelativeView(self.state_names, self.environment_names, joints, bool(self._known.base))
+        return RelativeView(
+            self.state_names, self.environment_names, joints, bool(self._known.base), self.base_pose
+        )
 
     @property
     def _sets(self) -> tuple[Mask, ...]:

@@ -11,6 +11,11 @@ and the tool itself is seen from the base: `R_wbᵀ (p_t − p_b)`, `R_wbᵀ R_t
 is the same motion everywhere, and what an operator steers to zero is an input. `E` is smooth, unlike a
 rotation vector; `p` and `E − Eᵀ` vanish at the goal.
 
+Operators also steer by where the base is: who steers joints drives it to where they mean to stand, with a
+heading in the world's axes. So it is seen too, `(x, y, cos θ, sin θ)` in the frame of the joint positions, in
+which every episode begins at home or up to 10 cm beside it. Seen from its own start, that little would be
+hidden, and every operator plans in the world.
+
 The robot's own velocities are left out: the next joint velocity is nearly the present one, so a policy that
 sees them learns to go on as it goes, and stays at rest where it once comes to rest.
 """
@@ -33,6 +38,7 @@ _DIRECTION = ("nx", "ny")
 _NEAR = (0.05, 0.25)  # r: from where on being near is told finely [m]
 _MATRIX = tuple(f"r{row}{column}" for row in range(3) for column in range(3))
 _TOOL = tuple(f"tool.{axis}" for axis in _POSE)
+_BASE = ("base.x", "base.y", "base.cos", "base.sin")
 
 
 @dataclass(frozen=True)
@@ -100,12 +106,14 @@ class RelativeView:
         environment_names: of `observation.environment_state` as recorded, (e,).
         joints: of the robot, (n,).
         mobile: whether the first three joints are a base's x, y and heading.
+        base_pose: whether it shows where the base is.
     """
 
     state_names: tuple[str, ...]
     environment_names: tuple[str, ...]
     joints: tuple[str, ...]
     mobile: bool
+    base_pose: bool = False
 
     def __post_init__(self) -> None:
         """Check that what the view starts from is there.
@@ -126,7 +134,7 @@ class RelativeView:
         """What the numbers are called: of the state, of the environment."""
         tool = (*_TOOL[:3], *(f"tool.{entry}" for entry in _MATRIX))
         environment = tuple(f"{group.name}.{part}" for group in self._groups for part in _parts(group))
-        return (*self._own, *tool), environment
+        return (*self._own, *tool, *(_BASE if self._shows_base else ())), environment
 
     def __call__(self, state: FloatArray, environment: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return both as the policy reads them, (T, s') and (T, e') float32.
@@ -142,6 +150,7 @@ class RelativeView:
             self._of(state, self._own),
             pose.turned(place),
             (pose.matrices().transpose(0, 2, 1) @ pose.rotation).reshape(-1, 9),
+            *((pose.base, np.cos(pose.yaw), np.sin(pose.yaw)) if self._shows_base else ()),
         )
         seen = [_seen(group, environment[:, group.start : group.end], pose) for group in self._groups]
         around = np.column_stack(seen) if seen else np.zeros((len(state), 0))
@@ -159,6 +168,10 @@ class RelativeView:
     def velocities(self, state: FloatArray) -> FloatArray:
         """Return the joint velocities in recorded states, (T, n)."""
         return self._of(state, [f"{joint}.vel" for joint in self.joints])
+
+    @property
+    def _shows_base(self) -> bool:
+        return self.base_pose and self.mobile
 
     @cached_property
     def _own(self) -> tuple[str, ...]:

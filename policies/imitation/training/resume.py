@@ -13,6 +13,8 @@ from handrail.policies.imitation.training.presets import resolved
 if TYPE_CHECKING:
     from handrail.policies.imitation.training.source import Source
 
+_OLDER = {"base_pose": False}  # of a training before that could be said
+
 
 def check_settings(config: TrainConfig, began: PolicyMeta) -> None:
     """Check that settings are those of a checkpoint, and its sizes still those of the preset.
@@ -20,7 +22,7 @@ def check_settings(config: TrainConfig, began: PolicyMeta) -> None:
     Raises:
         HandrailError: one is another.
     """
-    now, then = as_json(config), began.training
+    now, then = as_json(config), _OLDER | dict(began.training)
     for entry in fields(config):
         if entry.name not in FREE_ON_RESUME and entry.name in then:
             _check_same(f"--{entry.name}", now[entry.name], then[entry.name])

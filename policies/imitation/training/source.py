@@ -165,7 +165,7 @@ def read_source(config: TrainConfig, began: PolicyMeta | None = None) -> Source:
         interface, features, columns = None, *_recorded(info, selection, config)
         _check_inputs(config, info, features)
     else:
-        interface, features, columns = _interpreted(info, selection, config.actions)
+        interface, features, columns = _interpreted(info, selection, config.actions, config.base_pose)
     if config.images:
         features |= _cameras(info)
     return Source(config, info, selection, interface, features, columns | _counters(selection, info.fps))
@@ -199,7 +199,7 @@ def steadied(stats: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
 
 
 def _interpreted(
-    info: DatasetInfo, selection: Selection, actions: str
+    info: DatasetInfo, selection: Selection, actions: str, base_pose: bool
 ) -> tuple[PolicyInterface, dict[str, dict[str, Any]], Columns]:
     missing = [key for key in COLUMNS if key not in info.features]
     if missing:
@@ -208,7 +208,7 @@ def _interpreted(
             f" {', '.join(missing)}; for other datasets say --actions recorded"
         )
     episodes = _rows(info, selection, COLUMNS)
-    interface = PolicyInterface.of_dataset(info.features, episodes, actions)
+    interface = PolicyInterface.of_dataset(info.features, episodes, actions, base_pose)
     observed = [interface.observe(episode[STATE], episode[ENVIRONMENT]) for episode in episodes]
     columns = {
         STATE: np.concatenate([state for state, _ in observed]),

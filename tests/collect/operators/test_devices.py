@@ -127,4 +127,4 @@ def test_the_base_is_driven_by_itself_where_the_mask_or_the_device_asks_for_it()
     for mode in MODES.values():
         scripted_operator(MODEL, mode, task, HumanSettings())
     told = {name for name, drives in zip(MODES, driving, strict=True) if drives}
-    assert told == {"switching", "decoupled", "direct_single", "leader"}
+    assert told == {"switching", "decoupled", "direct_single"}

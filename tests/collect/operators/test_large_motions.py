@@ -78,22 +78,23 @@ def test_a_leader_makes_large_turns_without_folding_the_arm(view, offsets):
     assert nearest(path) > 0.07
 
 
-def test_the_straight_way_keeps_clear_where_there_is_one_that_does():
-    """The first solution that can be gone to straight, though a nearer one reaches the goal as well."""
-    collision, clear, farther = CollisionModel(MODEL), 0.03, 0
-    share = np.linspace(0.1, 1.0, 10)[:, None]
-    for offsets in np.random.default_rng(3).uniform(-2.0, 2.0, (8, 6)):
+def test_the_nearest_solution_is_taken_that_keeps_clear():
+    """The first of all in the order of how far the joints turn; the one that keeps clearest if none does."""
+    collision, share = CollisionModel(MODEL), np.linspace(0.1, 1.0, 10)[:, None]
+    farther = 0
+    for offsets in np.random.default_rng(3).uniform(-2.0, 2.0, (6, 6)):
         goal = by_joints(*offsets)
-        kept = [
-            np.min(collision.values(HOME + share * (there - HOME)))
-            for there, error in arm_solutions(MODEL, HOME, goal)
-            if error < REACHED
-        ]
-        there = straight_solution(MODEL, collision, HOME, goal, clear)
-        found = np.min(collision.values(HOME + share * (there - HOME)))
-        np.testing.assert_allclose(MODEL.pose(there).position, goal.position, atol=0.01)
-        assert found >= min(clear, max(kept)) - 1e-9
-        farther += kept[0] < clear <= found
+        ways = [there - HOME for there, error in arm_solutions(MODEL, HOME, goal) if error < REACHED]
+        far = [np.linalg.norm(way) for way in ways]
+        assert far == sorted(far)
+        assert np.max(np.abs(ways)) <= np.pi + 1e-9  # the shorter way around
+        kept = np.array([np.min(collision.values(HOME + share * way)) for way in ways])
+        for clear in (0.03, np.median(kept), np.inf):
+            there = straight_solution(MODEL, collision, HOME, goal, clear)
+            which = np.argmax(kept >= clear) if np.any(kept >= clear) else np.argmax(kept)
+            np.testing.assert_allclose(there, HOME + ways[which], atol=1e-12)
+            np.testing.assert_allclose(MODEL.pose(there).position, goal.position, atol=0.01)
+            farther += which > 0
     assert farther
 
 

@@ -84,6 +84,17 @@ def test_a_mask_of_ones_own_has_no_mode_s_name(masked):
     assert replay.replay_episode(masked, 1)[0].largest == 0.0
 
 
+def test_settings_of_a_person_that_are_gone_are_passed_over():
+    """Older episodes say two numbers more of a person; any other unknown one is a slip."""
+    config = SessionConfig(task="reach")
+    said = json.loads(settings_json(config))
+    said["human"] |= {"inner_error": 0.08, "tremor": 0.003}
+    assert recorded_settings({"settings": json.dumps(said)}) == config
+    said["human"]["tremr"] = 0.003
+    with pytest.raises(HandrailError, match="unknown entry 'tremr'"):
+        recorded_settings({"settings": json.dumps(said)})
+
+
 WHOLE = json.loads(settings_json(SessionConfig()))
 
 

@@ -82,11 +82,11 @@ def moved(columns, shift, angle):
 
 @pytest.mark.parametrize("actions", ["realised", "intent"])
 def test_same_everywhere(actions):
-    """A policy sees and writes the same wherever in the world the same thing happens."""
+    """A policy sees and writes the same wherever in the world the same thing happens, but for where it is."""
     rng = np.random.default_rng(0)
     columns = episode(rng, [("ee",), ("base", "joint")])
     other = moved(columns, np.array([3.0, -2.0]), 2.1)
-    interface = PolicyInterface.of_dataset(FEATURES, [columns], actions)
+    interface = PolicyInterface.of_dataset(FEATURES, [columns], actions, base_pose=False)
     for seen in zip(
         interface.observe(columns["observation.state"], columns["observation.environment_state"]),
         interface.observe(other["observation.state"], other["observation.environment_state"]),
@@ -94,6 +94,32 @@ def test_same_everywhere(actions):
     ):
         np.testing.assert_allclose(seen[0], seen[1], atol=1e-5)
     np.testing.assert_allclose(interface.encode(columns), interface.encode(other), atol=1e-5)
+
+
+def test_a_policy_sees_where_the_base_is():
+    """Its place and heading, after all else; who sees nothing of it sees the same otherwise."""
+    columns = episode(np.random.default_rng(2), [("ee",)])
+    parts = columns["observation.state"], columns["observation.environment_state"]
+    placed = PolicyInterface.of_dataset(FEATURES, [columns], "realised")
+    without = dataclasses.replace(placed, base_pose=False)
+    (state, around), (less, same) = placed.observe(*parts), without.observe(*parts)
+    x, y, yaw = columns["observation.state"][:, :3].T
+    names = placed.observation_names[0]
+    assert names == (*without.observation_names[0], "base.x", "base.y", "base.cos", "base.sin")
+    np.testing.assert_allclose(state[:, -4:], np.column_stack([x, y, np.cos(yaw), np.sin(yaw)]), atol=1e-6)
+    np.testing.assert_array_equal(state[:, :-4], less)
+    np.testing.assert_array_equal(around, same)
+
+
+def test_an_older_checkpoint_keeps_its_view():
+    """It does not say whether it sees where the base is: then it does not."""
+    interface = PolicyInterface.of_dataset(FEATURES, [episode(np.random.default_rng(3), [("ee",)])], "intent")
+    content = json.loads(json.dumps(dataclasses.asdict(interface)))
+    assert PolicyInterface.from_dict(content) == interface
+    del content["base_pose"]
+    assert PolicyInterface.from_dict(content) == dataclasses.replace(interface, base_pose=False)
+    with pytest.raises(HandrailError, match="base_pose: expected true or false"):
+        PolicyInterface.from_dict(content | {"base_pose": "yes"})
 
 
 def test_a_policy_does_not_see_how_fast_the_robot_moves():
