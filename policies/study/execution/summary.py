@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from handrail.collect.experiments.scaling.digest import digest_of_rows
 from handrail.datasets.quality.load import read_demonstrations
 from handrail.datasets.quality.measure import measure
+from handrail.datasets.reading.digest import digest_of_rows
 
 
 def summary(root: Path, seed: int) -> dict[str, Any]:
