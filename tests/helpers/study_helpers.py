@@ -4,6 +4,7 @@ import dataclasses
 import functools
 import shutil
 import tempfile
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -113,10 +114,12 @@ def make(job, design, layout, shares=None):
             share = shares[job.policy.label][job.cell.draw]
         write_json(layout.policy(job.policy) / "checkpoints/000010/pretrained_model/handrail.json", {})
         for what, config in evaluations(job, design).items():
-            rollouts = [made_up(seed, bool(rng.random() < share)) for seed in config.seeds]
-            ending = {"nominal": "", "disturbed": " pushed", "protected": " filter"}[what]
-            entry = {"training_seed": job.cell.draw, "dataset_draw": job.cell.draw, "rollouts": rollouts}
-            arms = {job.policy.label + ending: [entry]}
+            arms = {}
+            for perturbation, protection in product(config.perturbations, config.protections):
+                rollouts = [made_up(seed, bool(rng.random() < share)) for seed in config.seeds]
+                entry = {"training_seed": job.cell.draw, "dataset_draw": job.cell.draw, "rollouts": rollouts}
+                ending = {"protected": protection, "disturbed": perturbation.words, "nominal": ""}[what]
+                arms[f"{job.policy.label} {ending}".strip()] = [entry]
             write_json(layout.evaluation(job.policy, what), {"format": FORMAT, "arms": arms})
     result = LEARNT if job.policy else COLLECTED
     took = {"seconds": 10.0, "processor_seconds": 9.0, "cores": 2, "ended": "2026-01-01T00:00:00+00:00"}

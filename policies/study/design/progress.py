@@ -68,7 +68,7 @@ class StudyProgress:
 
     def _has_dataset(self, job: Job) -> bool:
         """Return whether the dataset that a job noted is still there, whole."""
-        root, noted = self.layout.dataset(job.cell), note_of(job, self.layout).get("result", {})
+        root, noted = self.layout.dataset(job.cell), self._notes[job.name].get("result", {})
         try:
             return read_info(root).episodes >= noted.get("episodes", 1) and any(root.glob("data/*/*.parquet"))
         except HandrailError:
@@ -76,13 +76,17 @@ class StudyProgress:
 
     def note(self, job: Job) -> dict[str, Any]:
         """Return the note of a job: `settings`, `result`, what it `took`; nothing until it is done."""
-        return note_of(job, self.layout) if job.name in self.done else {}
+        return self._notes[job.name] if job.name in self.done else {}
 
     def rollouts(self, job: Job) -> list[Path]:
         """Return the files of the rollouts of a job's policy; none until it is done."""
         if job.policy is None or job.name not in self.done:
             return []
         return [self.layout.evaluation(job.policy, what) for what in evaluations(job, self.design)]
+
+    @cached_property
+    def _notes(self) -> dict[str, dict[str, Any]]:
+        return {job.name: note_of(job, self.layout) for job in self.jobs}
 
     @cached_property
     def jobs(self) -> list[Job]:

@@ -28,7 +28,8 @@ class Contrast:
         tasks: over which, with equal weight.
         measure: `success` or `contact`.
         estimate: over draws, each draw's conditions met the same scenes.
-        p_adjusted: by Holm over what is declared; None where nothing is tested.
+        sides: the mean of what is added, and of what is taken off.
+        p_adjusted: by Holm over what is declared; None where nothing is tested, or not yet.
     """
 
     name: str
@@ -36,6 +37,7 @@ class Contrast:
     tasks: tuple[str, ...]
     measure: str
     estimate: Estimate
+    sides: tuple[float, float]
     p_adjusted: float | None = None
 
     @property
@@ -45,10 +47,13 @@ class Contrast:
 
 
 def contrasts(results: Results) -> list[Contrast]:
-    """Return all contrasts for which there is something: the declared ones first, p adjusted over these."""
+    """Return all contrasts for which there is something: the declared ones first, p adjusted over these.
+
+    Nothing is tested before all draws are there: who looks in between and stops where it suits finds too much.
+    """
     design = results.progress.design
     declared = [each for each in _declared(results, design) if each]
-    tested = [each for each in declared if each.estimate.p is not None]
+    tested = [each for each in declared if each.estimate.replicates == design.draws > 1]
     adjusted = holm([each.estimate.p for each in tested if each.estimate.p is not None])
     by_name = {each.name: p for each, p in zip(tested, adjusted, strict=True)}
     found = [replace(each, p_adjusted=by_name.get(each.name)) for each in declared]
@@ -144,4 +149,16 @@ def _contrast(
         for draw in draws
     ]
     least = sum(weight**2 * each.least(measure) for each, weight in conditions)
-    return Contrast(name, kind, tasks, measure, student(values, least))
+    sides = _side(conditions, draws, measure, 1.0), _side(conditions, draws, measure, -1.0)
+    return Contrast(name, kind, tasks, measure, student(values, least), sides)
+
+
+def _side(
+    conditions: Sequence[tuple[Condition, float]], draws: Sequence[int], measure: str, sign: float
+) -> float:
+    """Return the mean over the conditions whose weights have a sign."""
+    side = [(each, abs(weight)) for each, weight in conditions if weight * sign > 0.0]
+    total = sum(
+        weight * float(each.draws[draw].values(measure).mean()) for each, weight in side for draw in draws
+    )
+    return total / (len(draws) * sum(weight for _, weight in side))

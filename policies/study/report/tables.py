@@ -50,7 +50,8 @@ def contrasts_table(found: Sequence[Contrast], kind: str, results: Results) -> T
             str(estimate.replicates),
         ]
         seen = estimate.detectable(len(factors.primary)) if factors else None
-        tail = [p_alone(estimate.p), p_alone(each.p_adjusted), expected.get(each.name, DASH)]
+        p = estimate.p if each.p_adjusted is not None else None
+        tail = [p_alone(p), p_alone(each.p_adjusted), expected.get(each.name, DASH)]
         rows.append([*cells, *(tail + [DASH if seen is None else f"{100 * seen:.0f}"] if tested else [])])
     headings = ["contrast", "tasks", "of", "points", "95 %", "draws"]
     headings += ["p", "p (Holm)", "detectable, planned", "detectable, as it came out"] if tested else []
@@ -207,8 +208,9 @@ def sweep(task: str, results: Results) -> list[tuple[float, Condition, float]]:
         for noise in sorted({1.0, *design.sweep.noises}):
             condition, data = results.find(task, mode, "", noise), results.collected(task, mode, noise)
             successes = sum(each["successes"] for each in data)
-            if condition and successes:
-                kept = {draw: each for draw, each in condition.draws.items() if draw < design.sweep.draws}
+            draws = condition.draws.items() if condition else ()
+            kept = {draw: each for draw, each in draws if draw < design.sweep.draws}
+            if kept and successes:
                 seconds = 60.0 * sum(each["minutes"] for each in data) / successes
                 found.append((noise, Condition(task, mode, "", kept), seconds))
     return found

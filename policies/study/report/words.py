@@ -21,7 +21,7 @@ def answer(found: Sequence[Contrast], results: Results) -> list[str]:
     sentences = [_effect(declared.get(WORDS["controller"]), "controller", results)]
     both = [_effect(declared.get(WORDS[name]), name, results) for name in ("input", "interaction")]
     sentences.append("; ".join(filter(None, both)))
-    return [_begun(sentence) for sentence in (*filter(None, sentences), _limits(results))]
+    return [_begun(each) for each in (*filter(None, sentences), _limits(list(declared.values()), results))]
 
 
 def _undeclared(design: StudyDesign) -> str:
@@ -34,33 +34,36 @@ def _undeclared(design: StudyDesign) -> str:
 
 def _effect(contrast: Contrast | None, name: str, results: Results) -> str:
     """Return what a declared contrast says."""
-    if contrast is None:
+    factors = results.progress.design.factors
+    if contrast is None or factors is None:
         return ""
-    estimate, factors = contrast.estimate, results.progress.design.factors
-    assert factors is not None
-    size = f"{points(estimate.value)} points"
+    estimate, size = contrast.estimate, f"{points(contrast.estimate.value)} points"
     if estimate.interval is None:
-        return f"{_subject(name)}: {size} in one draw, which tests nothing"
-    rest = f"95 % {points_span(estimate.interval)}, {p_value(contrast.p_adjusted or 0.0)} after Holm"
-    seen = estimate.detectable(len(factors.primary)) or 0.0
+        return f"{_subject(contrast, name)}: one draw tests nothing"
+    span = f"95 % {points_span(estimate.interval)}"
+    if contrast.p_adjusted is None:
+        return f"{_subject(contrast, name)}: {size} so far ({span}), not tested before all draws are done"
+    rest = f"{span}, {p_value(contrast.p_adjusted)} after Holm"
     if contrast.detected:
-        return f"{_subject(name)}: a difference of {size} ({rest})"
-    unseen = f"one below about {100 * seen:.0f} points would often go unseen here"
-    return f"{_subject(name)}: no difference detected ({size}, {rest}; {unseen})"
+        return f"{_subject(contrast, name)}: a difference of {size} ({rest})"
+    seen = 100 * (estimate.detectable(len(factors.primary)) or 0.0)
+    unseen = f"one below about {seen:.0f} points would often go unseen here"
+    return f"{_subject(contrast, name)}: no difference detected ({size}, {rest}; {unseen})"
 
 
-def _subject(name: str) -> str:
+def _subject(contrast: Contrast, name: str) -> str:
+    one, other = map(percent, contrast.sides)
     return {
-        "controller": "Policies that learnt from what the MPC completed, against the same input without it",
-        "input": "those that learnt from an operator who steers the hand, against one who steers the joints",
-        "interaction": "what the MPC adds with the hand, against what it adds with the joints",
+        "controller": f"policies that learnt from demonstrations with the MPC succeeded in {one}, without in"
+        f" {other}",
+        "input": f"with the hand steered it was {one}, with the joints {other}",
+        "interaction": f"what the MPC adds is {points(contrast.estimate.value)} points more with the hand"
+        " than with the joints",
     }[name]
 
 
-def _limits(results: Results) -> str:
-    design = results.progress.design
-    draws = [set(each.draws) for each in results.conditions.values() if not each.treatment]
-    done = max((len(each) for each in draws), default=0)
+def _limits(declared: Sequence[Contrast], results: Results) -> str:
+    design, done = results.progress.design, min(each.estimate.replicates for each in declared)
     partly = (
         f"{done} of {design.draws} draws so far, " if results.progress.missing else f"{design.draws} draws, "
     )

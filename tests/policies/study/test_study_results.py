@@ -118,7 +118,9 @@ def test_only_draws_that_are_whole_count(gathered):
     found = {(each.name, each.tasks): each for each in contrasts(results) if each.measure == "success"}
     assert found[WORDS["input"], ("reach", "tray")].estimate.replicates == 3
     assert found[WORDS["input"], ("reach",)].estimate.replicates == 4
-    assert "4 draws so far" in answer(contrasts(results), results)[-1]
+    assert all(each.p_adjusted is None for each in found.values())  # nobody stops where it suits
+    assert "not tested before all draws are done" in answer(contrasts(results), results)[0]
+    assert "3 of 4 draws so far" in answer(contrasts(results), results)[-1]
     assert any("jobs are not done yet" in text for text in cautions(results))
 
 
@@ -175,6 +177,10 @@ def test_the_answer_is_three_sentences_and_claims_no_more_than_was_detected(gath
     said = answer(found, results)
     assert len(said) == 3
     assert [each.name for each in found if each.detected] == [WORDS["controller"]]
+    shares = {label: shares_of(results, "reach", label).mean() for label in MODES}
+    shares |= {label: (shares[label] + shares_of(results, "tray", label).mean()) / 2 for label in MODES}
+    with_it, without = (shares["ee"] + shares["joints"]) / 2, (shares["decoupled"] + shares["direct"]) / 2
+    assert f"with the MPC succeeded in {100 * with_it:.0f} %, without in {100 * without:.0f} %" in said[0]
     assert "a difference of +" in said[0]
     assert said[1].count("no difference detected") == 2
     assert said[1].count("would often go unseen") == 2
@@ -194,7 +200,7 @@ def test_without_factors_or_with_one_draw_nothing_is_claimed(gathered):
     single = gathered(replace(DESIGN, draws=1, beside=None))
     found = contrasts(single)
     assert all(each.estimate.interval is None and each.p_adjusted is None for each in found)
-    assert "tests nothing" in answer(found, single)[0]
+    assert "one draw tests nothing" in answer(found, single)[0]
     assert "There is one draw" in how(single, found)
     assert tables.contrasts_table(found, DECLARED, single).rows
 
