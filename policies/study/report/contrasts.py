@@ -49,7 +49,7 @@ class Contrast:
 def contrasts(results: Results) -> list[Contrast]:
     """Return all contrasts for which there is something: the declared ones first, p adjusted over these.
 
-    Nothing is tested before all draws are there: who looks in between and stops where it suits finds too much.
+    Nothing is tested before all draws are there: who looks in between and stops where it suits finds more.
     """
     design = results.progress.design
     declared = [each for each in _declared(results, design) if each]
