@@ -20,6 +20,10 @@ class StudyConfig(ExecutionConfig):
     """Also write tables and figures into this Markdown file (.md), between marks."""
     report_only: bool = False
     """Only write the report of what is done so far."""
+    plan: bool = False
+    """Only say what the study declares and what it can detect; nothing is run."""
+    only: str = ""
+    """Only the jobs of this cell, TASK/MODE/DRAW such as reach/ee/3: the same data and the same rollouts."""
 
     @property
     def folder(self) -> Path:

@@ -11,9 +11,9 @@ from typing import Any
 
 from handrail.collect.execution.config import ExecutionConfig
 from handrail.collect.experiments.scaling.config import ScalingConfig
-from handrail.collect.experiments.scaling.digest import digest_of_rows
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.presentation.table import Table
+from handrail.datasets.reading.digest import digest_of_rows
 from handrail.datasets.reading.reader import read_episodes
 
 _COMMAND = "from handrail.scripts.record import main; main()"

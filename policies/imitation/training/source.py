@@ -3,7 +3,7 @@
 import hashlib
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -27,7 +27,7 @@ from handrail.policies.imitation.interface.interface import (
     PolicyInterface,
 )
 from handrail.policies.imitation.training.memory import MemoryDataset, MemoryMeta
-from handrail.policies.imitation.training.selection import Selection, select, select_again
+from handrail.policies.imitation.training.selection import Row, Selection, hold_out, select, select_again
 
 if TYPE_CHECKING:
     from lerobot.configs.policies import PreTrainedConfig
@@ -74,13 +74,28 @@ class Source:
 
     @property
     def trained_on(self) -> dict[str, float]:
-        """How many episodes, how many attempts they took, and how long those were [s]."""
-        chosen = self.selection
-        return {
-            "episodes": len(chosen.rows),
+        """How many episodes it learns from, how many attempts all took, and how long those were [s]."""
+        chosen, (_, held_out) = self.selection, self.split
+        numbers: dict[str, float] = {
+            "episodes": len(chosen.rows) - len(held_out),
             "attempts": chosen.attempts,
             "operator_time": chosen.operator_time,
         }
+        return numbers | ({"held_out": len(held_out)} if held_out else {})
+
+    @property
+    def split(self) -> tuple[list[Row], list[Row]]:
+        """The episodes to learn from, and those that are held out."""
+        return hold_out(self.selection.rows, self.config)
+
+    def only(self, rows: Sequence[Row]) -> "Source":
+        """Return the source with some of its episodes, in their order."""
+        numbers, all_rows = {row["episode_index"] for row in rows}, self.selection.rows
+        inside = [row["episode_index"] in numbers for row in all_rows]
+        kept = np.repeat(inside, [row["length"] for row in all_rows])
+        selection = replace(self.selection, rows=tuple(rows))
+        columns = {key: values[kept] for key, values in self.columns.items()}
+        return replace(self, selection=selection, columns=columns | _counters(selection, self.info.fps))
 
     def dataset(self, policy: "PreTrainedConfig") -> MemoryDataset:
         """Return what LeRobot trains a policy on."""

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from compare_helpers import quick_and_slow
+from compare_helpers import judge, quick_and_slow
 
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.comparison import compare as comparing
@@ -14,7 +14,7 @@ from handrail.datasets.comparison.differences import differences
 from handrail.datasets.comparison.evaluations import Condition, Policy
 from handrail.datasets.comparison.findings import findings
 from handrail.datasets.comparison.groups import Group
-from handrail.datasets.comparison.outcomes import LIKE_FOR_LIKE, Pair, in_families, judge, judge_pairs
+from handrail.datasets.comparison.outcomes import LIKE_FOR_LIKE, Pair, in_families, judge_pairs
 from handrail.datasets.format.schema import Feature
 from handrail.datasets.quality.catalogue import METRICS
 from handrail.datasets.quality.demonstration import Demonstration
