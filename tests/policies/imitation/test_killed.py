@@ -147,8 +147,7 @@ def test_a_study_killed_while_it_writes(tmp_path):
     design, layout, kills = load_design(str(preset)), Layout(study), 0
     kept: set[str] = set()
     for job in jobs(design):
-        few, many = (1, 8) if job.task else (5, 60)
-        for change in (*rng.integers(few, many, 2).tolist(), NEVER):
+        for change in (*rng.integers(5, 60, 2).tolist(), NEVER):
             if layout.done(job).is_file():
                 break
             kills += killed(study, change, do, job, design, study)
