@@ -17,7 +17,7 @@ from command_helpers import command
 from places import HELPERS
 from shared_helpers import content, saved, started, wait_until
 
-from handrail.collect.experiments.scaling.digest import digest_of_rows
+from handrail.datasets.reading.digest import digest_of_rows
 
 os.environ["RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER"] = "0"  # else Ray looks for 127.0.0.1 at another address
 NODE = {"num_cpus": 1, "object_store_memory": 100_000_000, "node_ip_address": "127.0.0.1"}
