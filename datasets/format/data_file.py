@@ -7,7 +7,7 @@ whole. Every page has a checksum, so that no rows are taken for others.
 """
 
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import pyarrow as pa
@@ -60,6 +60,8 @@ class GrowingDataFile:
 
     def abandon(self) -> None:
         """Let the file go, which the caller removes."""
+        with suppress(OSError, pa.ArrowException):  # else it complains when it is forgotten
+            self._writer.close()
         self._sink.close()
 
     def _write_group(self) -> None:
