@@ -66,9 +66,20 @@ class MetricPrediction:
         """Which end was thought to be better: `higher`, `lower` or ""."""
         return _GOOD.get(self.metric, "")
 
+    @property
+    def between_detected(self) -> bool:
+        """Whether it is there between modes: the interval leaves zero out, the adjusted p is below 0.05."""
+        return _detected(self.between, self.p_between)
+
+    @property
+    def within_detected(self) -> bool:
+        """The same between recordings of one mode."""
+        return _detected(self.within, self.p_within)
+
+    @property
     def detected(self) -> bool:
-        """Whether either is there: the interval leaves zero out, and the adjusted p is below 0.05."""
-        return _detected(self.between, self.p_between) or _detected(self.within, self.p_within)
+        """Whether either is there."""
+        return self.between_detected or self.within_detected
 
 
 def _detected(found: RankCorrelation | None, p: float) -> bool:

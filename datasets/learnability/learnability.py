@@ -15,8 +15,9 @@ from handrail.datasets.learnability.parts import ALL, GRIPPER, parts
 from handrail.datasets.learnability.policy_rows import PolicyView, recorded_view
 from handrail.datasets.learnability.sample import Budget, Sample, take
 from handrail.datasets.learnability.two_heaps import NEIGHBOURS, two_heaps
-from handrail.datasets.quality.demonstration import Demonstration, DoesNotApply
-from handrail.datasets.quality.pool import embed
+from handrail.datasets.quality.demonstration import DoesNotApply
+from handrail.datasets.quality.episode import Episode
+from handrail.datasets.quality.pool import Spread, embed
 from handrail.datasets.statistics.resampling import Interval, percentiles
 
 CAVEAT = (
@@ -98,7 +99,7 @@ class Learnability:
 
 
 def learnability(
-    episodes: Sequence[Demonstration],
+    episodes: Sequence[Episode],
     rng: np.random.Generator,
     view: PolicyView = recorded_view,
     budget: Budget | None = None,
@@ -203,7 +204,9 @@ class _Judge:
             return None
         switches = groups.get(GRIPPER, [])
         motion = [place for place in groups[ALL] if place not in switches] or groups[ALL]
-        near, heaped = two_heaps(embed(seen, _COMPONENTS)(seen), left[:, motion], self.sample.owner)
+        spread = Spread()
+        spread.add(seen)
+        near, heaped = two_heaps(embed(spread, _COMPONENTS)(seen), left[:, motion], self.sample.owner)
         if near.sum() <= _LEAST * len(near):
             return Score(0.0, (0.0, 0.0))
         return self._ratio(heaped, near)

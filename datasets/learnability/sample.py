@@ -8,11 +8,14 @@ import numpy as np
 from handrail.controllers.arrays import FloatArray, IntArray
 from handrail.datasets.learnability.candidates import PREVIOUS, before, hidden_variables
 from handrail.datasets.learnability.policy_rows import Actions, PolicyRows, PolicyView
-from handrail.datasets.quality.consistency import frames_of
 from handrail.datasets.quality.demonstration import Demonstration, DoesNotApply
+from handrail.datasets.quality.episode import Episode
+from handrail.datasets.quality.load import each_opened
+from handrail.datasets.quality.sample import frames_of
 
 EPISODES, FRAMES = 200, 4000  # of a group at most
 FEWEST = 6  # episodes
+_LEAST = 50  # frames
 _THIRDS = ("first third", "second third", "last third")
 
 
@@ -50,16 +53,14 @@ class Sample:
         return int(self.owner.max()) + 1
 
 
-def shared_budget(groups: Sequence[Sequence[Demonstration]]) -> Budget:
+def shared_budget(groups: Sequence[Sequence[Episode]]) -> Budget:
     """Return as much as the smallest of some groups has, and no more than is needed."""
     episodes = min(EPISODES, *(len(group) for group in groups))
     means = [sum(episode.count for episode in group) / len(group) for group in groups]
     return Budget(episodes, min(FRAMES, int(episodes * min(means))))
 
 
-def take(
-    episodes: Sequence[Demonstration], view: PolicyView, budget: Budget, rng: np.random.Generator
-) -> Sample:
+def take(episodes: Sequence[Episode], view: PolicyView, budget: Budget, rng: np.random.Generator) -> Sample:
     """Return frames of randomly chosen episodes; the order in which these are given does not matter.
 
     Args:
@@ -76,8 +77,11 @@ def take(
     order = sorted(range(len(episodes)), key=lambda place: episodes[place].number)
     drawn = np.sort(rng.permutation(len(order))[: budget.episodes])
     chosen = [episodes[order[place]] for place in drawn]
-    frames = frames_of(chosen, budget.frames)
-    taken = [_taken(episode, view(episode), each) for episode, each in zip(chosen, frames, strict=True)]
+    frames = frames_of([episode.count for episode in chosen], budget.frames)
+    if sum(map(len, frames)) < _LEAST:
+        raise DoesNotApply(f"there are fewer than {_LEAST} frames")
+    opened = zip(each_opened(chosen), frames, strict=True)  # one in memory at a time
+    taken = [_taken(episode, view(episode), each) for episode, each in opened]
     first = taken[0]
     if any(each.shape != first.shape for each in taken):
         raise DoesNotApply("its episodes do not all hold the same")

@@ -20,8 +20,9 @@ def learnability_words(found: Mapping[str, Learnability | str]) -> str:
         score = usual.parts[ALL]
         told.append(f"{label} {number(score.estimate)} (95 % {span(score.interval)}; {space}")
         told[-1] += f", {each.episodes} episodes, {each.frames} frames)"
-    return f"Learnability, held-out R² of the action from what a policy reads: {'; '.join(told)}." + (
-        f" {CAVEAT}" if known else ""
+    return (
+        f"Learnability, held-out R² of the action from what a policy reads: {'; '.join(told)}. It is"
+        f" described, not tested: no difference is claimed.{f' {CAVEAT}' if known else ''}"
     )
 
 

@@ -4,7 +4,7 @@ It writes the joint velocities that came about, or the operator's own command: b
 the base's axes like what the policy sees.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -24,7 +24,8 @@ Columns = Mapping[str, np.ndarray]
 Mask = tuple[bool, ...]
 ACTIONS = ("realised", "intent")
 STATE, ENVIRONMENT, ACTION = "observation.state", "observation.environment_state", "action"
-COLUMNS = (STATE, ENVIRONMENT, ACTION, "teleop.values", "teleop.mask")
+MASK = "teleop.mask"
+COLUMNS = (STATE, ENVIRONMENT, ACTION, "teleop.values", MASK)
 _GRIPPER = "gripper"
 _HALF = 0.5  # a gripper command beyond it closes
 _CHANNELS = Entry("names of channels", lists(is_text))
@@ -51,13 +52,13 @@ class PolicyInterface:
 
     @classmethod
     def of_dataset(
-        cls, features: Mapping[str, Feature], episodes: Sequence[Columns], actions: str
+        cls, features: Mapping[str, Feature], episodes: Iterable[Columns], actions: str
     ) -> "PolicyInterface":
         """Return the interface of a policy that is trained on some episodes.
 
         Args:
             features: of the dataset.
-            episodes: `COLUMNS` of each.
+            episodes: `MASK` of each; read only where the operator's own commands are learnt.
             actions: `realised` or `intent`.
 
         Raises:
@@ -100,7 +101,7 @@ class PolicyInterface:
         pose = self._view.pose(state)
         for pair in self._pairs:
             values[:, pair] = pose.turned(values[:, pair])
-        rows = columns["teleop.mask"][:, : len(self.channels)].astype(bool)
+        rows = columns[MASK][:, : len(self.channels)].astype(bool)
         flags = [(rows == mask).all(axis=1) for mask in self.masks] if len(self.masks) > 1 else []
         return np.column_stack([values[:, self.commanded], *flags, gripper]).astype(np.float32)
 
@@ -176,11 +177,11 @@ class PolicyInterface:
         return [[start, start + 1] for start in whole]
 
 
-def _masks_of(channels: Channels, episodes: Sequence[Columns]) -> tuple[Mask, ...]:
+def _masks_of(channels: Channels, episodes: Iterable[Columns]) -> tuple[Mask, ...]:
     """Return every set of channels that an operator owned in some episodes."""
     masks: set[Mask] = set()
     for columns in episodes:
-        rows = columns["teleop.mask"][:, : channels.size].astype(bool)
+        rows = columns[MASK][:, : channels.size].astype(bool)
         masks |= set(map(tuple, np.unique(rows, axis=0).tolist()))
     if not any(map(any, masks)):
         raise HandrailError("intent as action: expected episodes in which an operator steers, got none")

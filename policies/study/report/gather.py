@@ -16,7 +16,7 @@ from handrail.datasets.comparison.outcomes import (
     judge,
     judge_pairs,
 )
-from handrail.datasets.quality.load import read_demonstrations
+from handrail.datasets.quality.load import recorded_episodes
 from handrail.datasets.reading.reader import read_info
 from handrail.policies.study.design.design import StudyDesign, Sweep
 from handrail.policies.study.design.jobs import Cell
@@ -88,7 +88,7 @@ def read_collected(progress: StudyProgress, cell: Cell) -> Collected | None:
     root = progress.dataset(cell)
     if root is None:
         return None
-    return collected(Group(cell.mode, read_info(root), tuple(read_demonstrations(root))))
+    return collected(Group(cell.mode, read_info(root), tuple(recorded_episodes(root))))
 
 
 def read_conditions(
