@@ -17,7 +17,7 @@ _MODEST = ("setpriv", "--bounding-set=-sys_nice", "--inh-caps=-sys_nice")  # sta
 _LAST = (*(_MODEST if os.geteuid() == 0 and shutil.which("setpriv") else ()), "nice", "-n", "19")
 _MOMENT = 0.02  # [s]
 _SHOWN = 300  # letters of what a command said last
-_REAPED = 90.0  # workers of a killed command end by themselves within this [s]
+_REAPED = 300.0  # workers of a killed command end by themselves within this [s]
 
 
 def command(name: str) -> str:
@@ -73,6 +73,15 @@ class Child:
     def workers(self) -> list[int]:
         """The processes that its own processes have begun: those forked from its server."""
         return [worker for child in children(self.pid) for worker in children(child)]
+
+    @property
+    def spent(self) -> float:
+        """The processor's time that the command has used, its workers left out [s]."""
+        try:
+            words = Path(f"/proc/{self.pid}/stat").read_text().rpartition(")")[2].split()
+        except OSError:
+            return 0.0
+        return (int(words[11]) + int(words[12])) / os.sysconf("SC_CLK_TCK")
 
     def set(self, **faults: float) -> None:
         """Say which disk and clock it has from now on: `delay` [s], `shift` [s]."""

@@ -26,9 +26,9 @@ def any_work(
         only: the only kind that is wanted; any when empty.
     """
     recipe = RECIPES[int(rng.integers(len(RECIPES)))]
-    kinds = {"record": 5, "record_2": 4, "resume": 2, "packed": 2, "edit": 4, "evaluate": 2, "replay": 1}
+    kinds = {"record": 5, "record_2": 4, "resume": 2, "packed": 2, "edit": 4, "evaluate": 1, "replay": 1}
     if fault.workers:
-        kinds = {"record_2": 3, "evaluate_2": 1}
+        kinds = {"record_2": 5, "evaluate_2": 1}
     if fault.cluster or (not only and rng.random() < _RAY and fault.codes >= KILLED):
         return RayRecording(folder, workshop, recipe)
     names = [only] if only else list(kinds)

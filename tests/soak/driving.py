@@ -10,6 +10,7 @@ import os
 import re
 import signal
 import time
+from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -103,7 +104,8 @@ class Drive:
         lost = [each for each in before if now.get(each) != before[each]]
         complaints += [f"{each} was saved and is gone or another" for each in lost]
         row = {"round": self._number, "fault": name, "work": "drive in the browser, one process"}
-        row |= {"struck": True, "saved_before": len(before), "saved_after": len(now), "lost": len(lost)}
+        row |= {"struck": True, "saved_before": _episodes(before), "saved_after": _episodes(now)}
+        row |= {"lost": _episodes(lost)}
         row |= {"seconds": round(took, 1), "complaints": complaints, "commit": commit()}
         note(self._out / ROUNDS, row | {"load": round(os.getloadavg()[0], 1)})
         self._number += 1
@@ -167,7 +169,7 @@ class Drive:
             complaints.append(repair.last_words)
         row = {"round": self._number, "fault": "Ctrl-C at the end", "struck": ran, "code": code}
         row |= {"work": "drive in the browser, one process", "seconds": 0.0, "commit": commit()}
-        row |= {"saved_before": len(before), "lost": len(lost), "complaints": complaints}
+        row |= {"saved_before": _episodes(before), "lost": _episodes(lost), "complaints": complaints}
         note(self._out / ROUNDS, row | {"said": repair.last_words})
 
 
@@ -183,6 +185,11 @@ def _memory(pid: int) -> dict[str, int]:
     said = dict(line.split(":", 1) for line in lines)
     files = len(list(Path(f"/proc/{pid}/fd").iterdir()))
     return {"rss": int(said["VmRSS"].split()[0]), "files": files, "threads": int(said["Threads"])}
+
+
+def _episodes(files: Iterable[str]) -> int:
+    """Return of how many episodes some files are."""
+    return len({name.partition("/chunk-")[2] for name in files})
 
 
 def _digest(file: Path) -> str:

@@ -19,9 +19,9 @@ from workshop import Workshop
 
 from handrail.datasets.recording.repair import repair
 
-_PATIENCE = 600.0  # for the end of a command [s]
-_ARRIVAL = 240.0  # for the moment of the fault [s]
-_STARTS = 12.0  # a command has begun to work by then [s]
+_PATIENCE = 1800.0  # for the end of a command [s]
+_ARRIVAL = 900.0  # for the moment of the fault [s]
+_STARTS = 8.0  # of the processor's time; a command has begun to work by then [s]
 _EPISODE = 1.5  # [s]
 _DISK = 48  # size of the small one [MB]
 _GOES = 4  # commands after a fault
@@ -123,9 +123,12 @@ class _Round:
         work, first = self._work, self._work.progress()
         todo = max(0, work.steps - first)
         wanted = first + int(self._rng.integers(0, todo + 1)) if todo else first
-        if wanted == first:
-            time.sleep(self._rng.uniform(0.5, _STARTS))
-        wait_until(lambda: work.progress() >= wanted or not child.runs, _ARRIVAL)
+        spent = self._rng.uniform(0.0, _STARTS) if wanted == first else 0.0
+
+        def is_there() -> bool:
+            return not child.runs or (work.progress() >= wanted and child.spent >= spent)
+
+        wait_until(is_there, _ARRIVAL)
         if wanted > first:
             time.sleep(self._rng.uniform(0.0, _EPISODE))
         return child.runs

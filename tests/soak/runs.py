@@ -12,15 +12,15 @@ from workshop import Recipe, Workshop
 class Evaluation(Work):
     """`handrail-evaluate`, with one process or two."""
 
-    _EPISODES = 14
+    _EPISODES = 6
 
     def __init__(self, folder: Path, workshop: Workshop, workers: int = 1) -> None:
         super().__init__(folder, workshop)
         self.many, self._file = workers, folder / "e.json"
         self.name = "evaluate" + (f" --workers {workers}" if workers > 1 else "")
-        words = ("evaluate", str(workshop.policy()), "--episodes", str(self._EPISODES), "--time_limit", "2")
+        words = ("evaluate", str(workshop.policy()), "--episodes", str(self._EPISODES), "--time_limit", "1")
         self._words = (*words, "--json", "{}/e.json")
-        whole = workshop.edited("evaluation", self._words, {}, "e.json")
+        whole = workshop.edited(f"evaluation-{self._EPISODES}", self._words, {}, "e.json")
         self.wanted = rollouts_of(whole)
 
     def words(self) -> list[str] | None:

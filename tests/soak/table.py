@@ -1,13 +1,15 @@
 """What came of a soak, as a page: `python tests/soak/table.py OUT docs/results/soak.md`.
 
-The tables stand between two marks in the page; the words around them are written by hand.
+The tables stand between two marks in the page; the words around them are written by hand. Everything goes to
+a JSON file beside it.
 """
 
 import argparse
+import json
 import re
 import statistics
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +17,7 @@ from notes import read
 
 Row = dict[str, Any]
 _HEADINGS = (
-    *("fault", "how often", "during", "the command then", "saved before", "lost"),
+    *("fault", "how often", "during", "the command then", "saved before", "lost", "complaints"),
     *("mended by `handrail-repair`", "finished by the same command", "seconds"),
 )
 _SIGNALS = {-9: "killed", -15: "ended by SIGTERM", -1: "hung up"}
@@ -32,6 +34,10 @@ def main() -> None:
         begin, end = f"<!-- {name} -->", f"<!-- end of {name} -->"
         text = re.sub(f"{begin}.*?{end}", lambda _, t=table: f"{begin}\n{t}\n{end}", text, flags=re.DOTALL)  # noqa: B023
     given.page.write_text(text)
+    names = ("rounds", "driving", "memory")
+    kept = {name: read(given.out / f"{name}.jsonl") for name in names}
+    lines = [f'"{name}": [\n{",\n".join(map(json.dumps, rows))}\n]' for name, rows in kept.items()]
+    given.page.with_suffix(".json").write_text("{" + ",\n".join(lines) + "}\n")
 
 
 def tables(out: Path) -> dict[str, str]:
@@ -40,21 +46,27 @@ def tables(out: Path) -> dict[str, str]:
     drives = [row for row in read(out / "driving.jsonl") if row.get("struck")]
     return {
         "rounds": _by_fault(rounds),
-        "drives": _by_fault(drives),
+        "drives": _by_fault(drives, together=True),
         "memory": _memory(read(out / "memory.jsonl")),
         "sum": _sum(rounds, drives, read(out / "rounds.jsonl")),
     }
 
 
-def _by_fault(rows: Sequence[Row]) -> str:
+def _by_fault(rows: Sequence[Row], together: bool = False) -> str:
+    """Return a line a fault.
+
+    Args:
+        rows: of what happened.
+        together: whether all are of one recording, which had saved the more the later it was.
+    """
     lines = [_line(_HEADINGS), _line(["---"] * len(_HEADINGS))]
     for fault in sorted({row["fault"] for row in rows}):
         some = [row for row in rows if row["fault"] == fault]
-        lines.append(_line([fault, *_cells(some)]))
+        lines.append(_line([fault, *_cells(some, max if together else sum)]))
     return "\n".join(lines)
 
 
-def _cells(rows: Sequence[Row]) -> list[str]:
+def _cells(rows: Sequence[Row], all_of: Callable[[Iterable[int]], int]) -> list[str]:
     works = Counter(_kind(row["work"]) for row in rows)
     ends = Counter(_end(row) for row in rows)
     goes = [row["goes"] for row in rows if "goes" in row]
@@ -62,8 +74,9 @@ def _cells(rows: Sequence[Row]) -> list[str]:
         str(len(rows)),
         _counted(works),
         _counted(ends),
-        str(sum(row["saved_before"] for row in rows)),
+        str(all_of(row["saved_before"] for row in rows)),
         str(sum(row["lost"] for row in rows)),
+        str(sum(bool(row["complaints"]) for row in rows)),
         str(sum(bool(row.get("mended")) for row in rows)),
         f"{sum(row['last_code'] in (0, 2) for row in rows if row.get('goes'))} of {sum(map(bool, goes))}",
         f"{statistics.median(row['seconds'] for row in rows):.0f}",
@@ -114,7 +127,9 @@ def _sum(rounds: Sequence[Row], drives: Sequence[Row], every: Sequence[Row]) -> 
     return (
         f"{len(both)} faults ({len(rounds)} in {hours:.1f} hours of rounds, {len(drives)} in the drives);"
         f" {late} more came when the command was done already. Saved before a fault:"
-        f" {sum(row['saved_before'] for row in both)} pieces; lost: {sum(row['lost'] for row in both)}."
+        f" {sum(row['saved_before'] for row in rounds)} pieces in the rounds, and up to"
+        f" {max((row['saved_before'] for row in drives), default=0)} episodes in a drive;"
+        f" lost: {sum(row['lost'] for row in both)}."
         f" Rounds with something to complain of: {len(bad)}."
     )
 
