@@ -17,6 +17,13 @@ from handrail.controllers.robot.model import RobotModel
 _MASS = 0.1  # of a cube of 5 cm [kg]
 _BIN_HEIGHT = 0.10
 _POSE = ("x", "y", "z", "qw", "qx", "qy", "qz")
+_STAGES = ("approach", "grasp", "lift", "carry", "place")
+_AT, _AROUND, _LIFTED = (
+    2.0,
+    1.0,
+    0.5,
+)  # of the cube's width: the hand is there, around it; it is off the table
+_OPEN = 0.8  # share of the stroke from which the gripper is open
 _VIEW = Viewpoint(position=(3.0, 0.0, 3.5), target=(0.05, 0.0, 0.2), fovy=56.0)
 
 
@@ -68,6 +75,23 @@ class PickPlace:
             numbers += [item.position[0], item.position[1], item.top]
         return np.concatenate([numbers, obstacle_features(state.start.scene)])
 
+    @property
+    def stages(self) -> tuple[str, ...]:
+        """What is done one after the other."""
+        return _STAGES
+
+    def stage(self, state: TaskState) -> str:
+        """Return what is to be done: get to the cube, close around it, lift it, go over the bin, let go."""
+        cube, start = state.pose("cube").position, state.object("cube")
+        width, away = start.shape.size[0], float(np.linalg.norm(state.tool.position - cube))
+        if _over_bin(state, cube):
+            return "place"
+        if cube[2] > start.position[2] + _LIFTED * width:
+            return "carry"
+        if away > _AT * width:
+            return "approach"
+        return "lift" if away < _AROUND * width and state.opening < _OPEN else "grasp"
+
     def outcome(self, state: TaskState) -> Verdict:
         """Judge where the cube is, whether it rests, and where the gripper is."""
         position = state.pose("cube").position
@@ -102,3 +126,10 @@ def _inside_bin(state: TaskState, position: FloatArray) -> bool:
     pose, size = state.pose("bin"), state.object("bin").shape.size
     local = pose.rotation.T @ (position - pose.position)
     return bool(np.all(np.abs(local) < size / 2))
+
+
+def _over_bin(state: TaskState, position: FloatArray) -> bool:
+    """Return whether a place is within the bin, or anywhere above it."""
+    pose, size = state.pose("bin"), state.object("bin").shape.size
+    local = pose.rotation.T @ (position - pose.position)
+    return bool(np.all(np.abs(local[:2]) < size[:2] / 2) and local[2] > -size[2] / 2)

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
@@ -135,4 +135,18 @@ class Task(Protocol):
 
     def outcome(self, state: TaskState) -> Verdict:
         """Judge a moment."""
+        ...
+
+
+@runtime_checkable
+class Staged(Protocol):
+    """A task that is done in stages, one after the other."""
+
+    @property
+    def stages(self) -> tuple[str, ...]:
+        """Their names, in order."""
+        ...
+
+    def stage(self, state: TaskState) -> str:
+        """Return which of them is to be done at a moment."""
         ...

@@ -19,7 +19,7 @@ A rollout needs `seed` and `success`; other numbers (`contacts`, `length` [s], â
 where every rollout of a condition has them. Several files add up; the same rollout twice is an error.
 """
 
-from collections.abc import Iterable, Mapping, Set
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -74,24 +74,6 @@ class Condition:
         rollouts = [rollout for policy in self.policies for rollout in policy.rollouts.values()]
         common = set.intersection(*(set(rollout) for rollout in rollouts))
         return (SUCCESS, *sorted(common - {SUCCESS}))
-
-    @property
-    def rollouts(self) -> frozenset[tuple[int, int, int]]:
-        """Draw, training seed and evaluation seed of every rollout."""
-        return frozenset((*each.key, seed) for each in self.policies for seed in each.rollouts)
-
-    def only(self, rollouts: Set[tuple[int, int, int]]) -> "Condition | None":
-        """Return the condition with some of its rollouts; None if it has none of these.
-
-        Args:
-            rollouts: Draw, training seed and evaluation seed of each.
-        """
-        fewer = [
-            replace(each, rollouts={k: v for k, v in each.rollouts.items() if (*each.key, k) in rollouts})
-            for each in self.policies
-        ]
-        kept = tuple(each for each in fewer if each.rollouts)
-        return Condition(self.label, kept) if kept else None
 
     def runs(self, outcome: str = SUCCESS) -> list[Run]:
         """Return one outcome of all policies."""

@@ -123,17 +123,6 @@ class Outcomes:
     differences: tuple[OutcomeDifference, ...]
 
 
-def judge(conditions: Mapping[str, Condition], baseline: str, rng: np.random.Generator) -> Outcomes:
-    """Compare the success of all conditions with the baseline's.
-
-    Args:
-        conditions: By label.
-        baseline: The label that the others are compared with.
-        rng: Of the resampling.
-    """
-    return judge_pairs(conditions, [Pair(label, baseline) for label in conditions if label != baseline], rng)
-
-
 def judge_pairs(
     conditions: Mapping[str, Condition], pairs: Sequence[Pair], rng: np.random.Generator
 ) -> Outcomes:

@@ -52,7 +52,15 @@ class TrainConfig:
     draw: int = 0
     """Seed of the order in which episodes are drawn; more episodes or minutes only add to the fewer."""
     steps: int = 0
-    """Updates of the policy; 0 for the preset's."""
+    """Updates of the policy; 0 for the preset's. With --patience the most that there may be."""
+    eval_split: float = 0.0
+    """Share of the episodes that the policy does not learn from, 5 at least: the loss is measured on them."""
+    eval_steps: int = 500
+    """Updates between two such measurements."""
+    patience: int = 0
+    """End when that loss is flat: so many measurements brought too little; 0 makes all updates."""
+    improvement: float = 0.02
+    """Share by which the best of these measurements has to be below the best before them."""
     batch_size: int = 0
     """Samples an update; 0 for the preset's."""
     lr: float = 0.0
@@ -88,9 +96,16 @@ class TrainConfig:
         for name in ("episodes", "minutes", "draw", "steps", "batch_size", "lr", "seed"):
             if not 0 <= getattr(self, name) < float("inf"):
                 raise HandrailError(f"--{name} {getattr(self, name)}: expected 0 or more")
-        for name in ("threads", "save_freq"):
+        for name in ("threads", "save_freq", "eval_steps"):
             if getattr(self, name) < 1:
                 raise HandrailError(f"--{name} {getattr(self, name)}: expected 1 or more")
+        for name in ("eval_split", "improvement"):
+            if not 0.0 <= getattr(self, name) < 1.0:
+                raise HandrailError(f"--{name} {getattr(self, name)}: expected 0 to below 1")
+        if self.patience < 0:
+            raise HandrailError(f"--patience {self.patience}: expected 0 or more")
+        if self.patience and not self.eval_split:
+            raise HandrailError("--patience: expected --eval_split too, the share of episodes to measure on")
         if self.resume and self.overwrite:
             raise HandrailError("--resume and --overwrite: expected one of them, got both")
         self.options()

@@ -7,6 +7,7 @@ import numpy as np
 from datasets_helpers import REPO, create
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
+from handrail.datasets.comparison.outcomes import Pair, judge_pairs
 from handrail.datasets.format.schema import Feature
 
 JOINTS = [f"{name}.pos" for name in ("pan", "lift", "elbow", "flex", "roll", "gripper")]
@@ -127,3 +128,8 @@ def check_texts(figure) -> None:
         assert inside.containsy(box.y0) and inside.containsy(box.y1), text  # noqa: PT018
         others = [other for other, its in shown[place + 1 :] if box.padded(-0.5).overlaps(its)]
         assert not others, (text, others)
+
+
+def judge(conditions, baseline, rng):
+    """Compare the success of all conditions with the baseline's."""
+    return judge_pairs(conditions, [Pair(label, baseline) for label in conditions if label != baseline], rng)

@@ -4,6 +4,7 @@ import dataclasses
 import functools
 import shutil
 import tempfile
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -20,38 +21,50 @@ from handrail.policies.study.execution.run import run_study
 DESIGN = """
 modes = ["ee", "direct"]
 baseline = "direct"
-seeds = [0, 1]
+draws = 2
 rollouts = 40
 [tasks.reach]
-episodes = 5
 minutes = 0.1
+episodes = 5
 steps = 10
+[beside]
+intents = ["ee"]
+draws = 2
 [robustness]
 perturbations = ["push"]
 protections = ["filter"]
 rollouts = 20
-seeds = [0, 1]
+draws = 2
 [sweep]
 tasks = ["reach"]
 noises = [0.0]
-seeds = [0]
+draws = 1
 """
 
 SMALLEST = """
 modes = ["ee", "direct"]
 baseline = "direct"
-seeds = [0]
+draws = 2
 rollouts = 3
 persons = 2
 [tasks.reach]
-episodes = 2
-minutes = 0.3
+minutes = 0.6
+episodes = 7
 rollout_limit = 1.5
 steps = 20
+policy_options = ["dim_model=16", "n_heads=2", "dim_feedforward=16", "n_encoder_layers=1"]
+[flat]
+every = 5
+patience = 1
+[beside]
+intents = ["ee"]
+draws = 1
+same_number = 1
 [robustness]
 perturbations = ["push"]
 protections = ["filter"]
 rollouts = 2
+draws = 1
 """  # of real jobs
 
 
@@ -67,28 +80,57 @@ def recorded():
     return folder
 
 
-def make(job, design, layout):
-    """Leave the files that a job leaves, made up: the better the operator, the better the policy."""
-    if job.cell:
-        shutil.copytree(Path(recorded().name, "set"), layout.dataset(job.cell))
-    if job.policy:
-        rng = np.random.default_rng(job.policy.seed)
-        share = 0.9 if job.policy.cell.mode == "ee" else 0.3
+COLLECTED = {
+    "episodes": 6,
+    "successes": 5,
+    "minutes": 1.5,
+    "frames": 72,
+    "reasons": {"timeout": 1},
+    "digest": "d1ce",
+    "quality": {"length": 3.0, "sparc": -2.5},
+}
+LEARNT = {
+    "steps": 10,
+    "trained_on": {"episodes": 5.0, "operator_time": 90.0},
+    "data": "da7a",
+    "validation": {"5": 0.4, "10": 0.3},
+    "training_seconds": 8.0,
+    "rollout_seconds": 2.0,
+}
+
+
+def make(job, design, layout, shares=None):
+    """Leave the files that a job leaves, made up: the better the operator, the better the policy.
+
+    Args:
+        shares: success by label, of each draw; then datasets and policies are left out, as if they were gone.
+    """
+    if job.policy is None and shares is None:
+        shutil.copytree(Path(recorded().name, "set"), layout.dataset(job.cell), dirs_exist_ok=True)
+    elif job.policy:
+        rng = np.random.default_rng(job.cell.draw)
+        share = 0.9 if job.cell.mode == "ee" else 0.3
+        if shares is not None:
+            share = shares[job.policy.label][job.cell.draw]
         write_json(layout.policy(job.policy) / "checkpoints/000010/pretrained_model/handrail.json", {})
         for what, config in evaluations(job, design).items():
-            rollouts = [
-                {"seed": seed, "success": bool(rng.random() < share), "contacts": seed % 2, "length": 3.0}
-                for seed in config.seeds
-            ]
-            ending = {"nominal": "", "disturbed": " pushed", "protected": " filter"}[what]
-            entry = {"training_seed": job.policy.seed, "rollouts": rollouts}
-            arms = {job.policy.label + ending: [entry]}
+            arms = {}
+            for perturbation, protection in product(config.perturbations, config.protections):
+                rollouts = [made_up(seed, bool(rng.random() < share)) for seed in config.seeds]
+                entry = {"training_seed": job.cell.draw, "dataset_draw": job.cell.draw, "rollouts": rollouts}
+                ending = {"protected": protection, "disturbed": perturbation.words, "nominal": ""}[what]
+                arms[f"{job.policy.label} {ending}".strip()] = [entry]
             write_json(layout.evaluation(job.policy, what), {"format": FORMAT, "arms": arms})
-    if job.task:
-        write_json(layout.comparison(job.task) / "report.html", {})
-    result = {"episodes": 6} if job.cell else {}
+    result = LEARNT if job.policy else COLLECTED
+    took = {"seconds": 10.0, "processor_seconds": 9.0, "cores": 2, "ended": "2026-01-01T00:00:00+00:00"}
     write_json(layout.begun(job), fingerprint(job, design))
-    write_json(layout.done(job), {"settings": fingerprint(job, design), "result": result, "seconds": 0.0})
+    write_json(layout.done(job), {"settings": fingerprint(job, design), "result": result, "took": took})
+
+
+def made_up(seed, success):
+    """Return a rollout, which failed while it lifted if it did."""
+    row = {"seed": seed, "success": success, "contacts": seed % 2, "length": 3.0}
+    return row | {"failure_reason": ""} if success else row | {"failure_reason": "timeout", "stage": "lift"}
 
 
 class Starter:

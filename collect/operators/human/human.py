@@ -29,9 +29,10 @@ class HumanSettings:
     Attributes:
         delay: from perception to hand [s]; 0.14–0.25 in people.
         refractory: shortest time between two corrections [s]; 0.35 for a velocity stick.
-        threshold: change of the wanted command, relative to full stick, below which the hand stays.
+        threshold: change of the wanted command, relative to full stick, below which the hand stays; of
+            joints, as that moves the tool (`InputMap.fine`).
         noise: standard deviation of the signal-dependent noise over |command|; about 0.1.
-        drift: standard deviation of the drift over full stick, while the stick is deflected.
+        drift: standard deviation of the drift over full stick, while the stick is deflected; likewise.
         correlation: how fast noise, drift and misjudgement wander, time constant [s].
         switch_time: hands off the stick while changing to other inputs [s]; makes switching 17.4 % of the
             time when steering joint by joint.

@@ -78,7 +78,7 @@ class ScriptedOperator:
         self._settings = self._human.episode(rng)
         self._script.reset(view)
         self._perception = Perception(self._settings, rng)
-        self._hand = HumanHand(self._settings, self._map.full, rng)
+        self._hand = HumanHand(self._settings, self._map.full, self._map.fine, rng)
         self._map.reset(view, self._settings, rng)
         self._mask: BoolArray | None = None
         self._switches = 0

@@ -23,6 +23,7 @@ from handrail.controllers.interface.controller import Controller
 from handrail.policies.imitation.evaluation.conditions import Checkpoint, PolicyCondition, own_protection
 from handrail.policies.imitation.evaluation.features import action_of
 from handrail.policies.imitation.evaluation.operator import AsRecorded, AsSteered, PolicyOperator
+from handrail.policies.imitation.evaluation.progress import RolloutProgress
 from handrail.policies.imitation.interface.checkpoint import TrainedPolicy
 from handrail.policies.imitation.interface.torch_state import repeatable, threads
 
@@ -58,9 +59,10 @@ def run_rollout(
         operator = PolicyOperator(policy, interface, channels, meta.mode)
         late = DelayedOperator(operator, perturbation.delay)
         pushers = (Pusher(perturbation.push),) if perturbation.push else ()
-        session = Session(env, controller, late, observers, disturbances=pushers)
+        progress = RolloutProgress()
+        session = Session(env, controller, late, (*observers, progress), disturbances=pushers)
         outcome = session.run(seed)
-    return _row(outcome, operator.malformed)
+    return _row(outcome, operator.malformed) | ({} if outcome.success else progress.failed(outcome))
 
 
 def _columns(checkpoint: Checkpoint, channels: Channels) -> AsRecorded | AsSteered:

@@ -43,6 +43,7 @@ _CHECKED = {  # what more has to hold of `PolicyMeta` than the types of its fiel
         f"0 to {MOST_TIME:g} s", lambda value: is_number(value) and 0 <= value <= MOST_TIME, needed=False
     ),
     "sizes": Entry("settings by name", lambda value: _are_sizes(value), needed=False),
+    "validation": Entry("losses by update", lambda value: _are_losses(value), needed=False),
 }
 
 
@@ -67,6 +68,7 @@ class PolicyMeta:
         episodes: numbers of the episodes that it learnt from, in order.
         data: digest of what it learnt from.
         time_limit: that its episodes had at most [s]; 0 if that was the task's own, or they do not say.
+        validation: loss on the episodes that were held out, by update.
     """
 
     environment: str
@@ -85,6 +87,7 @@ class PolicyMeta:
     episodes: Sequence[int] = ()
     data: str = ""
     time_limit: float = 0.0
+    validation: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -204,6 +207,10 @@ def read_meta(folder: Path) -> tuple[PolicyInterface | None, PolicyMeta]:
             f" got {meta.actions} of mode {meta.mode!r}"
         )
     return described, meta
+
+
+def _are_losses(value: Any) -> bool:
+    return is_table(value) and all(step.isdecimal() and is_number(loss) for step, loss in value.items())
 
 
 def _are_sizes(value: Any) -> bool:

@@ -6,7 +6,7 @@ says them: `q* = q + v / k`, from which the same velocity comes back, `v = k (q*
 the robot is elsewhere. Whatever comes out, the robot's limits bound it.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -27,7 +27,8 @@ Columns = Mapping[str, np.ndarray]
 Mask = tuple[bool, ...]
 ACTIONS = ("realised", "targets", "intent")
 STATE, ENVIRONMENT, ACTION = "observation.state", "observation.environment_state", "action"
-COLUMNS = (STATE, ENVIRONMENT, ACTION, "teleop.values", "teleop.mask")
+MASK = "teleop.mask"
+COLUMNS = (STATE, ENVIRONMENT, ACTION, "teleop.values", MASK)
 _GRIPPER = "gripper"
 _HALF = 0.5  # a gripper command beyond it closes
 _CHANNELS = Entry("names of channels", lists(is_text))
@@ -59,7 +60,7 @@ class PolicyInterface:
     def of_dataset(
         cls,
         features: Mapping[str, Feature],
-        episodes: Sequence[Columns],
+        episodes: Iterable[Columns],
         actions: str,
         base_pose: bool = True,
     ) -> "PolicyInterface":
@@ -67,7 +68,7 @@ class PolicyInterface:
 
         Args:
             features: of the dataset.
-            episodes: `COLUMNS` of each.
+            episodes: `MASK` of each; read only where the operator's own commands are learnt.
             actions: one of `ACTIONS`.
             base_pose: whether it shall see where the base is.
 
@@ -119,7 +120,7 @@ class PolicyInterface:
         pose = self._view.pose(state)
         for pair in self._pairs:
             values[:, pair] = pose.turned(values[:, pair])
-        rows = columns["teleop.mask"][:, : len(self.channels)].astype(bool)
+        rows = columns[MASK][:, : len(self.channels)].astype(bool)
         flags = [(rows == mask).all(axis=1) for mask in self.masks] if len(self.masks) > 1 else []
         return np.column_stack([values[:, self.commanded], *flags, gripper]).astype(np.float32)
 
@@ -211,11 +212,11 @@ class PolicyInterface:
         return [[start, start + 1] for start in whole]
 
 
-def _masks_of(channels: Channels, episodes: Sequence[Columns]) -> tuple[Mask, ...]:
+def _masks_of(channels: Channels, episodes: Iterable[Columns]) -> tuple[Mask, ...]:
     """Return every set of channels that an operator owned in some episodes."""
     masks: set[Mask] = set()
     for columns in episodes:
-        rows = columns["teleop.mask"][:, : channels.size].astype(bool)
+        rows = columns[MASK][:, : channels.size].astype(bool)
         masks |= set(map(tuple, np.unique(rows, axis=0).tolist()))
     if not any(map(any, masks)):
         raise HandrailError("intent as action: expected episodes in which an operator steers, got none")

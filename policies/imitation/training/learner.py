@@ -11,11 +11,13 @@ from lerobot.common.train_utils import load_training_state
 from lerobot.configs.train import TrainPipelineConfig
 from lerobot.optim.factory import make_optimizer_and_scheduler
 from lerobot.policies.factory import make_policy, make_pre_post_processors
+from torch.optim.lr_scheduler import LambdaLR
 
 from handrail.controllers.errors import HandrailError
 from handrail.policies.imitation.interface.checkpoint import MODEL
 from handrail.policies.imitation.interface.steps import without_steps
 from handrail.policies.imitation.training.memory import MemoryMeta
+from handrail.policies.imitation.training.plateau import Plateau
 
 _WHOLE_MODEL = (DistributedType.NO, DistributedType.MULTI_CPU, DistributedType.MULTI_GPU)  # in every process
 
@@ -39,9 +41,21 @@ class Learner:
 
 
 def build_learner(
-    settings: TrainPipelineConfig, meta: MemoryMeta, checkpoint: Path | None, accelerator: Accelerator
+    settings: TrainPipelineConfig,
+    meta: MemoryMeta,
+    checkpoint: Path | None,
+    accelerator: Accelerator,
+    plateau: Plateau | None = None,
 ) -> Learner:
-    """Return a learner made anew, or as it was when a checkpoint was written, what is random included."""
+    """Return a learner made anew, or as it was when a checkpoint was written, what is random included.
+
+    Args:
+        settings: LeRobot's.
+        meta: of what it learns from.
+        checkpoint: to go on from; None to begin.
+        accelerator: of its processes.
+        plateau: says how the learning rate goes; None for the settings' schedule.
+    """
     described = settings.policy
     assert described is not None
     if checkpoint is not None:
@@ -56,6 +70,8 @@ def build_learner(
         around = without_steps(loaded[0]), without_steps(loaded[1])  # the data in memory are seen so already
     step: int = 0
     optimizer, schedule = make_optimizer_and_scheduler(settings, policy)
+    if plateau is not None:
+        schedule = LambdaLR(optimizer, plateau.rate)
     _fuse(optimizer)
     if checkpoint is not None:
         step, optimizer, schedule = load_training_state(checkpoint, optimizer, schedule)

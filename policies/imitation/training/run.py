@@ -28,6 +28,8 @@ from handrail.policies.imitation.interface.steps import with_steps
 from handrail.policies.imitation.training.curve import Curve
 from handrail.policies.imitation.training.learner import Learner, build_accelerator, build_learner
 from handrail.policies.imitation.training.memory import MemoryDataset
+from handrail.policies.imitation.training.plateau import Plateau
+from handrail.policies.imitation.training.validation import Validation
 
 _OVER_PROCESSES = {
     **{"loss": "mean", "grad_norm": "none", "lr": "none"},
@@ -47,6 +49,8 @@ class Run:
         quiet: whether to show no progress.
         interface: what the policy reads and writes, for the checkpoints; None if that is what was recorded.
         completion: what completes its intents.
+        validation: measures the loss on held-out episodes; None without any.
+        plateau: ends the training where that loss is flat; None makes all updates.
     """
 
     settings: TrainPipelineConfig
@@ -56,17 +60,19 @@ class Run:
     quiet: bool = False
     interface: PolicyInterface | None = None
     completion: Completion | None = None
+    validation: Validation | None = None
+    plateau: Plateau | None = None
 
     def train(self) -> None:
         """Train to the end; one of the processes writes checkpoints and the curve, and shows the progress.
 
         Raises:
-            HandrailError: accelerate would split the model between processes.
+            HandrailError: accelerate would split the model between processes, or the loss is not finite.
         """
         settings, accelerator = self.settings, build_accelerator(self.settings.policy)
         assert settings.output_dir is not None
         set_seed(settings.seed, accelerator)  # pyright: ignore[reportArgumentType]
-        learner = build_learner(settings, self.dataset.meta, self.checkpoint, accelerator)
+        learner = build_learner(settings, self.dataset.meta, self.checkpoint, accelerator, self.plateau)
         main = accelerator.is_main_process
         curve = Curve(settings.output_dir, learner.step) if main else None
         columns = TextColumn("training"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
@@ -82,8 +88,10 @@ class Run:
         assert settings.optimizer is not None
         around = settings.optimizer.grad_clip_norm, accelerator, learner.schedule
         batches = self._batches(learner.step, accelerator)
-        bar = progress.add_task("", total=settings.steps, completed=learner.step)
-        for step in range(learner.step + 1, settings.steps + 1):
+        bar = progress.add_task("", total=self._end, completed=learner.step)
+        step = learner.step
+        while step < self._end:
+            step += 1
             began = time.perf_counter()
             batch = learner.before(next(batches))
             means.dataloading_s = time.perf_counter() - began
@@ -96,10 +104,18 @@ class Run:
                     curve.add(row := means.to_dict() | {"step": step})
                     progress.update(bar, description=f"loss {row['loss']:.4f}")
                 means.reset_averages()
-            if should_save_checkpoint(step, settings.save_freq, settings.steps):
+            if self.validation and (step % self.validation.every == 0 or step == self._end):
+                self.validation.measure(step, learner, accelerator, settings.batch_size)
+                progress.update(bar, total=self._end)
+            if should_save_checkpoint(step, settings.save_freq, self._end):
                 if accelerator.is_main_process:
                     self._save(learner, step, accelerator)
                 accelerator.wait_for_everyone()
+
+    @property
+    def _end(self) -> int:
+        """The last update, as far as is known now."""
+        return self.plateau.end if self.plateau else self.settings.steps
 
     def _means(self, step: int, accelerator: Accelerator) -> MetricsTracker:
         meters = {name: AverageMeter(name, reduction=how) for name, how in _OVER_PROCESSES.items()}

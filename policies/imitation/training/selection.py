@@ -1,5 +1,6 @@
 """Which episodes a policy is trained on, and how much of an operator's time they took."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -11,6 +12,7 @@ from handrail.policies.imitation.config import TrainConfig
 
 Row = Mapping[str, Any]
 _MINUTE = 60.0
+_FEWEST_HELD_OUT = 5  # episodes
 
 
 @dataclass(frozen=True)
@@ -80,6 +82,25 @@ def select_again(rows: Sequence[Row], numbers: Sequence[int], trained_on: Mappin
         )
     kept = tuple(there[number] for number in numbers)
     return Selection(kept, int(trained_on["attempts"]), trained_on["operator_time"])
+
+
+def hold_out(rows: Sequence[Row], config: TrainConfig) -> tuple[list[Row], list[Row]]:
+    """Return the episodes to learn from, and those that are held out, drawn by `draw` alone.
+
+    Raises:
+        HandrailError: there would be none to learn from.
+    """
+    if not config.eval_split:
+        return list(rows), []
+    count = max(_FEWEST_HELD_OUT, math.ceil(config.eval_split * len(rows)))
+    if count >= len(rows):
+        raise HandrailError(
+            f"--eval_split {config.eval_split:g}: expected more than {count} episodes, to hold {count} out;"
+            f" got {len(rows)}"
+        )
+    chosen = set(np.random.default_rng([config.draw, 1]).permutation(len(rows))[:count].tolist())
+    held_out = [row for place, row in enumerate(rows) if place in chosen]
+    return [row for place, row in enumerate(rows) if place not in chosen], held_out
 
 
 def _attempts(rows: Sequence[Row], config: TrainConfig) -> list[Row]:

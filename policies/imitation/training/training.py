@@ -25,6 +25,7 @@ from handrail.policies.imitation.interface.checkpoint import (
 from handrail.policies.imitation.interface.torch_state import threads
 from handrail.policies.imitation.interface.trust import check_links, check_policy_folder
 from handrail.policies.imitation.training.curve import NAME as CURVE
+from handrail.policies.imitation.training.plateau import Plateau
 from handrail.policies.imitation.training.presets import policy_config, resolved
 from handrail.policies.imitation.training.refusal import in_one_line
 from handrail.policies.imitation.training.resume import as_json, check_data, check_settings
@@ -55,10 +56,12 @@ def train(config: TrainConfig, quiet: bool = False) -> Path:
     source, steps = read_source(config, began), resolved(config).steps
     if began is not None:
         check_data(source, began)
-    if checkpoint is not None and int(checkpoint.name) >= steps:
+    losses = {int(step): loss for step, loss in began.validation.items()} if began else {}
+    plateau = _plateau(config, steps, losses)
+    if checkpoint is not None and int(checkpoint.name) >= (plateau.end if plateau else steps):
         return checkpoint / MODEL
     with threads(config.threads), _no_pages_of_logs(), in_one_line(config):
-        _run(config, source, steps, checkpoint, quiet)
+        _run(config, source, steps, checkpoint, quiet, losses, plateau)
     last = last_checkpoint(config.folder)
     assert last is not None
     return last / MODEL
@@ -74,19 +77,43 @@ def _goes_on(config: TrainConfig, checkpoint: Path) -> PolicyMeta:
     return began
 
 
-def _run(config: TrainConfig, source: Source, steps: int, checkpoint: Path | None, quiet: bool) -> None:
+def _plateau(config: TrainConfig, steps: int, losses: Mapping[int, float]) -> Plateau | None:
+    """Return what ends a training where the loss on held-out episodes is flat; None where nothing does."""
+    if not config.patience:
+        return None
+    return Plateau(losses, config.patience, config.improvement, steps, _warmup(steps))
+
+
+def _warmup(steps: int) -> int:
+    return min(_WARMUP, steps // 10)
+
+
+def _run(
+    config: TrainConfig,
+    source: Source,
+    steps: int,
+    checkpoint: Path | None,
+    quiet: bool,
+    losses: dict[int, float],
+    plateau: Plateau | None,
+) -> None:
     from handrail.policies.imitation.training.run import Run
+    from handrail.policies.imitation.training.validation import Validation
 
     settings = _settings(config, steps)
     assert settings.policy is not None
+    learnt, held_out = (source.only(rows).dataset(settings.policy) if rows else None for rows in source.split)
+    assert learnt is not None
     Run(
         settings,
-        source.dataset(settings.policy),
+        learnt,
         checkpoint,
-        lambda folder, step: write_meta(folder, source.interface, _meta(source, step)),
+        lambda folder, step: write_meta(folder, source.interface, _meta(source, step, losses)),
         quiet,
         source.interface,
         _completion(_meta(source, steps)),
+        Validation(held_out, config.eval_steps, losses) if held_out else None,
+        plateau,
     ).train()
 
 
@@ -96,7 +123,7 @@ def _settings(config: TrainConfig, steps: int) -> "TrainPipelineConfig":
     from lerobot.optim.schedulers import CosineAnnealingWithWarmupSchedulerConfig as Cosine
 
     sizes, policy = resolved(config), policy_config(config)
-    schedule = Cosine(min(_WARMUP, steps // 10)) if sizes.cosine else policy.get_scheduler_preset()
+    schedule = Cosine(_warmup(steps)) if sizes.cosine else policy.get_scheduler_preset()
     return TrainPipelineConfig(
         dataset=DatasetConfig(config.dataset.name, root=str(config.dataset.folder), video_backend="pyav"),
         policy=policy,
@@ -110,7 +137,7 @@ def _settings(config: TrainConfig, steps: int) -> "TrainPipelineConfig":
         save_freq=config.save_freq,
         env_eval_freq=0,
         optimizer=policy.get_optimizer_preset(),
-        scheduler=schedule,
+        scheduler=None if config.patience else schedule,  # then the plateau says it
     )
 
 
@@ -147,7 +174,7 @@ def _is_checkpoint(path: Path) -> bool:
     return path.name in ("last", ".last") or path.name.strip(".").removesuffix(".old").isdecimal()
 
 
-def _meta(source: Source, steps: int) -> PolicyMeta:
+def _meta(source: Source, steps: int, losses: Mapping[int, float] | None = None) -> PolicyMeta:
     config, rows = source.config, source.selection.rows
     return PolicyMeta(
         environment=_common([str(row.get("environment") or "") for row in rows]),
@@ -166,6 +193,7 @@ def _meta(source: Source, steps: int) -> PolicyMeta:
         episodes=[int(row["episode_index"]) for row in rows],
         data=source.digest,
         time_limit=_time_limit(rows),
+        validation={str(step): loss for step, loss in (losses or {}).items()},
     )
 
 

@@ -1,33 +1,52 @@
-"""What a study consists of: modes, tasks and seeds, as a TOML file says; light to import.
+"""What a study consists of: modes, tasks and draws, as a TOML file says; light to import.
 
 modes = ["ee", "direct"]        teleop modes
 baseline = "direct"             the mode that the others are compared with
 policy = "act"                  that LeRobot has registered
-seeds = [0, 1, 2]               of the trainings
-rollouts = 100                  of each policy, on the same seeds for all
-budgets = ["time", "number"]    what fits into the task's minutes; as many successes as its episodes
-persons = 5                     scripted operators, who take turns
-seed = 0                        of the scenes in which is recorded, and in which is evaluated
+draws = 8                       replicates: each a fresh recording with persons of its own, a training seed,
+                                and beginnings of its own for the rollouts; the same for all modes
+rollouts = 50                   of each policy
+persons = 5                     scripted operators of a recording, who take turns
+seed = 0                        of everything: another seed is another study of the same kind
 
 [tasks.reach]
-episodes = 50                   successful demonstrations of each mode, at least; the budget "number"
-minutes = 10.0                  of the operator's time with each mode, with failures; the budget "time"
-steps = 4000                    updates of each policy
+minutes = 10.0                  of the operator's time in each mode, failed attempts included
+episodes = 50                   successful demonstrations in each mode, at least
+steps = 4000                    updates of each policy; the most there may be where there is a [flat]
 batch_size = 0                  samples an update; 0 for the preset's
 policy_options = ["dropout=0.1"]        more of LeRobot's settings of the policy
 time_limit = {direct_single = 60.0}     of an episode by mode [s]; the task's own where none is named
 rollout_limit = 20.0            after which a policy's rollout has failed [s]; the task's own without it
 
-[robustness]                    optional: what else policies of the main design go through
+[flat]                          optional: train until the loss on held-out episodes is flat, one rule for all
+held_out = 0.1                  share of the episodes, 5 at least
+every = 500                     updates between two measurements of that loss
+patience = 4                    measurements, the best of which has to be
+improvement = 0.02              by this share below the best before them
+
+[factors]                       optional: the 2 × 2 of what is steered and whether the MPC completes it
+hand_mpc = "ee"                 the mode that is each cell
+hand_none = "ee_dls"
+joint_mpc = "joints"
+joint_none = "direct"
+primary = ["input", "controller", "interaction"]        declared before the run: what is tested
+sd = 0.1                        of a policy's success from draw to draw, for the power
+
+[beside]                        optional, exploratory: more policies
+intents = ["ee"]                of these modes also the operator's intent is learnt, completed when it drives
+draws = 2                       on the first so many draws
+same_number = 1                 draws of which policies also learn from `episodes` demonstrations each
+
+[robustness]                    optional, exploratory: what else policies go through
 perturbations = ["push", "shift", "delay"]      each a condition of its own
 protections = ["mpc", "filter"] of policies that command joint velocities
 rollouts = 50                   under each condition
-seeds = [0]                     of the trainings whose policies go through it
+draws = 1                       the first so many
 
-[sweep]                         optional: how human the operator is
+[sweep]                         optional, exploratory: how human the operator is
 tasks = ["reach"]
 noises = [0.0, 2.0]             besides 1, which the study itself has
-seeds = [0]
+draws = 1
 """
 
 import math
@@ -39,20 +58,57 @@ from handrail.collect.operators.modes import MODES
 from handrail.collect.tasks.catalogue import TASKS
 from handrail.controllers.errors import HandrailError, unknown_name
 
-BUDGETS = ("time", "number")
+CONTRASTS = ("input", "controller", "interaction")
+MOST_DRAWS = 1000
 
 
 @dataclass(frozen=True)
 class TaskDesign:
     """One task of a study; its settings are explained above."""
 
-    episodes: int = 50
-    minutes: float = 0.0
+    minutes: float
+    episodes: int = 2
     steps: int = 4000
     batch_size: int = 0
     time_limit: Mapping[str, float] = field(default_factory=dict)
     rollout_limit: float = 0.0
     policy_options: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Flat:
+    """When a policy has learnt what there is; explained above."""
+
+    held_out: float = 0.1
+    every: int = 500
+    patience: int = 4
+    improvement: float = 0.02
+
+
+@dataclass(frozen=True)
+class Factors:
+    """Which mode is which cell of the 2 × 2, and what is tested; explained above."""
+
+    hand_mpc: str
+    hand_none: str
+    joint_mpc: str
+    joint_none: str
+    primary: tuple[str, ...] = CONTRASTS
+    sd: float = 0.1
+
+    @property
+    def modes(self) -> tuple[str, str, str, str]:
+        """The four cells."""
+        return self.hand_mpc, self.hand_none, self.joint_mpc, self.joint_none
+
+
+@dataclass(frozen=True)
+class Beside:
+    """More policies than the main design has; explained above."""
+
+    intents: tuple[str, ...] = ()
+    draws: int = 0
+    same_number: int = 0
 
 
 @dataclass(frozen=True)
@@ -62,7 +118,7 @@ class Robustness:
     perturbations: tuple[str, ...] = ("push", "shift", "delay")
     protections: tuple[str, ...] = ("filter",)
     rollouts: int = 50
-    seeds: tuple[int, ...] = (0,)
+    draws: int = 1
 
 
 @dataclass(frozen=True)
@@ -71,25 +127,32 @@ class Sweep:
 
     tasks: tuple[str, ...]
     noises: tuple[float, ...] = (0.0, 2.0)
-    seeds: tuple[int, ...] = (0,)
+    draws: int = 1
 
 
 @dataclass(frozen=True)
 class StudyDesign:
-    """A whole study, called after its file; its settings are explained above."""
+    """A whole study, called after its file; its settings are explained above.
+
+    Attributes:
+        digest: of what its file says, comments left out; "" where it comes from no file.
+    """
 
     name: str
     modes: tuple[str, ...]
     tasks: Mapping[str, TaskDesign]
     baseline: str
     policy: str = "act"
-    seeds: tuple[int, ...] = (0, 1, 2)
+    draws: int = 3
     rollouts: int = 100
-    budgets: tuple[str, ...] = ("time",)
     persons: int = 5
     seed: int = 0
+    flat: Flat | None = None
+    factors: Factors | None = None
+    beside: Beside | None = None
     robustness: Robustness | None = None
     sweep: Sweep | None = None
+    digest: str = ""
 
     def check(self) -> None:
         """Check every name, and what only a study asks; `check_jobs` checks the settings of its jobs.
@@ -105,42 +168,55 @@ class StudyDesign:
         _known("mode", self.modes, MODES)
         _known("task", self.tasks, TASKS)
         _known("baseline", (self.baseline,), self.modes)
-        _known("budget", self.budgets, BUDGETS)
+        if self.factors:
+            _known("mode of the factors", self.factors.modes, self.modes)
+            _known("contrast", self.factors.primary, CONTRASTS)
+        if self.beside:
+            completed = [mode for mode in self.modes if MODES[mode].controller == "mpc"]
+            _known("mode of intents, which the MPC completes", self.beside.intents, completed)
         if self.sweep:
             _known("task of the sweep", self.sweep.tasks, tuple(self.tasks))
-        if self.persons < 1:
-            raise HandrailError(f"study {self.name}: persons expected 1 or more, got {self.persons}")
         for name, chosen in self._chosen():
             if not chosen or len(set(chosen)) < len(chosen):
                 raise HandrailError(f"study {self.name}: {name} expected some, each once, got {chosen}")
-        if self.robustness and not set(self.robustness.seeds) <= set(self.seeds):
-            raise HandrailError(
-                f"study {self.name}: robustness.seeds expected some of {self.seeds}, "
-                f"got {self.robustness.seeds}"
-            )
+        for name, count, least, most in self._counts():
+            if not least <= count <= most:
+                raise HandrailError(
+                    f"study {self.name}: {name} expected a whole number from {least} to {most}, got {count}"
+                )
         for task, design in self.tasks.items():
             self._check_task(task, design)
 
     def _chosen(self) -> Iterator[tuple[str, tuple[Any, ...]]]:
         """Yield what there has to be one of, by name."""
-        yield from (("seeds", self.seeds), ("modes", self.modes), ("budgets", self.budgets))
+        yield "modes", self.modes
+        if self.factors:
+            yield from (("factors", self.factors.modes), ("factors.primary", self.factors.primary))
         if self.robustness:
-            yield "robustness.seeds", self.robustness.seeds
             yield "robustness.perturbations", self.robustness.perturbations
         if self.sweep:
-            yield from (("sweep.tasks", self.sweep.tasks), ("sweep.seeds", self.sweep.seeds))
-            yield "sweep.noises", self.sweep.noises
+            yield from (("sweep.tasks", self.sweep.tasks), ("sweep.noises", self.sweep.noises))
+
+    def _counts(self) -> Iterator[tuple[str, int, int, int]]:
+        """Yield how many there are of something, by name, with the least and the most there may be."""
+        yield from (("draws", self.draws, 1, MOST_DRAWS), ("persons", self.persons, 1, MOST_DRAWS))
+        yield "seed", self.seed, 0, 10**5
+        if self.beside:
+            yield "beside.draws", self.beside.draws, 0, self.draws
+            yield "beside.same_number", self.beside.same_number, 0, self.draws
+        if self.robustness:
+            yield "robustness.draws", self.robustness.draws, 0, self.draws
+        if self.sweep:
+            yield "sweep.draws", self.sweep.draws, 1, self.draws
 
     def _check_task(self, name: str, task: TaskDesign) -> None:
         """Check what only a study asks of a task; its jobs check the rest."""
         _known(f"mode in time_limit of {name}", tuple(task.time_limit), self.modes)
-        if task.episodes < 2 or task.steps < 1 or not 0.0 <= task.minutes < math.inf:
+        if task.episodes < 2 or task.steps < 1 or not 0.0 < task.minutes < math.inf:
             raise HandrailError(
-                f"study {self.name}, task {name}: expected episodes ≥ 2, steps ≥ 1, minutes ≥ 0, "
+                f"study {self.name}, task {name}: expected episodes ≥ 2, steps ≥ 1, minutes above 0, "
                 f"got {task.episodes}, {task.steps}, {task.minutes}"
             )
-        if "time" in self.budgets and not task.minutes:
-            raise HandrailError(f"study {self.name}, task {name}: the budget 'time' needs minutes")
 
 
 def _known(what: str, names: Any, choices: Any) -> None:

@@ -6,25 +6,26 @@ from itertools import product
 from pathlib import Path
 from typing import Literal
 
-from handrail.collect.operators.modes import MODES
 from handrail.policies.study.design.design import StudyDesign
 
 Actions = Literal["realised", "intent"]
+Budget = Literal["time", "number"]
 CONDITIONS = ("nominal", "disturbed", "protected")
 
 
 @dataclass(frozen=True)
 class Cell:
-    """What is collected as one dataset: a task in a mode, by operators as human as `noise` says."""
+    """What is collected as one dataset: a task in a mode, one draw, by operators as human as `noise` says."""
 
     task: str
     mode: str
+    draw: int
     noise: float = 1.0
 
     @property
     def name(self) -> str:
-        """A name for files and logs: `reach/ee`, or `reach/ee@0.5` where the noise is not 1."""
-        return f"{self.task}/{self.mode}" + (f"@{self.noise:g}" if self.noise != 1.0 else "")
+        """A name for files and logs: `reach/ee/3`, or `reach/ee@0.5/3` where the noise is not 1."""
+        return f"{self.task}/{self.mode}{f'@{self.noise:g}' if self.noise != 1.0 else ''}/{self.draw}"
 
 
 @dataclass(frozen=True)
@@ -34,14 +35,12 @@ class StudyPolicy:
     Attributes:
         cell: whose dataset.
         actions: `realised` joint velocities or the operator's `intent`.
-        budget: `time` or `number`: how much of the dataset.
-        seed: of the training.
+        budget: how much of the dataset: the same operator's `time`, or the same `number` of demonstrations.
     """
 
     cell: Cell
-    actions: Actions
-    budget: str
-    seed: int
+    actions: Actions = "realised"
+    budget: Budget = "time"
 
     @property
     def label(self) -> str:
@@ -52,87 +51,76 @@ class StudyPolicy:
     @property
     def name(self) -> str:
         """A name for files and logs."""
-        return f"{self.cell.name}/{self.actions}-{self.budget}-{self.seed}"
+        return f"{self.cell.name}/{self.actions}-{self.budget}"
 
 
 @dataclass(frozen=True)
 class Job:
-    """One piece of work: collect a dataset; train and evaluate a policy; compare the modes of a task.
+    """One piece of work: collect a dataset, or train and evaluate a policy.
 
     Attributes:
         name: of the job, unique.
-        needs: names of the jobs that come before.
-        cell: to collect.
-        policy: to train and evaluate.
-        task: to compare.
+        cell: whose dataset it collects or learns from.
+        policy: to train and evaluate; None collects.
         robust: whether the policy also goes through the further conditions.
     """
 
     name: str
-    needs: tuple[str, ...] = ()
-    cell: Cell | None = None
+    cell: Cell
     policy: StudyPolicy | None = None
-    task: str = ""
     robust: bool = False
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """Names of the jobs that come before."""
+        return (f"collect/{self.cell.name}",) if self.policy else ()
 
 
 def jobs(design: StudyDesign) -> list[Job]:
-    """Return all jobs, what matters most first: the main design seed by seed, then the sweep."""
-    found: list[Job] = []
-    for seed, task in product(design.seeds, design.tasks):
-        cells = [Cell(task, mode) for mode in design.modes]
-        if seed == design.seeds[0]:
-            found += map(_collect, cells)
-        policies = [
-            policy for budget in design.budgets for cell in cells for policy in _policies(cell, budget, seed)
-        ]
-        robust = design.robustness is not None and seed in design.robustness.seeds
-        found += [_policy(policy, robust and policy.budget == design.budgets[0]) for policy in policies]
-    found += [_compare(task, found) for task in design.tasks]
-    return found + list(_sweep(design))
+    """Return all jobs, what matters most first: draw by draw the main design, then what is beside it."""
+    return [job for draw in range(design.draws) for job in _draw(design, draw)]
 
 
-def _sweep(design: StudyDesign) -> Iterator[Job]:
-    if not design.sweep:
-        return
-    cells = [
-        Cell(task, mode, noise)
-        for noise, task, mode in product(design.sweep.noises, design.sweep.tasks, design.modes)
-        if noise != 1.0
-    ]
-    yield from map(_collect, cells)
-    for seed, cell in product(design.sweep.seeds, cells):
-        yield from (_policy(policy, robust=False) for policy in _policies(cell, design.budgets[0], seed))
-
-
-def _policies(cell: Cell, budget: str, seed: int) -> list[StudyPolicy]:
-    completed = MODES[cell.mode].controller == "mpc"  # the others leave nothing for an intent to complete
-    spaces: tuple[Actions, ...] = ("realised", "intent") if completed else ("realised",)
-    return [StudyPolicy(cell, actions, budget, seed) for actions in spaces]
+def _draw(design: StudyDesign, draw: int) -> Iterator[Job]:
+    """Yield the jobs of a draw: after each draw what is done is balanced."""
+    robust = design.robustness is not None and draw < design.robustness.draws
+    cells = {task: [Cell(task, mode, draw) for mode in design.modes] for task in design.tasks}
+    for task in design.tasks:
+        yield from map(_collect, cells[task])
+        yield from (_policy(StudyPolicy(cell), robust) for cell in cells[task])
+    for cell in (cell for task in design.tasks for cell in cells[task]):
+        if design.beside and draw < design.beside.draws and cell.mode in design.beside.intents:
+            yield _policy(StudyPolicy(cell, "intent"), robust)
+        if design.beside and draw < design.beside.same_number:
+            yield _policy(StudyPolicy(cell, budget="number"), robust=False)
+    if design.sweep and draw < design.sweep.draws:
+        swept = product(design.sweep.noises, design.sweep.tasks, design.modes)
+        others = [Cell(task, mode, draw, noise) for noise, task, mode in swept if noise != 1.0]
+        yield from map(_collect, others)
+        yield from (_policy(StudyPolicy(cell), robust=False) for cell in others)
 
 
 def _collect(cell: Cell) -> Job:
-    return Job(f"collect/{cell.name}", cell=cell)
+    return Job(f"collect/{cell.name}", cell)
 
 
 def _policy(policy: StudyPolicy, robust: bool) -> Job:
-    return Job(f"policy/{policy.name}", (f"collect/{policy.cell.name}",), policy=policy, robust=robust)
-
-
-def _compare(task: str, others: list[Job]) -> Job:
-    mine = [
-        job.name
-        for job in others
-        if (job.cell and job.cell.task == task) or (job.policy and job.policy.cell.task == task)
-    ]
-    return Job(f"compare/{task}", tuple(mine), task=task)
+    return Job(f"policy/{policy.name}", policy.cell, policy, robust)
 
 
 @dataclass(frozen=True)
 class Layout:
-    """Where everything lies in a study's folder."""
+    """Where everything lies in a study's folder.
+
+    What is large is in `datasets` and `policies`, and may go: what is done stays done without it.
+    """
 
     root: Path
+
+    @property
+    def designs(self) -> Path:
+        """Return the file of the designs with which the study was run."""
+        return self.root / "designs.json"
 
     def dataset(self, cell: Cell) -> Path:
         """Return the folder of a dataset."""
@@ -144,24 +132,14 @@ class Layout:
 
     def evaluation(self, policy: StudyPolicy, what: str) -> Path:
         """Return the file of a policy's rollouts: `nominal`, `disturbed` or `protected`."""
-        return (
-            self.root
-            / "evaluations"
-            / policy.cell.name
-            / what
-            / f"{policy.actions}-{policy.budget}-{policy.seed}.json"
-        )
-
-    def comparison(self, task: str) -> Path:
-        """Return the folder of a task's report."""
-        return self.root / "comparisons" / task
+        return self.root / "evaluations" / policy.cell.name / what / f"{policy.actions}-{policy.budget}.json"
 
     def begun(self, job: Job) -> Path:
         """Return the file that says with which settings a job was begun."""
         return self.root / "begun" / f"{job.name}.json"
 
     def done(self, job: Job) -> Path:
-        """Return the file that says that a job is done, and with which settings."""
+        """Return the file that says that a job is done, with which settings, and what came of it."""
         return self.root / "done" / f"{job.name}.json"
 
     def log(self, job: Job) -> Path:

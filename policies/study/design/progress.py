@@ -1,4 +1,4 @@
-"""How a study stands: which jobs were done with its present settings and left whole files."""
+"""How a study stands: which jobs were done with its present settings, and what came of them."""
 
 import json
 from collections.abc import Mapping
@@ -13,9 +13,8 @@ from handrail.datasets.reading.reader import read_info
 from handrail.datasets.storage import strict_json
 from handrail.datasets.storage.atomic import write_whole
 from handrail.policies.imitation.evaluation.config import EvaluateConfig
-from handrail.policies.imitation.interface.checkpoint import model_folder
 from handrail.policies.study.design.design import StudyDesign
-from handrail.policies.study.design.jobs import Cell, Job, Layout, jobs
+from handrail.policies.study.design.jobs import Job, Layout, jobs
 from handrail.policies.study.design.settings import evaluations, fingerprint
 
 _NAMED = 3  # jobs that are not done, in words
@@ -36,12 +35,12 @@ class StudyProgress:
     @cached_property
     def done(self) -> frozenset[str]:
         """Names of the jobs that are done, as they were when this was first asked."""
-        return frozenset(job.name for job in self._jobs if is_done(job, self.design, self.layout))
+        return frozenset(job.name for job in self.jobs if is_done(job, self.design, self.layout))
 
     @property
     def missing(self) -> list[str]:
         """Names of the jobs that are not."""
-        return [job.name for job in self._jobs if job.name not in self.done]
+        return [job.name for job in self.jobs if job.name not in self.done]
 
     @property
     def words(self) -> str:
@@ -51,46 +50,69 @@ class StudyProgress:
             return ""
         named = ", ".join(missing[:_NAMED]) + (", …" if len(missing) > _NAMED else "")
         verb = "is" if len(missing) == 1 else "are"
-        return f"{len(missing)} of {len(self._jobs)} jobs {verb} not done yet: {named}"
+        return f"{len(missing)} of {len(self.jobs)} jobs {verb} not done yet: {named}"
 
-    def dataset(self, cell: Cell) -> Path | None:
-        """Return the folder of a dataset, None until it is collected."""
-        done = any(job.cell == cell and job.name in self.done for job in self._jobs)
-        return self.layout.dataset(cell) if done else None
+    def todo(self, only: str = "") -> list[Job]:
+        """Return the jobs to be done: those that are missing, and recordings anew that they need.
 
-    def evaluations(self, cell: Cell, what: str) -> list[Path]:
-        """Return the files of the rollouts of a cell's policies under some condition."""
-        return [
-            self.layout.evaluation(job.policy, what)
-            for job in self._jobs
-            if job.policy and job.policy.cell == cell and job.name in self.done
-            if what in evaluations(job, self.design)
-        ]
+        A dataset that is gone is recorded again only for a policy that is still to be trained on it.
+
+        Args:
+            only: the name of a cell: its jobs alone; all where empty.
+        """
+        chosen = [job for job in self.jobs if only in ("", job.cell.name)]
+        missing = {job.name for job in chosen if job.name not in self.done}
+        needed = {name for job in chosen if job.name in missing for name in job.needs}
+        gone = {job.name for job in chosen if job.policy is None and not self._has_dataset(job)}
+        return [job for job in chosen if job.name in missing or job.name in needed & gone]
+
+    def _has_dataset(self, job: Job) -> bool:
+        """Return whether the dataset that a job noted is still there, whole."""
+        root, noted = self.layout.dataset(job.cell), self._notes[job.name].get("result", {})
+        try:
+            return read_info(root).episodes >= noted.get("episodes", 1) and any(root.glob("data/*/*.parquet"))
+        except HandrailError:
+            return False
+
+    def note(self, job: Job) -> dict[str, Any]:
+        """Return the note of a job: `settings`, `result`, what it `took`; nothing until it is done."""
+        return self._notes[job.name] if job.name in self.done else {}
+
+    def rollouts(self, job: Job) -> list[Path]:
+        """Return the files of the rollouts of a job's policy; none until it is done."""
+        if job.policy is None or job.name not in self.done:
+            return []
+        return [self.layout.evaluation(job.policy, what) for what in evaluations(job, self.design)]
 
     @cached_property
-    def _jobs(self) -> list[Job]:
+    def _notes(self) -> dict[str, dict[str, Any]]:
+        return {job.name: note_of(job, self.layout) for job in self.jobs}
+
+    @cached_property
+    def jobs(self) -> list[Job]:
+        """All jobs of the study."""
         return jobs(self.design)
 
 
 def is_done(job: Job, design: StudyDesign, layout: Layout) -> bool:
-    """Return whether a job was done with just these settings, and what it made is there."""
-    note = read_json(layout.done(job))
-    if note.get("settings") != fingerprint(job, design):
+    """Return whether a job was done with just these settings, and the small files it made are there.
+
+    Datasets and policies may be gone: what is to be known of them is in the job's note and its rollouts.
+    """
+    if note_of(job, layout).get("settings") != fingerprint(job, design):
         return False
+    if job.policy is None:
+        return True
     try:
-        if job.cell:
-            return _has_dataset(layout.dataset(job.cell), note.get("result") or {})
-        if job.policy:
-            model_folder(layout.policy(job.policy))
-            wanted = evaluations(job, design).items()
-            return all(_has_rollouts(layout.evaluation(job.policy, what), each) for what, each in wanted)
-        return (layout.comparison(job.task) / "report.html").is_file()
+        wanted = evaluations(job, design).items()
+        return all(_has_rollouts(layout.evaluation(job.policy, what), each) for what, each in wanted)
     except HandrailError:
         return False
 
 
-def _has_dataset(root: Path, result: Mapping[str, Any]) -> bool:
-    return read_info(root).episodes >= result.get("episodes", 0) and any(root.glob("data/*/*.parquet"))
+def note_of(job: Job, layout: Layout) -> dict[str, Any]:
+    """Return the note of a job that was done at some time: its settings, its result, what it took."""
+    return read_json(layout.done(job))
 
 
 def _has_rollouts(file: Path, config: EvaluateConfig) -> bool:

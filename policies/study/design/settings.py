@@ -12,14 +12,20 @@ from handrail.policies.imitation.config import TrainConfig
 from handrail.policies.imitation.evaluation.config import EvaluateConfig
 from handrail.policies.imitation.training.presets import check_policy, resolved
 from handrail.policies.imitation.training.resume import as_json
-from handrail.policies.study.design.design import StudyDesign
+from handrail.policies.study.design.design import MOST_DRAWS, StudyDesign
 from handrail.policies.study.design.jobs import Cell, Job, StudyPolicy, jobs
 
 BATCH = 10  # episodes, until the next person has a turn
 _FPS = 20  # [Hz]
 _RECORDED = ("task", "mode", "noise", "time_limit", "seed")
 _LEARNT = ("policy", "actions", "success_only", "episodes", "minutes", "draw", "seed")
+_ENDED = ("eval_split", "eval_steps", "patience", "improvement")
 _DRIVEN = ("episodes", "seed", "label", "protection", "perturbation", "time_limit")
+
+
+def seed_of(design: StudyDesign, cell: Cell) -> int:
+    """Return the seed of a draw, of its recordings and of its rollouts: the same for every mode."""
+    return MOST_DRAWS * design.seed + cell.draw
 
 
 def recording(cell: Cell, design: StudyDesign, root: Path, so_far: int = 0) -> RecordConfig:
@@ -35,9 +41,9 @@ def recording(cell: Cell, design: StudyDesign, root: Path, so_far: int = 0) -> R
         task=cell.task,
         mode=cell.mode,
         noise=cell.noise,
-        person=1 + so_far // BATCH % design.persons,
+        person=1 + cell.draw * design.persons + so_far // BATCH % design.persons,
         time_limit=design.tasks[cell.task].time_limit.get(cell.mode, 0.0),
-        seed=design.seed,
+        seed=seed_of(design, cell),
         dataset=DatasetConfig(
             repo_id=f"study/{cell.task}-{cell.mode}",
             root=str(root),
@@ -45,12 +51,23 @@ def recording(cell: Cell, design: StudyDesign, root: Path, so_far: int = 0) -> R
             fps=_FPS,
         ),
         resume=root.exists(),
+        workers=1,  # a job has one core
     )
 
 
 def training(policy: StudyPolicy, design: StudyDesign, dataset: Path, output: Path) -> TrainConfig:
     """Return how a policy is trained."""
-    task, timed = design.tasks[policy.cell.task], policy.budget == "time"
+    task, timed, flat = design.tasks[policy.cell.task], policy.budget == "time", design.flat
+    ended = (
+        {
+            "eval_split": flat.held_out,
+            "eval_steps": flat.every,
+            "patience": flat.patience,
+            "improvement": flat.improvement,
+        }
+        if flat
+        else {}
+    )
     return TrainConfig(
         dataset=StoredConfig(root=str(dataset)),
         output=str(output),
@@ -59,11 +76,13 @@ def training(policy: StudyPolicy, design: StudyDesign, dataset: Path, output: Pa
         success_only=True,
         steps=task.steps,
         batch_size=task.batch_size,
-        seed=policy.seed,
+        seed=policy.cell.draw,
+        draw=policy.cell.draw,
         policy_options=task.policy_options,
         minutes=task.minutes if timed else 0.0,
         episodes=0 if timed else task.episodes,
         resume=True,
+        **ended,
     )
 
 
@@ -79,9 +98,10 @@ def evaluations(job: Job, design: StudyDesign, folder: str = "policy") -> dict[s
     assert policy is not None
     common: dict[str, Any] = {
         "policy": (folder,),
-        "seed": design.seed,
+        "seed": seed_of(design, policy.cell),
         "label": policy.label,
         "time_limit": design.tasks[policy.cell.task].rollout_limit,
+        "workers": 1,  # a job has one core
     }
     found = {"nominal": EvaluateConfig(episodes=design.rollouts, **common)}
     if job.robust and more:
@@ -96,17 +116,14 @@ def fingerprint(job: Job, design: StudyDesign) -> dict[str, Any]:
     """Return all settings that a job's result depends on, as JSON has them, nothing left to a preset.
 
     Of a dataset `recording` says what it is; `wanted` may grow. A policy depends on both, on its `training`
-    and on its `evaluations`; a comparison on all that it compares.
+    and on its `evaluations`.
     """
-    if job.cell:
+    if job.policy is None:
         return _of_cell(job.cell, design)
-    if job.policy:
-        config = training(job.policy, design, Path("dataset"), Path("policy"))
-        learnt = _some(config, _LEARNT) | {"sizes": as_json(resolved(config))}
-        driven = {what: _some(each, _DRIVEN) for what, each in evaluations(job, design).items()}
-        return _of_cell(job.policy.cell, design) | {"training": learnt, "evaluations": driven}
-    needed = {each.name: fingerprint(each, design) for each in jobs(design) if each.name in job.needs}
-    return {"modes": list(design.modes), "baseline": design.baseline, "compared": needed}
+    config = training(job.policy, design, Path("dataset"), Path("policy"))
+    learnt = _some(config, (*_LEARNT, *_ENDED)) | {"sizes": as_json(resolved(config))}
+    driven = {what: _some(each, _DRIVEN) for what, each in evaluations(job, design).items()}
+    return _of_cell(job.cell, design) | {"training": learnt, "evaluations": driven}
 
 
 def check_jobs(design: StudyDesign) -> None:
@@ -118,8 +135,7 @@ def check_jobs(design: StudyDesign) -> None:
     found = jobs(design)
     for job in found:
         with _named(design, job):
-            if job.cell:
-                recording(job.cell, design, Path("dataset")).check()
+            recording(job.cell, design, Path("dataset")).check()
             if job.policy:
                 training(job.policy, design, Path("dataset"), Path("policy")).check()
                 for config in evaluations(job, design).values():
@@ -136,7 +152,7 @@ def check_policies(design: StudyDesign) -> None:
     Raises:
         HandrailError: it cannot be built.
     """
-    firsts = {job.policy.cell.task: job for job in reversed(jobs(design)) if job.policy}
+    firsts = {job.cell.task: job for job in reversed(jobs(design)) if job.policy}
     for job in firsts.values():
         with _named(design, job):
             assert job.policy is not None

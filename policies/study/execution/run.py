@@ -14,8 +14,10 @@ from handrail.datasets.storage.lock import DatasetLock
 from handrail.policies.imitation.training.installed import check_installed
 from handrail.policies.study.config import StudyConfig
 from handrail.policies.study.design.design import StudyDesign
-from handrail.policies.study.design.jobs import Job, Layout, jobs
+from handrail.policies.study.design.designs import check_cell, note_design
+from handrail.policies.study.design.jobs import Job, Layout
 from handrail.policies.study.design.load import load_design
+from handrail.policies.study.design.power import plan
 from handrail.policies.study.design.progress import StudyProgress
 from handrail.policies.study.design.settings import check_policies
 from handrail.policies.study.execution.work import do
@@ -40,19 +42,25 @@ def run_study(
     config.check()
     design = load_design(config.preset)
     progress, console = StudyProgress(design, Layout(config.folder)), Console(stderr=True)
+    check_cell(config.only, progress.jobs)
+    told = f"study {design.name}, design {design.digest}: {len(progress.jobs)} jobs. {plan(design)}"
+    console.print(told, highlight=False, soft_wrap=True)
+    if config.plan:
+        return 0
     check_installed("handrail-study", ("torch", "accelerate"), design.policy)
     if config.page:
         with_part(read_page(Path(config.page).expanduser()), f"study {design.name}", "")
     failed = False
     with _alone_in(config):
         if not config.report_only:
-            if any(name.startswith("policy/") for name in progress.missing):
+            note_design(progress.layout, design)
+            if any(job.policy for job in progress.todo(config.only)):
                 check_policies(design)
             with (
                 _going_on(),
                 Execution(config, f"study {design.name}", console, _PRELOAD, isolated) as execution,
             ):
-                for result in execution.run(_todo(progress, work)):
+                for result in execution.run(_todo(progress, work, config.only)):
                     failed |= bool(result.error)
         from handrail.policies.study.report.report import write_study
 
@@ -61,16 +69,14 @@ def run_study(
     return FAILED if failed else 0
 
 
-def _todo(progress: StudyProgress, work: Callable[[Job, StudyDesign, Path], None]) -> list[Piece]:
-    """Return the jobs that are not done, what matters most first; their logs begin anew."""
+def _todo(progress: StudyProgress, work: Callable[[Job, StudyDesign, Path], None], only: str) -> list[Piece]:
+    """Return the jobs that are to be done, what matters most first; their logs begin anew."""
     design, layout = progress.design, progress.layout
-    missing = [job for job in jobs(design) if job.name in progress.missing]
-    for job in missing:
+    todo = progress.todo(only)
+    for job in todo:
         with explained(str(layout.log(job))):
             layout.log(job).unlink(missing_ok=True)  # of an earlier time
-    return [
-        Piece(job.name, work, (job, design, layout.root), job.needs, log=layout.log(job)) for job in missing
-    ]
+    return [Piece(job.name, work, (job, design, layout.root), job.needs, log=layout.log(job)) for job in todo]
 
 
 @contextlib.contextmanager

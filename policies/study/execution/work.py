@@ -1,35 +1,49 @@
 """Does one job of a study; whatever is killed goes on where it was."""
 
+import os
+import resource
 import time
 from collections.abc import Mapping
 from dataclasses import replace
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 from handrail.controllers.errors import HandrailError
-from handrail.datasets.comparison.config import CompareConfig
-from handrail.datasets.reading.reader import read_episodes, read_info
+from handrail.datasets.reading.reader import read_episodes
 from handrail.datasets.storage.atomic import remove
-from handrail.policies.imitation.interface.checkpoint import last_checkpoint
+from handrail.policies.imitation.interface.checkpoint import last_checkpoint, read_meta
 from handrail.policies.study.design.design import StudyDesign
 from handrail.policies.study.design.jobs import CONDITIONS, Cell, Job, Layout, StudyPolicy
-from handrail.policies.study.design.progress import StudyProgress, read_json, write_json
+from handrail.policies.study.design.progress import note_of, read_json, write_json
 from handrail.policies.study.design.settings import evaluations, fingerprint, recording, training
+from handrail.policies.study.execution.summary import summary
 
 _MOST_ATTEMPTS = 6  # for each success that is wanted
 
 
 def do(job: Job, design: StudyDesign, root: Path) -> None:
-    """Do a job of a study and write that it is done.
+    """Do a job of a study and write that it is done, what came of it, and what it took.
 
     Raises:
         HandrailError, OSError: it cannot be done.
     """
-    layout, start = Layout(root), time.time()
+    layout, start, spent = Layout(root), time.monotonic(), _processor_time()
     begin(job, design, layout)
     result = work(job, design, layout)
-    settings, seconds = fingerprint(job, design), round(time.time() - start, 1)
-    write_json(layout.done(job), {"settings": settings, "result": result, "seconds": seconds})
+    took = {
+        "seconds": round(time.monotonic() - start, 1),
+        "processor_seconds": round(_processor_time() - spent, 1),
+        "cores": os.cpu_count(),
+        "ended": datetime.now(UTC).isoformat(timespec="seconds"),
+    }
+    write_json(layout.done(job), {"settings": fingerprint(job, design), "result": result, "took": took})
+
+
+def _processor_time() -> float:
+    """Return what this process and those it waited for have used so far [s]."""
+    used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    return sum(each.ru_utime + each.ru_stime for each in used)
 
 
 def begin(job: Job, design: StudyDesign, layout: Layout) -> None:
@@ -56,10 +70,8 @@ def begin(job: Job, design: StudyDesign, layout: Layout) -> None:
 
 def _stale(job: Job, now: Mapping[str, Any], before: Mapping[str, Any], layout: Layout) -> list[Path]:
     """Return where something would be that does not go with the settings of now."""
-    if job.cell:
-        return [layout.dataset(job.cell)] if now["recording"] != before.get("recording") else []
     if job.policy is None:
-        return []
+        return [layout.dataset(job.cell)] if now["recording"] != before.get("recording") else []
     policy, driven = job.policy, before.get("evaluations", {})
     if any(now[part] != before.get(part) for part in ("recording", "wanted", "training")):
         return [layout.policy(policy), *(layout.evaluation(policy, what) for what in CONDITIONS)]
@@ -69,73 +81,67 @@ def _stale(job: Job, now: Mapping[str, Any], before: Mapping[str, Any], layout: 
 
 
 def work(job: Job, design: StudyDesign, layout: Layout) -> dict[str, Any]:
-    """Do a job and return what is to be noted of it: how much there is of a dataset.
+    """Do a job and return what is to be known of it when what is large is gone.
 
     Raises:
         HandrailError: it cannot be done.
     """
-    if job.cell:
-        return _collect(job.cell, design, layout)
     if job.policy:
-        _train_and_evaluate(job, job.policy, design, layout)
-    else:
-        _compare(job.task, design, layout)
-    return {}
-
-
-def _collect(cell: Cell, design: StudyDesign, layout: Layout) -> dict[str, Any]:
-    """Record in turns of a few episodes, each by another person, until there is enough."""
-    from handrail.collect.commands.record import record
-
-    wanted, root = design.tasks[cell.task], layout.dataset(cell)
-    found = _collected(root) if root.exists() else {"episodes": 0, "successes": 0, "minutes": 0.0}
-    while found["successes"] < wanted.episodes or found["minutes"] < wanted.minutes:
-        code = record(recording(cell, design, root, found["episodes"]))
-        if code:
-            raise HandrailError(f"collecting {cell.name}: recording ended with exit code {code}")
-        found = _collected(root)
-        if found["episodes"] >= _MOST_ATTEMPTS * wanted.episodes and found["successes"] < wanted.episodes:
-            raise HandrailError(
-                f"collecting {cell.name}: expected {wanted.episodes} successes, "
-                f"got {found['successes']} in {found['episodes']} attempts"
-            )
+        return _train_and_evaluate(job, job.policy, design, layout)
+    root, before = layout.dataset(job.cell), note_of(job, layout)
+    _collect(job.cell, design, root)
+    found = summary(root, design.seed)
+    same = before.get("settings") == fingerprint(job, design)
+    expected = before.get("result", {}).get("digest", found["digest"])
+    if same and found["digest"] != expected:
+        print(f"recorded again, the rows differ: expected the digest {expected}, got {found['digest']}")
+        found["digest_before"] = expected
     return found
 
 
-def _collected(root: Any) -> dict[str, Any]:
-    episodes = read_episodes(root)
-    return {
-        "episodes": len(episodes),
-        "successes": sum(bool(episode["success"]) for episode in episodes),
-        "minutes": sum(episode["length"] for episode in episodes) / read_info(root).fps / 60.0,
-    }
+def _collect(cell: Cell, design: StudyDesign, root: Path) -> None:
+    """Record in turns of a few episodes, each by another person, until there is enough."""
+    from handrail.collect.commands.record import record
+
+    wanted = design.tasks[cell.task]
+    while True:
+        rows = read_episodes(root) if root.exists() else []
+        config = recording(cell, design, root, len(rows))
+        successes = sum(bool(row["success"]) for row in rows)
+        minutes = sum(row["length"] for row in rows) / config.dataset.fps / 60.0
+        if successes >= wanted.episodes and minutes >= wanted.minutes:
+            return
+        if len(rows) >= _MOST_ATTEMPTS * wanted.episodes and successes < wanted.episodes:
+            raise HandrailError(
+                f"collecting {cell.name}: expected {wanted.episodes} successes, "
+                f"got {successes} in {len(rows)} attempts"
+            )
+        code = record(config)
+        if code:
+            raise HandrailError(f"collecting {cell.name}: recording ended with exit code {code}")
 
 
-def _train_and_evaluate(job: Job, policy: StudyPolicy, design: StudyDesign, layout: Layout) -> None:
+def _train_and_evaluate(job: Job, policy: StudyPolicy, design: StudyDesign, layout: Layout) -> dict[str, Any]:
     """Train a policy and let it drive, under every condition into a file of its own."""
     from handrail.policies.imitation.evaluation.evaluation import evaluate
     from handrail.policies.imitation.training.training import train
 
+    start = time.monotonic()
     folder = train(training(policy, design, layout.dataset(policy.cell), layout.policy(policy)))
+    trained = time.monotonic()
     for what, config in evaluations(job, design, str(folder)).items():
         file = layout.evaluation(policy, what)
         file.parent.mkdir(parents=True, exist_ok=True)
         evaluate(replace(config, json=str(file)))
-
-
-def _compare(task: str, design: StudyDesign, layout: Layout) -> None:
-    """Write the report of a task: its datasets and what the policies did."""
-    from handrail.datasets.comparison.compare import compare
-    from handrail.datasets.comparison.report.report import write_report
-
-    cells = [Cell(task, mode) for mode in design.modes]
-    progress = StudyProgress(design, layout)
-    files = [path for cell in cells for path in progress.evaluations(cell, "nominal")]
-    config = CompareConfig(
-        datasets=tuple(str(layout.dataset(cell)) for cell in cells),
-        labels=design.modes,
-        baseline=design.baseline,
-        evaluations=tuple(map(str, files)),
-        output=str(layout.comparison(task)),
-    )
-    write_report(compare(config))
+    _, meta = read_meta(folder)
+    for other in (layout.policy(policy) / "checkpoints").glob("*"):
+        if other.name.isdecimal() and other != folder.parent:  # one was needed only to go on from
+            remove(other)
+    return {
+        "steps": meta.steps,
+        "trained_on": dict(meta.trained_on),
+        "data": meta.data,
+        "validation": dict(meta.validation),
+        "training_seconds": round(trained - start, 1),
+        "rollout_seconds": round(time.monotonic() - trained, 1),
+    }

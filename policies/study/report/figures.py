@@ -1,96 +1,143 @@
-"""The figures of a study: the answer by task, what disturbs, and how it depends on the operator's noise."""
+"""The figures of a study: contrasts, the policies by task, their training, what disturbs, the sweep."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from handrail.datasets.comparison.outcomes import ConditionOutcome
-from handrail.datasets.presentation.drawing import COLOURS, new_figure, tidy
-from handrail.policies.study.design.design import StudyDesign
-from handrail.policies.study.report.conditions import StudyCondition
-from handrail.policies.study.report.results import TaskResults
+from handrail.datasets.presentation.drawing import COLOURS, GREY, INK, new_figure, tidy
+from handrail.policies.study.report.contrasts import DECLARED, Contrast
+from handrail.policies.study.report.results import Condition, Results
+from handrail.policies.study.report.tables import sweep
 
 _WIDTH = 10.4  # [inch]
 
 
-def figures(design: StudyDesign, results: Sequence[TaskResults]) -> dict[str, Any]:
+def figures(results: Results, found: Sequence[Contrast]) -> dict[str, Any]:
     """Return matplotlib figures by name; those for which there is something to show."""
+    tasks = [task for task in results.progress.design.tasks if results.of_task(task)]
     made: dict[str, Any] = {}
-    evaluated = [each for each in results if each.undisturbed]
-    if evaluated:
-        made["answer"] = _answer(design, evaluated)
-    if any(each.disturbed for each in evaluated):
-        made["robustness"] = _robustness(design, [each for each in evaluated if each.disturbed])
-    swept = [each for each in evaluated if each.sweep]
+    if any(each.estimate.interval and each.kind == DECLARED for each in found):
+        made["contrasts"] = _contrasts(found)
+    if tasks:
+        made["answer"] = _answer(tasks, results)
+    curved = [task for task in tasks if any(_curves(each, results) for each in results.of_task(task))]
+    if curved:
+        made["training"] = _training(curved, results)
+    disturbed = [task for task in tasks if results.of_task(task, treated=True)]
+    if disturbed:
+        made["robustness"] = _robustness(disturbed, results)
+    swept = [task for task in tasks if sweep(task, results)]
     if swept:
-        made["sweep"] = _sweep(design, swept)
+        made["sweep"] = _sweep(swept, results)
     return made
 
 
-def _style(design: StudyDesign, condition: StudyCondition) -> dict[str, Any]:
+def _contrasts(found: Sequence[Contrast]) -> Any:
+    """The declared contrasts over all tasks, and beneath them the same of each task, which explore."""
+    declared = [each for each in found if each.kind == DECLARED and each.estimate.interval]
+    rows: list[tuple[str, Contrast]] = []
+    for each in declared:
+        rows.append((each.name, each))
+        same = (c for c in found if (c.name, c.measure) == (each.name, each.measure) and c is not each)
+        rows += [(f"{', '.join(c.tasks)} (exploratory)", c) for c in same if c.estimate.interval]
+    figure = new_figure(_WIDTH, 0.9 + 0.34 * len(rows))
+    axes = figure.subplots()
+    for row, (_, each) in enumerate(rows):
+        first = each.kind == DECLARED
+        colour = INK if first else GREY
+        axes.plot(
+            np.multiply(100, each.estimate.interval or (0, 0)),
+            [row, row],
+            color=colour,
+            lw=2.4 if first else 1.2,
+        )
+        axes.plot(100 * each.estimate.value, row, "o", color=colour, ms=7 if first else 4)
+    axes.axvline(0.0, color=GREY, lw=0.8)
+    axes.set(yticks=range(len(rows)), yticklabels=[name for name, _ in rows], ylim=(len(rows) - 0.4, -0.6))
+    axes.set_xlabel("difference in policy success [points], 95 %")
+    tidy(axes, "x")
+    return figure
+
+
+def _style(condition: Condition, results: Results) -> dict[str, Any]:
     """Return how a condition is drawn: the mode's colour, the action's mark."""
-    colour = COLOURS[design.modes.index(condition.mode) % len(COLOURS)]
-    mark = "D" if condition.actions == "intent" else "o"
-    return {"color": colour, "marker": mark, "ms": 5, "label": _name(condition)}
+    modes, policy = results.progress.design.modes, next(iter(condition.draws.values())).policy
+    mark = "D" if policy.actions == "intent" else "s" if policy.budget == "number" else "o"
+    colour = COLOURS[modes.index(policy.cell.mode) % len(COLOURS)]
+    return {"color": colour, "marker": mark, "label": _name(condition)}
 
 
-def _name(condition: StudyCondition) -> str:
+def _name(condition: Condition) -> str:
     """Return what a condition is called: an intent is no policy alone."""
-    data = f"{condition.mode}, same number" if condition.budget == "number" else condition.mode
-    return f"{data}:\nintent through MPC" if condition.actions == "intent" else data
+    return condition.label.replace(" intent", ":\nintent through MPC").replace(" same", ",\nsame")
 
 
-def _answer(design: StudyDesign, results: Sequence[TaskResults]) -> Any:
-    """One panel a task: success of every condition; thick: these policies, thin: training, ticks: seeds."""
-    rows = max(len(each.undisturbed) for each in results)
+def _answer(tasks: Sequence[str], results: Results) -> Any:
+    """One panel a task: success of every condition; a line: 95 %, ticks: draws."""
+    rows = max(len(results.of_task(task)) for task in tasks)
     figure = new_figure(_WIDTH, 1.2 + 0.4 * rows)
-    grid = figure.subplots(1, len(results), squeeze=False)[0]
-    for axes, each in zip(grid, results, strict=True):
-        for row, found in enumerate(each.undisturbed.values()):
-            outcome, style = found.outcome, _style(design, found.condition) | {"ms": 8, "mec": "white"}
-            colour = style["color"]
-            axes.plot(np.multiply(100, outcome.wilson), [row, row], color=colour, lw=5.0, alpha=0.35)
-            if outcome.nested:
-                axes.plot(np.multiply(100, outcome.nested), [row, row], color=colour, lw=1.4)
-            axes.plot(
-                np.multiply(100, outcome.seeds),
-                np.full(len(outcome.seeds), row + 0.26),
-                "|",
-                color=colour,
-                ms=6,
-            )
-            axes.plot(100 * outcome.share, row, **style)
-        labels = [_name(found.condition) for found in each.undisturbed.values()]
-        axes.set(title=each.task.replace("_", " "), xlabel="policy success [%]", xlim=(-3, 103))
-        axes.set(ylim=(len(labels) - 0.4, -0.6), yticks=range(len(labels)), yticklabels=labels)
+    for axes, task in zip(figure.subplots(1, len(tasks), squeeze=False)[0], tasks, strict=True):
+        conditions = results.of_task(task)
+        for row, each in enumerate(conditions):
+            style = _style(each, results) | {"ms": 7, "mec": "white"}
+            axes.plot(np.multiply(100, each.interval), [row, row], color=style["color"], lw=1.6)
+            shares = [100 * share for share in each.shares.values()]
+            axes.plot(shares, np.full(len(shares), row + 0.26), "|", color=style["color"], ms=6)
+            axes.plot(100 * each.success.value, row, **style)
+        axes.set(title=task.replace("_", " "), xlabel="policy success [%]", xlim=(-3, 103))
+        axes.set(ylim=(len(conditions) - 0.4, -0.6), yticks=range(len(conditions)))
+        axes.set_yticklabels([_name(each) for each in conditions])
         tidy(axes, "x")
     return figure
 
 
-def _robustness(design: StudyDesign, results: Sequence[TaskResults]) -> Any:
-    """One panel a task: success of every condition under every treatment."""
+def _curves(condition: Condition, results: Results) -> list[tuple[list[int], list[float]]]:
+    """Return updates and loss on held-out episodes of each policy."""
+    found = [each["validation"] for each in results.trained(condition) if each.get("validation")]
+    return [(steps := sorted(map(int, each)), [each[str(step)] for step in steps]) for each in found]
+
+
+def _training(tasks: Sequence[str], results: Results) -> Any:
+    """One panel a task: the loss on held-out episodes of every policy of joint velocities; a dot ends it."""
     figure = new_figure(_WIDTH, 3.2)
-    grid = figure.subplots(1, len(results), squeeze=False, sharey=True)[0]
-    for axes, each in zip(grid, results, strict=True):
-        names = [
-            "undisturbed",
-            *dict.fromkeys(found.condition.treatment for found in each.disturbed.values()),
-        ]
-        conditions = list(
-            dict.fromkeys(replace(found.condition, treatment="") for found in each.disturbed.values())
-        )
-        for place, condition in enumerate(conditions):
-            shown = by_treatment(each, condition)
-            xs = [names.index(name) for name in shown]
-            shift = 0.5 * ((place + 0.5) / len(conditions) - 0.5)
-            values = np.array([outcome.share for outcome in shown.values()])
-            spans = np.array([outcome.wilson for outcome in shown.values()])
-            errors = np.abs(spans.T - values) * 100
-            style = _style(design, condition) | {"ls": "", "elinewidth": 1.2}
-            axes.errorbar(np.array(xs) + shift, 100 * values, yerr=errors, **style)
-        axes.set(title=each.task.replace("_", " "), xticks=range(len(names)), ylim=(-3, 103))
+    for axes, task in zip(figure.subplots(1, len(tasks), squeeze=False)[0], tasks, strict=True):
+        for each in results.of_task(task):
+            if each.label not in results.progress.design.modes:
+                continue
+            style = _style(each, results)
+            for place, (steps, losses) in enumerate(_curves(each, results)):
+                name = style["label"] if place == 0 else None
+                axes.plot(np.divide(steps, 1000), losses, color=style["color"], lw=0.8, alpha=0.7, label=name)
+                axes.plot(steps[-1] / 1000, losses[-1], "o", color=style["color"], ms=3)
+        axes.set(title=task.replace("_", " "), xlabel="updates [thousand]", ylim=(0, None), xlim=(0, None))
+        axes.legend(fontsize=8, frameon=False)
+        tidy(axes)
+    figure.axes[0].set_ylabel("loss on held-out episodes")
+    return figure
+
+
+def _robustness(tasks: Sequence[str], results: Results) -> Any:
+    """One panel a task: success of every condition under every treatment, and of the same draws without."""
+    figure = new_figure(_WIDTH, 3.2)
+    grid = figure.subplots(1, len(tasks), squeeze=False, sharey=True)[0]
+    for axes, task in zip(grid, tasks, strict=True):
+        treated = results.of_task(task, treated=True)
+        names = ["undisturbed", *dict.fromkeys(each.treatment for each in treated)]
+        labels = list(dict.fromkeys(each.label for each in treated))
+        for place, label in enumerate(labels):
+            shown = [
+                found
+                for name in names
+                if (found := results.find(task, label, name if name != names[0] else ""))
+            ]
+            shift = 0.5 * ((place + 0.5) / len(labels) - 0.5)
+            xs = [names.index(each.treatment or names[0]) + shift for each in shown]
+            values = np.array([each.success.value for each in shown])
+            errors = np.abs(np.array([each.interval for each in shown]).T - values) * 100
+            style = _style(shown[0], results) | {"ls": "", "elinewidth": 1.2, "ms": 5}
+            axes.errorbar(xs, 100 * values, yerr=errors, **style)
+        axes.set(title=task.replace("_", " "), xticks=range(len(names)), ylim=(-3, 103))
         axes.set_xticklabels(names, rotation=20)
         tidy(axes, "y")
     grid[0].set_ylabel("policy success [%], 95 %")
@@ -100,31 +147,21 @@ def _robustness(design: StudyDesign, results: Sequence[TaskResults]) -> Any:
     return figure
 
 
-def by_treatment(results: TaskResults, condition: StudyCondition) -> dict[str, ConditionOutcome]:
-    """Return a condition disturbed, and undisturbed: the same policies in the same scenes."""
-    mine = [
-        found for found in results.disturbed.values() if replace(found.condition, treatment="") == condition
-    ]
-    without = next((found.without for found in mine if found.without), None)
-    shown = {"undisturbed": without} if without else {}
-    return shown | {found.condition.treatment: found.outcome for found in mine}
-
-
-def _sweep(design: StudyDesign, results: Sequence[TaskResults]) -> Any:
+def _sweep(tasks: Sequence[str], results: Results) -> Any:
     """Success of the policies, and the operator's time for a demonstration, over the operator's noise."""
-    figure = new_figure(_WIDTH, 3.0 * len(results))
-    grid = figure.subplots(len(results), 2, squeeze=False)
-    for (left, right), each in zip(grid, results, strict=True):
-        for found in each.sweep.values():
-            condition = found[0].condition
-            noises = [point.noise for point in found]
-            shares = np.array([point.outcome.share for point in found])
-            spans = np.array([point.outcome.wilson for point in found])
-            style = _style(design, condition) | {"lw": 1.4}
+    figure = new_figure(_WIDTH, 3.0 * len(tasks))
+    grid = figure.subplots(len(tasks), 2, squeeze=False)
+    for (left, right), task in zip(grid, tasks, strict=True):
+        found = sweep(task, results)
+        for label in dict.fromkeys(each.label for _, each, _ in found):
+            mine = [point for point in found if point[1].label == label]
+            noises, conditions, seconds = zip(*mine, strict=True)
+            shares = np.array([each.success.value for each in conditions])
+            spans = np.array([each.interval for each in conditions])
+            style = _style(conditions[0], results) | {"lw": 1.4, "ms": 5}
             left.errorbar(noises, 100 * shares, yerr=100 * np.abs(spans.T - shares), **style)
-            if condition.actions == "realised":
-                right.plot(noises, [point.seconds for point in found], **style)
-        left.set(title=each.task.replace("_", " "), ylabel="policy success [%], 95 %", ylim=(-3, 103))
+            right.plot(noises, seconds, **style)
+        left.set(title=task.replace("_", " "), ylabel="policy success [%], 95 %", ylim=(-3, 103))
         right.set(title="operator's time", ylabel="s a successful demonstration", ylim=(0, None))
         for axes in (left, right):
             axes.set(xlabel="operator's noise: 0 perfect, 1 as people are")

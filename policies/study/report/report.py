@@ -6,30 +6,39 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from handrail.collect.session.build import software_versions
-from handrail.datasets.comparison.finding import Finding
 from handrail.datasets.comparison.report.report import json_text
 from handrail.datasets.presentation import markup
 from handrail.datasets.presentation.drawing import png, svg
 from handrail.datasets.presentation.markdown import markdown_table, write_part
+from handrail.datasets.presentation.table import Table
 from handrail.datasets.storage.atomic import explained, write_whole
 from handrail.policies.study.config import StudyConfig
+from handrail.policies.study.design.designs import designs
 from handrail.policies.study.design.progress import StudyProgress
+from handrail.policies.study.report import tables
+from handrail.policies.study.report.contrasts import DECLARED, EXPLORATORY, SYSTEM, Contrast, contrasts
 from handrail.policies.study.report.figures import figures
-from handrail.policies.study.report.gather import gather
-from handrail.policies.study.report.how import how
-from handrail.policies.study.report.results import TaskResults
-from handrail.policies.study.report.tables import tables
+from handrail.policies.study.report.results import Condition, Results, gather
+from handrail.policies.study.report.words import answer, cautions, how
 
 _CAPTIONS = {
-    "answer": "Success of the policies; thick: 95 % for these policies, thin: with training, ticks: training"
-    " seeds. Round: joint velocities, unprotected; diamonds: intent through the MPC, policy and controller.",
-    "robustness": "Success disturbed and undisturbed, of the same policies in the same scenes.",
+    "contrasts": "What makes a difference: declared, over all tasks (dark), and in each task (grey).",
+    "answer": "Success of the policies; lines: 95 %, ticks: draws. Round: joint velocities, unprotected;"
+    " diamonds: intent through the MPC, policy and controller; squares: the same number of demonstrations.",
+    "training": "Loss on held-out episodes while the policies learnt; a dot is where the training ended.",
+    "robustness": "Success disturbed and undisturbed.",
     "sweep": "How human the operator is, and what that does to policies and to the operator's time.",
 }
-_FORMAT = "handrail.study/1"
+_FORMAT = "handrail.study/2"
+_OF_TASK = (
+    tables.conditions_table,
+    tables.failures_table,
+    tables.collection_table,
+    tables.quality_table,
+    tables.treatments_table,
+    tables.sweep_table,
+)
 
 
 def write_study(config: StudyConfig, progress: StudyProgress) -> list[Path]:
@@ -42,84 +51,115 @@ def write_study(config: StudyConfig, progress: StudyProgress) -> list[Path]:
     Raises:
         HandrailError: a file cannot be written.
     """
-    design, root = progress.design, progress.layout.root
-    results = gather(progress, np.random.default_rng(design.seed))
-    drawn = figures(design, results)
+    root, results = progress.layout.root, gather(progress)
+    found = contrasts(results)
+    drawn = figures(results, found)
     files = {
-        root / "report.html": _html(progress, results, drawn),
-        root / "study.json": _json(progress, results),
+        root / "report.html": _html(config, results, found, drawn),
+        root / "study.json": _json(config, results, found),
     }
     with explained("study: expected a folder that can be written"):
         for path, text in files.items():
             write_whole(path, text.encode())
         written = list(files)
         if config.page:
-            written += _write_page(Path(config.page).expanduser(), progress, results, drawn)
+            written += _write_page(config, results, found, drawn)
     return written
 
 
-def _html(progress: StudyProgress, results: Sequence[TaskResults], drawn: Mapping[str, Any]) -> str:
-    design, layout = progress.design, progress.layout
-    title = f"Study {design.name}: {', '.join(design.modes)}"
-    answers = [f"{_title(each)}. {each.answer}" for each in results if each.answer]
-    parts = [markup.paragraph(answer, "headline") for answer in answers]
-    parts += [markup.paragraph(f"{progress.words}.")] if progress.words else []
+def _of_all(results: Results, found: Sequence[Contrast]) -> list[Table]:
+    made = [tables.contrasts_table(found, kind, results) for kind in (DECLARED, SYSTEM, EXPLORATORY)]
+    return [table for table in made if table.rows]
+
+
+def _of_task(task: str, results: Results) -> list[Table]:
+    return [table for make in _OF_TASK if (table := make(task, results)).rows]
+
+
+def _html(config: StudyConfig, results: Results, found: Sequence[Contrast], drawn: Mapping[str, Any]) -> str:
+    progress = results.progress
+    title = f"Study {progress.design.name}: {', '.join(progress.design.modes)}"
+    parts = [markup.paragraph(" ".join(answer(found, results)), "headline")]
+    parts.append(markup.items(("caution", text) for text in cautions(results)))
     pictures = [(_CAPTIONS[name], "", svg(figure)) for name, figure in drawn.items()]
     parts += [markup.section("Figures", markup.panels(pictures, "wide"))] if pictures else []
-    for each in results:
-        words = [(_look(found), found.text) for found in each.findings]
-        link = ""
-        if (layout.comparison(each.task) / "report.html").is_file():
-            address = f"comparisons/{each.task}/report.html"
-            link = markup.link("The demonstrations compared: quality, trajectories", address)
-        parts.append(markup.section(_title(each), markup.items(words), link, *tables(each)))
-    parts.append(markup.section("How to read this", markup.paragraph(how(design, results))))
+    if tested := _of_all(results, found):
+        parts.append(markup.section("Contrasts", *tested))
+    parts += [markup.section(_title(task), *_of_task(task, results)) for task in progress.design.tasks]
+    parts.append(markup.section("How to read this", markup.paragraph(how(results, found))))
+    again = tables.times_table(results), tables.cells_table(results, config.preset)
+    parts.append(markup.section("Again", *(table for table in again if table.rows)))
     return markup.page(title, *parts)
 
 
-def _look(found: Finding) -> str:
-    return "caution" if found.kind == "caution" else "detected" if found.detected else "quiet"
+def _title(task: str) -> str:
+    return task.replace("_", " ").capitalize()
 
 
-def _bullet(found: Finding) -> str:
-    return f"- {'Caution: ' if found.kind == 'caution' else ''}{found.text}"
-
-
-def _title(results: TaskResults) -> str:
-    return results.task.replace("_", " ").capitalize()
-
-
-def _json(progress: StudyProgress, results: Sequence[TaskResults]) -> str:
-    versions = software_versions() | {"torch": importlib.metadata.version("torch")}
+def _json(config: StudyConfig, results: Results, found: Sequence[Contrast]) -> str:
+    progress = results.progress
+    done = {job.name: note for job in progress.jobs if (note := progress.note(job))}
+    took = [note.get("took", {}) for note in done.values()]
     content = {
         "format": _FORMAT,
         "design": asdict(progress.design),
+        "designs": designs(progress.layout),
         "missing": progress.missing,
-        "versions": versions,
-        "tasks": {each.task: asdict(each) for each in results},
+        "versions": software_versions() | {"torch": importlib.metadata.version("torch")},
+        "answer": answer(found, results),
+        "contrasts": [asdict(each) for each in found],
+        "conditions": [_numbers(noise, each) for (noise, *_), each in results.conditions.items()],
+        "jobs": {name: {"result": note["result"], "took": note.get("took")} for name, note in done.items()},
+        "seconds": sum(each.get("seconds", 0.0) for each in took),
+        "processor_seconds": sum(each.get("processor_seconds", 0.0) for each in took),
+        "again": tables.cell_command(config.preset, "TASK/MODE/DRAW"),
     }
     return json_text(content)
 
 
+def _numbers(noise: float, condition: Condition) -> dict[str, Any]:
+    return {
+        "task": condition.task,
+        "label": condition.label,
+        "treatment": condition.treatment,
+        "noise": noise,
+        "success": asdict(condition.success),
+        "interval": condition.interval,
+        "draws": {str(draw): share for draw, share in condition.shares.items()},
+        "successes": int(condition.rolled().sum()),
+        "rollouts": len(condition.rolled()),
+        "touched": float(condition.rolled("contact").mean()),
+        "length": condition.mean("length"),
+        "failures": dict(condition.failures),
+    }
+
+
 def _write_page(
-    page: Path, progress: StudyProgress, results: Sequence[TaskResults], drawn: Mapping[str, Any]
+    config: StudyConfig, results: Results, found: Sequence[Contrast], drawn: Mapping[str, Any]
 ) -> list[Path]:
     """Put tables and figures between the study's marks; figures and JSON go beside the page."""
-    design = progress.design
+    page, design = Path(config.page).expanduser(), results.progress.design
     stem = f"{page.stem}_{design.name}"
-    parts = [f"`handrail-study --preset {design.name}` wrote this. {how(design, results)}"]
-    parts += [f"{progress.words}."] if progress.words else []
+    parts = [" ".join(answer(found, results)), "\n".join(f"- {text}" for text in cautions(results))]
     written = [page]
     for name, figure in drawn.items():
         picture = page.parent / f"{stem}_{name}.png"
         write_whole(picture, png(figure))
         parts.append(f"![{_CAPTIONS[name]}]({picture.name})")
         written.append(picture)
-    for each in results:
-        parts += [f"### {_title(each)}", "\n".join(map(_bullet, each.findings))]
-        parts += map(markdown_table, tables(each))
+    parts += map(markdown_table, _of_all(results, found))
+    for task in design.tasks:
+        if of_task := _of_task(task, results):
+            parts += [f"### {_title(task)}", *map(markdown_table, of_task)]
+    parts += ["### How to read this", how(results, found)]
+    times = tables.times_table(results)
+    parts += [markdown_table(times)] if times.rows else []
+    again = tables.cell_command(config.preset, "TASK/MODE/DRAW")
+    parts.append(
+        f"`handrail-study --preset {config.preset}` wrote this, design `{design.digest}`. `{again}` runs one"
+        " cell anew, with the same rows and the same rollouts; digests are in the JSON."
+    )
     data = page.parent / f"{stem}.json"
-    write_whole(data, _json(progress, results).encode())
-    body = "\n\n".join(filter(None, parts))
-    write_part(page, "Teleoperation modes", f"study {design.name}", body)
+    write_whole(data, _json(config, results, found).encode())
+    write_part(page, "Teleoperation modes", f"study {design.name}", "\n\n".join(filter(None, parts)))
     return [*written, data]

@@ -1,78 +1,176 @@
-"""What a study found so far: what was collected, how the policies fared, under which treatments."""
+"""What the rollouts of a study are, policy by policy, read from the small files that its jobs leave."""
 
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
 
-from handrail.datasets.comparison.collection import Collected
-from handrail.datasets.comparison.finding import Finding
-from handrail.datasets.comparison.outcomes import ConditionOutcome, Outcomes
-from handrail.datasets.statistics.proportions import ShareDifference
-from handrail.policies.study.report.conditions import StudyCondition
+import numpy as np
+
+from handrail.controllers.arrays import FloatArray
+from handrail.datasets.statistics.paired import wilson
+from handrail.datasets.statistics.resampling import Interval
+from handrail.datasets.statistics.student import Estimate, student, variance_of_share
+from handrail.policies.study.design.jobs import Cell, Job, StudyPolicy
+from handrail.policies.study.design.progress import StudyProgress, read_json
+
+MEASURES = ("success", "contact")  # of a rollout: whether it succeeded, whether it touched anything
 
 
 @dataclass(frozen=True)
-class ConditionResult:
-    """All policies of a condition under one treatment.
+class Driven:
+    """What one policy did under one treatment.
 
     Attributes:
-        condition: what it is.
-        outcome: success with its intervals.
-        touched: share of rollouts with a contact.
-        contacts: mean a rollout.
-        without: outcome of the same policies in the same scenes with neither disturbance nor protection; None
-            where this is it, or it is not known.
-        change: success minus that, as pairs.
+        policy: which.
+        treatment: what disturbs or protects, `pushed` or `filter`; "" for neither.
+        rollouts: lines of the evaluation's file, by seed.
     """
 
-    condition: StudyCondition
-    outcome: ConditionOutcome
-    touched: float
-    contacts: float
-    without: ConditionOutcome | None = None
-    change: ShareDifference | None = None
+    policy: StudyPolicy
+    treatment: str
+    rollouts: Mapping[int, Mapping[str, Any]]
+
+    def values(self, measure: str = "success") -> FloatArray:
+        """Return whether each rollout succeeded, or touched anything, (R,), by seed."""
+        rows = [self.rollouts[seed] for seed in sorted(self.rollouts)]
+        if measure == "contact":
+            return np.array([row.get("contacts", 0) > 0 for row in rows], float)
+        return np.array([row["success"] for row in rows], float)
+
+    @property
+    def failures(self) -> Counter[str]:
+        """Where and how rollouts failed, `lift, stalled`, and how many of each."""
+        failed = [row for row in self.rollouts.values() if not row["success"]]
+        return Counter(_where(row) for row in failed)
+
+
+def _where(row: Mapping[str, Any]) -> str:
+    """Return the stage in which a rollout failed and how it ended, or else the reason."""
+    said = [str(row[name]) for name in ("stage", "ended") if row.get(name)]
+    return ", ".join(said) or str(row.get("failure_reason") or "unknown")
 
 
 @dataclass(frozen=True)
-class SweepPoint:
-    """A condition at one level of the operator's noise.
+class Condition:
+    """All draws of one kind of policy under one treatment.
 
     Attributes:
-        condition: what it is.
-        noise: 0 perfect, 1 as people are.
-        outcome: of its policies of the training seeds that the sweep has.
-        seconds: operator time of a successful demonstration, failed attempts included [s].
-    """
-
-    condition: StudyCondition
-    noise: float
-    outcome: ConditionOutcome
-    seconds: float
-
-
-@dataclass(frozen=True)
-class TaskResults:
-    """One task.
-
-    Attributes:
-        task: its name.
-        collected: by mode.
-        policies: undisturbed, each against the baseline of its budget; None before any was evaluated.
-        shielded: joint velocities through a protection, each against the baseline's through the same one.
-        undisturbed: with neither disturbance nor protection, by condition.
-        disturbed: by condition and what disturbs, `ee pushed`.
-        protected: by condition and protection, `direct filter`.
-        sweep: by condition, in the order of the noise.
-        answer: in a few sentences, what is like for like first.
-        findings: in words.
+        task: which.
+        label: of the policies.
+        treatment: as of its draws.
+        draws: by number.
     """
 
     task: str
-    collected: Mapping[str, Collected]
-    policies: Outcomes | None
-    shielded: Outcomes | None
-    undisturbed: Mapping[str, ConditionResult]
-    disturbed: Mapping[str, ConditionResult]
-    protected: Mapping[str, ConditionResult]
-    sweep: Mapping[str, tuple[SweepPoint, ...]]
-    answer: str = ""
-    findings: tuple[Finding, ...] = ()
+    label: str
+    treatment: str
+    draws: Mapping[int, Driven]
+
+    @property
+    def shares(self) -> dict[int, float]:
+        """Success of each draw's policy."""
+        return {draw: float(each.values().mean()) for draw, each in self.draws.items()}
+
+    def least(self, measure: str = "success") -> float:
+        """Return the variance of a draw's share if only its rollouts were drawn anew."""
+        values = [each.values(measure) for each in self.draws.values()]
+        together = np.concatenate(values)
+        return variance_of_share(together.sum(), len(together), round(len(together) / len(values)))
+
+    @cached_property
+    def success(self) -> Estimate:
+        """Mean over draws."""
+        return student(list(self.shares.values()), self.least())
+
+    @property
+    def interval(self) -> Interval:
+        """95 % of the success: Student's t over draws; of a single one Wilson's, for this very policy."""
+        if self.success.interval:
+            low, high = self.success.interval
+            return max(0.0, low), min(1.0, high)
+        values = self.rolled()
+        return wilson(float(values.sum()), len(values))
+
+    def rolled(self, measure: str = "success") -> FloatArray:
+        """Return one measure of all rollouts."""
+        return np.concatenate([each.values(measure) for each in self.draws.values()])
+
+    def mean(self, name: str) -> float:
+        """Return the mean of a number of all rollouts."""
+        rows = [row for each in self.draws.values() for row in each.rollouts.values()]
+        return float(np.mean([row.get(name, 0.0) for row in rows]))
+
+    @property
+    def failures(self) -> Counter[str]:
+        """Where and how rollouts failed."""
+        return sum((each.failures for each in self.draws.values()), Counter[str]())
+
+
+@dataclass(frozen=True)
+class Results:
+    """All that is done of a study.
+
+    Attributes:
+        progress: of the study.
+        conditions: by noise of the operator, task, label and treatment.
+    """
+
+    progress: StudyProgress
+    conditions: Mapping[tuple[float, str, str, str], Condition]
+
+    def find(self, task: str, label: str, treatment: str = "", noise: float = 1.0) -> Condition | None:
+        """Return a condition; None where nothing of it is done."""
+        return self.conditions.get((noise, task, label, treatment))
+
+    def of_task(self, task: str, treated: bool = False) -> list[Condition]:
+        """Return the conditions of a task, disturbed and protected ones or the others."""
+        return [
+            each
+            for (noise, name, _, treatment), each in self.conditions.items()
+            if (noise, name, bool(treatment)) == (1.0, task, treated)
+        ]
+
+    def collected(self, task: str, mode: str, noise: float = 1.0) -> list[dict[str, Any]]:
+        """Return what was collected in a mode, draw by draw."""
+        jobs = [
+            job for job in self.progress.jobs if job.policy is None and _kind(job.cell) == (task, mode, noise)
+        ]
+        return [note["result"] for job in jobs if (note := self.progress.note(job))]
+
+    def trained(self, condition: Condition) -> list[dict[str, Any]]:
+        """Return what came of the trainings of a condition's policies."""
+        wanted = [each.policy for each in condition.draws.values()]
+        jobs = [job for job in self.progress.jobs if job.policy in wanted]
+        return [note["result"] for job in jobs if (note := self.progress.note(job))]
+
+
+def _kind(cell: Cell) -> tuple[str, str, float]:
+    return cell.task, cell.mode, cell.noise
+
+
+def gather(progress: StudyProgress) -> Results:
+    """Return what is done of a study: the main design first, in the order of its modes."""
+    found: dict[tuple[float, str, str, str], dict[int, Driven]] = {}
+    for job in progress.jobs:
+        for each in _driven(job, progress):
+            cell = each.policy.cell
+            key = (cell.noise, cell.task, each.policy.label, each.treatment)
+            found.setdefault(key, {})[cell.draw] = each
+    ordered = sorted(found.items(), key=lambda item: _place(item[1]))
+    return Results(progress, {key: Condition(key[1], key[2], key[3], draws) for key, draws in ordered})
+
+
+def _place(draws: Mapping[int, Driven]) -> tuple[bool, bool]:
+    """Sort the main design before what is beside it; else as the jobs come."""
+    policy = next(iter(draws.values())).policy
+    return policy.budget == "number", policy.actions == "intent"
+
+
+def _driven(job: Job, progress: StudyProgress) -> Iterable[Driven]:
+    for file in progress.rollouts(job):
+        for label, (entry,) in read_json(file)["arms"].items():
+            assert job.policy is not None
+            rollouts = {row["seed"]: row for row in entry["rollouts"]}
+            yield Driven(job.policy, label.removeprefix(job.policy.label).strip(), rollouts)

@@ -1,99 +1,255 @@
-"""The tables of a study, for a page in HTML and one in Markdown alike; the first three are a comparison's."""
+"""The tables of a study, for a page in HTML and one in Markdown alike."""
 
-from dataclasses import replace
+from collections import Counter
+from collections.abc import Sequence
+from typing import Any
 
-from handrail.datasets.comparison.outcomes import ConditionOutcome, Outcomes
-from handrail.datasets.comparison.report.tables import (
-    collection_table,
-    conditions_table,
-    outcome_differences_table,
-)
-from handrail.datasets.presentation.table import Table
+import numpy as np
+
+from handrail.datasets.comparison.outcomes import compare_rollouts
+from handrail.datasets.presentation.table import Cell, Table
 from handrail.datasets.presentation.wording import (
     DASH,
-    THESE_POLICIES,
+    duration,
     number,
+    p_alone,
     percent,
     percent_span,
     points,
     points_span,
 )
-from handrail.policies.study.report.conditions import FAMILIES
-from handrail.policies.study.report.results import ConditionResult, TaskResults
+from handrail.datasets.quality.catalogue import METRICS
+from handrail.datasets.statistics.resampling import Run
+from handrail.policies.study.design.power import detectable
+from handrail.policies.study.report.contrasts import CONTRASTS, DECLARED, EXPLORATORY, WORDS, Contrast
+from handrail.policies.study.report.results import Condition, Results
+
+_TITLES = {
+    DECLARED: "Declared before the run: policy success",
+    EXPLORATORY: "Exploratory: not declared, not tested",
+}
 
 
-def tables(results: TaskResults) -> list[Table]:
-    """Return the tables of a task that have something in them."""
-    both = [each for each in (results.policies, results.shielded) if each]
-    differences = [each for outcomes in both for each in outcomes.differences]
-    differences.sort(key=lambda each: FAMILIES.index(each.family))
-    compared = Outcomes((), tuple(differences))
-    made = [
-        replace(collection_table(list(results.collected.values())), title="Collecting"),
-        replace(
-            conditions_table(results.policies or compared),
-            title="Policies, undisturbed; “intent” goes through the MPC",
-        ),
-        replace(outcome_differences_table(compared), title="Differences"),
-        _treatments(results),
-        _sweep(results),
-    ]
-    return [table for table in made if table.rows]
+def contrasts_table(found: Sequence[Contrast], kind: str, results: Results) -> Table:
+    """Return contrasts of a kind, in percentage points."""
+    design, factors = results.progress.design, results.progress.design.factors
+    expected = {
+        WORDS[name]: f"{100 * detectable(design, name):.0f}"
+        for name in CONTRASTS
+        if factors and design.draws > 1
+    }
+    tested, rows = kind == DECLARED, []
+    for each in (each for each in found if each.kind == kind):
+        estimate = each.estimate
+        cells = [
+            each.name,
+            ", ".join(each.tasks),
+            "rollouts with contact" if each.measure == "contact" else "success",
+            Cell(points(estimate.value), "detected" if each.detected else ""),
+            points_span(estimate.interval) if estimate.interval else DASH,
+            str(estimate.replicates),
+        ]
+        seen = estimate.detectable(len(factors.primary)) if factors else None
+        p = estimate.p if each.p_adjusted is not None else None
+        tail = [p_alone(p), p_alone(each.p_adjusted), expected.get(each.name, DASH)]
+        rows.append([*cells, *(tail + [DASH if seen is None else f"{100 * seen:.0f}"] if tested else [])])
+    headings = ["contrast", "tasks", "of", "points", "95 %", "draws"]
+    headings += ["p", "p (Holm)", "detectable, planned", "detectable, as it came out"] if tested else []
+    title = _TITLES.get(kind, "A claim about a system: a policy and a controller, against a policy alone")
+    return Table(headings, rows, title)
 
 
-def _treatments(results: TaskResults) -> Table:
+def conditions_table(task: str, results: Results) -> Table:
+    """Return how the undisturbed policies of a task fared."""
     headings = (
         "policy",
-        "disturbed or protected by",
         "success",
-        THESE_POLICIES,
-        "without",
-        "points",
-        "points 95 %",
+        "95 %",
+        "each draw",
         "rollouts with contact",
-        "contacts / 100 rollouts",
+        "length s",
+        "learnt from",
+        "updates",
     )
-    rows = [_treatment(each) for each in (*results.disturbed.values(), *results.protected.values())]
-    return Table(headings, rows, "Disturbed, protected; beside the same rollouts without")
+    rows = [_condition(each, results) for each in results.of_task(task)]
+    return Table(headings, rows, "Policies, undisturbed; “intent” goes through the MPC")
 
 
-def _treatment(each: ConditionResult) -> tuple[str, ...]:
+def _condition(each: Condition, results: Results) -> tuple[str, ...]:
+    learnt = results.trained(each)
+    episodes = [one["trained_on"].get("episodes", 0.0) for one in learnt]
+    minutes = [one["trained_on"].get("operator_time", 0.0) / 60.0 for one in learnt]
+    steps = sorted(one["steps"] for one in learnt)
     return (
-        each.condition.label,
-        each.condition.treatment,
-        _share(each.outcome),
-        percent_span(each.outcome.wilson),
-        _share(each.without) if each.without else DASH,
-        points(each.change.estimate) if each.change else DASH,
-        points_span(each.change.interval) if each.change else DASH,
-        percent(each.touched),
-        number(100 * each.contacts),
+        each.label,
+        percent(each.success.value),
+        percent_span(each.interval),
+        ", ".join(f"{100 * share:.0f}" for share in each.shares.values()),
+        percent(float(each.rolled("contact").mean())),
+        number(each.mean("length")),
+        f"{np.mean(episodes):.0f} episodes, {np.mean(minutes):.1f} min",
+        f"{steps[0]}" if steps[0] == steps[-1] else f"{steps[0]} to {steps[-1]}",
     )
 
 
-def _sweep(results: TaskResults) -> Table:
-    headings = (
-        "policy",
-        "operator's noise",
-        "success",
-        THESE_POLICIES,
-        "each training seed",
-        "s a demonstration",
-    )
+def failures_table(task: str, results: Results) -> Table:
+    """Return where the rollouts of a task failed: the furthest stage, and how it ended."""
+    conditions = results.of_task(task)
+    total = sum((each.failures for each in conditions), Counter[str]())
+    kinds = [kind for kind, _ in total.most_common()]
     rows = [
-        (
-            label,
-            f"{point.noise:g}",
-            _share(point.outcome),
-            percent_span(point.outcome.wilson),
-            ", ".join(percent(share) for share in point.outcome.seeds),
-            number(point.seconds),
-        )
-        for label, points_ in results.sweep.items()
-        for point in points_
+        (each.label, str(len(each.rolled())), *(str(each.failures[kind]) for kind in kinds))
+        for each in conditions
     ]
+    title = "Where rollouts failed: the furthest stage, and how they ended"
+    return Table(("policy", "rollouts", *kinds), rows if kinds else [], title)
+
+
+def collection_table(task: str, results: Results) -> Table:
+    """Return what was collected, all draws of a mode together."""
+    headings = (
+        "mode", "draws", "episodes", "success", "operator time", "s a success", "successes / h", "failures",
+    )  # fmt: skip
+    rows = []
+    for mode in results.progress.design.modes:
+        found = results.collected(task, mode)
+        if found:
+            rows.append((mode, str(len(found)), *_collected(found)))
+    return Table(headings, rows, "Collecting")
+
+
+def _collected(found: Sequence[dict[str, Any]]) -> tuple[str, ...]:
+    episodes, successes = (sum(each[name] for each in found) for name in ("episodes", "successes"))
+    minutes = sum(each["minutes"] for each in found)
+    reasons = sum((Counter(each["reasons"]) for each in found), Counter[str]())
+    return (
+        str(episodes),
+        percent(successes / episodes),
+        f"{minutes:.1f} min",
+        number(60.0 * minutes / successes) if successes else DASH,
+        number(60.0 * successes / minutes),
+        ", ".join(f"{reason} ({count})" for reason, count in reasons.most_common()) or DASH,
+    )
+
+
+def quality_table(task: str, results: Results) -> Table:
+    """Return the quality metrics of the demonstrations: the mean over draws of the mean over episodes."""
+    modes = [mode for mode in results.progress.design.modes if results.collected(task, mode)]
+    rows = []
+    for metric in METRICS:
+        means = [
+            [
+                each["quality"][metric.name]
+                for each in results.collected(task, mode)
+                if metric.name in each["quality"]
+            ]
+            for mode in modes
+        ]
+        if any(means):
+            rows.append((metric.title, *(number(float(np.mean(each))) if each else DASH for each in means)))
+    return Table(("metric", *modes), rows, "The demonstrations: described, not tested")
+
+
+def treatments_table(task: str, results: Results) -> Table:
+    """Return disturbed and protected policies beside the same rollouts without."""
+    headings = (
+        "policy", "disturbed or protected by", "success", "without", "points", "points 95 %", "with contact",
+    )  # fmt: skip
+    rows = [_treatment(each, results) for each in results.of_task(task, treated=True)]
+    return Table(headings, rows, "Disturbed, protected; beside the same policies in the same scenes without")
+
+
+def _treatment(each: Condition, results: Results) -> tuple[str, ...]:
+    whole, shown = results.find(each.task, each.label), [DASH] * 3
+    same = _same(whole, each) if whole else []
+    if same:
+        change = compare_rollouts(_runs(each), same)
+        share = np.concatenate([run.values for run in same]).mean()
+        shown = [percent(float(share)), points(change.estimate), points_span(change.interval)]
+    touched = float(each.rolled("contact").mean())
+    return each.label, each.treatment, percent(float(each.rolled().mean())), *shown, percent(touched)
+
+
+def _runs(condition: Condition) -> list[Run]:
+    return [
+        Run(draw, draw, tuple(sorted(each.rollouts)), each.values()) for draw, each in condition.draws.items()
+    ]
+
+
+def _same(whole: Condition, treated: Condition) -> list[Run]:
+    """Return the runs of a condition in the scenes of another; none where it lacks one."""
+    found = []
+    for run in _runs(treated):
+        driven = whole.draws.get(run.draw)
+        if driven is None or not set(run.seeds) <= driven.rollouts.keys():
+            return []
+        values = np.array([driven.rollouts[seed]["success"] for seed in run.seeds], float)
+        found.append(Run(run.draw, run.draw, run.seeds, values))
+    return found
+
+
+def sweep_table(task: str, results: Results) -> Table:
+    """Return how success and the operator's time depend on how human the operator is."""
+    rows = [
+        (each.label, f"{noise:g}", percent(each.success.value), percent_span(each.interval), number(seconds))
+        for noise, each, seconds in sweep(task, results)
+    ]
+    headings = ("policy", "operator's noise", "success", "95 %", "s a demonstration")
     return Table(headings, rows, "Operators from perfect to clumsy")
 
 
-def _share(condition: ConditionOutcome) -> str:
-    return f"{percent(condition.share)} ({condition.successes} of {condition.rollouts})"
+def sweep(task: str, results: Results) -> list[tuple[float, Condition, float]]:
+    """Return noise, condition and seconds a successful demonstration, policy by policy, noise rising."""
+    design = results.progress.design
+    if not design.sweep or task not in design.sweep.tasks:
+        return []
+    found = []
+    for mode in design.modes:
+        for noise in sorted({1.0, *design.sweep.noises}):
+            condition, data = results.find(task, mode, "", noise), results.collected(task, mode, noise)
+            successes = sum(each["successes"] for each in data)
+            draws = condition.draws.items() if condition else ()
+            kept = {draw: each for draw, each in draws if draw < design.sweep.draws}
+            if kept and successes:
+                seconds = 60.0 * sum(each["minutes"] for each in data) / successes
+                found.append((noise, Condition(task, mode, "", kept), seconds))
+    return found
+
+
+def times_table(results: Results) -> Table:
+    """Return what the jobs took."""
+    took: dict[tuple[str, str], list[dict[str, Any]]] = {}
+    for job in results.progress.jobs:
+        note = results.progress.note(job)
+        if note.get("took"):
+            kind = "train and evaluate" if job.policy else "collect"
+            took.setdefault((job.cell.task, kind), []).append(note["took"])
+    rows = [
+        (
+            task,
+            kind,
+            str(len(each)),
+            duration(float(np.mean([one["seconds"] for one in each]))),
+            duration(sum(one["processor_seconds"] for one in each)),
+            ", ".join(sorted({str(one["cores"]) for one in each})),
+        )
+        for (task, kind), each in took.items()
+    ]
+    headings = ("task", "job", "jobs", "a job, by the clock", "all, of a core", "cores of the machine")
+    return Table(headings, rows, "What it took (of a job that was interrupted: since it went on)")
+
+
+def cells_table(results: Results, name: str) -> Table:
+    """Return the command that runs a cell anew, and the digest of its rows."""
+    rows, seen = [], set[str]()
+    for job in results.progress.jobs:
+        note = results.progress.note(job)
+        if job.policy is None and note and job.cell.name not in seen:
+            seen.add(job.cell.name)
+            rows.append((job.cell.name, note["result"]["digest"], cell_command(name, job.cell.name)))
+    return Table(("cell", "digest of the rows", "command"), rows, "Any cell again")
+
+
+def cell_command(name: str, cell: str) -> str:
+    """Return the command that records, trains and evaluates one cell of a study anew."""
+    return f"handrail-study --preset {name} --only {cell} --output outputs/again"

@@ -1,94 +1,169 @@
-"""What a task's policies say: like for like first, then policies with a controller, then cautions."""
+"""What a study says in words: an answer of three sentences, and how to read the rest."""
 
-from collections.abc import Iterator, Mapping
-from dataclasses import replace
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
 
-from handrail.datasets.comparison.cautions import training_cautions
-from handrail.datasets.comparison.finding import Finding
-from handrail.datasets.comparison.outcome_findings import outcome_findings
-from handrail.datasets.comparison.outcomes import Outcomes
-from handrail.policies.study.report.conditions import FAMILIES, StudyCondition
-from handrail.policies.study.report.results import ConditionResult, TaskResults
-
-_UNPROTECTED = "Like for like, joint velocities, unprotected"
-_PROTECTED = "Like for like, joint velocities, both through the"
-_CONTROLLER = "Policy plus controller, intent through the MPC against joint velocities, unprotected"
+from handrail.datasets.presentation.wording import p_value, percent, points, points_span
+from handrail.policies.imitation.training.plateau import Plateau
+from handrail.policies.study.design.design import StudyDesign
+from handrail.policies.study.design.designs import designs
+from handrail.policies.study.design.power import plan
+from handrail.policies.study.report.contrasts import DECLARED, SYSTEM, WORDS, Contrast
+from handrail.policies.study.report.results import Results
 
 
-def findings(results: TaskResults, baseline: str) -> tuple[Finding, ...]:
-    """Return all findings of a task; each says first what is compared with what."""
-    found = [replace(finding, text=f"{title}: {finding.text}") for title, finding in _titled(results)]
-    cautions = list(_missing(results, baseline))
-    for outcomes, conditions in _judged(results):
-        cautions += _cautions(outcomes, conditions)
-    return (*found, *(Finding("caution", text) for text in dict.fromkeys(cautions)))
+def answer(found: Sequence[Contrast], results: Results) -> list[str]:
+    """Return the answer, a sentence each: the controller, the input and their interaction, and the limits."""
+    design = results.progress.design
+    declared = {each.name: each for each in found if each.kind == DECLARED}
+    if not declared:
+        return [_undeclared(design)]
+    sentences = [_effect(declared.get(WORDS["controller"]), "controller", results)]
+    both = [_effect(declared.get(WORDS[name]), name, results) for name in ("input", "interaction")]
+    sentences.append("; ".join(filter(None, both)))
+    return [_begun(each) for each in (*filter(None, sentences), _limits(list(declared.values()), results))]
 
 
-def answer(results: TaskResults) -> str:
-    """Return the answer in a few sentences, one for each kind of comparison."""
-    parts: dict[str, list[str]] = {}
-    for title, finding in _titled(results):
-        parts.setdefault(title, []).append(finding.short)
-    return " ".join(f"{title}: {'; '.join(shorts)}." for title, shorts in parts.items())
+def _undeclared(design: StudyDesign) -> str:
+    if design.factors:
+        return "No draw has all cells of the 2 × 2 on all tasks yet: nothing can be said."
+    return "No contrast was declared before the run: what is shown explores, and nothing is tested." + (
+        " With one draw it does not say how much another recording would differ." * (design.draws < 2)
+    )
 
 
-def _judged(results: TaskResults) -> Iterator[tuple[Outcomes, Mapping[str, ConditionResult]]]:
-    """Yield the outcomes there are, undisturbed and protected, and what their conditions are."""
-    for outcomes, conditions in (
-        (results.policies, results.undisturbed),
-        (results.shielded, results.protected),
-    ):
-        if outcomes:
-            yield outcomes, conditions
+def _effect(contrast: Contrast | None, name: str, results: Results) -> str:
+    """Return what a declared contrast says."""
+    factors = results.progress.design.factors
+    if contrast is None or factors is None:
+        return ""
+    estimate, size = contrast.estimate, f"{points(contrast.estimate.value)} points"
+    if estimate.interval is None:
+        return f"{_subject(contrast, name)}: one draw tests nothing"
+    span = f"95 % {points_span(estimate.interval)}"
+    if contrast.p_adjusted is None:
+        return f"{_subject(contrast, name)}: {size} so far ({span}), not tested before all draws are done"
+    rest = f"{span}, {p_value(contrast.p_adjusted)} after Holm"
+    if contrast.detected:
+        return f"{_subject(contrast, name)}: a difference of {size} ({rest})"
+    seen = 100 * (estimate.detectable(len(factors.primary)) or 0.0)
+    unseen = f"one below about {seen:.0f} points would often go unseen here"
+    return f"{_subject(contrast, name)}: no difference detected ({size}, {rest}; {unseen})"
 
 
-def _titled(results: TaskResults) -> list[tuple[str, Finding]]:
-    """Return findings with what they compare: joint velocities, these through a protection, then intents."""
-    found = [pair for judged in _judged(results) for pair in _of(*judged)]
-    found.sort(key=lambda pair: FAMILIES.index(pair[0].family))
-    return [(_title(condition), finding) for condition, finding in found]
+def _subject(contrast: Contrast, name: str) -> str:
+    one, other = map(percent, contrast.sides)
+    return {
+        "controller": f"policies that learnt from demonstrations with the MPC succeeded in {one}, without in"
+        f" {other}",
+        "input": f"with the hand steered it was {one}, with the joints {other}",
+        "interaction": f"what the MPC adds is {points(contrast.estimate.value)} points more with the hand"
+        " than with the joints",
+    }[name]
 
 
-def _title(condition: StudyCondition) -> str:
-    if condition.actions == "intent":
-        return _CONTROLLER
-    return f"{_PROTECTED} {condition.treatment}" if condition.treatment else _UNPROTECTED
+def _limits(declared: Sequence[Contrast], results: Results) -> str:
+    design, done = results.progress.design, min(each.estimate.replicates for each in declared)
+    partly = (
+        f"{done} of {design.draws} draws so far, " if results.progress.missing else f"{design.draws} draws, "
+    )
+    minutes = ", ".join(f"{task.minutes:g} min of {name}" for name, task in design.tasks.items())
+    return (
+        f"this holds for {partly}scripted operators and one simulated robot, for {design.policy} policies"
+        f" that write joint velocities unprotected, and for {minutes} of operator time in each mode; it says"
+        " nothing of people, of other learners, or of a policy that the MPC completes"
+    )
 
 
-def _of(
-    outcomes: Outcomes, conditions: Mapping[str, ConditionResult]
-) -> Iterator[tuple[StudyCondition, Finding]]:
-    """Yield what every difference says, conditions called after their data alone: the title says the rest."""
-    by_label = {condition.label: condition for condition in outcomes.conditions}
-    for difference in outcomes.differences:
-        labels = [difference.label, difference.baseline]
-        names = [conditions[label].condition.label for label in labels]
-        both = tuple(replace(by_label[label], label=name) for label, name in zip(labels, names, strict=True))
-        named = replace(difference, label=names[0], baseline=names[1])
-        (finding,) = outcome_findings(Outcomes(both, (named,)))
-        yield conditions[difference.label].condition, finding
+def _begun(sentence: str) -> str:
+    return f"{sentence[:1].upper()}{sentence[1:]}."
 
 
-def _missing(results: TaskResults, baseline: str) -> Iterator[str]:
-    differences = results.policies.differences if results.policies else ()
-    compared = {each.label for each in differences}
-    alone = [
-        label
-        for label, each in results.undisturbed.items()
-        if label not in compared and (each.condition.mode, each.condition.actions) != (baseline, "realised")
-    ]
-    if alone:
+def how(results: Results, found: Sequence[Contrast]) -> str:
+    """Return the paragraph: what was drawn, trained and tested."""
+    return " ".join(_how(results.progress.design, results, found))
+
+
+def _how(design: StudyDesign, results: Results, found: Sequence[Contrast]) -> Iterator[str]:
+    yield (
+        f"A draw is a fresh recording (other scenes, {design.persons} other scripted persons), one training"
+        f" seed and {design.rollouts} beginnings of its own; it is the same for all modes, so draws are"
+        " pairs. Every mode got the same operator time, failed attempts included."
+    )
+    if design.flat:
         yield (
-            f"Compared with nothing: {', '.join(alone)}; there is no policy yet of joint velocities that"
-            f" learnt from {baseline} on the same budget."
+            f"Each policy was trained until its loss on held-out episodes ({percent(design.flat.held_out)}, 5"
+            f" at least) was flat: the best of {design.flat.patience} measurements, one every"
+            f" {design.flat.every} updates, not {percent(design.flat.improvement)} below the best before;"
+            " then the learning rate fell to zero over a last fifth of the updates. The last checkpoint"
+            " counts."
+        )
+    else:
+        yield "Every policy got the same number of updates; whether its loss was flat by then is not known."
+    yield (
+        "Policies write joint velocities, which go to the robot unprotected. “Intent” is another thing: the"
+        " policy writes the operator's command, and the MPC completes it and keeps it safe when the policy"
+        " drives, too."
+    )
+    if design.draws > 1:
+        yield (
+            "Intervals are 95 %, Student's t over draws, where a draw varies at least as its rollouts do."
+            " Contrasts are taken within each draw; several tasks count alike."
+        )
+    else:
+        yield (
+            "There is one draw: intervals (Wilson) are of these very policies, and say nothing of another"
+            " recording."
+        )
+    declared = [each for each in found if each.kind == DECLARED]
+    if declared:
+        yield (
+            f"Only the {len(declared)} declared contrasts are tested, p after Holm over these. All others"
+            " explore: their intervals are not adjusted, and with so many of them some leave out zero by"
+            " chance."
+        )
+    if any(each.kind == SYSTEM for each in found):
+        yield (
+            "A system claim compares a policy and a controller with a policy alone. The other side is the"
+            " best of the unprotected ones, chosen afterwards, which is in its favour."
+        )
+    yield plan(design)
+
+
+def cautions(results: Results) -> list[str]:
+    """Return what stands in the way of reading the results as they are meant."""
+    return list(_cautions(results))
+
+
+def _cautions(results: Results) -> Iterator[str]:
+    progress = results.progress
+    if progress.words:
+        yield f"{progress.words}."
+    seen = designs(progress.layout)
+    if len({each["digest"] for each in seen}) > 1 or (seen and seen[-1]["digest"] != progress.design.digest):
+        told = ", ".join(f"{each['digest']} from {each['since']}" for each in seen)
+        yield f"The design was changed after the study began ({told}); this is {progress.design.digest}."
+    again = [
+        job.cell.name for job in progress.jobs if "digest_before" in progress.note(job).get("result", {})
+    ]
+    if again:
+        yield f"Recorded again, and the rows were others than before: {', '.join(again)}."
+    flat = progress.design.flat
+    capped = [
+        condition.label
+        for condition in results.conditions.values()
+        if flat and any(_capped(each, progress.design, condition.task) for each in results.trained(condition))
+    ]
+    if capped:
+        yield (
+            f"Some policies of {', '.join(dict.fromkeys(capped))} ended with the most updates that there"
+            " might be, before their loss was flat."
         )
 
 
-def _cautions(outcomes: Outcomes, conditions: Mapping[str, ConditionResult]) -> Iterator[str]:
-    """Yield what the intervals leave out; budgets differ on purpose, so each for itself."""
-    for budget in dict.fromkeys(each.condition.budget for each in conditions.values()):
-        mine = {label for label, each in conditions.items() if each.condition.budget == budget}
-        differences = tuple(each for each in outcomes.differences if each.label in mine)
-        if differences:
-            of_budget = tuple(condition for condition in outcomes.conditions if condition.label in mine)
-            yield from training_cautions(Outcomes(of_budget, differences))
+def _capped(result: Mapping[str, Any], design: StudyDesign, task: str) -> bool:
+    """Return whether a training ended before its loss was flat."""
+    flat = design.flat
+    losses = {int(step): loss for step, loss in result.get("validation", {}).items()}
+    assert flat is not None
+    return Plateau(losses, flat.patience, flat.improvement, design.tasks[task].steps, 0).flat is None

@@ -44,7 +44,7 @@ def signal(steps=200):
 
 
 def run(settings, wanted, times, seed=0):
-    hand = HumanHand(settings, FULL, np.random.default_rng(seed))
+    hand = HumanHand(settings, FULL, FULL, np.random.default_rng(seed))
     return np.array([hand.move(row, time) for row, time in zip(wanted, times, strict=True)])
 
 
@@ -102,6 +102,27 @@ def test_the_hand_never_leaves_the_stick():
     wanted = np.tile(FULL, (len(times), 1))
     moved = run(human(noise=1.0, drift=1.0, correlation=0.5), wanted, times)
     assert np.all(np.abs(moved) <= FULL)
+
+
+@pytest.mark.parametrize("name", ["ridgeback_ur10", "ridgeback_panda", "lekiwi"])
+def test_a_person_is_as_exact_at_the_tool_with_joints_as_with_the_hand(name):
+    model, times = load_model(name), PERIOD * np.arange(4000)
+    sticks = StickMap(model, MODES["direct"], Gains().within(model.description.world))
+    tool, joints = sticks.channels.tool_slice, sticks.channels.joint_slice
+    hand = HumanHand(human(drift=0.02, correlation=0.2), sticks.full, sticks.fine, np.random.default_rng(0))
+    wanted = 1e-9 * sticks.full  # touched, and next to nothing
+    moved = np.array([hand.move(wanted, time) for time in times])
+    by_hand = moved[:, tool] / sticks.full[tool]
+    by_joints = moved[:, joints] @ model.jacobian(model.description.home).T / sticks.full[tool]
+    assert np.sqrt(np.mean(by_hand**2)) == pytest.approx(0.02, rel=0.1)
+    assert np.sqrt(np.mean(by_joints**2)) == pytest.approx(0.02, rel=0.1)
+
+
+def test_a_dead_zone_is_a_share_of_what_is_fine():
+    full, fine = np.array([1.0]), np.array([0.4])
+    hand = HumanHand(human(threshold=0.1, refractory=0.05), full, fine, np.random.default_rng(0))
+    moved = [hand.move(np.array([wanted]), float(time))[0] for time, wanted in enumerate((0.5, 0.53, 0.55))]
+    assert moved == [0.5, 0.5, 0.55]
 
 
 @pytest.mark.parametrize("value", [-0.1, np.nan, np.inf])

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from compare_helpers import judge
 from scipy import stats
 
 from handrail.datasets.comparison.evaluations import Condition, Policy
-from handrail.datasets.comparison.outcomes import judge
 from handrail.datasets.statistics.paired import paired_success
 from handrail.datasets.statistics.proportions import mcnemar_by_scene, paired_shares
 from handrail.datasets.statistics.replicates import (

@@ -4,12 +4,12 @@ import json
 
 import numpy as np
 import pytest
+from compare_helpers import judge
 from scipy.stats import fisher_exact
 
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.comparison.differences import at_equal_length
 from handrail.datasets.comparison.evaluations import FORMAT, read_evaluations
-from handrail.datasets.comparison.outcomes import judge
 from handrail.datasets.statistics.proportions import (
     holm,
     newcombe,

@@ -37,7 +37,7 @@ def folder(tmp_path_factory):
 
 
 def config(folder, *names, **settings):
-    settings = {"episodes": 2, "time_limit": 4.0} | settings
+    settings = {"episodes": 2, "time_limit": 4.0, "workers": 1} | settings
     return EvaluateConfig(policy=tuple(str(folder / name) for name in names), **settings)
 
 

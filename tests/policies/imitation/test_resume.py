@@ -78,7 +78,9 @@ def test_a_training_goes_on_with_the_view_that_it_began_with(recorded, tmp_path)
     config = tiny(recorded, tmp_path / "older", base_pose=False)
     whole = train(config, quiet=True)
     older = cut(config, tmp_path / "cut")
-    path = last_checkpoint(tmp_path / "cut") / "pretrained_model" / NAME
+    checkpoint = last_checkpoint(tmp_path / "cut")
+    assert checkpoint
+    path = checkpoint / "pretrained_model" / NAME
     content = json.loads(path.read_text())
     del content["interface"]["base_pose"], content["training"]["base_pose"]
     path.write_text(json.dumps(content))

@@ -37,21 +37,22 @@ def test_changed_settings_are_done_again_and_nothing_else(tmp_path, preset):
     Path(preset).write_text(DESIGN.replace("steps = 10", "steps = 20"))
     again = Starter()
     assert run_here(config, again) == 0
-    expected = [job.name for job in jobs(load_design(preset)) if not job.cell]
+    expected = [job.name for job in jobs(load_design(preset)) if job.policy]
     assert sorted(again.begun) == sorted(expected)
 
 
 def test_a_failure_stops_only_what_needs_it(tmp_path, preset, capsys):
     config = StudyConfig(preset, str(tmp_path / "study"))
-    starter = Starter(failing="collect/reach/direct")
+    starter = Starter(failing="collect/reach/direct/1")
     assert run_here(config, starter) == 1
     done = {
         path.relative_to(tmp_path / "study/done").with_suffix("").as_posix()
         for path in (tmp_path / "study/done").rglob("*.json")
     }
-    assert "policy/reach/ee/intent-time-1" in done
-    assert not any("reach/direct/" in name for name in done)
-    assert "collect/reach/direct" in capsys.readouterr().err
+    assert "policy/reach/ee/1/intent-time" in done
+    assert "policy/reach/direct/0/realised-time" in done
+    assert not any("reach/direct/1" in name for name in done)
+    assert "collect/reach/direct/1" in capsys.readouterr().err
     assert run_here(config, Starter()) == 0
 
 
@@ -61,24 +62,35 @@ def test_report_says_what_is_in_the_files(tmp_path, preset):
     config = StudyConfig(preset, str(tmp_path / "study"), page=str(page))
     assert run_here(config, Starter()) == 0
     content = json.loads((tmp_path / "study/study.json").read_text())
-    arms = {arm["label"]: arm for arm in content["tasks"]["reach"]["policies"]["conditions"]}
+    found = content["conditions"]
+    arms = {each["label"]: each for each in found if (each["treatment"], each["noise"]) == ("", 1.0)}
     assert set(arms) == {"ee", "ee intent", "direct"}
     assert all(arm["rollouts"] == 80 for arm in arms.values())
-    (ee,) = [d for d in content["tasks"]["reach"]["policies"]["differences"] if d["label"] == "ee"]
-    assert ee["rollouts"]["estimate"] == pytest.approx(
+    (ee,) = [each for each in content["contrasts"] if each["name"] == "ee − direct"]
+    assert ee["estimate"]["value"] == pytest.approx(
         (arms["ee"]["successes"] - arms["direct"]["successes"]) / 80
     )
-    assert set(content["tasks"]["reach"]["disturbed"]) == {f"{label} pushed" for label in arms}
-    assert content["tasks"]["reach"]["disturbed"]["ee pushed"]["touched"] == pytest.approx(0.5)
-    assert [point["noise"] for point in content["tasks"]["reach"]["sweep"]["ee"]] == [0.0, 1.0]
+    pushed = {each["label"]: each for each in found if each["treatment"] == "pushed"}
+    assert set(pushed) == set(arms)
+    assert pushed["ee"]["touched"] == pytest.approx(0.5)
+    assert {each["noise"] for each in found if each["label"] == "ee"} == {0.0, 1.0}
+    failed = arms["direct"]["rollouts"] - arms["direct"]["successes"]
+    assert arms["direct"]["failures"] == {"lift": failed}
+    policies = [each for name, each in content["jobs"].items() if name.startswith("policy/")]
+    assert all(each["took"]["seconds"] == 10.0 for each in policies)
+    assert content["seconds"] == 10.0 * len(content["jobs"])
+    assert content["design"]["digest"] == content["designs"][0]["digest"] == load_design(preset).digest
     text = page.read_text()
     assert text.startswith("# Ours\n\nBefore.")
     assert text.endswith("After.\n")
     assert "old" not in text
-    assert f"{arms['direct']['successes']} of 80" in text
+    row = next(line for line in text.splitlines() if line.startswith("| direct | ") and " 95 %" not in line)
+    assert f"| {100 * arms['direct']['successes'] / 80:.0f} % |" in text, row
     assert (tmp_path / "page_small_answer.png").read_bytes().startswith(b"\x89PNG")
     html = (tmp_path / "study/report.html").read_text()
-    assert f"{arms['ee intent']['successes']} of 80" in html
+    assert f"{100 * arms['ee intent']['successes'] / 80:.0f} %" in html
+    for cell in ("reach/ee/0", "reach/direct@0/0"):
+        assert f"handrail-study --preset {preset} --only {cell} --output outputs/again" in html
 
 
 def test_report_of_a_study_that_has_hardly_begun(tmp_path, preset):
@@ -89,6 +101,17 @@ def test_report_of_a_study_that_has_hardly_begun(tmp_path, preset):
     (tmp_path / "study" / "begun").mkdir(parents=True)
     assert run_here(config, Starter()) == 0
     assert (tmp_path / "study/report.html").is_file()
+
+
+def test_a_plan_runs_nothing(tmp_path, preset, capsys):
+    starter = Starter()
+    assert run_here(StudyConfig(preset, str(tmp_path / "study"), plan=True), starter) == 0
+    assert starter.begun == []
+    assert not (tmp_path / "study").exists()
+    said = capsys.readouterr().err
+    assert load_design(preset).digest in said
+    assert f"{len(jobs(load_design(preset)))} jobs" in said
+    assert "Nothing is declared" in said
 
 
 @pytest.mark.parametrize("name", design_names())

@@ -11,9 +11,24 @@ from handrail.datasets.presentation.markdown import with_part
 from handrail.datasets.storage.lock import DatasetLock
 from handrail.policies.study.config import StudyConfig
 from handrail.policies.study.design import design as design_module
-from handrail.policies.study.design.design import Robustness, StudyDesign, Sweep, TaskDesign
+from handrail.policies.study.design.design import (
+    Beside,
+    Factors,
+    Flat,
+    Robustness,
+    StudyDesign,
+    Sweep,
+    TaskDesign,
+)
 from handrail.policies.study.design.load import load_design
 from handrail.scripts.study import main
+
+FACTORS = "[factors]\n" + "".join(
+    f"{cell} = '{mode}'\n"
+    for cell, mode in zip(
+        ("hand_mpc", "hand_none", "joint_mpc", "joint_none"), ("ee", "direct", "ee", "direct"), strict=True
+    )
+)
 
 
 @pytest.fixture
@@ -31,8 +46,9 @@ def preset(tmp_path):
         (('"direct"]', '"psychic"]'), "unknown mode 'psychic'"),
         (('baseline = "direct"', 'baseline = "leader"'), "unknown baseline 'leader'"),
         (("[tasks.reach]", "[tasks.dance]"), "unknown task"),
-        (("minutes = 0.1", ""), "needs minutes"),
-        (("seeds = [0, 1]", "seeds = [0, 0]"), "seeds"),
+        (("minutes = 0.1", ""), "minutes"),
+        (("minutes = 0.1", "minutes = 0"), "minutes above 0"),
+        (("draws = 2", "draws = 0"), "draws expected a whole number from 1 to 1000, got 0"),
         (("minutes = 0.1", "minutes = nan"), "minutes: expected a finite number, got nan"),
         (("minutes = 0.1", "minutes = 0.1\nrollout_limit = -1.0"), "time_limit -1.0: expected 0"),
         (
@@ -45,14 +61,20 @@ def preset(tmp_path):
         ),
         (("minutes = 0.1", 'minutes = 0.1\npolicy_options = ["nonsense"]'), "expected key=value"),
         (("rollouts = 40", "seed = -1\nrollouts = 40"), "seed: expected a whole number, 0 or more, got -1"),
-        (("seeds = [0, 1]", "seeds = [0, -1]"), "seeds: expected whole numbers, 0 or more"),
-        (("seeds = [0]", "seeds = [-1]"), "seeds: expected whole numbers, 0 or more"),
+        (("draws = 2", "draws = -1"), "draws: expected a whole number, 0 or more, got -1"),
+        (('intents = ["ee"]', 'intents = ["direct"]'), "unknown mode of intents, which the MPC completes"),
+        (("[beside]", "[flat]\nheld_out = 1.5\n[beside]"), "--eval_split 1.5: expected 0 to below 1"),
+        (("[beside]", "[factors]\nhand_mpc = 'ee'\n[beside]"), "hand_none"),
+        (("[beside]", FACTORS.replace("direct", "leader") + "[beside]"), "unknown mode of the factors"),
+        (("[beside]", FACTORS + "[beside]"), "factors expected some, each once"),
+        (("[beside]", FACTORS + 'primary = ["luck"]\n[beside]'), "unknown contrast 'luck'"),
         (("rollouts = 40", "rollouts = 2000000"), "--episodes 2000000"),
         (("rollouts = 20", "rollouts = -5"), "rollouts: expected a whole number, 0 or more, got -5"),
         (('["push"]', '["pusch"]'), "pusch"),
         (('["push"]', "[]"), "robustness.perturbations expected some"),
         (('["filter"]', '["fltr"]'), "unknown protection 'fltr'"),
-        (("rollouts = 20\nseeds = [0, 1]", "seeds = [2]"), "robustness.seeds expected some of"),
+        (("rollouts = 20\ndraws = 2", "draws = 3"), "robustness.draws expected a whole number from 0 to 2"),
+        (("noises = [0.0]\ndraws = 1", "noises = [0.0]\ndraws = 9"), "sweep.draws expected"),
         (("noises = [0.0]", "noises = [-1.0]"), "--noise -1"),
         (("noises = [0.0]", "noises = []"), "sweep.noises expected some"),
         (("noises = [0.0]", "noises = [0.3, 0.30000000001]"), "expected every job once"),
@@ -84,20 +106,20 @@ def test_a_policy_that_cannot_be_built_is_known_before_anything_begins(change, w
 
 def test_every_setting_of_a_design_is_explained_where_people_look():
     written = design_module.__doc__ or ""
-    for kind in (StudyDesign, TaskDesign, Robustness, Sweep):
+    for kind in (StudyDesign, TaskDesign, Flat, Factors, Beside, Robustness, Sweep):
         for entry in dataclasses.fields(kind):
             described = f"\n{entry.name} = " in written or f"[{entry.name}" in written
-            assert described or entry.name == "name", entry.name
+            assert described or entry.name in ("name", "digest"), entry.name
 
 
 def test_a_failed_job_is_told_by_what_it_said_this_time(tmp_path, preset, capsys):
-    log = tmp_path / "study/logs/collect/reach/ee.log"
+    log = tmp_path / "study/logs/collect/reach/ee/0.log"
     log.parent.mkdir(parents=True)
     log.write_text("error: disk full, last week\n")
-    assert run_here(StudyConfig(preset, str(tmp_path / "study")), Starter(failing="collect/reach/ee")) == 1
+    assert run_here(StudyConfig(preset, str(tmp_path / "study")), Starter(failing="collect/reach/ee/0")) == 1
     said = capsys.readouterr().err.replace("\n", " ")
-    assert "failed: collect/reach/ee: of today" in said
-    assert "failed: compare/reach: what it needs failed" in said
+    assert "failed: collect/reach/ee/0: of today" in said
+    assert "failed: policy/reach/ee/0/realised-time: what it needs failed" in said
     assert "last week" not in said
 
 
@@ -148,6 +170,13 @@ def test_what_is_not_installed_is_said_before_anything_begins(missing, tmp_path,
     with pytest.raises(HandrailError, match=f"handrail-study: expected {missing}"):
         run_here(StudyConfig(preset, str(tmp_path / "study")), starter)
     assert starter.begun == []
+
+
+def test_a_cluster_may_be_asked_for_without_saying_anything_of_workers(monkeypatch):
+    monkeypatch.setattr("handrail.collect.execution.config.find_spec", lambda name: name)
+    StudyConfig(ray="auto").check_execution()
+    with pytest.raises(HandrailError, match="--ray auto and --workers 3: expected one of them"):
+        StudyConfig(ray="auto", workers=3).check_execution()
 
 
 @pytest.mark.parametrize(

@@ -6,16 +6,18 @@ import shutil
 from pathlib import Path
 
 import pytest
-from study_helpers import DESIGN, Starter, changed, everything, run_here
+from study_helpers import COLLECTED, DESIGN, Starter, changed, everything, run_here
 
 from handrail.controllers.errors import HandrailError
 from handrail.policies.imitation.training import presets
 from handrail.policies.study.config import StudyConfig
+from handrail.policies.study.design.design import Flat
 from handrail.policies.study.design.jobs import jobs
 from handrail.policies.study.design.load import load_design
 from handrail.policies.study.design.progress import StudyProgress, is_done, read_json, write_json
-from handrail.policies.study.design.settings import fingerprint
-from handrail.policies.study.execution.work import begin
+from handrail.policies.study.design.settings import evaluations, fingerprint, recording
+from handrail.policies.study.execution import work as work_module
+from handrail.policies.study.execution.work import begin, do
 
 
 @pytest.fixture
@@ -29,7 +31,7 @@ def preset(tmp_path):
     ("change", "goes"),
     [
         (lambda design: design, set()),
-        (lambda design: dataclasses.replace(design, seeds=(0,)), set()),
+        (lambda design: dataclasses.replace(design, draws=1), set()),
         (lambda design: changed(design, episodes=4), {"policy", "nominal", "disturbed", "protected"}),
         (lambda design: changed(design, steps=11), {"policy", "nominal", "disturbed", "protected"}),
         (lambda design: changed(design, rollout_limit=9.0), {"nominal", "disturbed", "protected"}),
@@ -41,7 +43,7 @@ def preset(tmp_path):
 )
 def test_what_other_settings_made_is_removed_and_nothing_else(change, goes, tmp_path, preset):
     design, layout, found = everything(tmp_path, preset)
-    names = {"collect/reach/ee", "policy/reach/ee/realised-time-0"}
+    names = {"collect/reach/ee/0", "policy/reach/ee/0/realised-time"}
     collect, policy = (job for job in found if job.name in names)
     made = {"dataset": layout.dataset(collect.cell), "policy": layout.policy(policy.policy)}
     made |= {what: layout.evaluation(policy.policy, what) for what in ("nominal", "disturbed", "protected")}
@@ -66,53 +68,47 @@ def test_what_nobody_knows_the_settings_of_is_neither_used_nor_removed(tmp_path,
         layout.begun(job).unlink()
         with pytest.raises(HandrailError, match="expected a note"):
             begin(job, design, layout)
-        made = layout.dataset(job.cell) if job.cell else layout.policy(job.policy)
+        made = layout.policy(job.policy) if job.policy else layout.dataset(job.cell)
         assert made.exists()
 
 
 def test_the_preset_s_sizes_are_part_of_what_a_policy_depends_on(tmp_path, preset, monkeypatch):
     design, layout, found = everything(tmp_path, preset)
-    policies = {job.name for job in found if job.policy}
+    policies = [job.name for job in found if job.policy]
     assert StudyProgress(design, layout).missing == []
     monkeypatch.setitem(presets.ACT_CPU, "dropout", 0.1)
-    lost = {job.name for job in found if not is_done(job, design, layout)}
-    assert lost == policies | {job.name for job in found if job.task}
+    assert [job.name for job in found if not is_done(job, design, layout)] == policies
 
 
 def test_every_setting_of_the_design_is_part_of_what_something_depends_on(preset):
-    """But for the name, and for what says only how many jobs there are."""
+    """But for the name, and for what only the report looks at."""
     design = load_design(preset)
 
     def prints(design):
         return {job.name: fingerprint(job, design) for job in jobs(design)}
 
     others = [dataclasses.replace(design, **{key: value}) for key, value in (
-        ("baseline", "ee"), ("policy", "diffusion"), ("rollouts", 41), ("persons", 1), ("seed", 1),
-        ("budgets", ("number",)), ("robustness", None), ("sweep", None), ("seeds", (3,)),
+        ("policy", "diffusion"), ("rollouts", 41), ("persons", 1), ("seed", 1), ("flat", Flat()),
+        ("beside", None), ("robustness", None), ("sweep", None), ("draws", 3),
+        *(("flat", Flat(**{name: 0.5})) for name in ("held_out", "improvement")),
+        *(("flat", Flat(**{name: 7})) for name in ("every", "patience")),
     )]  # fmt: skip
     others += [changed(design, **{key: value}) for key, value in (
         ("episodes", 6), ("minutes", 0.2), ("steps", 11), ("batch_size", 4), ("time_limit", {"ee": 3.0}),
         ("rollout_limit", 9.0), ("policy_options", ("dropout=0.2",)),
     )]  # fmt: skip
     assert all(prints(other) != prints(design) for other in others)
-    assert prints(dataclasses.replace(design, name="other")) == prints(design)
+    assert len({str(prints(other)) for other in others}) == len(others)
+    assert prints(dataclasses.replace(design, name="other", baseline="ee")) == prints(design)
 
 
 BREAK = {
-    "an empty data folder": ("collect", lambda root: shutil.rmtree(root / "datasets/reach/ee/data")),
-    "no dataset": ("collect", lambda root: shutil.rmtree(root / "datasets/reach/ee")),
-    "fewer episodes": (
-        "collect",
-        lambda root: edit(root / "datasets/reach/ee/meta/info.json", "total_episodes", 5),
-    ),
-    "no policy": ("policy", lambda root: shutil.rmtree(root / "policies/reach/ee/realised-time-0")),
+    "no note": ("collect", lambda root: (root / "done/collect/reach/ee/0.json").unlink()),
     "no rollouts": ("policy", lambda root: (root / EE.format("protected")).unlink()),
     "half a file": ("policy", lambda root: (root / EE.format("nominal")).write_text('{"format": ')),
     "a rollout less": ("policy", lambda root: drop_rollout(root / EE.format("disturbed"))),
-    "no report": ("compare", lambda root: (root / "comparisons/reach/report.html").unlink()),
 }
-INFO = "datasets/reach/ee/meta/info.json"
-EE = "evaluations/reach/ee/{}/realised-time-0.json"
+EE = "evaluations/reach/ee/0/{}/realised-time.json"
 
 
 def edit(path, key, value):
@@ -130,11 +126,7 @@ def test_done_means_that_everything_is_there(case, tmp_path, preset):
     kind, damage = BREAK[case]
     design, layout, _ = everything(tmp_path, preset)
     damage(layout.root)
-    name = {
-        "collect": "collect/reach/ee",
-        "policy": "policy/reach/ee/realised-time-0",
-        "compare": "compare/reach",
-    }
+    name = {"collect": "collect/reach/ee/0", "policy": "policy/reach/ee/0/realised-time"}
     assert StudyProgress(design, layout).missing == [name[kind]]
 
 
@@ -147,20 +139,106 @@ def test_the_report_has_nothing_of_other_settings_and_counts_what_is_missing(tmp
         config = StudyConfig(preset, str(layout.root), page=str(page), report_only=True)
         assert run_here(config, Starter()) == 0
         content = json.loads((layout.root / "study.json").read_text())
-        return content["tasks"]["reach"], content["missing"]
+        return content, content["missing"]
 
-    results, missing = report(DESIGN.replace("seeds = [0, 1]", "seeds = [0]"))
-    assert missing == ["compare/reach"]
-    assert [arm["rollouts"] for arm in results["policies"]["conditions"]] == [40, 40, 40]
+    results, missing = report(DESIGN.replace("draws = 2", "draws = 1"))
+    assert missing == []
+    assert {each["rollouts"] for each in results["conditions"] if not each["treatment"]} == {40}
     results, missing = report(DESIGN.replace("steps = 10", "steps = 11"))
-    assert results["policies"] is None
-    assert not results["disturbed"]
-    assert set(results["collected"]) == {"ee", "direct"}
+    assert results["conditions"] == results["contrasts"] == []
+    assert {name.partition("/")[0] for name in results["jobs"]} == {"collect"}
     words = f"{len(missing)} of {len(found)} jobs are not done yet: "
     assert words in page.read_text()
     assert words in (layout.root / "report.html").read_text()
-    results, missing = report(DESIGN.replace("seeds = [0, 1]", "persons = 1\nseeds = [0, 1]", 1))
+    results, missing = report(DESIGN.replace("draws = 2", "persons = 1\ndraws = 2", 1))
     assert len(missing) == len(found)
-    assert not results["collected"]
+    assert not results["jobs"]
     report(DESIGN)
     assert "not done yet" not in page.read_text()
+
+
+def test_what_is_large_may_go_and_is_made_again_only_where_it_is_needed(tmp_path, preset):
+    design, layout, _ = everything(tmp_path, preset)
+    for folder in ("datasets", "policies", "logs"):
+        shutil.rmtree(layout.root / folder, ignore_errors=True)
+    config, idle = StudyConfig(preset, str(layout.root)), Starter()
+    assert run_here(config, idle) == 0
+    assert idle.begun == []
+    (layout.root / EE.format("nominal")).unlink()
+    again = Starter()
+    assert run_here(config, again) == 0
+    assert again.begun == ["collect/reach/ee/0", "policy/reach/ee/0/realised-time"]
+    assert StudyProgress(design, layout).todo() == []
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        lambda root: shutil.rmtree(root / "data"),
+        lambda root: edit(root / "meta/info.json", "total_episodes", 5),
+        lambda root: (root / "meta/info.json").write_text("{"),
+    ],
+)
+def test_a_dataset_that_is_not_whole_is_recorded_before_it_is_learnt_from(damage, tmp_path, preset):
+    design, layout, found = everything(tmp_path, preset)
+    collect, policy = found[0], next(job for job in found if job.policy and job.cell == found[0].cell)
+    damage(layout.dataset(collect.cell))
+    assert StudyProgress(design, layout).todo() == []
+    layout.done(policy).unlink()
+    assert StudyProgress(design, layout).todo() == [collect, policy]
+
+
+def test_recorded_again_another_way_is_told(tmp_path, preset, monkeypatch):
+    design, layout, found = everything(tmp_path, preset)
+    edit(layout.done(found[0]), "result", {"digest": "d1ce"})
+    monkeypatch.setattr(work_module, "_collect", lambda cell, design, root: None)
+    monkeypatch.setattr(work_module, "summary", lambda root, seed: dict(COLLECTED, digest="0ther"))
+    do(found[0], design, layout.root)
+    assert run_here(StudyConfig(preset, str(layout.root), report_only=True), Starter()) == 0
+    html = (layout.root / "report.html").read_text()
+    assert "the rows were others than before: reach/ee/0" in html
+
+
+def test_a_cell_alone_is_only_its_jobs(tmp_path, preset):
+    starter = Starter()
+    config = StudyConfig(preset, str(tmp_path / "study"), only="reach/ee/1")
+    assert run_here(config, starter) == 0
+    names = [job.name for job in jobs(load_design(preset)) if job.cell.name == "reach/ee/1"]
+    assert starter.begun == names
+    with pytest.raises(
+        HandrailError, match="unknown cell of the study 'reach/ee/2': expected one of reach/ee/0"
+    ):
+        run_here(dataclasses.replace(config, only="reach/ee/2"), Starter())
+
+
+def test_a_design_that_is_changed_after_the_beginning_shows(tmp_path, preset):
+    config = StudyConfig(preset, str(tmp_path / "study"))
+    assert run_here(config, Starter()) == 0
+    first = load_design(preset).digest
+    Path(preset).write_text("# the same\n" + DESIGN.replace("rollouts = 40", "rollouts   =  40  # each"))
+    assert load_design(preset).digest == first
+    assert run_here(config, Starter()) == 0
+    assert "design was changed" not in (tmp_path / "study/report.html").read_text()
+    Path(preset).write_text(DESIGN.replace("rollouts = 40", "rollouts = 39"))
+    second = load_design(preset).digest
+    assert run_here(config, Starter()) == 0
+    said = (tmp_path / "study/report.html").read_text()
+    assert "design was changed" in said
+    assert first in said
+    assert second in said
+
+
+def test_draws_are_done_one_after_the_other_and_share_nothing(preset):
+    design = load_design(preset)
+    found = jobs(design)
+    assert [job.cell.draw for job in found] == sorted(job.cell.draw for job in found)
+    draws = []
+    for draw in range(design.draws):
+        mine = [job for job in found if job.cell.draw == draw]
+        turns = [recording(job.cell, design, Path("set"), 10 * turn) for job in mine for turn in range(5)]
+        driven = [each for job in mine if job.policy for each in evaluations(job, design).values()]
+        seeds = {seed for each in driven for seed in each.seeds}
+        draws.append(({each.seed for each in turns}, {each.person for each in turns}, seeds))
+    for one, other in zip(*draws, strict=True):
+        assert one
+        assert not one & other

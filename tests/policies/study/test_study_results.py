@@ -1,227 +1,291 @@
-"""What a study says of its policies: like for like first, beside the same rollouts, and never too much."""
+"""What a study says of its policies: only what was declared is tested, draws are pairs, never too much."""
 
+import json
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 from compare_helpers import check_texts
 from figure_helpers import shows
+from scipy import stats
+from study_helpers import make
 
-from handrail.controllers.errors import HandrailError
-from handrail.datasets.comparison.collection import Collected
-from handrail.datasets.comparison.evaluations import Condition, Policy
-from handrail.datasets.comparison.outcomes import LIKE_FOR_LIKE
 from handrail.datasets.statistics.proportions import holm
-from handrail.policies.study.design.design import Robustness, StudyDesign, Sweep, TaskDesign
-from handrail.policies.study.design.jobs import jobs
-from handrail.policies.study.report import gather as studied
-from handrail.policies.study.report.conditions import CONTROLLER, PROTECTED, identify
-from handrail.policies.study.report.figures import by_treatment, figures
-from handrail.policies.study.report.how import how
-from handrail.policies.study.report.tables import tables
+from handrail.datasets.statistics.student import student, variance_of_share
+from handrail.policies.study.design.design import (
+    Beside,
+    Factors,
+    Flat,
+    Robustness,
+    StudyDesign,
+    Sweep,
+    TaskDesign,
+)
+from handrail.policies.study.design.jobs import Layout, jobs
+from handrail.policies.study.design.power import detectable, plan, weights
+from handrail.policies.study.design.progress import StudyProgress
+from handrail.policies.study.report import tables
+from handrail.policies.study.report.contrasts import DECLARED, EXPLORATORY, SYSTEM, WORDS, contrasts
+from handrail.policies.study.report.figures import figures
+from handrail.policies.study.report.results import gather
+from handrail.policies.study.report.words import answer, cautions, how
 
-FAMILIES = (LIKE_FOR_LIKE, CONTROLLER, PROTECTED)
-TASK = TaskDesign(episodes=5, minutes=1.0, steps=10)
-DESIGN = StudyDesign("made", ("ee", "direct"), {"reach": TASK}, "direct", seeds=(0, 1, 2), rollouts=40)
-ROBUST = replace(DESIGN, robustness=Robustness(perturbations=("push",), rollouts=15))
-
-
-def arm(label, share, seeds, scenes, trained_on=None):
-    """Policies whose scenes are those that every arm meets, some of them hard for all."""
-    found = []
-    for seed in seeds:
-        luck = np.random.default_rng([seed, *label.encode()]).random(scenes)
-        rollouts = {k: {"success": float(luck[k] < share), "contacts": k % 2} for k in range(scenes)}
-        found.append(Policy(0, seed, trained_on or {"episodes": 5.0}, rollouts))
-    return Condition(label, tuple(found))
+TASK = TaskDesign(minutes=1.0, episodes=5, steps=10)
+MODES = ("ee", "decoupled", "joints", "direct")
+FACTORS = Factors(*MODES)
+DESIGN = StudyDesign(
+    "made",
+    MODES,
+    {"reach": TASK, "tray": TASK},
+    "direct",
+    draws=4,
+    rollouts=20,
+    factors=FACTORS,
+    beside=Beside(("ee",), 4, 4),
+    flat=Flat(every=5, patience=1),
+)
+SHARES = {
+    "ee": (0.95, 0.9, 1.0, 0.9),
+    "decoupled": (0.7, 0.6, 0.8, 0.75),
+    "joints": (0.8, 0.75, 0.9, 0.8),
+    "direct": (0.8, 0.7, 0.85, 0.75),
+    "ee intent": (1.0, 1.0, 1.0, 1.0),
+}
+SHARES |= {f"{mode} same number": SHARES[mode] for mode in MODES}
 
 
 @pytest.fixture
-def gathered(monkeypatch):
-    """Return what a study would gather if its jobs had left made-up rollouts; some may be missing."""
+def gathered(tmp_path):
+    """Return what a study gathers of made-up rollouts; some of its jobs may be missing."""
 
-    def made(design, task, what, noise):
-        found = {}
+    def found(design=DESIGN, shares=SHARES, missing=lambda job: False):
+        layout = Layout(tmp_path / "study")
         for job in jobs(design):
-            own = job.policy
-            if own and (own.cell.task, own.cell.noise) == (task, noise) and (what == "nominal" or job.robust):
-                ending = {"nominal": "", "disturbed": " pushed", "protected": " filter"}[what]
-                if what != "protected" or own.actions == "realised":
-                    scenes = design.rollouts if what == "nominal" else design.robustness.rollouts
-                    share = 0.9 if own.cell.mode == "ee" else 0.3
-                    seeds = found.setdefault(own.label + ending, (share, [], scenes))[1]
-                    seeds.append(own.seed)
-        return {label: arm(label, share, seeds, scenes) for label, (share, seeds, scenes) in found.items()}
+            if not missing(job):
+                make(job, design, layout, shares)
+        return gather(StudyProgress(design, layout))
 
-    def gather(design, missing=()):
-        def read(design, _, task, what, noise=1.0):
-            return {k: v for k, v in made(design, task, what, noise).items() if k not in missing}
+    return found
 
-        monkeypatch.setattr(studied, "read_conditions", read)
-        monkeypatch.setattr(
-            studied, "read_collected", lambda _, cell: Collected(cell.mode, 10, 9, (0.6, 1.0), 90.0, 900, {})
+
+def shares_of(results, task, label):
+    return np.array(list(results.find(task, label).shares.values()))
+
+
+def test_a_contrast_is_what_its_words_say_draw_by_draw(gathered):
+    results = gathered()
+    found = {(each.name, each.tasks, each.measure): each for each in contrasts(results)}
+    for scope in (("reach", "tray"), ("reach",), ("tray",)):
+        ee, hand, joints, direct = (
+            np.mean([shares_of(results, task, mode) for task in scope], axis=0) for mode in MODES
         )
-        rng = np.random.default_rng(0)
-        found = [studied.task_results(task, design, None, rng) for task in design.tasks]  # type: ignore[arg-type]
-        return studied.in_words(found, design)
-
-    return gather
-
-
-def pairs(outcomes):
-    return [(each.label, each.baseline) for each in outcomes.differences]
-
-
-def test_every_budget_has_its_own_baseline(gathered):
-    (both,) = gathered(replace(DESIGN, budgets=("time", "number")))
-    assert pairs(both.policies) == [
-        ("ee", "direct"),
-        ("ee intent", "direct"),
-        ("ee same number", "direct same number"),
-        ("ee intent same number", "direct same number"),
-    ]
-    (number,) = gathered(replace(DESIGN, budgets=("number",), sweep=Sweep(("reach",), (0.0,), (0, 1))))
-    assert pairs(number.policies) == pairs(both.policies)[2:]
-    assert set(number.sweep) == {"ee same number", "ee intent same number", "direct same number"}
+        expected = {
+            "input": (ee + hand) / 2 - (joints + direct) / 2,
+            "controller": (ee + joints) / 2 - (hand + direct) / 2,
+            "interaction": (ee - hand) - (joints - direct),
+        }
+        for name, values in expected.items():
+            estimate = found[WORDS[name], scope, "success"].estimate
+            assert estimate.value == pytest.approx(values.mean())
+            assert estimate.replicates == 4
+            by_scipy: Any = stats.ttest_1samp(values, 0.0)
+            wider = estimate.error >= values.std(ddof=1) / 2 - 1e-12
+            assert wider
+            if estimate.error == pytest.approx(values.std(ddof=1) / 2):
+                assert estimate.p == pytest.approx(by_scipy.pvalue)
+                interval = by_scipy.confidence_interval()
+                assert estimate.interval == pytest.approx((interval.low, interval.high))
 
 
-def test_without_the_baseline_nothing_is_compared(gathered):
-    (found,) = gathered(DESIGN, missing=("direct",))
-    assert pairs(found.policies) == []
-    assert found.answer == ""
-    (said,) = found.findings
-    assert said.kind == "caution"
-    assert "Compared with nothing: ee, ee intent; there is no policy" in said.text
+def test_only_what_is_declared_is_tested_over_all_tasks(gathered):
+    found: Any = contrasts(gathered())
+    declared = [each for each in found if each.kind == DECLARED]
+    assert [each.name for each in declared] == [WORDS[name] for name in FACTORS.primary]
+    assert all(each.tasks == ("reach", "tray") for each in declared)
+    assert [each.p_adjusted for each in declared] == holm([each.estimate.p for each in declared])
+    others = [each for each in found if each.kind != DECLARED]
+    assert others
+    assert all(each.p_adjusted is None and not each.detected for each in others)
+    fewer: Any = contrasts(gathered(replace(DESIGN, factors=replace(FACTORS, primary=("controller",)))))
+    (one,) = [each for each in fewer if each.kind == DECLARED]
+    assert one.p_adjusted == one.estimate.p
+    same = {each.name for each in fewer if each.kind == EXPLORATORY and each.tasks == ("reach", "tray")}
+    assert {WORDS["input"], WORDS["interaction"]} <= same
 
 
-def test_an_arm_of_another_study_is_refused():
-    with pytest.raises(
-        HandrailError, match="unknown condition of the evaluations 'leader': expected one of direct"
-    ):
-        identify(DESIGN, ["ee", "leader"])
+def test_only_draws_that_are_whole_count(gathered):
+    results = gathered(missing=lambda job: job.cell.name == "tray/joints/2")
+    found = {(each.name, each.tasks): each for each in contrasts(results) if each.measure == "success"}
+    assert found[WORDS["input"], ("reach", "tray")].estimate.replicates == 3
+    assert found[WORDS["input"], ("reach",)].estimate.replicates == 4
+    assert all(each.p_adjusted is None for each in found.values())  # nobody stops where it suits
+    assert "not tested before all draws are done" in answer(contrasts(results), results)[0]
+    assert "3 of 4 draws so far" in answer(contrasts(results), results)[-1]
+    assert any("jobs are not done yet" in text for text in cautions(results))
 
 
-def test_like_for_like_comes_first_and_a_controller_is_named(gathered):
-    (found,) = gathered(ROBUST)
-    texts = [each.text for each in found.findings if each.kind == "outcome"]
-    starts = [
-        "Like for like, joint velocities, unprotected: ",
-        "Like for like, joint velocities, both through the filter: ",
-        "Policy plus controller, intent through the MPC against joint velocities, unprotected: ",
-    ]
-    assert [text.startswith(start) for text, start in zip(texts, starts, strict=True)] == [True] * 3
-    assert [found.answer.index(start) for start in starts] == sorted(map(found.answer.index, starts))
-    assert pairs(found.shielded) == [("ee filter", "direct filter")]
-    (table,) = [each for each in tables(found) if each.title == "Differences"]
-    assert [str(row[5]).partition("\n")[2] for row in table.rows] == [
-        "over 1 like-for-like difference",
-        "over 1 protected difference",
-        "over 1 policy-plus-controller difference",
-    ]
+def test_draws_that_agree_by_chance_are_not_sure(gathered):
+    same = dict.fromkeys(SHARES, (0.5,) * 4)
+    sure = {label: (1.0 if label == "ee" else 0.0,) * 4 for label in SHARES}
+    for shares in (same, sure):
+        found: Any = contrasts(gathered(shares=shares))
+        for each in found:
+            low, high = each.estimate.interval
+            assert high - low > 0.05
+            assert 0.0 < each.estimate.p <= 1.0
 
 
-def test_cautions_are_said(gathered):
-    design = replace(ROBUST, seeds=(0,))
-    (found,) = gathered(design)
-    cautions = " ".join(each.text for each in found.findings if each.kind == "caution")
-    assert "Fewer than 3 training seeds (ee, direct, ee intent)" in cautions
-    assert "Fewer than 3 training seeds (ee filter, direct filter)" in cautions
-    assert cautions.count("One draw of each dataset") == 1
+@pytest.mark.parametrize("contrast", ["input", "controller", "interaction"])
+def test_what_is_planned_is_detected_in_four_of_five_studies(contrast):
+    """Policies drawn with the design's spread and the worst rollouts, an effect as large as planned for."""
+    rng, sizes, found = np.random.default_rng(3), weights(FACTORS, contrast), 0
+    design = replace(DESIGN, draws=8, rollouts=50)
+    effect, studies = detectable(design, contrast), 2000
+    total = sum(weight**2 for weight in sizes.values())
+    for _ in range(studies):
+        values = np.zeros(8)
+        for weight in sizes.values():
+            success = 0.5 + effect * weight / total + rng.normal(0.0, FACTORS.sd, (2, 8))
+            shares = rng.binomial(50, np.clip(success, 0.0, 1.0)) / 50
+            values += weight * shares.mean(axis=0)
+        estimate: Any = student(values)
+        found += estimate.p < 0.05 / 3
+    assert found / studies == pytest.approx(0.8, abs=0.06)
 
 
-def test_a_family_is_one_kind_of_comparison_over_all_tasks(gathered):
-    """A policy plus a controller is another question than the data: it changes no verdict on these."""
-    several = gathered(replace(ROBUST, tasks={"reach": TASK, "tray": TASK}))
-    found = [each for task in several for each in (*task.policies.differences, *task.shielded.differences)]
-    families = {family: [each for each in found if each.family == family] for family in FAMILIES}
-    assert sum(map(len, families.values())) == len(found) == 6
-    for members in families.values():
-        assert {each.tests for each in members} == {2}
-        assert [each.p_adjusted for each in members] == holm([each.p for each in members])
-    assert {each.label for each in families[CONTROLLER]} == {"ee intent"}
-    assert all("over 2 like-for-like differences" in task.findings[0].text for task in several)
+def test_a_plan_says_what_can_be_detected_before_anything_is_there():
+    said = plan(DESIGN)
+    for name in FACTORS.primary:
+        assert f"{name} {100 * detectable(DESIGN, name):.0f}" in said
+    assert detectable(replace(DESIGN, draws=16), "input") < detectable(DESIGN, "input")
+    assert detectable(DESIGN, "interaction") == pytest.approx(2 * detectable(DESIGN, "input"))
+    assert "Nothing is declared" in plan(replace(DESIGN, factors=None))
+    assert "One draw tests nothing" in plan(replace(DESIGN, draws=1))
+
+
+def test_a_system_is_compared_with_the_best_policy_alone_and_named_so(gathered):
+    found = [each for each in contrasts(gathered()) if each.kind == SYSTEM]
+    assert {each.measure for each in found} == {"success", "contact"}
+    assert all(each.name.startswith("ee intent + MPC − ee,") for each in found)
+    worse = dict(SHARES, ee=(0.1,) * 4)
+    found = [each for each in contrasts(gathered(shares=worse)) if each.kind == SYSTEM]
+    assert all("− joints," in each.name for each in found)
+
+
+def test_the_answer_is_three_sentences_and_claims_no_more_than_was_detected(gathered):
+    with_mpc = {label: (0.95 if label in ("ee", "joints") else 0.3,) * 4 for label in SHARES}
+    results = gathered(shares=with_mpc)
+    found = contrasts(results)
+    said = answer(found, results)
+    assert len(said) == 3
+    assert [each.name for each in found if each.detected] == [WORDS["controller"]]
+    shares = {label: shares_of(results, "reach", label).mean() for label in MODES}
+    shares |= {label: (shares[label] + shares_of(results, "tray", label).mean()) / 2 for label in MODES}
+    with_it, without = (shares["ee"] + shares["joints"]) / 2, (shares["decoupled"] + shares["direct"]) / 2
+    assert f"with the MPC succeeded in {100 * with_it:.0f} %, without in {100 * without:.0f} %" in said[0]
+    assert "a difference of +" in said[0]
+    assert said[1].count("no difference detected") == 2
+    assert said[1].count("would often go unseen") == 2
+    assert "scripted operators" in said[2]
+    assert "2 draws" not in said[2]
+    nothing = gathered(shares=dict.fromkeys(SHARES, (0.5,) * 4))
+    said = answer(contrasts(nothing), nothing)
+    assert "a difference of" not in " ".join(said)
+
+
+def test_without_factors_or_with_one_draw_nothing_is_claimed(gathered):
+    plain = gathered(replace(DESIGN, factors=None))
+    found = contrasts(plain)
+    assert not [each for each in found if each.kind == DECLARED]
+    assert "ee − direct" in {each.name for each in found}
+    assert "No contrast was declared" in answer(found, plain)[0]
+    single = gathered(replace(DESIGN, draws=1, beside=None))
+    found = contrasts(single)
+    assert all(each.estimate.interval is None and each.p_adjusted is None for each in found)
+    assert "one draw tests nothing" in answer(found, single)[0]
+    assert "There is one draw" in how(single, found)
+    assert tables.contrasts_table(found, DECLARED, single).rows
+
+
+def test_what_ended_before_its_loss_was_flat_is_told(gathered):
+    results = gathered()
+    assert any("before their loss was flat" in text for text in cautions(results))
+    steady = gathered(replace(DESIGN, flat=Flat(every=5, patience=1, improvement=0.5)))
+    assert not any("before their loss was flat" in text for text in cautions(steady))
 
 
 def test_undisturbed_beside_disturbed_is_the_same_policies_in_the_same_scenes(gathered):
-    (found,) = gathered(ROBUST)
-    assert found.undisturbed["ee"].outcome.rollouts == 120
-    for each in (*found.disturbed.values(), *found.protected.values()):
-        assert each.without.rollouts == each.outcome.rollouts == 15
-        share = 0.9 if each.condition.mode == "ee" else 0.3
-        values = arm(each.condition.label, share, [0], 40).runs()[0].values[:15]
-        assert each.without.seeds == (values.mean(),)
-        assert (each.change.paired, each.change.trials) == (True, (15,))
-        assert each.change.estimate == pytest.approx(each.outcome.share - each.without.share)
-    pushed = found.disturbed["ee pushed"]
-    shown = by_treatment(found, found.undisturbed["ee"].condition)
-    assert shown == {"undisturbed": pushed.without, "pushed": pushed.outcome}
+    robust = replace(DESIGN, robustness=Robustness(("push",), ("filter",), rollouts=8, draws=2))
+    results = gathered(robust)
+    table = tables.treatments_table("reach", results)
+    assert {row[0] for row in table.rows} == {*MODES, "ee intent"}
+    for condition in results.of_task("reach", treated=True):
+        assert set(condition.draws) == {0, 1}
+        whole = results.find("reach", condition.label)
+        for draw, each in condition.draws.items():
+            assert set(each.rollouts) < set(whole.draws[draw].rollouts)
 
 
-def test_a_condition_that_some_scenes_lack_stands_alone(gathered):
-    (found,) = gathered(ROBUST, missing=("ee",))
-    assert found.disturbed["ee pushed"].without is None
-    assert found.disturbed["direct pushed"].without is not None
-    assert figures(ROBUST, [found]).keys() == {"answer", "robustness"}
+def test_failures_are_counted_by_stage(gathered):
+    results = gathered()
+    table = tables.failures_table("reach", results)
+    assert table.headings == ("policy", "rollouts", "lift")
+    for label, rollouts, count in table.rows:
+        condition = results.find("reach", label)
+        assert (int(rollouts), int(count)) == (80, 80 - int(condition.rolled().sum()))
 
 
-def test_every_level_of_noise_has_the_same_training_seeds(gathered):
-    (found,) = gathered(replace(DESIGN, sweep=Sweep(("reach",), (0.0, 2.0), (0, 1))))
-    for points in found.sweep.values():
-        assert [point.noise for point in points] == [0.0, 1.0, 2.0]
-        assert {len(point.outcome.seeds) for point in points} == {2}
+def test_every_level_of_noise_has_the_same_draws(gathered):
+    results = gathered(replace(DESIGN, sweep=Sweep(("reach",), (0.0, 2.0), 2)))
+    found = tables.sweep("reach", results)
+    assert {noise for noise, _, _ in found} == {0.0, 1.0, 2.0}
+    assert {tuple(each.draws) for _, each, _ in found} == {(0, 1)}
+    assert tables.sweep("tray", results) == []
 
 
 def test_how_to_read_it_says_what_was_done(gathered):
-    several, one = ROBUST, replace(ROBUST, seeds=(0,))
-    said = how(several, gathered(several))
+    results = gathered()
+    said = how(results, contrasts(results))
     for words in (
         "same operator time",
-        "Welch",
-        "McNemar",
-        "1 like-for-like difference, 1 policy-plus-controller difference and 1 protected difference",
-        "ee against direct: what the operator steers and the controller differ at once",
-        "Student's t",
-        "mode ee",
-        "“With training”",
+        "Student's t over draws",
+        "held-out episodes",
+        "3 declared contrasts",
+        "Holm",
+        "system claim",
+        plan(DESIGN),
     ):
         assert words in said
-    assert "Boschloo" not in said
-    said = how(one, gathered(one))
-    assert "Welch" not in said
-    assert "There is one training seed" in said
-    number = replace(DESIGN, modes=("leader", "direct"), budgets=("number",))
-    said = how(number, gathered(number))
-    assert "same number of successful demonstrations" in said
-    assert "differ at once" not in said  # no MPC behind either
-    assert not any(
-        words in said for words in ("operator time", "the MPC", "mode ee", "protection", "Without")
-    )
-    empty = how(DESIGN, gathered(DESIGN, missing=("ee", "direct", "ee intent")))
-    assert not any(words in empty for words in ("Holm", "Intervals", "McNemar"))
+    fixed = gathered(replace(DESIGN, flat=None, factors=None, beside=None))
+    said = how(fixed, contrasts(fixed))
+    assert "whether its loss was flat by then is not known" in said
+    assert not any(words in said for words in ("system claim", "declared contrasts", "held-out"))
 
 
-def test_figures_show_what_was_found(gathered):
-    design = replace(ROBUST, sweep=Sweep(tuple(ROBUST.tasks), (0.0, 2.0), (0, 1)))
-    (found,) = gathered(design)
-    made = figures(design, [found])
-    shares = [100 * each.outcome.share for each in found.undisturbed.values()]
-    assert len(set(shares)) > 1
-    assert shows(made["answer"], shares)
-    assert shows(made["robustness"], [100 * each.outcome.share for each in found.disturbed.values()])
-    points = [point for line in found.sweep.values() for point in line]
-    assert shows(made["sweep"], [100 * point.outcome.share for point in points])
-    assert shows(made["sweep"], [point.seconds for point in points])
-    assert not shows(made["answer"], 12.345)
-
-
-def test_no_text_of_a_figure_covers_another(gathered):
-    names = ("reach", "tray", "pick_place", "drawer")
-    both = {"modes": ("ee", "direct", "leader"), "budgets": ("time", "number")}
+def test_figures_show_what_was_found_and_no_text_covers_another(gathered):
+    names = ("reach", "tray", "pick_place")
     design = replace(
-        ROBUST, tasks=dict.fromkeys(names, TASK), sweep=Sweep(names[:2], (0.0, 2.0), (0, 1)), **both
+        DESIGN,
+        tasks=dict.fromkeys(names, TASK),
+        robustness=Robustness(("push", "shift", "delay"), rollouts=8),
+        sweep=Sweep(names[:2], (0.0, 2.0), 1),
     )
-    robust = replace(design, robustness=Robustness(("push", "shift", "delay"), rollouts=15))
-    made = figures(robust, gathered(robust))
-    assert made.keys() == {"answer", "robustness", "sweep"}
+    results = gathered(design)
+    found = contrasts(results)
+    made = figures(results, found)
+    assert made.keys() == {"contrasts", "answer", "training", "robustness", "sweep"}
+    assert shows(made["answer"], [100 * each.success.value for each in results.of_task("reach")])
+    declared = [100 * each.estimate.value for each in found if each.kind == DECLARED]
+    assert shows(made["contrasts"], declared)
+    assert shows(made["training"], [0.4, 0.3])
+    assert shows(made["sweep"], [seconds for *_, seconds in tables.sweep("reach", results)])
+    assert not shows(made["answer"], 12.345)
     for figure in made.values():
         check_texts(figure)
+
+
+def test_a_share_of_few_is_never_certain():
+    assert variance_of_share(0, 50, 50) > 0.0
+    assert student([0.5]).interval is None
+    assert json.dumps(student([0.5, 0.7]).value)

@@ -1,0 +1,164 @@
+"""What is compared: the contrasts that were declared before the run, and all others, which only explore."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from handrail.datasets.statistics.proportions import holm
+from handrail.datasets.statistics.student import Estimate, student
+from handrail.policies.study.design.design import CONTRASTS, StudyDesign
+from handrail.policies.study.design.power import weights
+from handrail.policies.study.report.results import Condition, Results
+
+DECLARED, EXPLORATORY, SYSTEM = "declared", "exploratory", "system"
+_LEVEL = 0.05
+WORDS = {
+    "input": "input: hand − joints",
+    "controller": "controller: MPC − none",
+    "interaction": "interaction: what the MPC adds with the hand − with the joints",
+}
+
+
+@dataclass(frozen=True)
+class Contrast:
+    """A weighted sum of the success, or of the contacts, of conditions, over the draws that all of them have.
+
+    Attributes:
+        name: what is compared.
+        kind: `declared` before the run and tested, `exploratory`, or a claim about a `system`.
+        tasks: over which, with equal weight.
+        measure: `success` or `contact`.
+        estimate: over draws, each draw's conditions met the same scenes.
+        sides: the mean of what is added, and of what is taken off.
+        p_adjusted: by Holm over what is declared; None where nothing is tested, or not yet.
+    """
+
+    name: str
+    kind: str
+    tasks: tuple[str, ...]
+    measure: str
+    estimate: Estimate
+    sides: tuple[float, float]
+    p_adjusted: float | None = None
+
+    @property
+    def detected(self) -> bool:
+        """Whether a declared contrast differs from 0."""
+        return self.p_adjusted is not None and self.p_adjusted < _LEVEL
+
+
+def contrasts(results: Results) -> list[Contrast]:
+    """Return all contrasts for which there is something: the declared ones first, p adjusted over these.
+
+    Nothing is tested before all draws are there: who looks in between and stops where it suits finds more.
+    """
+    design = results.progress.design
+    declared = [each for each in _declared(results, design) if each]
+    tested = [each for each in declared if each.estimate.replicates == design.draws > 1]
+    adjusted = holm([each.estimate.p for each in tested if each.estimate.p is not None])
+    by_name = {each.name: p for each, p in zip(tested, adjusted, strict=True)}
+    found = [replace(each, p_adjusted=by_name.get(each.name)) for each in declared]
+    return found + [each for each in _exploratory(results, design) if each]
+
+
+def _declared(results: Results, design: StudyDesign) -> Iterator[Contrast | None]:
+    for name in design.factors.primary if design.factors else ():
+        yield _factor(results, design, name, tuple(design.tasks), DECLARED)
+
+
+def _exploratory(results: Results, design: StudyDesign) -> Iterator[Contrast | None]:
+    tasks = tuple(design.tasks)
+    scopes = [*([tasks] if len(tasks) > 1 else []), *((task,) for task in tasks)]
+    factors = design.factors
+    for scope in scopes:
+        for name in CONTRASTS if factors else ():
+            if scope != tasks or name not in factors.primary:  # pyright: ignore[reportOptionalMemberAccess]
+                yield _factor(results, design, name, scope, EXPLORATORY)
+        if factors:
+            yield _pair(results, factors.hand_mpc, factors.hand_none, scope)
+            yield _pair(results, factors.joint_mpc, factors.joint_none, scope)
+        for mode in () if factors else design.modes:
+            if mode != design.baseline:
+                yield _pair(results, mode, design.baseline, scope)
+        yield from _systems(results, design, scope)
+        for name in CONTRASTS if factors else ():
+            yield _factor(results, design, name, scope, EXPLORATORY, " same number")
+            yield _factor(results, design, name, scope, EXPLORATORY, "", "contact")
+
+
+def _factor(
+    results: Results,
+    design: StudyDesign,
+    name: str,
+    tasks: tuple[str, ...],
+    kind: str,
+    ending: str = "",
+    measure: str = "success",
+) -> Contrast | None:
+    assert design.factors is not None
+    parts = {f"{mode}{ending}": weight for mode, weight in weights(design.factors, name).items()}
+    title = WORDS[name] + (f" ({ending.strip()})" if ending else "")
+    return _contrast(results, title, kind, tasks, parts, measure)
+
+
+def _pair(results: Results, one: str, other: str, tasks: tuple[str, ...]) -> Contrast | None:
+    return _contrast(results, f"{one} − {other}", EXPLORATORY, tasks, {one: 1.0, other: -1.0})
+
+
+def _systems(results: Results, design: StudyDesign, tasks: tuple[str, ...]) -> Iterator[Contrast | None]:
+    """Yield intents completed by the MPC against the policies of joint velocities that did best."""
+    for mode in design.beside.intents if design.beside else ():
+        intent = [results.find(task, f"{mode} intent") for task in tasks]
+        if not all(intent):
+            continue
+        draws = set.intersection(*(set(each.draws) for each in intent if each))
+        means = {label: _mean([results.find(task, label) for task in tasks], draws) for label in design.modes}
+        known = {label: mean for label, mean in means.items() if mean is not None}
+        if known:
+            best = max(known, key=lambda label: known[label])
+            parts = {f"{mode} intent": 1.0, best: -1.0}
+            title = f"{mode} intent + MPC − {best}, the best policy of joint velocities, unprotected"
+            yield _contrast(results, title, SYSTEM, tasks, parts)
+            yield _contrast(results, title, SYSTEM, tasks, parts, "contact")
+
+
+def _mean(conditions: Sequence[Condition | None], draws: set[int]) -> float | None:
+    """Return the mean success over conditions and some draws; None where one is missing."""
+    shares = [each.shares.get(draw) if each else None for each in conditions for draw in draws]
+    known = [share for share in shares if share is not None]
+    return sum(known) / len(known) if known and len(known) == len(shares) else None
+
+
+def _contrast(
+    results: Results,
+    name: str,
+    kind: str,
+    tasks: tuple[str, ...],
+    parts: Mapping[str, float],
+    measure: str = "success",
+) -> Contrast | None:
+    """Return a contrast over the draws that all of its conditions have; None without any."""
+    found = [(results.find(task, label), weight) for task in tasks for label, weight in parts.items()]
+    conditions = [(each, weight / len(tasks)) for each, weight in found if each]
+    if len(conditions) < len(found):
+        return None
+    draws = sorted(set.intersection(*(set(each.draws) for each, _ in conditions)))
+    if not draws:
+        return None
+    values = [
+        sum(weight * float(each.draws[draw].values(measure).mean()) for each, weight in conditions)
+        for draw in draws
+    ]
+    least = sum(weight**2 * each.least(measure) for each, weight in conditions)
+    sides = _side(conditions, draws, measure, 1.0), _side(conditions, draws, measure, -1.0)
+    return Contrast(name, kind, tasks, measure, student(values, least), sides)
+
+
+def _side(
+    conditions: Sequence[tuple[Condition, float]], draws: Sequence[int], measure: str, sign: float
+) -> float:
+    """Return the mean over the conditions whose weights have a sign."""
+    side = [(each, abs(weight)) for each, weight in conditions if weight * sign > 0.0]
+    total = sum(
+        weight * float(each.draws[draw].values(measure).mean()) for each, weight in side for draw in draws
+    )
+    return total / (len(draws) * sum(weight for _, weight in side))
