@@ -15,8 +15,8 @@ _WAY = np.linspace(0.1, 1.0, 10)[:, None]  # where on a straight way one looks w
 def arm_solutions(model: RobotModel, q: FloatArray, goal: Pose) -> list[tuple[FloatArray, float]]:
     """Return configurations that bring the tool to the goal, (n,), and the error that each leaves.
 
-    By `‖q_ik − q‖`, the smallest first; those that do not reach the goal come last. A joint that can turn
-    more than once around is taken the shorter way.
+    By `‖q_ik − q‖`, the smallest first; those that do not reach the goal come last, by their error. A joint
+    that can turn more than once around is taken the shorter way.
 
     Args:
         model: of the robot.
@@ -30,7 +30,13 @@ def arm_solutions(model: RobotModel, q: FloatArray, goal: Pose) -> list[tuple[Fl
         starts += [q + angle * (np.arange(model.size) == joint) for angle in _TURNS]
     found = [arm_configuration(model, start, goal) for start in starts]
     unwound = [(_unwound(model, q, there), error) for there, error in found]
-    return sorted(unwound, key=lambda each: (each[1] >= REACHED, float(np.linalg.norm(each[0] - q))))
+
+    def order(solution: tuple[FloatArray, float]) -> tuple[bool, float]:
+        there, error = solution
+        missed = error >= REACHED
+        return missed, error if missed else float(np.linalg.norm(there - q))
+
+    return sorted(unwound, key=order)
 
 
 def straight_solution(
@@ -38,7 +44,7 @@ def straight_solution(
 ) -> FloatArray:
     """Return the nearest solution that all joints can go straight to at once, hitting nothing, (n,).
 
-    The one whose way keeps the largest distance if none keeps `clear`; the nearest configuration if the arm
+    The one whose way keeps the largest distance if none keeps `clear`; the one that comes nearest if the arm
     does not reach the goal.
 
     Args:
