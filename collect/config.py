@@ -25,9 +25,11 @@ REPO_ID = "handrail/demo"  # of a dataset whose name nobody says
 FOUND = Path("outputs/cockpit")  # of datasets whose folders nobody says
 CAMERAS = ("wrist", "scene")
 FPS_RANGE = (10, 100)
+WORTH_SHARING = 100  # episodes from which on several processes are quicker than one
 FIRST_SEED = 2**32  # of evaluations; recordings use the numbers below it
 MOST_MOVING = 4
 MOST_TIME = 3600.0  # [s]
+_ONE_PROCESS = ("robot_client", "realtime", "display_data", "display_web", "display_save")
 _SIZES = "an even number from 16 to 1024"
 _RANGES = {
     "noise": (0.0, 5.0, "a number from 0 (perfect) to 5"),
@@ -199,6 +201,8 @@ class FoundDatasetConfig(DatasetConfig):
 class RecordConfig(SessionConfig, ExecutionConfig):
     """Record demonstrations of a robot steered through the masked MPC as a LeRobot dataset."""
 
+    workers: int = field(default=0, kw_only=True)
+    """Processes that share the work, one core each; 0: all cores from 100 scripted episodes on, else 1."""
     dataset: DatasetConfig = field(default_factory=DatasetConfig)
     resume: bool = False
     """Add to the dataset that is there; what a crash left behind is cleared first."""
@@ -235,28 +239,33 @@ class RecordConfig(SessionConfig, ExecutionConfig):
             )
         self._check_rates()
         self._check_sharing()
-        if self.resume and self.overwrite:
-            raise HandrailError("--resume and --overwrite: expected one of them, got both")
-        if self.display_data and self.display_web:
-            raise HandrailError("--display_data and --display_web: expected one of them, got both")
+        for one, other in (("resume", "overwrite"), ("display_data", "display_web")):
+            if getattr(self, one) and getattr(self, other):
+                raise HandrailError(f"--{one} and --{other}: expected one of them, got both")
         if self.display_save and not self.display_save.endswith(".rrd"):
             raise HandrailError(f"--display_save {self.display_save}: expected a file that ends in .rrd")
         if self.display_save and not Path(self.display_save).parent.is_dir():
             raise HandrailError(f"--display_save {self.display_save}: expected a file in an existing folder")
 
+    @property
+    def processes(self) -> int:
+        """How many processes share the work on this computer: as many as are asked for, or as pay."""
+        pays = self.dataset.num_episodes >= WORTH_SHARING and not self._in_one_process
+        return super().processes if self.workers or pays else 1
+
+    @property
+    def _in_one_process(self) -> str:
+        """The flag because of which one process has to record; empty if several may."""
+        if OPERATORS.find(self.operator).interactive:
+            return f"--operator {self.operator}"
+        return next((f"--{name}" for name in _ONE_PROCESS if getattr(self, name)), "")
+
     def _check_sharing(self) -> None:
         """Check that the episodes may be recorded anywhere and in any order, if they are to be."""
         self.check_execution()
-        if not self.is_shared:
-            return
-        flag = f"--ray {self.ray}" if self.ray else f"--workers {self.workers}"
-        if OPERATORS.find(self.operator).interactive:
-            raise HandrailError(
-                f"{flag}: expected --operator scripted, got a person: --operator {self.operator}"
-            )
-        for name in ("robot_client", "realtime", "display_data", "display_web", "display_save"):
-            if getattr(self, name):
-                raise HandrailError(f"{flag}: expected a recording without --{name}, which is of one process")
+        if self.is_shared and (alone := self._in_one_process):
+            flag = f"--ray {self.ray}" if self.ray else f"--workers {self.workers}"
+            raise HandrailError(f"{flag}: expected a recording without {alone}, which is of one process")
 
     def _check_rates(self) -> None:
         fps = self.dataset.fps

@@ -1,4 +1,4 @@
-"""`handrail-push`: write a dataset's card, say what would be sent to the hub, and send it when asked."""
+"""`handrail-push`: write a dataset's card, say what would be sent, and send it when asked."""
 
 from handrail.collect.commands.config import PushConfig
 from handrail.scripts import cli
@@ -9,13 +9,16 @@ def main(config: PushConfig) -> None:
     """Run the command."""
     config.check()
     from handrail.datasets.sharing.push import prepare, upload
+    from handrail.datasets.sharing.store import copy
 
     dataset = config.dataset
-    push = prepare(dataset.folder, dataset.repo_id, config.license, config.private, config.verify)
+    settings = config.license, config.private, config.verify, config.to
+    push = prepare(dataset.folder, dataset.repo_id, *settings)
     print(push)
     if config.upload:
-        upload(push)
-        print(f"sent as {push.repo_id}")
+        send = copy if config.to else upload
+        send(push)
+        print(f"sent to {config.to}" if config.to else f"sent as {push.repo_id}")
     else:
         print("nothing was sent; --upload sends it")
 

@@ -19,21 +19,21 @@ def main(config: ReplayConfig) -> int:
     config.check()
     from rich.console import Console
 
-    from handrail.collect.commands.replay import replay_episode
+    from handrail.collect.commands.replay import replay_one_of
     from handrail.collect.session.contact_sheet import save_sheet
     from handrail.datasets.presentation.table import Table
-    from handrail.datasets.reading.reader import read_episodes
+    from handrail.datasets.reading.open_dataset import open_dataset
 
-    root = config.dataset.folder
-    episodes = range(len(read_episodes(root))) if config.episode < 0 else [config.episode]
     rows, clients = [], set[str]()
-    for episode in episodes:
-        video = Path(config.video).expanduser() if config.video else None
-        replay, pictures = replay_episode(root, episode, _PICTURES if config.sheet else 0, video, config.said)
-        rows.append(_row(replay))
-        clients.add(replay.robot_client)
-        if pictures:
-            save_sheet(pictures, Path(config.sheet).expanduser())
+    video = Path(config.video).expanduser() if config.video else None
+    shown = _PICTURES if config.sheet else 0
+    with open_dataset(config.dataset.folder) as dataset:
+        for episode in range(len(dataset.rows)) if config.episode < 0 else [config.episode]:
+            replay, pictures = replay_one_of(dataset, episode, shown, video, config.said)
+            rows.append(_row(replay))
+            clients.add(replay.robot_client)
+            if pictures:
+                save_sheet(pictures, Path(config.sheet).expanduser())
     console = Console(highlight=False, soft_wrap=True)
     console.print(Table(_HEADINGS, rows))
     for client in sorted(filter(None, clients)):

@@ -86,6 +86,8 @@ class PushConfig:
     dataset: StoredConfig = field(default_factory=StoredConfig)
     upload: bool = False
     """Send it, with LeRobot's upload, as --dataset.repo_id; log in first (hf auth login)."""
+    to: str = ""
+    """Send it to this place instead of the hub: s3://bucket/folder, gs://…, or what else fsspec knows."""
     private: bool = True
     """Whether only you see it there."""
     license: str = "cc-by-4.0"
@@ -104,6 +106,8 @@ class PushConfig:
             raise HandrailError(f"--dataset.repo_id: expected its name on the hub, owner/name; got {got}")
         if not re.fullmatch(r"[a-z0-9][a-z0-9.-]*", self.license):
             raise HandrailError(f"--license: expected a name such as cc-by-4.0, got {self.license!r}")
+        if self.to and not re.fullmatch(r"[a-z0-9+.-]+://[^\s]+", self.to):
+            raise HandrailError(f"--to: expected an address such as s3://bucket/folder, got {self.to!r}")
 
 
 @dataclass(frozen=True)

@@ -70,12 +70,16 @@ class Recording:
     ) -> None:
         self.columns = session_columns(config)
         task = config.dataset.single_task or env.task_description
-        recorder = Recorder(writer, task, self.columns)
+        self._recorder = Recorder(writer, task, self.columns)
         self.people = people
-        self._observers: list[EpisodeObserver] = [recorder, *displays, *people]
+        self._observers: list[EpisodeObserver] = [self._recorder, *displays, *people]
         self._session = build_session(config, env, self._observers, config.dataset.fps, *people)
         self._rehearsal = Rehearsal(env.model, build_modes(config, env))
         self._config, self._real = replace(config, cameras=""), env.real
+
+    def into(self, writer: EpisodeWriter) -> None:
+        """Save the episodes to come in another dataset."""
+        self._recorder.writer = writer
 
     def warm_up(self, seed: int) -> None:
         """Compile what an update needs, before somebody waits for it in real time; no robot moves."""

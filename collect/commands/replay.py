@@ -21,7 +21,7 @@ from handrail.controllers.entries import is_count
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.intent import Intent
 from handrail.datasets.format.columns import CLIENT
-from handrail.datasets.reading.reader import read_episodes, read_frames, read_info
+from handrail.datasets.reading.open_dataset import OpenDataset, open_dataset
 from handrail.datasets.recording.frames import Frame
 from handrail.datasets.recording.piece import TRIMMED
 
@@ -82,9 +82,20 @@ def replay_episode(
     Raises:
         HandrailError: no such dataset or episode, or one that Handrail did not record.
     """
-    info = read_info(root)
-    row = _row(root, episode)
-    frames = read_frames(root, episode, ["action", "observation.state"])
+    with open_dataset(root) as dataset:
+        return replay_one_of(dataset, episode, pictures, video, said)
+
+
+def replay_one_of(
+    dataset: OpenDataset,
+    episode: int,
+    pictures: int = 0,
+    video: Path | None = None,
+    said: Collection[str] = (),
+) -> tuple[Replay, list[NDArray[np.uint8]]]:
+    """Run the recorded commands of an episode of an open dataset; see `replay_episode`."""
+    info, row = dataset.info, _row(dataset, episode)
+    frames = dataset.frames(episode, ["action", "observation.state"])
     length = len(frames["action"])
     skipped = _trimmed(row)  # the operator did nothing then, so the robot stands still
     limit = (skipped + length - 0.5) / info.fps
@@ -92,7 +103,7 @@ def replay_episode(
     env = build_env(config, info.fps, render=bool(pictures or video))
     with contextlib.ExitStack() as stack:
         stack.callback(env.close)
-        _check_state(frames["observation.state"], env, f"episode {episode} of {root}")
+        _check_state(frames["observation.state"], env, f"episode {episode} of {info.root}")
         film = stack.enter_context(VideoFile(video, env.render_size, info.fps)) if video else None
         moments = {skipped + each for each in _moments(length, pictures)}
         camera, period = _Camera(moments, film), 1.0 / info.fps
@@ -101,7 +112,9 @@ def replay_episode(
         outcome = session.run(row["seed"])
     states = camera.states[skipped:]
     if not states:
-        raise HandrailError(f"episode {episode} of {root}: the task ended before the first recorded frame")
+        raise HandrailError(
+            f"episode {episode} of {info.root}: the task ended before the first recorded frame"
+        )
     difference = np.abs(states - frames["observation.state"][: len(states)])
     replay = Replay(
         episode=episode,
@@ -116,13 +129,12 @@ def replay_episode(
     return replay, camera.taken
 
 
-def _row(root: Path, episode: int) -> dict[str, Any]:
-    rows = read_episodes(root)
-    if not 0 <= episode < len(rows):
-        raise HandrailError(f"--episode {episode}: expected one of 0 to {len(rows) - 1} in {root}")
-    row = rows[episode]
+def _row(dataset: OpenDataset, episode: int) -> dict[str, Any]:
+    row = dataset.row(episode)
     if not is_count(row.get("seed")):
-        raise HandrailError(f"dataset {root}: expected one that handrail-record made, found no seed")
+        raise HandrailError(
+            f"dataset {dataset.info.root}: expected one that handrail-record made, found no seed"
+        )
     return row
 
 

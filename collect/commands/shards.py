@@ -5,21 +5,27 @@ shard has does not depend on who records it: whatever is cut short goes on with 
 """
 
 import json
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import chain
+from itertools import chain, repeat
 from pathlib import Path
 from typing import Any
 
+import pyarrow as pa
+
 from handrail.collect.config import RecordConfig
 from handrail.collect.session.recorded_settings import settings_json
-from handrail.controllers.errors import HandrailError
+from handrail.controllers.errors import HandrailError, message_of
 from handrail.datasets.editing.merge import check_alike, merged_encodings, merged_types
 from handrail.datasets.editing.source import Source
 from handrail.datasets.format.layout import Layout
+from handrail.datasets.format.lines import rows_of_lines
+from handrail.datasets.format.manifest import Manifest
+from handrail.datasets.format.metadata import EpisodeRecord
+from handrail.datasets.recording.piece import Piece
 from handrail.datasets.recording.rewrite import settle, write_anew
-from handrail.datasets.storage.atomic import explained, make_folder, remove, write_whole
-from handrail.datasets.storage.lock import DatasetLock
+from handrail.datasets.storage.atomic import explained, remove, write_whole
 from handrail.datasets.storage.strict_json import read_json
 
 FORMAT = "handrail.shards/1"
@@ -47,6 +53,11 @@ class Shard:
     def name(self) -> str:
         """Which episodes they are."""
         return f"episodes {self.first} to {self.first + self.episodes - 1}"
+
+    @property
+    def saved(self) -> int:
+        """How many of them are saved."""
+        return len(rows_of_lines(Layout(self.folder)))
 
 
 class Shards:
@@ -127,39 +138,37 @@ class Shards:
             for first in range(self.first, end, size)
         ]
 
-    def merge(self) -> None:
+    def merge(self, lines: Callable[[Shard], Sequence[EpisodeRecord]]) -> None:
         """Make one dataset of what was there before and of all shards, in order; nothing is encoded anew.
 
+        Whoever calls has the sole right to write there.
+
+        Args:
+            lines: returns the episodes of a shard when it is whole, once; what it raises ends the merge.
+
         Raises:
-            HandrailError: one is not whole, or the disk does not take it; nothing has changed then.
+            HandrailError: a shard cannot be read, or the disk does not take it; nothing has changed then.
         """
         with explained(f"cannot write dataset {str(self.root)!r}"):
-            make_folder(self.root)
-            lock = DatasetLock(Layout(self.root).staging)
+            shards = self.all
+            begin = lines(shards[0])
+            roots = [self.root] * bool(self.first) + [shards[0].folder]
+            sources = [Source.open(root) for root in roots]
+            check_alike(sources[0], sources[-1])
+            manifest, types = sources[0].manifest, merged_types(sources)
+            found = chain([begin], map(lines, shards[1:]))
+            new = chain.from_iterable(map(_pieces, shards, found, repeat(manifest)))
+            pieces = chain(sources[0].pieces() if self.first else (), new)
             try:
-                roots = [self.root] * bool(self.first) + [shard.folder for shard in self.all]
-                sources = [Source.open(root) for root in roots]
-                self._check_whole(sources)
-                pieces = chain.from_iterable(source.pieces() for source in sources)
-                manifest, types = sources[0].manifest, merged_types(sources)
                 write_anew(self.root, manifest, pieces, types, merged_encodings(sources), in_place=True)
-            finally:
-                lock.release()
+            except (pa.ArrowException, ValueError, KeyError) as error:
+                raise HandrailError(f"{str(self.folder)!r} cannot be read: {message_of(error)}") from error
 
     def remove(self) -> None:
         """Remove them; the plan first, so that nobody goes on with a part."""
         with explained(f"cannot remove {str(self.folder)!r}"):
             remove(self._plan)
             remove(self.folder)
-
-    def _check_whole(self, sources: list[Source]) -> None:
-        for other in sources[1:]:
-            check_alike(sources[0], other)
-        wanted = [self.first] * bool(self.first) + [shard.episodes for shard in self.all]
-        for source, number in zip(sources, wanted, strict=True):
-            if len(source.rows) != number:
-                name, found = str(source.layout.root), len(source.rows)
-                raise HandrailError(f"dataset {name!r}: expected {number} episodes, found {found}")
 
     @property
     def _plan(self) -> Path:
@@ -176,3 +185,12 @@ class Shards:
                 f"{str(self._plan)!r}: expected the plan of a recording, got {error}"
             ) from error
         raise HandrailError(f"{str(self._plan)!r}: expected format {FORMAT}, got {content['format']!r}")
+
+
+def _pieces(shard: Shard, lines: Sequence[EpisodeRecord], manifest: Manifest) -> Iterator[Piece]:
+    """Yield the episodes of a shard."""
+    if len(lines) != shard.episodes:
+        raise HandrailError(
+            f"dataset {str(shard.folder)!r}: expected {shard.episodes} episodes, found {len(lines)}"
+        )
+    yield from (Piece.of(Layout(shard.folder), manifest, line) for line in lines)

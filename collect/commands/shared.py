@@ -1,16 +1,19 @@
-"""Records with several workers: each its own shards, episode by episode crash-safe; one merge at the end."""
+"""Records with several workers: each its own shards, episode by episode crash-safe; merged as they come."""
 
 import time
-from contextlib import closing
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
+from contextlib import closing, contextmanager
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
+from threading import Event
 
 from rich.console import Console
 
 from handrail.collect.commands.account import PLAIN, RecordingLog, report
 from handrail.collect.commands.recording import Recording, episode_seed, open_writer
-from handrail.collect.commands.shards import Shards
+from handrail.collect.commands.shards import Shard, Shards
 from handrail.collect.config import RecordConfig
 from handrail.collect.envs.env import HandrailEnv
 from handrail.collect.execution.execution import Execution
@@ -20,6 +23,8 @@ from handrail.collect.session.build import build_env, build_session
 from handrail.collect.session.outcome import Outcome
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.format.layout import Layout
+from handrail.datasets.format.lines import each_line
+from handrail.datasets.format.metadata import EpisodeRecord
 from handrail.datasets.reading.reader import read_info
 from handrail.datasets.recording.writer import EpisodeWriter
 from handrail.datasets.storage.lock import HeldError
@@ -29,6 +34,7 @@ FAILED = 1
 _DYING = 60.0  # of a worker whose parent or computer is lost [s]
 _MOMENT = 0.1  # [s]
 _PRELOAD = ("handrail.collect.commands.shared",)
+_RECORDINGS: dict[RecordConfig, Recording] = {}
 
 
 def record_shared(config: RecordConfig, console: Console) -> int:
@@ -62,7 +68,8 @@ def record_shared(config: RecordConfig, console: Console) -> int:
             merged = shards.are_in(writer.num_episodes)
             if not merged:
                 _record_all(config, shards, log, execution)
-    _finish(shards, merged, log)
+    if not log.exit_code:
+        _remove(shards, log)
     log.wall_time = time.monotonic() - start
     info = read_info(shards.root)
     report(config, shards.root, info.episodes, info.frames, log, console)
@@ -70,46 +77,75 @@ def record_shared(config: RecordConfig, console: Console) -> int:
 
 
 def _record_all(config: RecordConfig, shards: Shards, log: RecordingLog, execution: Execution) -> None:
-    """Record all shards, until that is done, one fails, or an interrupt comes."""
+    """Record all shards and merge them, until that is done, one fails, or an interrupt comes."""
+    parts = {each.name: each for each in shards.all}
     jobs = [
-        Job(
-            each.name,
-            record_shard,
-            (config, each.folder, each.first, each.episodes),
-            (),
-            each.episodes,
-            each.log,
-        )
-        for each in shards.all
+        Job(name, record_shard, (config, each.folder, each.first, each.episodes), (), each.episodes, each.log)
+        for name, each in parts.items()
     ]
     goes_on = "what was recorded is kept, and the same flags go on"
     try:
-        for result in execution.run(jobs):
-            if result.error:
-                raise HandrailError(f"{result.job.name}: {result.error}; {goes_on}")
-            for outcome in result.value:
-                log.add(outcome)
-            execution.say(log.words)
+        with _merging(shards) as take:
+            for result in execution.run(jobs, part=lambda job: parts[job.name].saved):
+                if result.error:
+                    raise HandrailError(f"{result.job.name}: {result.error}; {goes_on}")
+                outcomes, lines = result.value
+                for outcome in outcomes:
+                    log.add(outcome)
+                execution.say(log.words)
+                take(result.job.name, lines)
+            execution.say(f"{log.words}, merging")
     except KeyboardInterrupt:
         log.trouble, log.exit_code = f"interrupted; {goes_on}", INTERRUPTED
     except HandrailError as error:
         log.trouble, log.exit_code = str(error), FAILED
 
 
-def _finish(shards: Shards, merged: bool, log: RecordingLog) -> None:
-    """Make one dataset of the shards, if all are whole, and remove them."""
-    if log.exit_code:
-        return
+@contextmanager
+def _merging(shards: Shards) -> Iterator[Callable[[str, Sequence[EpisodeRecord]], None]]:
+    """Merge shards while others are still recorded; provide what takes the name and the lines of a whole one.
+
+    Raises:
+        HandrailError: the disk does not take it; nothing has changed then.
+    """
+    whole = {each.name: Future[Sequence[EpisodeRecord]]() for each in shards.all}
+    stopped = Event()
+
+    def lines(shard: Shard) -> Sequence[EpisodeRecord]:
+        found = whole[shard.name].result()
+        del whole[shard.name]  # some 50 kB an episode
+        if stopped.is_set():
+            raise CancelledError
+        return found
+
+    def take(name: str, found: Sequence[EpisodeRecord]) -> None:
+        whole[name].set_result(found)
+        if merge.done():  # not all are whole: it failed
+            merge.result()
+
+    with ThreadPoolExecutor(1) as thread:
+        merge = thread.submit(shards.merge, lines)
+        try:
+            yield take
+            merge.result()
+        except BaseException:
+            stopped.set()
+            for each in list(whole.values()):
+                each.cancel()
+            raise
+
+
+def _remove(shards: Shards, log: RecordingLog) -> None:
     try:
-        if not merged:
-            shards.merge()
         shards.remove()
     except HandrailError as error:
         log.trouble, log.exit_code = str(error), FAILED
 
 
-def record_shard(config: RecordConfig, folder: Path, first: int, episodes: int) -> list[Outcome]:
-    """Record a part of a recording into a dataset of its own; return how those went that were not there yet.
+def record_shard(
+    config: RecordConfig, folder: Path, first: int, episodes: int
+) -> tuple[list[Outcome], list[EpisodeRecord]]:
+    """Record a part of a recording into a dataset of its own.
 
     Every episode is what it would be in one whole recording: it depends on its seed alone.
 
@@ -119,17 +155,22 @@ def record_shard(config: RecordConfig, folder: Path, first: int, episodes: int) 
         first: number of its first episode in the whole.
         episodes: how many it has.
 
+    Returns:
+        How those went that were not there yet, and the lines of metadata of all.
+
     Raises:
         HandrailError: the disk or an encoder failed; the saved episodes are whole.
     """
     own = replace(config, dataset=replace(config.dataset, place=str(folder), root=""))
     env, outcomes = _env(config), list[Outcome]()
     with _opened(own, folder, env) as writer, Interrupts() as interrupts:
-        recording = Recording(own, env, writer)
+        lines = list(each_line(Layout(folder), with_stats=True))
+        recording = _recording(config, env, writer)
         while writer.num_episodes < episodes:
             seed = episode_seed(config.seed, first + writer.num_episodes)
             outcomes.append(recording.episode(seed, interrupts))
-    return outcomes
+            lines += [writer.last] if writer.last else []
+    return outcomes, lines
 
 
 def _opened(config: RecordConfig, folder: Path, env: HandrailEnv) -> EpisodeWriter:
@@ -143,6 +184,15 @@ def _opened(config: RecordConfig, folder: Path, env: HandrailEnv) -> EpisodeWrit
             if time.monotonic() > given_up:
                 raise
             time.sleep(_MOMENT)
+
+
+def _recording(config: RecordConfig, env: HandrailEnv, writer: EpisodeWriter) -> Recording:
+    """Return what records, built once a process, for it takes as long as a part of an episode."""
+    if config not in _RECORDINGS:
+        _RECORDINGS.clear()
+        _RECORDINGS[config] = Recording(config, env, writer)
+    _RECORDINGS[config].into(writer)
+    return _RECORDINGS[config]
 
 
 @lru_cache(maxsize=1)

@@ -210,7 +210,6 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         super().reset(seed=seed)
         start: Start = (options or {}).get("start") or self._sample(self.model, self.np_random)
         meshes = bool(self.cameras or self.render_mode)
-        self.close()
         plant = self._build(self.model, start.scene, start.q, self.period, meshes=meshes, grip=start.grip)
         self._begun = start, plant
         self._steps = 0
@@ -278,8 +277,8 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         if use not in self._painters:
             pretty = use == "render"
             size = self.render_size if pretty else self.image_size
-            self._painters[use] = Painter(now.mujoco_model, size, pretty)
-        return self._painters[use].paint(now.data, camera)
+            self._painters[use] = Painter(size, pretty)
+        return self._painters[use].paint(now.mujoco_model, now.data, camera)
 
     def close(self) -> None:
         """Give the OpenGL contexts back."""

@@ -43,7 +43,8 @@ class AgentObservation:
 
 def bounded(numbers: FloatArray) -> NDArray[np.float32]:
     """Return the numbers as float32 within the space's bounds."""
-    return np.clip(np.nan_to_num(numbers), -_BOUND, _BOUND).astype(np.float32)
+    within = np.clip(numbers, -_BOUND, _BOUND)
+    return np.where(np.isnan(within), 0.0, within).astype(np.float32)
 
 
 def box_space(size: int) -> spaces.Space[Any]:

@@ -23,12 +23,13 @@ class Cluster:
 
     Args:
         address: of the cluster, or auto: the one that runs on this computer.
+        fresh: whether every job gets a process of its own.
 
     Raises:
         HandrailError: there is none.
     """
 
-    def __init__(self, address: str) -> None:
+    def __init__(self, address: str, fresh: bool = False) -> None:
         self._joined = not ray.is_initialized()
         if self._joined:
             try:
@@ -39,13 +40,19 @@ class Cluster:
                     f"--ray {address}: expected a running cluster (`ray start --head`), got"
                     f" {message_of(error)}"
                 ) from error
-        self._attempt: Any = ray.remote(num_cpus=1, max_retries=TRIES - 1)(alone)
+        once: dict[str, Any] = {"max_calls": 1} if fresh else {}
+        self._attempt: Any = ray.remote(num_cpus=1, max_retries=TRIES - 1, **once)(alone)
         self._running: dict[Any, Job] = {}
 
     @property
+    def cores(self) -> int:
+        """How many cores it has; computers may come and go."""
+        return max(1, int(ray.cluster_resources().get("CPU", 1)))
+
+    @property
     def capacity(self) -> int:
-        """How many jobs it takes at a time; computers may come and go."""
-        return max(1, _AHEAD * int(ray.cluster_resources().get("CPU", 1)))
+        """How many jobs it takes at a time."""
+        return _AHEAD * self.cores
 
     def start(self, job: Job) -> None:
         """Give a job to the cluster."""

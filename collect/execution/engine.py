@@ -65,7 +65,7 @@ def engine_of(config: ExecutionConfig, preload: Sequence[str] = (), fresh: bool 
     if config.ray:
         from handrail.collect.execution.cluster import Cluster
 
-        return Cluster(config.ray)
+        return Cluster(config.ray, fresh)
     if config.is_shared or fresh:
         from handrail.collect.execution.pool import Pool
 

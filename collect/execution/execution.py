@@ -1,5 +1,6 @@
 """Runs jobs wherever the settings say, shows how far it is, and names the slowest and the failed."""
 
+import time
 from collections import OrderedDict
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
@@ -22,6 +23,7 @@ from handrail.collect.execution.job import Job, Result
 
 _SLOWEST = 3  # jobs that are named at the end
 _WORTH_NAMING = 5.0  # [s]
+_LOOK = 1.0  # how often it is asked how far the running jobs are [s]
 _PLAIN: dict[str, Any] = {"highlight": False, "markup": False, "soft_wrap": True}
 
 
@@ -62,6 +64,7 @@ class Execution:
         self._bar = self._progress.add_task(title, total=None, words="")
         self._interrupts = Interrupts()
         self._results: list[Result] = []
+        self._done, self._parts, self._looked = 0, dict[str, int](), 0.0
 
     def __enter__(self) -> Self:
         self._interrupts.__enter__()
@@ -80,7 +83,12 @@ class Execution:
         """Show how it stands, beside the bar."""
         self._progress.update(self._bar, words=words)
 
-    def run(self, jobs: Iterable[Job], wanted: Callable[[Job], bool] = lambda job: True) -> Iterator[Result]:
+    def run(
+        self,
+        jobs: Iterable[Job],
+        wanted: Callable[[Job], bool] = lambda job: True,
+        part: Callable[[Job], int] = lambda job: 0,
+    ) -> Iterator[Result]:
         """Run jobs and yield what came of each as it is done, in any order.
 
         A job begins when all that it needs is done, what is first in the list first; one that needs what
@@ -89,13 +97,15 @@ class Execution:
         Args:
             jobs: with names that differ.
             wanted: whether a job is still to be done; asked before it begins.
+            part: how much of its size a running job has done; asked once a second, for the progress bar.
         """
         todo = OrderedDict((job.name, job) for job in jobs)
-        pending, running = set(todo), set[str]()
+        pending, running = set(todo), dict[str, Job]()
         self._progress.update(self._bar, total=sum(job.size for job in todo.values()))
         while self._begin(todo, pending, running, wanted) or running:
+            self._look_at(running.values(), part)
             for result in self._engine.wait() if running else ():
-                running.discard(result.job.name)
+                del running[result.job.name]
                 if not result.error:
                     pending.discard(result.job.name)
                 yield self._noted(result)
@@ -106,7 +116,7 @@ class Execution:
         self,
         todo: OrderedDict[str, Job],
         pending: set[str],
-        running: set[str],
+        running: dict[str, Job],
         wanted: Callable[[Job], bool],
     ) -> bool:
         """Begin what can begin, as much as there is room for; return whether anything left the list."""
@@ -118,17 +128,33 @@ class Execution:
                 begun.append(job)
                 if wanted(job):
                     self._engine.start(job)
-                    running.add(job.name)
+                    running[job.name] = job
         for job in begun:
             del todo[job.name]
             if job.name not in running:
                 pending.discard(job.name)
-                self._progress.advance(self._bar, job.size)
+                self._advance(job)
         return bool(begun)
+
+    def _look_at(self, running: Iterable[Job], part: Callable[[Job], int]) -> None:
+        """Show how far the running jobs are."""
+        now = time.monotonic()
+        if now >= self._looked + _LOOK:
+            self._looked, self._parts = now, {job.name: min(part(job), job.size) for job in running}
+            self._show()
+
+    def _advance(self, job: Job) -> None:
+        """Show that a job is over."""
+        self._done += job.size
+        self._parts.pop(job.name, None)
+        self._show()
+
+    def _show(self) -> None:
+        self._progress.update(self._bar, completed=self._done + sum(self._parts.values()))
 
     def _noted(self, result: Result) -> Result:
         self._results.append(replace(result, value=None))
-        self._progress.advance(self._bar, result.job.size)
+        self._advance(result.job)
         return result
 
     def _name_slowest_and_failed(self) -> None:

@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
+from multiprocessing import forkserver
 from multiprocessing.connection import Connection, wait
 from multiprocessing.context import ForkServerContext
 from multiprocessing.process import BaseProcess
@@ -43,6 +44,7 @@ class Pool:
         self.capacity = capacity
         self._context = multiprocessing.get_context("forkserver")
         self._context.set_forkserver_preload([_PRELOAD, *preload])
+        forkserver.ensure_running()  # it loads while the caller gets ready
         self._fresh = fresh
         self._workers: dict[Connection, _Worker] = {}
         self._lost = Counter[str]()

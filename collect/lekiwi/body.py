@@ -38,7 +38,6 @@ class LeKiwiBody:
 
     def reset(self, seed: int) -> None:
         """Begin an episode."""
-        self.close()
         self._env.reset(seed=seed)
         self._arm, self._twist = self._env.state().q[3:].copy(), np.zeros(3)
         self._gripper = 0.0 if self._env.start.grip is None else 1.0
@@ -101,8 +100,8 @@ class LeKiwiBody:
         ours, size = CAMERAS[camera]
         now = self._env.simulation
         if camera not in self._painters:
-            self._painters[camera] = Painter(now.mujoco_model, size, False)
-        return self._painters[camera].paint(now.data, ours)
+            self._painters[camera] = Painter(size)
+        return self._painters[camera].paint(now.mujoco_model, now.data, ours)
 
     def close(self) -> None:
         """Give the OpenGL contexts back."""

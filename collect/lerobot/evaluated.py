@@ -76,7 +76,6 @@ class EvaluatedEnv(gymnasium.Wrapper[Observation, NDArray[np.float32], Observati
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
         """Begin an episode."""
-        self._put_away()
         observation, info = self._env.reset(seed=None if seed is None else seed + self._first_seed)
         self._driver, self._whole = (
             Driver(each, self._env, self._env.period) for each in (self._controller, self._direct)
@@ -107,18 +106,14 @@ class EvaluatedEnv(gymnasium.Wrapper[Observation, NDArray[np.float32], Observati
     def render(self) -> NDArray[np.uint8]:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Return a quick picture from the scene camera: LeRobot films every step of ten episodes."""
         now = self._env.simulation
-        self._painter = self._painter or Painter(now.mujoco_model, self._env.render_size)
-        return self._painter.paint(now.data, "scene")
+        self._painter = self._painter or Painter(self._env.render_size)
+        return self._painter.paint(now.mujoco_model, now.data, "scene")
 
     def close(self) -> None:
         """Give the OpenGL contexts back."""
-        self._put_away()
-        self._env.close()
-
-    def _put_away(self) -> None:
         if self._painter:
             self._painter.close()
-        self._painter = None
+        self._env.close()
 
     @property
     def _meant(self) -> str:

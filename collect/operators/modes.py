@@ -21,6 +21,8 @@ class TeleopMode:
         controller: what becomes of the command: a name of `CONTROLLERS`, or `module:name`.
         help: one line.
         device: what the operator has in hand: a name of `DEVICES`.
+        task_objectives: whether the masked MPC takes on the objectives that a task brings, and the channels
+            that the operator then leaves to them.
     """
 
     name: str
@@ -28,6 +30,7 @@ class TeleopMode:
     controller: str
     help: str
     device: str = "sticks"
+    task_objectives: bool = True
 
     @property
     def by_focus(self) -> bool:
@@ -88,6 +91,13 @@ MODES = Registry(
     TeleopMode,
     (
         TeleopMode("ee", always("ee"), "mpc", "steer the hand; the base comes along by itself"),
+        TeleopMode(
+            "ee_whole",
+            always("ee"),
+            "mpc",
+            "steer the hand, its tilt too: ee without the objectives that a task brings (tray)",
+            task_objectives=False,
+        ),
         TeleopMode(
             "ee_dls",
             always("ee"),

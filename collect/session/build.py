@@ -121,7 +121,7 @@ def build_operator(config: SessionConfig, mode: TeleopMode, model: RobotModel) -
 def build_controller(mode: TeleopMode, model: RobotModel, fps: float, task: str = "") -> Controller:
     """Return the controller of a mode; the masked MPC's knows the objectives that robot and task bring."""
     spec = CONTROLLERS.find(mode.controller)
-    objectives = (_objectives(model, task),) if spec.objectives else ()
+    objectives = (_objectives(model, task if mode.task_objectives else ""),) if spec.objectives else ()
     return resolved(spec.build)(model, 1.0 / fps, *objectives)
 
 
@@ -142,8 +142,9 @@ def build_mode(config: SessionConfig, model: RobotModel) -> TeleopMode:
     """
     mode, task = MODES.find(config.mode), TASKS.find(config.task)
     if config.mask:
-        mode = mode_of_mask(config.mask, Channels.of(model.description), mode.controller)
-    if not CONTROLLERS.find(mode.controller).objectives:
+        own = mode_of_mask(config.mask, Channels.of(model.description), mode.controller)
+        mode = replace(own, task_objectives=mode.task_objectives)
+    if not (CONTROLLERS.find(mode.controller).objectives and mode.task_objectives):
         return mode
     return mode.leaving(task.left, task.minded)
 

@@ -24,7 +24,7 @@ class ModeController:
         self, modes: Mapping[str, TeleopMode], build: Callable[[TeleopMode], Controller], first: TeleopMode
     ) -> None:
         self._modes, self._build = modes, build
-        self._built: dict[str, Controller] = {}
+        self._built: dict[tuple[str, bool], Controller] = {}
         self._obstacles: tuple[Obstacle, ...] = ()
         self._mode = first
 
@@ -47,10 +47,10 @@ class ModeController:
 
     @property
     def _controller(self) -> Controller:
-        name = self._mode.controller
-        if name not in self._built:
-            self._built[name] = self._build(self._mode)
-        return self._built[name]
+        which = self._mode.controller, self._mode.task_objectives
+        if which not in self._built:
+            self._built[which] = self._build(self._mode)
+        return self._built[which]
 
     def _found(self, name: str) -> TeleopMode:
         """Return a mode; a mask of one's own is for the MPC, an unknown name changes nothing."""

@@ -12,13 +12,13 @@ class Recorder:
     """Records moments as frames; an observer of a session.
 
     Args:
-        writer: of the dataset.
+        writer: of the dataset; the next episode may have another one.
         task: what is being done, in words.
         columns: what every episode's metadata says of the session (operator, mode, …), as of its end.
     """
 
     def __init__(self, writer: EpisodeWriter, task: str, columns: Mapping[str, Scalar]) -> None:
-        self._writer = writer
+        self.writer = writer
         self._task = task
         self._columns = columns
         self._undoable: list[Frame] = []
@@ -26,19 +26,19 @@ class Recorder:
     def begin(self, env: HandrailEnv, seed: int) -> None:
         """Drop what an episode that ended early left open."""
         self._undoable.clear()
-        if self._writer.open_frames:
-            self._writer.discard_episode()
+        if self.writer.open_frames:
+            self.writer.discard_episode()
 
     def see(self, frame: Frame) -> None:
         """Add a frame, once no undo can take it back."""
-        del self._undoable[frame.number - self._writer.open_frames :]
+        del self._undoable[frame.number - self.writer.open_frames :]
         self._undoable.append(frame)
         self._add(frame.safe)
 
     def _add(self, safe: int) -> None:
         """Write the frames up to a number."""
-        while self._undoable and self._writer.open_frames < safe:
-            self._writer.add_frame(frame_row(self._undoable.pop(0)), self._task)
+        while self._undoable and self.writer.open_frames < safe:
+            self.writer.add_frame(frame_row(self._undoable.pop(0)), self._task)
 
     def end(self, outcome: Outcome) -> None:
         """Save the episode with how it went; or forget it, if the operator threw it away or begins it again.
@@ -47,10 +47,10 @@ class Recorder:
             HandrailError: the disk or an encoder failed; the saved episodes are whole.
         """
         if not outcome.kept:
-            self._writer.discard_episode()
+            self.writer.discard_episode()
             return
         self._add(outcome.frames)
-        self._writer.save_episode(
+        self.writer.save_episode(
             dict(self._columns)
             | {
                 "success": outcome.success,

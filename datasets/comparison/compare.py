@@ -21,7 +21,8 @@ from handrail.datasets.comparison.differences import Difference, differences
 from handrail.datasets.comparison.evaluations import Condition, read_evaluations
 from handrail.datasets.comparison.groups import Group, baseline_of, group_of, load_groups, unlike
 from handrail.datasets.comparison.outcomes import LIKE_FOR_LIKE, Outcomes, Pair, judge_pairs
-from handrail.datasets.quality.measure import Measurements, measure
+from handrail.datasets.quality.group_reading import Reading
+from handrail.datasets.quality.measure import Measurements, measured, read
 from handrail.datasets.reading.check import check_whole
 from handrail.datasets.statistics.proportions import ShareDifference
 from handrail.datasets.statistics.resampling import Interval
@@ -111,7 +112,14 @@ def compare(config: CompareConfig) -> Comparison:
         _SAME_NUMBER: matched_number(groups),
         "the same operator time": matched_time(groups),
     }
-    views = [_view(title, each, baseline, config, rng) for title, each in chosen.items()]
+    counted = {title: _counted(title, each, config) for title, each in chosen.items()}
+    readings = read(
+        [{group.label: group.episodes for group in each} for each in counted.values()], config.margin
+    )
+    views = [
+        _view(title, chosen[title], counted[title], each, baseline, rng)
+        for title, each in zip(chosen, readings, strict=True)
+    ]
     (base,) = [group for group in groups if group.label == baseline]
     others = [group for group in groups if group is not base]
     success = {group.label: success_difference(group, base) for group in others}
@@ -121,19 +129,28 @@ def compare(config: CompareConfig) -> Comparison:
     return Comparison(config, baseline, views, success, rates, ratios, outcomes)
 
 
-def _view(
-    title: str, groups: Sequence[Group], baseline: str, config: CompareConfig, rng: np.random.Generator
-) -> View:
-    measured = [group.successful() for group in groups] if config.success_only else list(groups)
-    for group in measured:
+def _counted(title: str, groups: Sequence[Group], config: CompareConfig) -> list[Group]:
+    """Return the episodes of which quality is measured."""
+    counted = [group.successful() for group in groups] if config.success_only else list(groups)
+    for group in counted:
         if not group.episodes:
             raise HandrailError(f"--success_only: {group.label!r} has no successful episode among {title}")
     if title == _SAME_NUMBER:  # of those that count; as many were collected
-        measured = matched_number(measured)
-    measurements = measure({group.label: group.episodes for group in measured}, rng, config.margin)
-    found = differences(measured, measurements, baseline, rng)
-    counted = [collected(group) for group in groups]
-    return View(title, measured, counted, measurements, found)
+        return matched_number(counted)
+    return counted
+
+
+def _view(
+    title: str,
+    groups: Sequence[Group],
+    counted: Sequence[Group],
+    readings: Mapping[str, Reading],
+    baseline: str,
+    rng: np.random.Generator,
+) -> View:
+    measurements = measured(readings, rng)
+    found = differences(counted, measurements, baseline, rng)
+    return View(title, counted, [collected(group) for group in groups], measurements, found)
 
 
 def _conditions(config: CompareConfig, groups: Sequence[Group]) -> dict[str, Condition]:

@@ -8,8 +8,8 @@ from typing import Any
 
 from handrail.controllers.errors import HandrailError, unknown_name
 from handrail.datasets.quality.columns import ColumnNames
-from handrail.datasets.quality.demonstration import Demonstration
-from handrail.datasets.quality.load import read_demonstrations
+from handrail.datasets.quality.episode import Episode
+from handrail.datasets.quality.load import each_opened, recorded_episodes
 from handrail.datasets.reading.reader import DatasetInfo, read_info
 
 FEWEST, MOST = 2, 8
@@ -28,7 +28,7 @@ class Group:
 
     label: str
     info: DatasetInfo
-    episodes: tuple[Demonstration, ...]
+    episodes: tuple[Episode, ...]
 
     def first(self, count: int) -> "Group":
         """Return the first episodes only."""
@@ -67,14 +67,14 @@ def load_groups(
     names = _names(roots, labels)
     groups: list[Group] = []
     for root, name in zip(roots, names, strict=True):
-        info, episodes = read_info(root), read_demonstrations(root, columns)
+        info, episodes = read_info(root), recorded_episodes(root, columns)
         if not episodes:
             raise HandrailError(f"dataset {str(info.root)!r}: expected one episode or more, got none")
         if not by:
             groups.append(Group(name, info, tuple(episodes)))
             continue
         prefix = f"{name} · " if len(roots) > 1 else ""
-        values = [_value(episode, by, str(root)) for episode in episodes]
+        values = _values(episodes, by, str(root))
         for each in dict.fromkeys(values):
             members = (episode for episode, value in zip(episodes, values, strict=True) if value == each)
             groups.append(Group(prefix + each, info, tuple(members)))
@@ -116,11 +116,21 @@ def _names(roots: Sequence[str | Path], labels: Sequence[str]) -> list[str]:
     return names
 
 
-def _value(episode: Demonstration, by: str, root: str) -> str:
-    """Return the value of a metadata column; a mode that the metadata lacks is read from the frames."""
+def _values(episodes: Sequence[Episode], by: str, root: str) -> list[str]:
+    """Return the values of a metadata column; modes that the metadata lacks are read from the frames."""
+    if by == "mode" and not all(by in episode.meta for episode in episodes):
+        opened = each_opened(episodes)
+        return [
+            episode.modes or "none"
+            if by not in episode.meta and episode.has("mode")
+            else _value(episode, by, root)
+            for episode in opened
+        ]
+    return [_value(episode, by, root) for episode in episodes]
+
+
+def _value(episode: Episode, by: str, root: str) -> str:
     meta: dict[str, Any] = {key: value for key, value in episode.meta.items() if "/" not in key}
-    if by not in meta and by == "mode" and episode.has("mode"):
-        return episode.modes or "none"
     if by not in meta:
         raise HandrailError(
             f"dataset {root!r}: unknown column {by!r} of episodes, expected one of {', '.join(meta)}"

@@ -3,6 +3,8 @@
 from bisect import bisect_right
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from itertools import groupby
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +31,6 @@ class Source:
         types: Of its extra columns.
         encodings: How its videos are encoded, where that is not as Handrail does it.
         info: What it is.
-        rows: Lines of metadata of its episodes, with `success` where that is known.
     """
 
     layout: Layout
@@ -37,7 +38,11 @@ class Source:
     types: ColumnTypes
     encodings: Encodings
     info: DatasetInfo
-    rows: Sequence[dict[str, Any]]
+
+    @cached_property
+    def rows(self) -> Sequence[dict[str, Any]]:
+        """Lines of metadata of its episodes, with `success` where that is known."""
+        return with_success(self.info, read_episodes(self.layout.root))
 
     @property
     def successes(self) -> list[bool | None]:
@@ -66,15 +71,15 @@ class Source:
         manifest = read_manifest(layout)
         check_folders(layout)
         check_whole(root, verify)
-        rows = with_success(info, read_episodes(root))
-        if not rows:
+        lines = rows_of_lines(layout)
+        if not lines:
             raise HandrailError(f"dataset {str(root)!r}: expected an episode or more, found none")
         try:
-            Lines.read(layout.row(0))
+            Lines.read(lines[0])
         except (ForeignLineError, FileNotFoundError) as error:
             raise _foreign(root, "its meta/episodes has been rewritten") from error
-        types, encodings = read_column_types(layout.row(0)), read_encodings(layout.info, manifest)
-        return cls(layout, manifest, types, encodings, info, rows)
+        types, encodings = read_column_types(lines[0]), read_encodings(layout.info, manifest)
+        return cls(layout, manifest, types, encodings, info)
 
     def pieces(self, numbers: Sequence[int] | None = None) -> Iterator[Piece]:
         """Yield episodes, one at a time; all of them without numbers.
@@ -82,21 +87,23 @@ class Source:
         Raises:
             HandrailError: A line of metadata cannot be read.
         """
-        slots = sorted(
-            number for path in rows_of_lines(self.layout) if (number := episode_of(path)) is not None
-        )
-        lines: Lines | None = None
-        for number in range(len(self.rows)) if numbers is None else numbers:
-            slot = slots[bisect_right(slots, number) - 1]
-            path = self.layout.row(slot)
-            try:
-                lines = lines if lines is not None and lines.path == path else Lines.read(path)
-                record = lines.record(number - slot, with_stats=True)
-            except (OSError, ValueError, KeyError, IndexError) as error:
-                raise HandrailError(
-                    f"{str(path)!r} cannot be read ({error}); the dataset is damaged"
-                ) from error
-            yield Piece.of(self.layout, self.manifest, record)
+        files = rows_of_lines(self.layout)
+        if numbers is None:
+            for path in files:
+                yield from self._pieces(path)
+            return
+        slots = sorted(number for path in files if (number := episode_of(path)) is not None)
+        for slot, some in groupby(numbers, key=lambda number: slots[bisect_right(slots, number) - 1]):
+            yield from self._pieces(self.layout.row(slot), [number - slot for number in some])
+
+    def _pieces(self, path: Path, places: Sequence[int] | None = None) -> Iterator[Piece]:
+        """Yield the episodes of a volume."""
+        try:
+            lines = Lines.read(path)
+            for place in range(len(lines)) if places is None else places:
+                yield Piece.of(self.layout, self.manifest, lines.record(place, with_stats=True))
+        except (OSError, ValueError, KeyError, IndexError) as error:
+            raise HandrailError(f"{str(path)!r} cannot be read ({error}); the dataset is damaged") from error
 
 
 def _foreign(root: Path, why: str) -> HandrailError:

@@ -1,7 +1,9 @@
-"""The rows of an episode in a file that may hold many: opened once, its row groups found by halving.
+"""Files of the rows of many episodes: grown by whole episodes, read one episode at a time.
 
-Episodes lie in a file in their order, so the statistics of `episode_index` say in log₂(groups) steps where
-one begins. A file whose statistics do not say, or say it wrongly, is read whole.
+A row group holds some thousand rows: LeRobot opens a file in as many steps as it has groups, and whoever
+wants one episode reads its group. Episodes lie in a file in their order, so the statistics of `episode_index`
+say in log₂(groups) steps where one begins. A file whose statistics do not say, or say it wrongly, is read
+whole. Every page has a checksum, so that no rows are taken for others.
 """
 
 from collections.abc import Iterator, Sequence
@@ -14,7 +16,56 @@ import pyarrow.parquet as pq
 from handrail.datasets.format.arrow import numbers, to_numpy
 
 _EPISODE = "episode_index"
-MOST_OPEN = 4  # files; one of a thousand episodes takes some 25 MB of memory
+_SEARCHED = [_EPISODE, "index"]  # columns whose statistics readers look rows up by
+ROWS = 1000  # of a row group of several episodes
+MOST_OPEN = 4  # files
+
+
+class GrowingDataFile:
+    """A parquet of rows that is being written, an episode after the other."""
+
+    def __init__(self, path: Path, schema: pa.Schema):
+        """Begin it.
+
+        Raises:
+            OSError: The disk does not take it.
+        """
+        self._sink = pa.OSFile(str(path), "wb")
+        self._writer = pq.ParquetWriter(
+            self._sink,
+            schema,
+            compression="snappy",
+            write_statistics=_SEARCHED,  # type: ignore[arg-type]
+            write_page_checksum=True,
+        )
+        self._waiting: list[pa.Table] = []
+
+    @property
+    def size(self) -> int:
+        """How large it is, about [byte]."""
+        return self._sink.tell() + sum(table.nbytes for table in self._waiting)
+
+    def add(self, episode: pa.Table) -> None:
+        """Append the rows of an episode."""
+        if self._waiting and sum(map(len, self._waiting)) + len(episode) > ROWS:
+            self._write_group()
+        self._waiting.append(episode)
+
+    def close(self) -> None:
+        """Finish the file."""
+        if self._waiting:
+            self._write_group()
+        self._writer.close()
+        self._sink.close()
+
+    def abandon(self) -> None:
+        """Let the file go, which the caller removes."""
+        self._sink.close()
+
+    def _write_group(self) -> None:
+        table = pa.concat_tables(self._waiting)
+        self._waiting = []
+        self._writer.write_table(table, row_group_size=max(1, len(table)))
 
 
 class DataFile:
@@ -27,9 +78,10 @@ class DataFile:
             OSError, pyarrow.ArrowException, ValueError: It is not there, not whole, or has no episodes.
         """
         self.path = path
-        self._file = pq.ParquetFile(path)
+        self._file = pq.ParquetFile(path, page_checksum_verification=True)
         self._groups = self._file.num_row_groups
         self._column = _leaves(self._file.metadata).index(_EPISODE) if self._groups else 0
+        self._last: tuple[range, list[str] | None, pa.Table] | None = None  # what was read last
 
     def rows(self, episode: int, length: int, columns: Sequence[str] | None = None) -> pa.Table:
         """Return the rows of an episode, in their order.
@@ -58,8 +110,11 @@ class DataFile:
         """Give the file free; safe to call twice."""
         self._file.close()
 
-    def _read(self, groups: Sequence[int], episode: int, columns: list[str] | None) -> pa.Table:
-        table = self._file.read_row_groups(list(groups), columns=columns, use_threads=False)
+    def _read(self, groups: range, episode: int, columns: list[str] | None) -> pa.Table:
+        if self._last is None or self._last[:2] != (groups, columns):
+            table = self._file.read_row_groups(list(groups), columns=columns, use_threads=False)
+            self._last = groups, columns, table
+        table = self._last[2]
         mask = to_numpy(table.column(_EPISODE).combine_chunks()) == episode
         return table if mask.all() else table.filter(numbers(mask, pa.bool_()))
 

@@ -140,11 +140,11 @@ class Lines:
         if table is None:
             with pq.ParquetFile(self.path) as file:
                 table = file.read(use_threads=False)
-        for name in [name for name in table.column_names if name.startswith(_STATS)]:
-            key, statistic = name.removeprefix(_STATS).rsplit("/", 1)
-            shape = (len(self), *_shape(table.schema.field(name).type))
-            values = flat_numbers(table.column(name)).reshape(shape)
-            found.setdefault(key, {})[statistic] = np.where(np.isfinite(values), values, 0)
+        for name, column in zip(table.column_names, table.columns, strict=True):
+            if name.startswith(_STATS):
+                key, statistic = name.removeprefix(_STATS).rsplit("/", 1)
+                values = flat_numbers(column).reshape(len(self), *_shape(column.type))
+                found.setdefault(key, {})[statistic] = np.where(np.isfinite(values), values, 0)
         return found
 
     def _stats_of(self, place: int) -> Stats:

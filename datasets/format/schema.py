@@ -72,6 +72,15 @@ def video_keys(features: Mapping[str, Feature]) -> tuple[str, ...]:
     return tuple(key for key, feature in features.items() if feature.is_video)
 
 
+def counted_columns(features: Mapping[str, Feature]) -> tuple[str, ...]:
+    """Return the columns of which statistics are kept: what LeRobot gives to policies, and normalises."""
+    return tuple(
+        key
+        for key, feature in features.items()
+        if feature.is_video or (feature.dtype != "string" and key.startswith(POLICY_PREFIXES))
+    )
+
+
 def check_features(features: Mapping[str, Feature]) -> None:
     """Check a whole schema before anything is created.
 
@@ -161,16 +170,20 @@ def _check_value(key: str, feature: Feature, value: Any) -> Any:
     return _check_finite(key, feature, array.reshape(shape), expected)
 
 
-def _check_finite(key: str, feature: Feature, array: np.ndarray, dtype: np.dtype) -> np.ndarray:
-    given = array
-    with np.errstate(over="ignore"):
-        array = given.astype(dtype)  # a copy, always
-    if dtype.kind in "iu" and not np.array_equal(array, given):
-        raise HandrailError(f"frame: {key!r} expected values that fit {dtype}, got {given.tolist()}")
+def _check_finite(key: str, feature: Feature, given: np.ndarray, dtype: np.dtype) -> np.ndarray:
+    array = given.copy() if given.dtype == dtype else _cast(key, given, dtype)
     if key.startswith(POLICY_PREFIXES) and dtype.kind == "f" and not np.isfinite(array).all():
         where = int(np.flatnonzero(~np.isfinite(array))[0])
         name = feature.names[where] if feature.names else str(where)
         raise HandrailError(
             f"frame: {key!r} expected finite values, got {array[where]} at {name} (a policy would read it)"
         )
+    return array
+
+
+def _cast(key: str, given: np.ndarray, dtype: np.dtype) -> np.ndarray:
+    with np.errstate(over="ignore"):
+        array = given.astype(dtype)
+    if dtype.kind in "iu" and not np.array_equal(array, given):
+        raise HandrailError(f"frame: {key!r} expected values that fit {dtype}, got {given.tolist()}")
     return array

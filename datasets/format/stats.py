@@ -13,6 +13,7 @@ import numpy as np
 Stats = dict[str, dict[str, np.ndarray]]
 
 QUANTILES = {"q01": 0.01, "q10": 0.10, "q50": 0.50, "q90": 0.90, "q99": 0.99}
+_SHARES = np.array(list(QUANTILES.values()))
 BINS = 5000
 STATISTICS = ("min", "max", "mean", "std", "count", *QUANTILES)
 _OTHERS = tuple(name for name in STATISTICS if name != "count")
@@ -124,16 +125,15 @@ def _quantiles(
     values: np.ndarray, edges: np.ndarray, weights: np.ndarray | None = None
 ) -> dict[str, np.floating]:
     """Return the quantiles of values, interpolated inside the first bin up to which enough of them lie."""
-    counts, _ = np.histogram(values, edges, weights=weights)
+    bins = np.minimum(np.searchsorted(edges, values, side="right"), BINS) - 1  # the last one is closed
+    counts = np.bincount(bins, weights, minlength=BINS)
     ranks = np.cumsum(counts)
-    found = {}
-    for name, share in QUANTILES.items():
-        target = share * ranks[-1]
-        chosen = np.searchsorted(ranks, target)
-        before = ranks[chosen] - counts[chosen]
-        width = edges[chosen + 1] - edges[chosen] if chosen else 0.0
-        found[name] = edges[chosen] + (target - before) / counts[chosen] * width
-    return found
+    targets = _SHARES * ranks[-1]
+    chosen = np.searchsorted(ranks, targets)
+    before = ranks[chosen] - counts[chosen]
+    width = np.where(chosen > 0, edges[chosen + 1] - edges[chosen], 0.0)
+    found = edges[chosen] + (targets - before) / counts[chosen] * width
+    return dict(zip(QUANTILES, found, strict=True))
 
 
 def _level_stats(counts: np.ndarray) -> dict[str, float | np.floating]:

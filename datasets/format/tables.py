@@ -86,6 +86,7 @@ def parquet_bytes(
         use_dictionary=dictionary,  # type: ignore[arg-type]
         write_statistics=statistics,
         store_schema=arrow_schema,
+        write_page_checksum=True,
     ) as writer:
         writer.write_table(table)
         if not arrow_schema:  # which would carry them

@@ -3,43 +3,36 @@
 All of these need the other episodes of a group.
 """
 
-from collections.abc import Callable, Sequence
-
 import numpy as np
 from scipy.spatial.distance import cdist
 from scipy.special import digamma, gammaln
 
 from handrail.controllers.arrays import FloatArray, IntArray
-from handrail.datasets.quality.demonstration import Demonstration, DoesNotApply
+from handrail.datasets.quality.demonstration import DoesNotApply
 from handrail.datasets.quality.metric import Metric
 from handrail.datasets.quality.pool import Pool
+from handrail.datasets.quality.sample import Sample
 
 RESOLUTION = 1e-3  # of the scale: states that are nearer are one state
 _NEIGHBOURS = 5
 _KS = (5, 6, 7)
 _BATCH = 1024
 
-Group = Sequence[Demonstration]
+
+def _action_variance(sample: Sample, pool: Pool, rng: np.random.Generator) -> FloatArray:
+    states = sample.points(lambda episode: pool.observations(episode.observation))
+    actions = sample.points(lambda episode: pool.actions(episode.relative_action))
+    return action_variance(states, actions, sample.owner)
 
 
-def _action_variance(group: Group, pool: Pool, rng: np.random.Generator) -> FloatArray:
-    frames = frames_of(group, pool.frames)
-    states = _points(group, frames, lambda episode: pool.observations(episode.observation))
-    actions = _points(group, frames, lambda episode: pool.actions(episode.relative_action))
-    return _mean_of_each(action_variance(states, actions, _owner(frames)), frames)
+def _state_coverage(sample: Sample, pool: Pool, rng: np.random.Generator) -> FloatArray:
+    return state_coverage(sample.points(lambda episode: pool.configurations(episode.configuration)))
 
 
-def _state_coverage(group: Group, pool: Pool, rng: np.random.Generator) -> FloatArray:
-    frames = frames_of(group, pool.frames)
-    states = _points(group, frames, lambda episode: pool.configurations(episode.configuration))
-    return _mean_of_each(state_coverage(states), frames)
-
-
-def _information(group: Group, pool: Pool, rng: np.random.Generator) -> FloatArray:
-    frames = frames_of(group, pool.frames)
-    states = _points(group, frames, lambda episode: pool.observations(episode.observation))
-    actions = _points(group, frames, lambda episode: pool.action_components(episode.relative_action))
-    return _mean_of_each(information(states, actions, rng), frames)
+def _information(sample: Sample, pool: Pool, rng: np.random.Generator) -> FloatArray:
+    states = sample.points(lambda episode: pool.observations(episode.observation))
+    actions = sample.points(lambda episode: pool.action_components(episode.relative_action))
+    return information(states, actions, rng)
 
 
 GROUP_METRICS = (
@@ -170,34 +163,6 @@ def _within(distances: FloatArray, radius: FloatArray) -> FloatArray:
     return 1.0 + np.count_nonzero(distances < radius[:, None], axis=1)
 
 
-def frames_of(episodes: Group, most: int) -> list[IntArray]:
-    """Return which frames stand for each episode: evenly spaced, as many of all that are long enough.
-
-    Args:
-        episodes: Of one group.
-        most: Frames of all episodes together; all of them where there are fewer.
-    """
-    lengths = np.array([episode.count for episode in episodes])
-    shares, left = np.zeros_like(lengths), min(most, int(lengths.sum()))
-    order = np.argsort(lengths, kind="stable")
-    for done, place in enumerate(order):  # the shorter ones whole, the rest alike, ±1
-        shares[place] = min(int(lengths[place]), left // (len(order) - done))
-        left -= int(shares[place])
-    pairs = zip(lengths, shares, strict=True)
-    return [np.linspace(0, length - 1, share).round().astype(int) for length, share in pairs]
-
-
-def _points(
-    group: Group, frames: Sequence[IntArray], read: Callable[[Demonstration], FloatArray]
-) -> FloatArray:
-    return np.vstack([read(episode)[chosen] for episode, chosen in zip(group, frames, strict=True)])
-
-
-def _owner(frames: Sequence[IntArray]) -> IntArray:
-    """Return which episode a point is from, `(N,)`."""
-    return np.repeat(np.arange(len(frames)), [len(chosen) for chosen in frames])
-
-
 def _nearest(points: FloatArray, owner: IntArray) -> tuple[IntArray, FloatArray]:
     """Return the five nearest points of other owners, `(N, 5)`, and how far the fifth is, ∞ without one."""
     if len(points) <= _NEIGHBOURS:
@@ -206,11 +171,3 @@ def _nearest(points: FloatArray, owner: IntArray) -> tuple[IntArray, FloatArray]
     distance[owner[:, None] == owner] = np.inf
     places = np.argpartition(distance, _NEIGHBOURS - 1, axis=1)[:, :_NEIGHBOURS]
     return places, np.take_along_axis(distance, places, axis=1).max(axis=1)
-
-
-def _mean_of_each(values: FloatArray, frames: Sequence[IntArray]) -> FloatArray:
-    """Return the mean of the points' values for each episode, `(E,)`; NaN where it has none."""
-    known, owner = np.isfinite(values), _owner(frames)
-    counts = np.bincount(owner[known], minlength=len(frames))
-    sums = np.bincount(owner[known], weights=values[known], minlength=len(frames))
-    return np.divide(sums, counts, out=np.full(len(frames), np.nan), where=counts > 0)

@@ -1,16 +1,17 @@
 """One recorded episode, read by what its columns mean rather than by what they are called."""
 
-import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from handrail.controllers.arrays import FloatArray
+from handrail.controllers.arrays import FloatArray, IntArray
 from handrail.controllers.errors import HandrailError
+from handrail.datasets.format.data_file import DataFiles
 from handrail.datasets.quality.columns import ColumnNames
+from handrail.datasets.quality.episode import Episode
 from handrail.datasets.quality.naming import (
     gripper_entry,
     is_velocity,
@@ -29,8 +30,8 @@ class DoesNotApply(HandrailError):  # noqa: N818, it says what the report says
 
 
 @dataclass(frozen=True)
-class Demonstration:
-    """One episode. What it does not hold raises `DoesNotApply` with the reason when it is asked for.
+class Demonstration(Episode):
+    """One episode with its rows. What it does not hold raises `DoesNotApply` with the reason.
 
     Attributes:
         number: of the episode in its dataset.
@@ -46,26 +47,14 @@ class Demonstration:
     meta: Mapping[str, Any]
     columns: ColumnNames = field(default_factory=ColumnNames)
 
-    @property
-    def fps(self) -> float:
-        """Frames a second [Hz]."""
-        return self.info.fps
+    def opened(self, files: DataFiles) -> "Demonstration":
+        """Return itself: its rows are at hand."""
+        return self
 
-    @property
-    def count(self) -> int:
-        """Number of frames."""
-        return int(self.meta["length"])
-
-    @property
-    def seconds(self) -> float:
-        """Duration, which is also the operator's time [s]."""
-        return self.count / self.fps
-
-    @property
-    def success(self) -> bool | None:
-        """How it ended, if that was recorded."""
-        value = self.meta.get("success")
-        return bool(value) if isinstance(value, bool | int | float) and math.isfinite(value) else None
+    def some(self, frames: IntArray) -> "Demonstration":
+        """Return some of its frames."""
+        rows = {name: values[frames] for name, values in self.frames.items()}
+        return replace(self, frames=rows, meta={**self.meta, "length": len(frames)})
 
     @cached_property
     def motion(self) -> FloatArray:

@@ -1,6 +1,5 @@
-"""All metrics of all groups that are compared, each value or why there is none."""
+"""Every metric of every episode of the groups that are compared, each value or why there is none."""
 
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -8,13 +7,12 @@ import numpy as np
 
 from handrail.controllers.arrays import FloatArray
 from handrail.datasets.quality.catalogue import METRICS
-from handrail.datasets.quality.demonstration import Demonstration, DoesNotApply
+from handrail.datasets.quality.demonstration import DoesNotApply
+from handrail.datasets.quality.group_reading import Reading
 from handrail.datasets.quality.metric import Metric
-from handrail.datasets.quality.pool import Pool
+from handrail.datasets.quality.readings import Groups, read_views
 from handrail.datasets.quality.units import why_not
 from handrail.datasets.statistics.resampling import FEWEST, Interval, bootstrap_mean
-
-_FRAMES = 2048  # of a group at most, for what compares every frame with every other
 
 
 @dataclass(frozen=True)
@@ -48,27 +46,23 @@ class Measured:
         return float(self.known.mean()) if self.applies else None
 
 
-Groups = Mapping[str, Sequence[Demonstration]]
-
-
 @dataclass(frozen=True)
 class Measurements:
     """What `measure` found.
 
     Attributes:
         values: By metric and group.
-        pools: Which pool a group is in: what is put on one scale only compares within one.
-        groups: What was measured.
+        groups: What was read of each group.
     """
 
     values: Mapping[str, Mapping[str, Measured]]
-    pools: Mapping[str, int]
-    groups: Groups
+    groups: Mapping[str, Reading]
 
     def why_not(self, metric: Metric, one: str, other: str) -> str:
         """Return why a metric's values of two groups cannot be compared; "" if they can."""
-        reason = why_not(metric.needs, self.groups[one], self.groups[other])
-        if not reason and metric.needs == "pool" and self.pools[one] != self.pools[other]:
+        first, second = self.groups[one], self.groups[other]
+        reason = why_not(metric.needs, first, second)
+        if not reason and metric.needs == "pool" and first.number != second.number:
             return "they were put on different scales"
         return reason
 
@@ -84,52 +78,39 @@ def measure(
         margin: Distance to keep [m].
         metrics: Which.
     """
-    numbers = _pools(groups)
-    pools = {
-        number: _pool([groups[label] for label in groups if numbers[label] == number], margin)
-        for number in set(numbers.values())
-    }
+    (readings,) = read([groups], margin, metrics)
+    return measured(readings, rng, metrics)
+
+
+def read(
+    views: Sequence[Groups], margin: float = 0.1, metrics: Sequence[Metric] = METRICS
+) -> list[dict[str, Reading]]:
+    """Read the episodes of several ways to choose them, those that are in several once for all."""
+    found = [{label: Reading(each, metrics) for label, each in groups.items()} for groups in views]
+    read_views(found, metrics, margin)
+    return found
+
+
+def measured(
+    readings: Mapping[str, Reading], rng: np.random.Generator, metrics: Sequence[Metric] = METRICS
+) -> Measurements:
+    """Return what was read as values with intervals."""
     values = {
-        metric.name: {
-            label: _measured(metric, episodes, pools[numbers[label]], rng)
-            for label, episodes in groups.items()
-        }
+        metric.name: {label: _measured(metric, reading, rng) for label, reading in readings.items()}
         for metric in metrics
     }
-    return Measurements(values, numbers, groups)
+    return Measurements(values, readings)
 
 
-def _pool(groups: Sequence[Sequence[Demonstration]], margin: float) -> Pool:
-    """Return what groups have in common; the smallest says how many frames are taken of each."""
-    fewest = min(sum(episode.count for episode in episodes) for episodes in groups)
-    return Pool([e for episodes in groups for e in episodes], margin, min(_FRAMES, fewest))
-
-
-def _pools(groups: Groups) -> dict[str, int]:
-    """Return a number for each group, the same for groups that can be put on one scale."""
-    first: list[str] = []  # label of each pool's first group
-    numbers: dict[str, int] = {}
-    for label, episodes in groups.items():
-        fitting = [n for n, known in enumerate(first) if not why_not("pool", groups[known], episodes)]
-        first += [] if fitting else [label]
-        numbers[label] = fitting[0] if fitting else len(first) - 1
-    return numbers
-
-
-def _measured(
-    metric: Metric, episodes: Sequence[Demonstration], pool: Pool, rng: np.random.Generator
-) -> Measured:
+def _measured(metric: Metric, reading: Reading, rng: np.random.Generator) -> Measured:
+    count = len(reading.episodes)
     if metric.measure_group is not None:
         try:
-            return Measured(metric.measure_group(episodes, pool, rng))
+            values = metric.measure_group(reading.sample, reading.pool, rng)
+            return Measured(reading.sample.mean_of_each(values, count))
         except DoesNotApply as error:
-            return Measured(np.full(len(episodes), np.nan), None, str(error))
-    values, reasons = np.full(len(episodes), np.nan), Counter[str]()
-    for place, episode in enumerate(episodes):
-        try:
-            values[place] = metric.measure(episode, pool) if metric.measure else np.nan
-        except DoesNotApply as error:
-            reasons[str(error)] += 1
+            return Measured(np.full(count, np.nan), None, str(error))
+    values, reasons = reading.values[metric.name], reading.reasons[metric.name]
     known, reason = values[np.isfinite(values)], reasons.most_common(1)[0][0] if reasons else ""
     interval = bootstrap_mean(known, rng) if len(known) >= FEWEST else None
     return Measured(values, interval, reason)

@@ -1,17 +1,19 @@
 """A quality metric: what it is called, its unit, what it means, and how it is measured."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray
 from handrail.datasets.quality.demonstration import Demonstration
 from handrail.datasets.quality.pool import Pool
-from handrail.datasets.quality.units import Needs
+from handrail.datasets.quality.sample import Sample
 
+Needs = Literal["", "motion", "position", "action", "controller", "pool"]
 OfEpisode = Callable[[Demonstration, Pool], float]
-OfGroup = Callable[[Sequence[Demonstration], Pool, np.random.Generator], FloatArray]
+OfGroup = Callable[[Sample, Pool, np.random.Generator], FloatArray]
 
 
 @dataclass(frozen=True)
@@ -24,10 +26,11 @@ class Metric:
         unit: Of its values; "" for a pure number.
         good: "higher" or "lower" where everything else being equal that is better; "" where it is not so.
         meaning: One sentence.
-        needs: What its unit hangs on, see `units.why_not`; "" where it has a unit of its own.
+        needs: What its unit hangs on, see `units.why_not`; "" where it has a unit of its own; "pool" for
+            whatever looks at more of the pool than its margin.
         measure: Its value for one episode, or None.
-        measure_group: Its values for all episodes of a group, for what needs the others; or None. Such values
-            depend on how many episodes there are and, through the neighbours they share, on each other.
+        measure_group: Its values for frames that stand for a group, for what needs the other episodes; or
+            None. Such values depend on how many there are and, through shared neighbours, on each other.
     """
 
     name: str

@@ -1,14 +1,18 @@
-"""What the datasets that are compared have in common: one scale for all, so that numbers can be compared."""
+"""What the datasets that are compared have in common: one scale for all, so that numbers can be compared.
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+Episodes come one after the other and need not stay: sums, ranges and scatter are all that is kept of them.
+"""
+
+from collections.abc import Callable
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray
 from handrail.datasets.quality.demonstration import Demonstration, DoesNotApply
 
+FRAMES = 2048  # of a group at most, for what compares every frame with every other
 _FEW = 2  # values that an entry takes if it is a switch
 _STILL = 1e-9  # a standard deviation below this is that of a constant
 
@@ -16,75 +20,133 @@ _STILL = 1e-9  # a standard deviation below this is that of a constant
 Embedding = Callable[[FloatArray], FloatArray]
 
 
-def embed(rows: FloatArray, most: int | None = None) -> Embedding:
+class Spread:
+    """Number, mean and scatter Σ (x − mean)(x − mean)ᵀ of rows that come in parts.
+
+    Source: Chan, Golub & LeVeque 1983, "Algorithms for computing the sample variance".
+    """
+
+    def __init__(self) -> None:
+        """Begin without a row."""
+        self.count, self.mean, self.scatter = 0, np.zeros(1), np.zeros((1, 1))
+
+    def add(self, rows: FloatArray) -> None:
+        """Take rows in, `(N, d)`."""
+        mean, total = rows.mean(axis=0), self.count + len(rows)
+        away, between = rows - mean, mean - self.mean
+        self.scatter = (
+            self.scatter + away.T @ away + np.outer(between, between) * self.count * len(rows) / total
+        )
+        self.mean = self.mean + between * len(rows) / total
+        self.count = total
+
+
+class Extent:
+    """Lowest and highest value of each entry of rows that come in parts, and a few different ones."""
+
+    def __init__(self) -> None:
+        """Begin without a row."""
+        self.values: list[FloatArray] = []
+
+    def add(self, rows: FloatArray) -> None:
+        """Take rows in, `(N, d)`."""
+        known = self.values or [np.empty(0)] * rows.shape[1]
+        both = (np.unique(np.append(*each)) for each in zip(known, rows.T, strict=True))
+        self.values = [each if len(each) <= _FEW else each[[0, 1, -1]] for each in both]
+
+    @property
+    def range(self) -> tuple[FloatArray, FloatArray]:
+        """Lowest and highest value of each entry, `(d,)` each; the same for a switch."""
+        low = np.array([each[0] for each in self.values])
+        return low, np.array([each[-1] if len(each) > _FEW else each[0] for each in self.values])
+
+
+def embed(spread: Spread, most: int | None = None) -> Embedding:
     """Return the linear map of rows onto few numbers of about unit size, `(N, d)` → `(N, m)`.
 
     y = (x − mean) / std · directions: standardised, then principal components, most variance first; entries
     that never change are left out.
 
     Args:
-        rows: `(N, d)`.
+        spread: Of the rows, `(N, d)`.
         most: Keep at most this many principal components; None keeps the standardised entries themselves.
 
     Raises:
         DoesNotApply: Nothing in the rows changes.
     """
-    mean, scale = rows.mean(axis=0), rows.std(axis=0)
+    mean, scale = spread.mean, np.sqrt(np.diag(spread.scatter) / spread.count)
     varies = scale > _STILL * np.maximum(1.0, np.abs(mean))
     if not varies.any():
         raise DoesNotApply("nothing in the columns ever changes")
     scale = np.where(varies, scale, np.inf)
     directions = np.eye(len(scale))[:, varies]
     if most is not None:
-        standard = (rows - mean) / scale
-        _, vectors = np.linalg.eigh(standard.T @ standard)
+        _, vectors = np.linalg.eigh(spread.scatter / np.outer(scale, scale))
         directions = vectors[:, ::-1][:, : min(most, int(varies.sum()))]
     return lambda values: (values - mean) / scale @ directions
 
 
-@dataclass(frozen=True)
 class Pool:
     """All episodes of datasets with the same columns.
 
     Attributes:
-        episodes: Of all of them.
         margin: Distance to keep [m].
         frames: Of each group, for what compares every frame with every other: as many of one as of another.
     """
 
-    episodes: Sequence[Demonstration]
-    margin: float = 0.1
-    frames: int = 2048
+    def __init__(self, margin: float = 0.1, frames: int = FRAMES):
+        """Begin without an episode."""
+        self.margin, self.frames = margin, frames
+        self._parts: dict[str, Any] = {
+            "action": Extent(),
+            "inputs": Extent(),
+            "configuration": Spread(),
+            "observation": Spread(),
+            "relative_action": Spread(),
+        }
+        self._missing: dict[str, DoesNotApply] = {}
+
+    def add(self, episode: Demonstration) -> None:
+        """Take an episode in."""
+        for name, part in self._parts.items():
+            if name in self._missing:
+                continue
+            try:
+                part.add(episode.matrix(name) if name == "action" else getattr(episode, name))
+            except DoesNotApply as error:
+                self._missing[name] = error
 
     @cached_property
     def action_range(self) -> tuple[FloatArray, FloatArray]:
         """Lowest and highest value of each entry of the action, `(a,)` each; the same for a switch."""
-        rows = np.vstack([episode.matrix("action") for episode in self.episodes])
-        low, high = rows.min(axis=0), rows.max(axis=0)
-        switch = np.array([len(np.unique(column)) <= _FEW for column in rows.T])
-        return low, np.where(switch, low, high)
+        return self._part("action").range
 
     @cached_property
     def input_scale(self) -> FloatArray:
         """Largest input of each axis, `(u,)`."""
-        return np.max([np.abs(episode.inputs).max(axis=0) for episode in self.episodes], axis=0)
+        return np.array([np.abs(each).max() for each in self._part("inputs").values])
 
     @cached_property
     def configurations(self) -> Embedding:
         """Standardised configurations."""
-        return embed(np.vstack([episode.configuration for episode in self.episodes]))
+        return embed(self._part("configuration"))
 
     @cached_property
     def observations(self) -> Embedding:
         """At most eight principal components of what a policy reads."""
-        return embed(np.vstack([episode.observation for episode in self.episodes]), most=8)
+        return embed(self._part("observation"), most=8)
 
     @cached_property
     def actions(self) -> Embedding:
         """Standardised relative actions."""
-        return embed(np.vstack([episode.relative_action for episode in self.episodes]))
+        return embed(self._part("relative_action"))
 
     @cached_property
     def action_components(self) -> Embedding:
         """At most eight principal components of the relative actions."""
-        return embed(np.vstack([episode.relative_action for episode in self.episodes]), most=8)
+        return embed(self._part("relative_action"), most=8)
+
+    def _part(self, name: str) -> Any:
+        if name in self._missing:
+            raise self._missing[name]
+        return self._parts[name]

@@ -113,7 +113,7 @@ def _summary(episode: Demonstration) -> EpisodeSummary:
 
 def _measured(metric: Metric, episode: Demonstration) -> float | None:
     try:
-        return metric.measure(episode, Pool([episode])) if metric.measure else None
+        return metric.measure(episode, Pool()) if metric.measure else None
     except DoesNotApply:
         return None
 

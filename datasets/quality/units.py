@@ -6,54 +6,54 @@ of the same size, all of these.
 """
 
 from collections.abc import Sequence
-from typing import Literal
 
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray
 from handrail.datasets.quality.demonstration import Demonstration, DoesNotApply
+from handrail.datasets.quality.group_reading import Reading
+from handrail.datasets.quality.metric import Needs
 from handrail.datasets.quality.naming import quantity
-
-Group = Sequence[Demonstration]
-Needs = Literal["", "motion", "position", "action", "controller", "pool"]
 
 _FACTOR = 10.0  # ranges that differ by more are of other units: degrees are 57 times radians
 _PERCENT = (1.0, 99.0)
 _STILL = 1e-9
 _NAMED = 3  # names that are shown
 _PARTS = ("state", "action", "asked")
+# controllers give up limits of their own, in [m], [m/s] or a share
+_OTHER_MODES = "the modes differ, so the controllers and their soft limits may"
 
 
-def why_not(needs: Needs, one: Group, other: Group) -> str:
+def why_not(needs: Needs, one: Reading, other: Reading) -> str:
     """Return why a metric's values of two groups cannot be compared; "" if they can.
 
     Args:
         needs: What the metric's unit hangs on: nothing; what moves; the unit of that as well; what the action
             commands; whose soft limits were given up; or everything that is put on one scale.
-        one: Episodes of one dataset.
+        one: Episodes of one dataset; that they were read is asked of them for the controller alone.
         other: Of the other.
     """
     if needs == "controller":
-        return _modes(one, other)
-    if not needs or one[0].info.root == other[0].info.root:
+        return "" if one.modes == other.modes else _OTHER_MODES
+    if not needs or one.episodes[0].info.root == other.episodes[0].info.root:
         return ""
     try:
         if needs == "pool":
             return _on_one_scale(one, other)
         if needs == "action":
             return _numbers("action", one, other) or _followed(one, other)
-        tools = one[0].motion_is_tool and other[0].motion_is_tool
-        if tools and (needs == "motion" or _by_handrail(one[0], other[0])):
+        tools = one.first.motion_is_tool and other.first.motion_is_tool
+        if tools and (needs == "motion" or _by_handrail(one.first, other.first)):
             return ""  # the same thing moves; a measure without a unit needs no more
         return _numbers("state", one, other)
     except DoesNotApply as error:
         return str(error)
 
 
-def _on_one_scale(one: Group, other: Group) -> str:
-    if _columns(one[0]) != _columns(other[0]):
+def _on_one_scale(one: Reading, other: Reading) -> str:
+    if _columns(one.first) != _columns(other.first):
         return "the datasets have different columns, so there is no common scale"
-    parts = [part for part in _PARTS if one[0].has(part)]
+    parts = [part for part in _PARTS if one.first.has(part)]
     return next(filter(None, (_numbers(part, one, other) for part in parts)), "")
 
 
@@ -64,9 +64,9 @@ def _columns(episode: Demonstration) -> tuple[object, ...]:
     return tuple((name, episode.frames[name].shape[1:], episode.info.features[name].names) for name in names)
 
 
-def _numbers(part: str, one: Group, other: Group) -> str:
+def _numbers(part: str, one: Reading, other: Reading) -> str:
     """Return why the numbers of a part are not known to be in the same unit."""
-    first, second = one[0], other[0]
+    first, second = one.first, other.first
     names = first.entries(part), second.entries(part)
     if not all(names):
         return f"the entries of the {part} have no names, so their units are not known"
@@ -83,32 +83,23 @@ def _numbers(part: str, one: Group, other: Group) -> str:
     silent = tuple(name for name in names[0] if not quantity(name))
     if silent:
         return f"the names in the {part} ({_few(silent)}) do not say whether it is positions or velocities"
-    factor = _times(_rows(part, one), _rows(part, other))
+    factor = _times(one.rows(part), other.rows(part))
     if factor > _FACTOR:
         return f"the numbers of the {part} are {factor:.0f} times as large in one, so their units may differ"
     return ""
 
 
-def _followed(one: Group, other: Group) -> str:
+def _followed(one: Reading, other: Reading) -> str:
     """Return why commands and what follows them are not the same thing, or not in the same unit."""
-    if one[0].fps != other[0].fps:
+    if one.first.fps != other.first.fps:
         return "the frame rates differ, and what follows a command is measured a frame later"
-    if _pairs(one[0]) != _pairs(other[0]):
+    if _pairs(one.first) != _pairs(other.first):
         return "the state measures other entries of the action"
     for group in (one, other):
-        factor = _times(np.vstack([e.commanded for e in group]), np.vstack([e.reached for e in group]))
-        if factor > _FACTOR and not group[0].info.from_handrail:
+        factor = _times(*group.followed())
+        if factor > _FACTOR and not group.first.info.from_handrail:
             return f"commands and state differ {factor:.0f} times in size, so their units may differ"
     return ""
-
-
-def _modes(one: Group, other: Group) -> str:
-    """Return why controllers may differ: each gives up limits of its own, in [m], [m/s] or a share."""
-    modes = [
-        {str(mode) for episode in group if episode.has("mode") for mode in np.unique(episode.column("mode"))}
-        for group in (one, other)
-    ]
-    return "" if modes[0] == modes[1] else "the modes differ, so the controllers and their soft limits may"
 
 
 def _by_handrail(*episodes: Demonstration) -> bool:
@@ -127,10 +118,6 @@ def _times(one: FloatArray, other: FloatArray) -> float:
     if not both.any():
         return 1.0
     return float(np.exp(np.median(np.abs(np.log(spans[0][both] / spans[1][both])))))
-
-
-def _rows(part: str, group: Group) -> FloatArray:
-    return np.vstack([episode.matrix(part) for episode in group])
 
 
 def _few(names: Sequence[str]) -> str:

@@ -10,8 +10,8 @@ import numpy as np
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import HandrailError, unknown_name
 from handrail.datasets.quality.catalogue import METRICS
-from handrail.datasets.quality.demonstration import Demonstration
-from handrail.datasets.quality.load import read_demonstrations
+from handrail.datasets.quality.episode import Episode
+from handrail.datasets.quality.load import recorded_episodes
 from handrail.datasets.quality.measure import measure
 from handrail.datasets.quality.metric import Metric
 from handrail.datasets.reading.reader import DatasetInfo
@@ -29,7 +29,7 @@ class Ranked:
         value: Of the metric.
     """
 
-    episode: Demonstration
+    episode: Episode
     value: float
 
 
@@ -53,7 +53,7 @@ def worst_episodes(root: str | Path, metric: Metric, count: int) -> list[Ranked]
     """
     if count < 1:
         raise HandrailError(f"--count {count}: expected 1 or more")
-    episodes = read_demonstrations(root)
+    episodes = recorded_episodes(root)
     if not episodes:
         raise HandrailError(f"dataset {str(root)!r}: expected an episode or more, found none")
     measured = measure({"": episodes}, np.random.default_rng(0), metrics=[metric]).values[metric.name][""]
@@ -64,7 +64,7 @@ def worst_episodes(root: str | Path, metric: Metric, count: int) -> list[Ranked]
     return ranked(episodes, metric, measured.values)[:count]
 
 
-def ranked(episodes: Sequence[Demonstration], metric: Metric, values: FloatArray) -> list[Ranked]:
+def ranked(episodes: Sequence[Episode], metric: Metric, values: FloatArray) -> list[Ranked]:
     """Return episodes from the worst to the best; those without a value are left out.
 
     Args:

@@ -3,7 +3,7 @@
 Pictures are not read here; `LeRobotDataset` does that.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -147,7 +147,7 @@ def read_frames(
 
 def read_rows_of(
     info: DatasetInfo,
-    episode: dict[str, Any],
+    episode: Mapping[str, Any],
     columns: Sequence[str] | None = None,
     files: DataFiles | None = None,
 ) -> dict[str, np.ndarray]:

@@ -147,7 +147,8 @@ def frame_row(frame: Frame) -> dict[str, Any]:
 
 def _finite(numbers: FloatArray | float) -> FloatArray:
     """Return numbers cut to ±`MOST`; what is none becomes 0."""
-    return np.clip(np.nan_to_num(numbers, nan=0.0), -MOST, MOST)
+    within = np.clip(numbers, -MOST, MOST)
+    return np.where(np.isnan(within), 0.0, within)
 
 
 def finite_distance(distance: float) -> float:

@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from dataclasses import replace as changed
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -62,6 +61,11 @@ class Piece:
         """Which picture of its videos is the first."""
         return self.record.offset + self.first
 
+    @property
+    def saved_stats(self) -> Stats:
+        """The statistics of the episode, as its line has them."""
+        return self.record.stats or {}
+
     def stretch(self, first: int, length: int) -> "Piece":
         """Return a part of it."""
         return changed(self, first=self.first + first, length=length)
@@ -79,18 +83,18 @@ class Piece:
         return changed(self, sentences=dict(sentences))
 
     def rows(
-        self, schema: pa.Schema, fps: int, totals: Totals, files: DataFiles
+        self, schema: pa.Schema, manifest: Manifest, totals: Totals, files: DataFiles
     ) -> tuple[pa.Table, tuple[str, ...], Stats]:
         """Return the rows in their new place.
 
         Args:
             schema: Of the data files of both datasets.
-            fps: Frames a second [Hz].
+            manifest: The schema of the new dataset.
             totals: What the episodes before it add up to.
             files: Opens the file of the rows.
 
         Returns:
-            The rows, their task sentences in order, and the statistics of the columns that have changed.
+            The rows, their task sentences in order, and the statistics of those columns that are counted.
         """
         whole = files.open(self.data).rows(self.record.episode, self.record.length)
         if whole.num_rows != self.record.length:
@@ -98,13 +102,14 @@ class Piece:
         whole = whole.select(schema.names).cast(schema)
         table = whole.slice(self.first, self.length)
         tasks, places = self._tasks(whole, table, totals)
-        values = self._counters(fps, totals) | {"task_index": places} | self._ending(table)
+        values = self._counters(manifest.fps, totals) | {"task_index": places} | self._ending(table)
         for name, column in values.items():
             place = table.schema.get_field_index(name)
             kind = table.schema.field(place)
             table = table.set_column(place, kind, numbers(column, kind.type))
-        anew = table.column_names if self.is_cut else values
-        stats = {name: column_stats(rows) for name in anew if (rows := _numbers(table, name)) is not None}
+        saved = {} if self.is_cut else {k: v for k, v in self.saved_stats.items() if k not in values}
+        counted = [name for name in totals.counted(manifest.features) if name in table.column_names]
+        stats = {name: saved.get(name) or column_stats(_numbers(table, name)) for name in counted}
         return table, tasks, stats
 
     def _counters(self, fps: int, totals: Totals) -> dict[str, np.ndarray]:
@@ -139,10 +144,7 @@ class Piece:
         return found
 
 
-def _numbers(table: pa.Table, name: str) -> np.ndarray | None:
-    """Return a column of numbers, (N,) or (N, d); None for texts."""
-    column: Any = table.column(name)
-    if pa.types.is_string(column.type):
-        return None
-    flat = flat_numbers(column)
+def _numbers(table: pa.Table, name: str) -> np.ndarray:
+    """Return a column of numbers, (N,) or (N, d)."""
+    flat = flat_numbers(table.column(name))
     return flat if len(flat) == table.num_rows else flat.reshape(table.num_rows, -1)

@@ -1,7 +1,7 @@
 """Writing episodes into volumes: files of many, one of rows, one of lines and one video a camera each.
 
-A volume ends when it is as large as LeRobot's files (100 MB of rows, 200 MB of video), with a thousand
-episodes, and where a video is encoded in another way. Nothing that is written is read or written again.
+A volume ends when it is as large as LeRobot's files (100 MB of rows, 200 MB of video), and where a video is
+encoded in another way. Nothing that is written is read or written again.
 """
 
 from collections.abc import Iterable, Mapping
@@ -9,15 +9,13 @@ from dataclasses import replace as changed
 from pathlib import Path
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
 
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.format.columns import ColumnTypes, Scalar, fit_columns
 from handrail.datasets.format.cut import encode_stretch
-from handrail.datasets.format.data_file import DataFiles, data_files
+from handrail.datasets.format.data_file import DataFiles, GrowingDataFile, data_files
 from handrail.datasets.format.join import Stretch, VideoJoin, Videos, videos
-from handrail.datasets.format.layout import FILES_IN_A_CHUNK, Layout
+from handrail.datasets.format.layout import Layout
 from handrail.datasets.format.lines import lines_bytes
 from handrail.datasets.format.manifest import Manifest
 from handrail.datasets.format.metadata import EpisodeRecord, FileSeal, Totals
@@ -28,8 +26,6 @@ from handrail.datasets.recording.piece import Piece
 from handrail.datasets.storage.atomic import make_folder, remove, write_synced
 
 MOST_ROWS, MOST_VIDEO = 100 * 2**20, 200 * 2**20  # [byte] of a file
-MOST_EPISODES = FILES_IN_A_CHUNK
-_SEARCHED = ["episode_index", "index"]  # columns whose statistics readers look rows up by
 
 
 def write_volumes(layout: Layout, manifest: Manifest, pieces: Iterable[Piece], types: ColumnTypes) -> Totals:
@@ -79,19 +75,12 @@ class _Volume:
             make_folder(path.parent)
         self._joins = {key: VideoJoin(path, manifest.fps) for key, path in streams.items()}
         self._paths = [*streams.values(), layout.data(self._slot)]
-        self._sink = pa.OSFile(str(layout.data(self._slot)), "wb")
         self._schema = data_schema(manifest.features)
-        self._rows = pq.ParquetWriter(
-            self._sink,
-            self._schema,
-            compression="snappy",
-            write_statistics=_SEARCHED,  # type: ignore[arg-type]
-        )
+        self._rows = GrowingDataFile(layout.data(self._slot), self._schema)
 
     def takes(self, stretches: Mapping[str, Stretch]) -> bool:
         """Return whether one more episode may be added."""
-        full = len(self._records) >= MOST_EPISODES or self._sink.tell() >= MOST_ROWS
-        full = full or any(join.size >= MOST_VIDEO for join in self._joins.values())
+        full = self._rows.size >= MOST_ROWS or any(join.size >= MOST_VIDEO for join in self._joins.values())
         return not full and all(self._joins[key].fits(stretch) for key, stretch in stretches.items())
 
     def add(
@@ -100,19 +89,18 @@ class _Volume:
         """Append an episode and return its line."""
         known: dict[str, Scalar] = {n: value for n, value in piece.columns.items() if value is not None}
         extras = fit_columns(known, self._types)
-        table, tasks, stats = piece.rows(self._schema, self._manifest.fps, totals, files)
+        table, tasks, stats = piece.rows(self._schema, self._manifest, totals, files)
         for key, stretch in stretches.items():
-            if piece.is_cut:
-                stats |= {key: pictures_of(piece, key, self._manifest)}
+            stats[key] = pictures_of(piece, key, self._manifest)
             self._joins[key].add(stretch)
-        self._rows.write_table(table, row_group_size=max(1, table.num_rows))
+        self._rows.add(table)
         record = changed(
             piece.record,
             episode=totals.episodes,
             start=totals.frames,
             length=piece.length,
             tasks=tasks,
-            stats={**(piece.record.stats or {}), **stats},
+            stats=stats,
             columns=extras,
             slot=self._slot,
             offset=totals.frames - self._start,
@@ -123,7 +111,6 @@ class _Volume:
     def close(self, totals: Totals) -> None:
         """Finish the files; the lines, with the seals of the others, go last."""
         self._rows.close()
-        self._sink.close()
         for join in self._joins.values():
             join.close()
         seals = {self._layout.relative(path): FileSeal.of(path) for path in self._paths}
@@ -135,7 +122,7 @@ class _Volume:
 
     def abandon(self) -> None:
         """Let the files go, which the caller removes."""
-        self._sink.close()
+        self._rows.abandon()
         for join in self._joins.values():
             join.close()
 
@@ -159,6 +146,8 @@ def _stretches(piece: Piece, manifest: Manifest, opened: Videos, staging: Path) 
 
 
 def pictures_of(piece: Piece, key: str, manifest: Manifest) -> dict[str, np.ndarray]:
-    """Return the statistics of one camera of a stretch."""
+    """Return the statistics of one camera of a stretch: as saved, or of the pictures that are left."""
+    if not piece.is_cut:
+        return piece.saved_stats[key]
     height, width = manifest.features[key].shape[:2]
     return decoded_stats(piece.videos[key], piece.length, height, width, piece.first_picture, manifest.fps)

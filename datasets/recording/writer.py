@@ -53,6 +53,10 @@ class EpisodeWriter:
 
     Every error is a `HandrailError` with one line. After an error in `add_frame` the frame is not in; after
     one in `save_episode` the episode is gone, the saved ones are whole, and the next may be recorded.
+
+    Attributes:
+        repaired: What `resume` put in order.
+        last: The line of metadata of the episode that this writer saved last.
     """
 
     def __init__(
@@ -64,10 +68,11 @@ class EpisodeWriter:
         types: ColumnTypes | None,
         repaired: RepairReport | None = None,
     ):
-        """Use `create` or `resume` instead; `repaired` says what the latter put in order."""
+        """Use `create` or `resume` instead."""
         self._layout, self._manifest, self._totals = layout, manifest, totals
         self._lock, self._types, self.repaired, self._unusable = lock, types, repaired, ""
         self._episode, self._encodings = OpenEpisode(layout, manifest), read_encodings(layout.info, manifest)
+        self.last: EpisodeRecord | None = None
 
     @classmethod
     def create(cls, root: str | Path, manifest: Manifest, overwrite: bool = False) -> Self:
@@ -175,11 +180,11 @@ class EpisodeWriter:
         extras = fit_columns(extras, types)
         self._unusable = "was interrupted while it saved an episode"  # until the state is known again
         try:
-            totals = self._stage(extras, types)
+            record, totals = self._stage(extras, types)
             self._publish_files(totals)
         except (OSError, HandrailError) as error:
             raise self._abandoned(error) from error
-        self._types, self._totals, episode = types, totals, self.num_episodes
+        self._types, self._totals, self.last, episode = types, totals, record, self.num_episodes
         self._episode = OpenEpisode(self._layout, self._manifest)
         self._unusable = ""
         with explained(f"episode {episode} is saved, but the summary files are late; `repair` rebuilds them"):
@@ -207,7 +212,7 @@ class EpisodeWriter:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def _stage(self, extras: Mapping[str, Scalar | None], types: ColumnTypes) -> Totals:
+    def _stage(self, extras: Mapping[str, Scalar | None], types: ColumnTypes) -> tuple[EpisodeRecord, Totals]:
         """Write every file under its temporary name; only renames are left to do."""
         staging, episode = self._layout.staging, self._episode
         stats = episode.finish_videos()
@@ -218,7 +223,7 @@ class EpisodeWriter:
             start=self.num_frames,
             length=episode.length,
             tasks=tuple(dict.fromkeys(episode.tasks)),
-            stats=numeric_stats(columns) | stats,
+            stats=numeric_stats(columns, self._totals.counted(self.features)) | stats,
             columns=extras,
             files={self._layout.relative(path): FileSeal.of(staged) for staged, path in self._streams()},
             slot=self.num_episodes,
@@ -230,7 +235,7 @@ class EpisodeWriter:
         write_synced(staging / "stats.json", stats_bytes(totals.stats or {}))
         for path in (self._layout.row(self.num_episodes), *(path for _, path in self._streams())):
             make_folder(path.parent)
-        return totals
+        return record, totals
 
     def _streams(self) -> list[tuple[Path, Path]]:
         """Return the staged and the final path of each video and of the data."""

@@ -12,8 +12,8 @@ from handrail.datasets.presentation.markdown import markdown_table
 from handrail.datasets.presentation.table import Table
 from handrail.datasets.presentation.wording import DASH, number, percent
 from handrail.datasets.quality.catalogue import METRICS
-from handrail.datasets.quality.demonstration import Demonstration
-from handrail.datasets.quality.load import read_demonstrations
+from handrail.datasets.quality.episode import Episode
+from handrail.datasets.quality.load import recorded_episodes
 from handrail.datasets.quality.measure import measure
 from handrail.datasets.storage.atomic import explained, write_whole
 
@@ -33,7 +33,7 @@ def description(root: Path) -> str:
     Raises:
         HandrailError: There is no dataset, or a file of it cannot be read.
     """
-    episodes = read_demonstrations(root)
+    episodes = recorded_episodes(root)
     if not episodes:
         raise HandrailError(f"dataset {str(root)!r}: expected an episode or more, found none")
     info = episodes[0].info
@@ -77,27 +77,27 @@ def write_card(root: Path, repo_id: str, license_id: str) -> str:
     return said
 
 
-def _counted(episodes: Sequence[Demonstration], name: str) -> str:
+def _counted(episodes: Sequence[Episode], name: str) -> str:
     """Return the values of a column of metadata and how many episodes have each."""
     values = Counter(value for episode in episodes for value in _values(episode, name))
     return ", ".join(f"{value} ({count})" for value, count in values.most_common())
 
 
-def _values(episode: Demonstration, name: str) -> Sequence[Any]:
+def _values(episode: Episode, name: str) -> Sequence[Any]:
     if name == "task":
         return episode.meta["tasks"]
     value = episode.meta.get(name)
     return [value] if value else []
 
 
-def _outcome(episodes: Sequence[Demonstration]) -> list[str]:
+def _outcome(episodes: Sequence[Episode]) -> list[str]:
     known = [episode.success for episode in episodes if episode.success is not None]
     reasons = _counted([episode for episode in episodes if episode.success is False], "failure_reason")
     lines = [f"success: {sum(known)} of {len(known)} ({percent(sum(known) / len(known))})"] if known else []
     return lines + ([f"failures: {reasons}"] if reasons else [])
 
 
-def _metrics(episodes: Sequence[Demonstration]) -> list[list[str]]:
+def _metrics(episodes: Sequence[Episode]) -> list[list[str]]:
     """Return a row for each metric of single episodes that applies."""
     metrics = [metric for metric in METRICS if not metric.of_group]
     values = measure({"": episodes}, np.random.default_rng(0), metrics=metrics).values

@@ -1,4 +1,4 @@
-"""Sending a dataset to the hub with LeRobot's own upload: only when asked, and only what may leave.
+"""Sending a dataset, to the hub with LeRobot's own upload: only when asked, and only what may leave.
 
 What goes is LeRobot's dataset and the card. `.damaged/`, `.handrail/` and whatever else lies in the folder
 stay, and episodes of a user study's participants are not sent at all.
@@ -33,7 +33,7 @@ class Push:
     """What is sent, or would be.
 
     Attributes:
-        repo_id: Where to.
+        repo_id: Its name.
         root: The dataset.
         files: Of it, relative to its folder.
         stays: Names in its folder of which nothing is sent.
@@ -41,6 +41,7 @@ class Push:
         private: Whether nobody else sees it.
         license_id: Its licence.
         description: What the card says of it.
+        to: Where to, instead of the hub, or "".
     """
 
     repo_id: str
@@ -51,17 +52,18 @@ class Push:
     private: bool
     license_id: str
     description: str
+    to: str = ""
 
     def __str__(self) -> str:
         stays = f"; these stay: {', '.join(self.stays)}" if self.stays else ""
         seen = "private" if self.private else "public"
-        return (
-            f"{self.root} as {self.repo_id} ({seen}): {len(self.files)} files, {self.size / 1e6:.1f} MB"
-            f"{stays}"
-        )
+        where = f"to {self.to}" if self.to else f"as {self.repo_id} ({seen})"
+        return f"{self.root} {where}: {len(self.files)} files, {self.size / 1e6:.1f} MB{stays}"
 
 
-def prepare(root: Path, repo_id: str, license_id: str, private: bool, verify: bool = False) -> Push:
+def prepare(
+    root: Path, repo_id: str, license_id: str, private: bool, verify: bool = False, to: str = ""
+) -> Push:
     """Check a dataset, write its card, and return what would be sent.
 
     Args:
@@ -70,6 +72,7 @@ def prepare(root: Path, repo_id: str, license_id: str, private: bool, verify: bo
         license_id: As the hub writes it, such as `cc-by-4.0`.
         private: Whether nobody else is to see it.
         verify: Read every byte anew.
+        to: Where to, instead of the hub.
 
     Raises:
         HandrailError: It is damaged, or has episodes of participants or links to other places.
@@ -86,7 +89,7 @@ def prepare(root: Path, repo_id: str, license_id: str, private: bool, verify: bo
     tops, sent = ({path.relative_to(root).parts[0] for path in some} for some in (found, files))
     names = tuple(path.relative_to(root).as_posix() for path in files)
     size = sum(path.stat().st_size for path in files)
-    return Push(repo_id, root, names, tuple(sorted(tops - sent)), size, private, license_id, said)
+    return Push(repo_id, root, names, tuple(sorted(tops - sent)), size, private, license_id, said, to)
 
 
 def upload(push: Push) -> None:

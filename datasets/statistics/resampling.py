@@ -10,6 +10,7 @@ from handrail.controllers.arrays import FloatArray
 
 RESAMPLES = 4000
 FEWEST = 5  # values below which resampling says nothing
+_AT_ONCE = 4_000_000  # resampled values in memory; that many in one go for up to a thousand
 
 Interval = tuple[float, float]
 
@@ -35,7 +36,13 @@ def bootstrap(
     """Return the 95 % bootstrap interval (percentiles) of a statistic, which takes samples and an axis."""
     count = resamples or RESAMPLES
     found = stats.bootstrap(
-        samples, statistic, n_resamples=count, paired=paired, method="percentile", rng=rng
+        samples,
+        statistic,
+        n_resamples=count,
+        batch=_batch(samples),
+        paired=paired,
+        method="percentile",
+        rng=rng,
     )
     return float(found.confidence_interval.low), float(found.confidence_interval.high)
 
@@ -58,8 +65,20 @@ def permutation_p(
         rng: Of the permutations.
     """
     kind = "samples" if paired else "independent"
-    found = stats.permutation_test(samples, statistic, permutation_type=kind, n_resamples=RESAMPLES, rng=rng)
+    found = stats.permutation_test(
+        samples,
+        statistic,
+        permutation_type=kind,
+        n_resamples=RESAMPLES,
+        batch=_batch(samples),
+        rng=rng,
+    )
     return float(found.pvalue)
+
+
+def _batch(samples: Sequence[np.ndarray]) -> int:
+    """Return how many resamples of samples fit into memory."""
+    return max(1, _AT_ONCE // sum(map(len, samples)))
 
 
 def difference_of_means(first: FloatArray, second: FloatArray, axis: int) -> FloatArray:

@@ -1,6 +1,6 @@
 """Settings of `handrail-study`; light to import."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 from handrail.collect.execution.config import ExecutionConfig
@@ -16,8 +16,6 @@ class StudyConfig(ExecutionConfig):
     """Which study: quick, full, or a file of your own that ends in .toml (see policies/study/presets)."""
     output: str = "outputs/study"
     """Folder of datasets, policies, evaluations and report; what is done there is not done again."""
-    workers: int = field(default=2, kw_only=True)
-    """Jobs at a time, one core each; 0 for as many as there are cores."""
     page: str = ""
     """Also write tables and figures into this Markdown file (.md), between marks."""
     report_only: bool = False

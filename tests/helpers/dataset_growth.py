@@ -1,9 +1,12 @@
-"""How the time of reading a dataset grows with its episodes: the table of docs/large_datasets.md.
+"""How the time of using a dataset grows with its episodes: the table of docs/large_datasets.md.
 
     python tests/helpers/dataset_growth.py FOLDER [FOLDER …]     # datasets, from small to large
+    python tests/helpers/dataset_growth.py --only WORD FOLDER …   # only what has this word in its name
+    python tests/helpers/dataset_growth.py --first COUNT FOLDER NEW   # its first episodes, as a dataset
 
-Each figure is from a process of its own, with its imports done. CPU time, since machines are shared. The last
-column is the exponent of the growth from the first dataset to the last, in episodes.
+Each figure is from a process of its own. Its imports are not counted; commands are counted from their start.
+CPU time, since machines are shared. The last column is the exponent of the growth from the first dataset to
+the last, in episodes.
 """
 
 import math
@@ -14,6 +17,8 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Iterator
+from contextlib import redirect_stderr
 from pathlib import Path
 
 os.environ["HF_HUB_OFFLINE"] = "1"
@@ -22,15 +27,26 @@ import numpy as np
 
 from handrail.datasets.comparison.compare import compare
 from handrail.datasets.comparison.config import CompareConfig
+from handrail.datasets.comparison.report.report import write_report
+from handrail.datasets.editing.pack import merge_datasets
+from handrail.datasets.editing.source import Source
 from handrail.datasets.format.data_file import data_files
 from handrail.datasets.format.layout import Layout
 from handrail.datasets.format.manifest import read_manifest
 from handrail.datasets.quality.summary import summarize
 from handrail.datasets.reading.check import check_whole
 from handrail.datasets.reading.reader import read_episodes, read_info, read_rows_of
+from handrail.datasets.recording.rewrite import write_anew
 from handrail.datasets.recording.writer import EpisodeWriter
 
 READS = 200
+SHARD = 100  # episodes
+TRAIN = (
+    "lerobot-train --dataset.repo_id=me/set --policy.type=act --policy.device=cpu --policy.push_to_hub=false"
+    " --policy.pretrained_backbone_weights=null --policy.chunk_size=20 --policy.n_action_steps=20"
+    " --policy.use_vae=false --policy.dim_model=32 --policy.n_heads=2 --policy.dim_feedforward=32"
+    " --policy.n_encoder_layers=1 --batch_size=8 --steps=1 --num_workers=0 --save_checkpoint=false"
+)
 
 
 def lerobot_dataset(root: Path):
@@ -65,6 +81,67 @@ def items(root: Path):
     return lambda: [dataset[int(index)] for index in chosen]
 
 
+def first_episodes(root: Path, new: Path, first: int, end: int) -> Path:
+    """Write some episodes of a dataset as another one."""
+    source = Source.open(root)
+    end = min(end, len(source.rows))
+    write_anew(new, source.manifest, source.pieces(range(first, end)), source.types, source.encodings)
+    return new
+
+
+def shards(root: Path) -> tuple[list[Path], Path]:
+    """Write a dataset as shards; return them, and where they are to be put together."""
+    folder, count = Path(os.environ["HF_DATASETS_CACHE"]), read_info(root).episodes
+    parts = [first_episodes(root, folder / f"{at}", at, at + SHARD) for at in range(0, count, SHARD)]
+    return parts, folder / "all"
+
+
+def merge(root: Path):
+    """Return what puts shards together."""
+    parts, target = shards(root)
+    return lambda: merge_datasets(parts, target)
+
+
+def aggregate(root: Path):
+    """Return what puts shards together with LeRobot."""
+    from lerobot.datasets.aggregate import aggregate_datasets
+
+    parts, target = shards(root)
+    return lambda: aggregate_datasets([f"me/{each.name}" for each in parts], "me/all", parts, target)
+
+
+def of_lerobot(root: Path):
+    """Return what opens, for the first time, what LeRobot put together."""
+    aggregate(root)()
+    return lambda: lerobot_dataset(Path(os.environ["HF_DATASETS_CACHE"]) / "all")
+
+
+def train(words: list[str]) -> None:
+    """Run a command that trains for one update."""
+    program = Path(sys.executable).with_name(words[0])
+    subprocess.run([program, *words[1:]], check=True, capture_output=True)
+
+
+def ours(root: Path) -> list[str]:
+    """Return the command of ours that trains for one update."""
+    out = Path(os.environ["HF_DATASETS_CACHE"]) / "policy"
+    return (
+        f"handrail-train {root} --output {out} --steps 1 --batch_size 8 --policy_options dim_model=32".split()
+    )
+
+
+def theirs(root: Path) -> list[str]:
+    """Return the command of LeRobot's that trains for one update."""
+    out = Path(os.environ["HF_DATASETS_CACHE"]) / "policy"
+    return [*TRAIN.split(), f"--dataset.root={root}", f"--output_dir={out}"]
+
+
+def report(root: Path) -> None:
+    """Compare a dataset with itself and write the report."""
+    output = str(Path(os.environ["HF_DATASETS_CACHE"]) / "report")
+    write_report(compare(CompareConfig((str(root),) * 2, output, labels=("a", "b"))))
+
+
 MEASURED = {
     "open: read_episodes": lambda root: lambda: read_episodes(root),
     "check, remembered": lambda root: [check_whole(root), lambda: check_whole(root)][1],
@@ -74,7 +151,12 @@ MEASURED = {
     "LeRobotDataset, first time": lambda root: lambda: lerobot_dataset(root),
     "LeRobotDataset, again": lambda root: [lerobot_dataset(root), lambda: lerobot_dataset(root)][1],
     f"{READS} items of LeRobotDataset": items,
-    "compare with itself": lambda root: lambda: compare(CompareConfig((str(root),) * 2, labels=("a", "b"))),
+    "compare with itself": lambda root: lambda: report(root),
+    "handrail-train, to the first update": lambda root: lambda: train(ours(root)),
+    "lerobot-train, to the first update": lambda root: lambda: train(theirs(root)),
+    f"handrail-merge of shards of {SHARD}": merge,
+    f"LeRobot's aggregate of shards of {SHARD}": aggregate,
+    "LeRobotDataset of the aggregate": of_lerobot,
 }
 
 
@@ -82,19 +164,21 @@ def measure(name: str, root: Path) -> str:
     """Return CPU time [s] and the memory at its peak [MB]."""
     if "LeRobot" in name:
         import lerobot.datasets.lerobot_dataset  # noqa: F401 - its import is not measured
-    run = MEASURED[name](root)
-    begun = time.process_time()
-    run()
-    spent = time.process_time() - begun
-    return f"{spent} {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024}"
+    with open(os.devnull, "w") as nowhere, redirect_stderr(nowhere):
+        run = MEASURED[name](root)
+        begun = time.process_time()
+        run()
+    used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    spent = time.process_time() - begun + used[1].ru_utime + used[1].ru_stime
+    return f"{spent} {max(each.ru_maxrss for each in used) // 1024}"
 
 
-def table(roots: list[Path]) -> list[str]:
-    """Return the table, a line each."""
+def table(roots: list[Path], word: str = "") -> Iterator[str]:
+    """Yield the table, a line each."""
     counts = [read_info(root).episodes for root in roots]
-    lines = ["| CPU time [s], memory [MB] | " + " | ".join(map(str, counts)) + " | exponent |"]
-    lines.append("|---" * (len(roots) + 2) + "|")
-    for name in MEASURED:
+    yield "| CPU time [s], memory [MB] | " + " | ".join(map(str, counts)) + " | exponent |"
+    yield "|---" * (len(roots) + 2) + "|"
+    for name in (name for name in MEASURED if word in name):
         found = [_in_a_process(name, root) for root in roots]
         growth = (
             math.log(found[-1][0] / found[0][0]) / math.log(counts[-1] / counts[0])
@@ -102,8 +186,17 @@ def table(roots: list[Path]) -> list[str]:
             else 0.0
         )
         cells = " | ".join(f"{seconds:.3g}, {memory:.0f}" for seconds, memory in found)
-        lines.append(f"| {name} | {cells} | {growth:.2f} |")
-    return lines
+        yield f"| {name} | {cells} | {growth:.2f} |"
+    yield "| bytes a frame | " + " | ".join(f"{_bytes(root):.0f}" for root in roots) + " | |"
+    yield "| files | " + " | ".join(str(len(_files(root))) for root in roots) + " | |"
+
+
+def _files(root: Path) -> list[Path]:
+    return [path for path in root.rglob("*") if path.is_file()]
+
+
+def _bytes(root: Path) -> float:
+    return sum(path.stat().st_size for path in _files(root)) / read_info(root).frames
 
 
 def _in_a_process(name: str, root: Path) -> list[float]:
@@ -120,5 +213,10 @@ def _in_a_process(name: str, root: Path) -> list[float]:
 if __name__ == "__main__":
     if sys.argv[1] == "--one":
         print(measure(sys.argv[2], Path(sys.argv[3])))
+    elif sys.argv[1] == "--first":
+        first_episodes(Path(sys.argv[3]), Path(sys.argv[4]), 0, int(sys.argv[2]))
     else:
-        print(*table([Path(word) for word in sys.argv[1:]]), sep="\n")
+        only = sys.argv[1] == "--only"
+        folders = [Path(word).absolute() for word in sys.argv[3 if only else 1 :]]
+        for line in table(folders, sys.argv[2] if only else ""):
+            print(line, flush=True)

@@ -6,10 +6,12 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from handrail.collect.config import SessionConfig
+from handrail.collect.operators.human.steering import FOLLOW
 from handrail.collect.operators.modes import MODES
 from handrail.collect.session.build import build_env
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.channels import Channels
+from handrail.controllers.numerics.rotation import turned
 from handrail.controllers.robot.model import load_model
 from handrail.policies.imitation.interface.checkpoint import PolicyMeta, read_meta, write_meta
 from handrail.policies.imitation.interface.interface import PolicyInterface
@@ -44,7 +46,13 @@ class StandIn:
         if self.interface.actions == "intent":
             return np.append(twist, 0.0)
         jacobian = load_model().jacobian(np.concatenate([np.zeros(3), state[:6]]))
-        return np.append(jacobian.T @ np.linalg.solve(jacobian @ jacobian.T + 0.01 * np.eye(6), twist), 0.0)
+        velocity = jacobian.T @ np.linalg.solve(jacobian @ jacobian.T + 0.01 * np.eye(6), twist)
+        if self.interface.actions == "targets":
+            x, y, cosine, sine = state[-4:]
+            yaw = np.arctan2(sine, cosine)
+            velocity[:3] = turned(velocity[:3], yaw)
+            velocity = np.concatenate([[x, y, yaw], state[:6]]) + velocity / FOLLOW
+        return np.append(velocity, 0.0)
 
     def _random(self, state, environment):
         """Draw something bold, and keep to it for a while."""
@@ -80,7 +88,7 @@ def load(folder: Path) -> StandIn:
 
 
 def checkpoint(
-    folder: Path, kind="chase", task="reach", mode="ee", actions="intent", training_seed=0
+    folder: Path, kind="chase", task="reach", mode="ee", actions="intent", training_seed=0, time_limit=0.0
 ) -> Path:
     """Write a checkpoint folder of a stand-in."""
     env = build_env(SessionConfig(task=task), 20)
@@ -91,9 +99,10 @@ def checkpoint(
         groups = [(name,) for name in (*channels.base, *channels.joints[3:])]
     masks = {tuple(channels.mask(*names).tolist()) for names in groups}
     owned = tuple(sorted(masks)) if actions == "intent" else ()
-    interface = PolicyInterface(actions, env.agent_names, env.state_names, channels.names, owned)
+    interface = PolicyInterface(actions, env.agent_names, env.state_names, channels.names, owned, True)
     trained_on = {"episodes": 50, "operator_time": 312.5}
-    meta = PolicyMeta(*(task, mode, "ridgeback_ur10", 20, actions, training_seed, 0, trained_on, "act", 100))
+    what = (task, mode, "ridgeback_ur10", 20, actions, training_seed, 0, trained_on, "act", 100)
+    meta = PolicyMeta(*what, time_limit=time_limit)
     env.close()
     folder.mkdir(parents=True)
     write_meta(folder, interface, meta)

@@ -23,7 +23,8 @@ LESS = {  # flag → the value that it gets where a page gives it
 MORE = {  # what is added where a page leaves it out
     "handrail-record": {"--dataset.num_episodes": "2"},
     "handrail-train": {"--steps": "4", "--batch_size": "4", "--device": "cpu"},
-    "handrail-evaluate": {"--time_limit": "1"},
+    "handrail-evaluate": {"--time_limit": "1", "--workers": "1"},
+    "handrail-trials": {"--workers": "1"},
     "handrail-showcase": {"--seconds": "1"},
     "handrail-profile": {"--updates": "10", "--solves": "1", "--tasks": "reach"},
     "handrail-train-rl": {

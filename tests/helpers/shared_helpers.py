@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pyarrow.parquet as pq
 
-from handrail.datasets.reading.reader import read_episodes, read_frames
+from handrail.datasets.format.data_file import data_files
+from handrail.datasets.reading.reader import read_episodes, read_info, read_rows_of
 
 CLOCKS = ("wall_clock", "controller.solve_time")  # of frames
 EPISODE_CLOCKS = ("started", "wall_time")
@@ -18,8 +19,9 @@ PLACES = ("data/", "meta/")  # in which file
 
 def content(root):
     """Return every row, every line of metadata and every summary of a dataset, without clocks and places."""
-    numbers = [row["episode_index"] for row in read_episodes(root)]
-    found = {f"frames {number}": _frames(root, number) for number in numbers}
+    info = read_info(root)
+    with data_files() as opened:
+        found = {f"frames {row['episode_index']}": _frames(info, row, opened) for row in read_episodes(root)}
     files = [pq.read_table(path).to_pylist() for path in sorted(root.glob("meta/episodes/*/*.parquet"))]
     lines = sorted(chain.from_iterable(files), key=itemgetter("episode_index"))
     found["lines"] = [
@@ -38,8 +40,8 @@ def started(root):
     return [row["started"] for row in read_episodes(root)]
 
 
-def _frames(root, number):
-    frames = read_frames(root, number)
+def _frames(info, row, opened):
+    frames = read_rows_of(info, row, files=opened)
     return {key: (np.asarray(frames[key]).tolist()) for key in frames if key not in CLOCKS}
 
 

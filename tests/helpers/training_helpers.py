@@ -5,7 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
-from handrail.collect.config import StoredConfig
+from handrail.collect.config import SessionConfig, StoredConfig
+from handrail.collect.session.recorded_settings import settings_json
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.robot.description import load_description
 from handrail.datasets.format.manifest import Manifest
@@ -60,8 +61,9 @@ def write_dataset(
     modes: Sequence[str] = (),
     successes: Sequence[bool] = (),
     cameras: Sequence[str] = (),
+    limits: Sequence[float] = (),
 ) -> Path:
-    """Write episodes of random numbers; modes and successes as given, else `ee` and success."""
+    """Write episodes of random numbers; modes, successes and time limits as given, else `ee` and success."""
     rng = np.random.default_rng(0)
     with EpisodeWriter.create(
         root, Manifest("handrail/test", FPS, "ridgeback_ur10", features(cameras))
@@ -71,7 +73,10 @@ def write_dataset(
                 writer.add_frame(frame(rng, cameras), "reach")
             mode = modes[number] if modes else "ee"
             success = successes[number] if successes else True
-            writer.save_episode({"environment": "reach", "mode": mode, "success": success, "seed": number})
+            row = {"environment": "reach", "mode": mode, "success": success, "seed": number}
+            if limits:
+                row["settings"] = settings_json(SessionConfig(task="reach", time_limit=limits[number]))
+            writer.save_episode(row)
     return root
 
 

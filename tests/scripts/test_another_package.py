@@ -94,7 +94,7 @@ def test_a_policy_alone_imports_nothing(missing, trained, unseen):
 
 
 def test_what_was_trained_on_it_is_evaluated(trained, tmp_path):
-    flags = [*said("--task", "--mode", "--robot"), "--episodes", 1, "--time_limit", 0.5]
+    flags = [*said("--task", "--mode", "--robot"), "--episodes", 1, "--time_limit", 0.5, "--workers", 1]
     done = command(trained, *flags, "--json", tmp_path / "e.json", name="evaluate")
     assert done.returncode == 0, done.stderr
     content = json.loads((tmp_path / "e.json").read_text())

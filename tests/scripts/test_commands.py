@@ -187,13 +187,13 @@ def test_a_replay_shows_when_the_commands_differ(recorded, monkeypatch):
     """The deviation is measured, not assumed."""
     from handrail.collect.commands import replay
 
-    honest = replay.read_frames
+    honest = replay.OpenDataset.frames
 
     def tampered(*arguments):
         frames = honest(*arguments)
         return frames | {"action": frames["action"] * np.float32(0.9)}
 
-    monkeypatch.setattr(replay, "read_frames", tampered)
+    monkeypatch.setattr(replay.OpenDataset, "frames", tampered)
     assert replay.replay_episode(recorded, 0)[0].largest > 0.01
 
 

@@ -1,6 +1,6 @@
 """What `handrail-benchmark` runs, as typed settings; light to import."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated
 
@@ -34,6 +34,8 @@ class BenchmarkConfig(ExecutionConfig):
     """End an episode at its success, as the protocol says; else 4 s after the planner's last step."""
     closed_loop: bool = False
     """The planner sees the hand and corrects its errors, instead of running open loop."""
+    workers: int = field(default=1, kw_only=True)
+    """Processes that share the work; 0 for as many as there are cores, which makes all times longer."""
     json: str = ""
     """Write everything measured, every episode too, to this file."""
     report: str = ""

@@ -79,7 +79,7 @@ class Example:
         marker = goal_marker(Pose(given.goal.position, given.goal.rotation))
         scene = Scene((*given.scene.objects, marker), given.scene.view)
         simulation = Simulation(model, scene, model.description.home, STEP, meshes=True)
-        painter = Painter(simulation.mujoco_model, size, pretty=True)
+        painter = Painter(size, pretty=True)
         try:
             for step in steps:
                 yield [_panel(simulation, painter, who, trace, step) for who, trace in self.runs]
@@ -91,7 +91,7 @@ def _panel(simulation: Simulation, painter: Painter, who: str, trace: Trace, ste
     """Return the picture of a run at a step, over a bar that says who it is and how far from the goal."""
     index = min(step, len(trace.q) - 1)
     simulation.show(trace.q[index])
-    picture = painter.paint(simulation.data, "scene")
+    picture = painter.paint(simulation.mujoco_model, simulation.data, "scene")
     d_p, d_r = trace.errors[max(index - 1, 0)]
     words = f"{index * STEP:4.1f} s   {d_p:.2f} m   d_r {d_r:.3f}"
     touched = sum(map(bool, trace.contacts[:index]))

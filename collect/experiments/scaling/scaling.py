@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from handrail.collect.execution.config import ExecutionConfig
 from handrail.collect.experiments.scaling.config import ScalingConfig
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.presentation.table import Table
@@ -19,7 +20,7 @@ _COMMAND = "from handrail.scripts.record import main; main()"
 
 
 def measure(config: ScalingConfig) -> dict[str, Any]:
-    """Return what each number of workers took.
+    """Return what each number of workers took, and the Ray cluster.
 
     Efficiency is episodes a core-second against the first number of workers, where every worker counts as a
     core: of the whole command, and of the time between the first episode's beginning and the last one's end.
@@ -32,8 +33,10 @@ def measure(config: ScalingConfig) -> dict[str, Any]:
     """
     config.check()
     load = os.getloadavg()[0]
-    with tempfile.TemporaryDirectory(prefix="handrail-scaling-") as folder:
-        runs = [_run(config, count, Path(folder) / str(place)) for place, count in enumerate(config.counts)]
+    above = Path(config.folder).expanduser().absolute() if config.folder else None
+    with tempfile.TemporaryDirectory(prefix="handrail-scaling-", dir=above) as folder:
+        places = enumerate(config.places)
+        runs = [_run(config, place, Path(folder) / str(number)) for number, place in places]
     for run in runs:
         for span in ("seconds", "recording_seconds"):
             whole, first = run[span] * run["workers"], runs[0][span] * runs[0]["workers"]
@@ -49,7 +52,7 @@ def scaling_table(results: dict[str, Any]) -> Table:
     """Return what was measured, a line for each number of workers."""
     rows = [
         [
-            str(run["workers"]),
+            f"{run['workers']}{' on Ray' if run['ray'] else ''}",
             f"{run['seconds']:.1f}",
             f"{run['recording_seconds']:.1f}",
             f"{results['episodes'] / run['seconds'] / run['workers']:.3f}",
@@ -71,24 +74,43 @@ def scaling_table(results: dict[str, Any]) -> Table:
     return Table(headings, rows, "Recording with several workers", caption)
 
 
-def _run(config: ScalingConfig, workers: int, root: Path) -> dict[str, Any]:
+def _run(config: ScalingConfig, place: ExecutionConfig, root: Path) -> dict[str, Any]:
+    workers, where = _cores(place), ("--ray", place.ray) if place.ray else ("--workers", place.workers)
     flags: Sequence[object] = (
         *(root, "--task", config.task, "--mode", config.mode, "--seed", config.seed),
-        *("--dataset.num_episodes", config.episodes, "--workers", workers),
+        *("--dataset.num_episodes", config.episodes, *where),
         *(("--cameras", config.cameras) if config.cameras else ()),
     )
     start = time.monotonic()
     done = subprocess.run([sys.executable, "-c", _COMMAND, *map(str, flags)], capture_output=True, text=True)
     seconds = time.monotonic() - start
     if done.returncode:
-        raise HandrailError(f"{workers} workers: recording failed: {done.stderr.strip()[-300:]}")
+        raise HandrailError(f"{where[0]} {where[1]}: recording failed: {done.stderr.strip()[-300:]}")
     rows = read_episodes(root)
     first = min(row["started"] for row in rows)
     last = max(row["started"] + row["wall_time"] for row in rows)
     return {
         "workers": workers,
+        "ray": bool(place.ray),
         "seconds": seconds,
         "recording_seconds": last - first,
         "frames": sum(row["length"] for row in rows),
         "rows": digest_of_rows(root),
     }
+
+
+def _cores(place: ExecutionConfig) -> int:
+    """Return how many cores share the work.
+
+    Raises:
+        HandrailError: there is no such cluster.
+    """
+    if not place.ray:
+        return place.processes
+    from handrail.collect.execution.cluster import Cluster
+
+    cluster = Cluster(place.ray)
+    try:
+        return cluster.cores
+    finally:
+        cluster.close()

@@ -37,6 +37,8 @@ class InputMap(ABC):
     Attributes:
         channels: of the robot.
         full: full deflection of every input, (m,) [m/s, rad/s].
+        fine: what the hand's dead zone and drift are shares of, (m,): full deflection, of all joints together
+            made to the measure of the stick for the hand (`as_fine`).
     """
 
     def __init__(self, model: RobotModel, mode: TeleopMode, gains: Gains) -> None:
@@ -48,6 +50,8 @@ class InputMap(ABC):
         base, joints = gains.full[6:][: self._base], np.full(model.size, gains.joint_rate)
         joints[: self._base] = base
         self.full: FloatArray = np.concatenate([base, gains.full[:6], joints])
+        finely = as_fine(model, joints, gains.full[:6]) * joints
+        self.fine: FloatArray = np.concatenate([base, gains.full[:6], finely])
 
     HIDDEN: ClassVar[Mapping[str, Hidden]] = {}
 
@@ -122,3 +126,19 @@ class StickMap(InputMap):
 
     def _base_world(self, goal: MotionGoal, q: FloatArray) -> FloatArray:
         return turned(goal.base, q[2]) if self.channels.base else np.zeros(0)
+
+
+def as_fine(model: RobotModel, joints: FloatArray, hand: FloatArray) -> float:
+    """Return the share of full stick on all joints that moves the tool at home as 1 of the hand's stick does.
+
+    `1 / √(mean_i Σ_j (J_ij joints_j / hand_i)²)`. So a person is as exact at the tool with joints as with the
+    hand; else 2 % of every joint's stick shake it 2.5 times as much as 2 % of the hand's, and inside a dead
+    zone of 3 % each it may stay 3 cm from where it shall be.
+
+    Args:
+        model: of the robot.
+        joints: full stick of each joint, (n,).
+        hand: full stick of the hand, (6,).
+    """
+    moved = model.jacobian(model.description.home) * joints / hand[:, None]
+    return float(1.0 / np.sqrt(np.mean(np.sum(moved**2, axis=1))))

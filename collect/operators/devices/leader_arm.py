@@ -8,12 +8,11 @@ from handrail.collect.operators.devices.input_map import StickMap
 from handrail.collect.operators.human.hidden import Hidden
 from handrail.collect.operators.human.human import HumanSettings
 from handrail.collect.operators.human.motion_goal import MotionGoal
+from handrail.collect.operators.human.steering import FOLLOW
 from handrail.collect.operators.operator import View
 from handrail.controllers.arrays import BoolArray, FloatArray
 from handrail.controllers.interface.controller import State
 from handrail.controllers.numerics.rotation import turned
-
-_FOLLOW = 6.0  # of the joints towards the leader's [1/s]
 
 _AHEAD = Hidden("where the leader's joints are", "0.2 s ahead of the arm", "never", "where the arm is")
 
@@ -48,7 +47,7 @@ class LeaderArmMap(StickMap):
         lower, upper = self._limits()
         self._leader = np.clip(self._leader + elapsed * moved[self._arm], lower, upper)
         sent = moved.copy()
-        sent[self._arm] += _FOLLOW * (self._leader - state.q[self._base :])
+        sent[self._arm] += FOLLOW * (self._leader - state.q[self._base :])
         return sent
 
     def raw(self, moved: FloatArray) -> FloatArray:

@@ -7,7 +7,7 @@ import numpy as np
 from handrail.collect.operators.devices.input_map import InputMap
 from handrail.collect.operators.devices.joint_order import plan_joints, sweep_clearance
 from handrail.collect.operators.human.hidden import Hidden
-from handrail.collect.operators.human.human import HumanSettings
+from handrail.collect.operators.human.human import MOOD, HumanSettings
 from handrail.collect.operators.human.motion_goal import MotionGoal, Target
 from handrail.collect.operators.operator import View
 from handrail.controllers.arrays import BoolArray, FloatArray
@@ -40,6 +40,7 @@ class SingleAxisMap(InputMap):
     """
 
     HIDDEN: ClassVar = {
+        "_least": MOOD,
         **dict.fromkeys(("_axis", "_axis_holds", "_left"), _AXIS),
         **dict.fromkeys(("_goal", "_thought", "_thinks_at", "_order", "_care"), _PLAN),
     }

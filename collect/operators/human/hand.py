@@ -6,7 +6,7 @@ from typing import ClassVar
 import numpy as np
 
 from handrail.collect.operators.human.hidden import Hidden
-from handrail.collect.operators.human.human import HumanSettings
+from handrail.collect.operators.human.human import MOOD, HumanSettings
 from handrail.collect.operators.human.wander import Wander
 from handrail.controllers.arrays import FloatArray
 
@@ -29,25 +29,29 @@ class HumanHand:
     """Turns the wanted command of each moment into what the hand does.
 
     The hand sees `wanted(t - delay)`; it moves there only when that differs from where it is going by more
-    than the threshold and the refractory time has passed (intermittent control), or at once when it is
+    than `threshold · fine` and the refractory time has passed (intermittent control), or at once when it is
     let go. It moves along minimum jerk, `10τ³ - 15τ⁴ + 6τ⁵` of the way. On where it is come
-    `noise · |held| · a` and `drift · full · b`, where a and b are Ornstein–Uhlenbeck processes.
+    `noise · |held| · a` and `drift · fine · b`, where a and b are Ornstein–Uhlenbeck processes.
 
     Args:
         settings: of the hand.
         full: full deflection of every input, (k,).
+        fine: what dead zone and drift are shares of, (k,).
         rng: of the episode, which begins with the hand at rest.
     """
 
     HIDDEN: ClassVar = {
+        "_settings": MOOD,
         "_seen": _LATE,
         **dict.fromkeys(("_left", "_held", "_moved"), _MOVEMENT),
         "_wander": _SHAKE,
     }
 
-    def __init__(self, settings: HumanSettings, full: FloatArray, rng: np.random.Generator) -> None:
+    def __init__(
+        self, settings: HumanSettings, full: FloatArray, fine: FloatArray, rng: np.random.Generator
+    ) -> None:
         self._settings = settings
-        self._full = np.asarray(full, dtype=float)
+        self._full, self._fine = np.asarray(full, dtype=float), np.asarray(fine, dtype=float)
         self._seen: deque[tuple[float, FloatArray]] = deque()
         self._left = np.zeros(len(self._full))  # where the last movement began
         self._held = np.zeros(len(self._full))  # where it ends
@@ -60,7 +64,7 @@ class HumanHand:
         noise, drift = self._wander.at(time)
         settings, held = self._settings, self._position(time)
         touched = np.abs(held) > 0
-        moved = held + settings.noise * np.abs(held) * noise + settings.drift * self._full * drift * touched
+        moved = held + settings.noise * np.abs(held) * noise + settings.drift * self._fine * drift * touched
         return np.clip(moved, -self._full, self._full) if settings.noise or settings.drift else moved
 
     def _delayed(self, wanted: FloatArray, time: float) -> FloatArray:
@@ -72,7 +76,7 @@ class HumanHand:
 
     def _correct(self, wanted: FloatArray, time: float) -> None:
         """Begin a movement if there is reason to, and it may begin."""
-        change = np.max(np.abs(wanted - self._held) / self._full)
+        change = np.max(np.abs(wanted - self._held) / self._fine)
         released = not np.any(wanted)
         rested = time - self._moved >= self._settings.refractory - 1e-9
         begins = released or (change > self._settings.threshold and rested) or not self._settings.refractory

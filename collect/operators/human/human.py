@@ -4,9 +4,22 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
+from handrail.collect.operators.human.hidden import Hidden
 from handrail.controllers.errors import HandrailError
 
 _WIDEST = 2.0  # a person is at most this many standard deviations from the average
+PERSON = Hidden(
+    "who steers: delay, pauses, noise, misjudgement",
+    "each by a factor of e^0.15z (`persons`)",
+    "once a recording",
+    "no; the same in every mode of a `--person`",
+)
+MOOD = Hidden(
+    "how they are today: the same numbers again",
+    "each by a factor of e^0.08z (`moods`)",
+    "as an episode begins",
+    "no; the same in every mode of a seed",
+)
 
 
 @dataclass(frozen=True)
@@ -16,9 +29,10 @@ class HumanSettings:
     Attributes:
         delay: from perception to hand [s]; 0.14–0.25 in people.
         refractory: shortest time between two corrections [s]; 0.35 for a velocity stick.
-        threshold: change of the wanted command, relative to full stick, below which the hand stays.
+        threshold: change of the wanted command, relative to full stick, below which the hand stays; of
+            joints, as that moves the tool (`InputMap.fine`).
         noise: standard deviation of the signal-dependent noise over |command|; about 0.1.
-        drift: standard deviation of the drift over full stick, while the stick is deflected.
+        drift: standard deviation of the drift over full stick, while the stick is deflected; likewise.
         correlation: how fast noise, drift and misjudgement wander, time constant [s].
         switch_time: hands off the stick while changing to other inputs [s]; makes switching 17.4 % of the
             time when steering joint by joint.

@@ -6,7 +6,7 @@ from typing import ClassVar
 import numpy as np
 
 from handrail.collect.operators.human.hidden import Hidden
-from handrail.collect.operators.human.human import HumanSettings
+from handrail.collect.operators.human.human import MOOD, HumanSettings
 from handrail.collect.operators.human.motion_goal import MotionGoal
 from handrail.collect.operators.human.steering import hand_errors
 from handrail.collect.operators.human.wander import Wander
@@ -34,7 +34,7 @@ class Perception:
         rng: of the episode.
     """
 
-    HIDDEN: ClassVar = {"_wander": _MISJUDGED}
+    HIDDEN: ClassVar = {"_share": MOOD, "_wander": _MISJUDGED}
 
     def __init__(self, settings: HumanSettings, rng: np.random.Generator) -> None:
         self._share = settings.misjudgement

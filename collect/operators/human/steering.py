@@ -9,6 +9,9 @@ from handrail.controllers.numerics.rotation import rotation_vector, turned
 from handrail.controllers.robot.description import World
 from handrail.controllers.robot.model import Pose
 
+FOLLOW = 6.0
+"""k of joints that follow a target, q̇ = k (q_target − q) [1/s]: a leader arm's, sliders', a policy's."""
+
 
 @dataclass(frozen=True)
 class Gains:

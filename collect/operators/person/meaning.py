@@ -6,7 +6,7 @@ from typing import Literal
 import numpy as np
 
 from handrail.collect.operators.devices.input_map import StickMap
-from handrail.collect.operators.human.steering import Gains
+from handrail.collect.operators.human.steering import FOLLOW, Gains
 from handrail.collect.operators.modes import Focus, TeleopMode
 from handrail.collect.operators.person.inputs import Inputs
 from handrail.controllers.arrays import BoolArray, FloatArray
@@ -19,7 +19,6 @@ from handrail.controllers.robot.model import RobotModel
 
 HandFrame = Literal["world", "base", "tool", "view"]
 HAND_FRAMES: tuple[HandFrame, ...] = ("world", "base", "tool", "view")
-_FOLLOW = 6.0  # of the joints towards their targets [1/s]
 
 
 @dataclass(frozen=True)
@@ -108,7 +107,7 @@ class InputMeaning:
             )
         if inputs.targets and not setting.is_single:
             full = setting.speed * self._full[self._arm]
-            toward = _FOLLOW * (np.array(inputs.targets) - state.q[self._base :])
+            toward = FOLLOW * (np.array(inputs.targets) - state.q[self._base :])
             values[self._arm] = np.clip(toward, -full, full)
             raw[self._arm] = inputs.targets
         values[[joints.start + joint for joint in setting.locked]] = 0.0

@@ -8,7 +8,7 @@ import numpy as np
 from handrail.collect.operators.devices.devices import DEVICES
 from handrail.collect.operators.human.hand import HumanHand
 from handrail.collect.operators.human.hidden import Hidden
-from handrail.collect.operators.human.human import HumanSettings
+from handrail.collect.operators.human.human import MOOD, PERSON, HumanSettings
 from handrail.collect.operators.human.motion_goal import MotionGoal
 from handrail.collect.operators.human.perception import Perception
 from handrail.collect.operators.human.steering import Gains
@@ -20,18 +20,6 @@ from handrail.controllers.interface.intent import Intent, RawInput
 from handrail.controllers.registry import resolved
 from handrail.controllers.robot.model import RobotModel
 
-_PERSON = Hidden(
-    "who steers: delay, pauses, noise, misjudgement",
-    "each by a factor of e^0.15z (`persons`)",
-    "once a recording",
-    "no; the same in every mode of a `--person`",
-)
-_MOOD = Hidden(
-    "how they are today: the same numbers again",
-    "each by a factor of e^0.08z (`moods`)",
-    "as an episode begins",
-    "no; the same in every mode of a seed",
-)
 _CHANGE = Hidden("hands off while they change to other channels", "0.3 s", "never", "no")
 
 
@@ -67,7 +55,7 @@ class ScriptedOperator:
         free_at: when the hand is back on the input after the last change of channels [s]; −∞ before any.
     """
 
-    HIDDEN: ClassVar = {"_human": _PERSON, "_settings": _MOOD, "_mask": _CHANGE, "_switches": _CHANGE} | {
+    HIDDEN: ClassVar = {"_human": PERSON, "_settings": MOOD, "_mask": _CHANGE, "_switches": _CHANGE} | {
         "free_at": _CHANGE
     }
 
@@ -90,7 +78,7 @@ class ScriptedOperator:
         self._settings = self._human.episode(rng)
         self._script.reset(view)
         self._perception = Perception(self._settings, rng)
-        self._hand = HumanHand(self._settings, self._map.full, rng)
+        self._hand = HumanHand(self._settings, self._map.full, self._map.fine, rng)
         self._map.reset(view, self._settings, rng)
         self._mask: BoolArray | None = None
         self._switches = 0

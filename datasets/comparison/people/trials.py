@@ -10,8 +10,8 @@ from handrail.controllers.errors import HandrailError
 from handrail.datasets.comparison.people.folder import StudyFolder
 from handrail.datasets.comparison.people.measures import MEASURES
 from handrail.datasets.quality.columns import ColumnNames
-from handrail.datasets.quality.demonstration import Demonstration
-from handrail.datasets.quality.load import read_demonstrations
+from handrail.datasets.quality.episode import Episode
+from handrail.datasets.quality.load import recorded_episodes
 from handrail.datasets.quality.measure import measure
 
 SCRIPTED = "scripted"  # the name of the operator, as handrail-record writes it
@@ -55,26 +55,26 @@ def read_trials(study: StudyFolder, beside: Sequence[Path], columns: ColumnNames
     Raises:
         HandrailError: a dataset cannot be read, or one beside the study has a participant.
     """
-    found: dict[str, list[tuple[str, Demonstration]]] = {}
+    found: dict[str, list[tuple[str, Episode]]] = {}
     left_out = 0
     for (task, condition), root in study.datasets.items():
-        for episode in read_demonstrations(root, columns):
+        for episode in recorded_episodes(root, columns):
             named = bool(_participant(episode)) or episode.meta.get("operator") == SCRIPTED
             left_out += not named
             if named:
                 found.setdefault(task, []).append((condition, episode))
     for root in beside:
-        for episode in read_demonstrations(root, columns):
+        for episode in recorded_episodes(root, columns):
             task, condition = _beside(root, episode)
             found.setdefault(task, []).append((condition, episode))
     return [trial for task, episodes in found.items() for trial in _measured(task, episodes)], left_out
 
 
-def _participant(episode: Demonstration) -> str:
+def _participant(episode: Episode) -> str:
     return str(episode.meta.get("participant") or "")
 
 
-def _beside(root: Path, episode: Demonstration) -> tuple[str, str]:
+def _beside(root: Path, episode: Episode) -> tuple[str, str]:
     """Return task and mode of an episode of a dataset that is no part of the study."""
     where = f"dataset {str(root)!r}, episode {episode.number}"
     if _participant(episode):
@@ -88,9 +88,9 @@ def _beside(root: Path, episode: Demonstration) -> tuple[str, str]:
     return task, mode
 
 
-def _measured(task: str, episodes: Sequence[tuple[str, Demonstration]]) -> Iterator[Trial]:
+def _measured(task: str, episodes: Sequence[tuple[str, Episode]]) -> Iterator[Trial]:
     """Yield the trials of a task, all on one scale where their columns are the same."""
-    groups: dict[str, list[Demonstration]] = {}
+    groups: dict[str, list[Episode]] = {}
     for condition, episode in episodes:
         groups.setdefault(f"{condition} of {episode.info.root}", []).append(episode)
     conditions = {f"{condition} of {episode.info.root}": condition for condition, episode in episodes}

@@ -15,6 +15,7 @@ from handrail.datasets.comparison.groups import Group, group_of
 from handrail.datasets.comparison.outcomes import ConditionOutcome
 from handrail.datasets.presentation.drawing import COLOURS, GREY, INK, Panel, new_figure, rows, short, tidy
 from handrail.datasets.quality.demonstration import Demonstration, DoesNotApply
+from handrail.datasets.quality.load import each_opened
 from handrail.datasets.quality.measure import Measured
 from handrail.datasets.quality.metric import Metric
 from handrail.datasets.quality.naming import position_entries
@@ -206,20 +207,20 @@ def _same_limits(axes: Iterable[Any]) -> None:
 
 def _has_motion(group: Group) -> bool:
     try:
-        return group.episodes[0].motion.shape[1] > 0
+        return any(episode.motion.shape[1] > 0 for episode in each_opened(group.episodes[:1]))
     except DoesNotApply:
         return False
 
 
 def _paths(group: Group, colour: str) -> Panel:
     axes = new_figure(_WIDTH, 2.6).subplots()
-    for episode in group.episodes[:_SHOWN]:
+    for episode in each_opened(group.episodes[:_SHOWN]):
         motion = episode.motion
         x, y = motion[:, 0], motion[:, 1] if motion.shape[1] > 1 else np.zeros(len(motion))
         line = _FAILED if episode.success is False else colour
         axes.plot(x, y, color=line, lw=1.0, alpha=0.7)
         axes.plot(x[-1], y[-1], "o", color=line, ms=3)
-    first = group.episodes[0]
+    (first,) = each_opened(group.episodes[:1])
     names = ("tool x [m]", "tool y [m]") if first.motion_is_tool else _first_names(first)
     axes.set(xlabel=short(names[0], _AXIS_LABEL), ylabel=short(names[1], _AXIS_LABEL))
     if first.motion_is_tool:

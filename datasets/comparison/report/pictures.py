@@ -7,7 +7,7 @@ from handrail.datasets.comparison.groups import Group
 from handrail.datasets.format.path_pattern import fill
 from handrail.datasets.format.schema import video_keys
 from handrail.datasets.presentation.drawing import address
-from handrail.datasets.quality.demonstration import Demonstration
+from handrail.datasets.quality.episode import Episode
 from handrail.datasets.reading.reader import DatasetInfo
 
 _EPISODES = 3  # shown of each group
@@ -27,7 +27,7 @@ def first_pictures(group: Group) -> list[tuple[str, str]]:
     return shown
 
 
-def _first_frame(info: DatasetInfo, key: str, episode: Demonstration) -> str:
+def _first_frame(info: DatasetInfo, key: str, episode: Episode) -> str:
     import av
     from av.error import FFmpegError
 

@@ -196,10 +196,12 @@ def _condition(
             f"--protection {protection}: expected a policy of joint velocities, or own or none; "
             f"{checkpoint.folder} decides on the intent of mode {meta.mode}"
         )
-    name = (meta.mode or meta.policy) + (" intent" if checkpoint.intent_mode else "")
+    written = meta.actions if checkpoint.intent_mode or meta.actions == "targets" else ""
+    name = " ".join(filter(None, (meta.mode or meta.policy, written)))
     protected = "" if chosen == own else "unprotected" if chosen == "none" else chosen
     label = " ".join(filter(None, (config.label or name, protected, perturbation.words)))
-    return PolicyCondition(checkpoint, chosen, perturbation, config.time_limit, label)
+    limit = config.time_limit or meta.time_limit
+    return PolicyCondition(checkpoint, chosen, perturbation, limit, label)
 
 
 def own_protection(mode: str) -> str:

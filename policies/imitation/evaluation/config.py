@@ -48,7 +48,7 @@ class EvaluateConfig(ExecutionConfig):
     fps: int = 20
     """Decisions a second of such policies: the rate of their dataset [Hz]."""
     time_limit: float = 0.0
-    """Time after which a rollout is given up [s]; the task's own when 0."""
+    """Time after which a rollout is given up [s]; when 0, that of the demonstrations, or the task's own."""
     video: str = ""
     """Also film the first rollout to this .mp4 file (needs OpenGL)."""
     checkpoints: Annotated[tyro.conf.Positional[Words], tyro.conf.arg(metavar="FOLDER [FOLDER …]")] = ()
@@ -115,7 +115,7 @@ class EvaluateConfig(ExecutionConfig):
                 raise HandrailError(f"--{flag} {getattr(self, flag)}: expected one or more, each once")
         if not 0.0 <= self.time_limit <= MOST_TIME:
             raise HandrailError(
-                f"--time_limit {self.time_limit}: expected 0 (the task's own) to {MOST_TIME} s"
+                f"--time_limit {self.time_limit}: expected 0 (that of the demonstrations) to {MOST_TIME} s"
             )
         if not self.folders:
             raise HandrailError(

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from handrail.collect.config import FPS_RANGE
+from handrail.collect.config import FPS_RANGE, MOST_TIME
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.entries import Entry, is_count, is_name, is_number, is_table
 from handrail.controllers.errors import HandrailError, message_of
@@ -39,6 +39,9 @@ _CHECKED = {  # what more has to hold of `PolicyMeta` than the types of its fiel
         f"a whole number from {_LOW} to {_HIGH}", lambda value: is_count(value) and _LOW <= value <= _HIGH
     ),
     "actions": Entry(f"one of {', '.join(ACTION_SPACES)}", lambda value: value in ACTION_SPACES),
+    "time_limit": Entry(
+        f"0 to {MOST_TIME:g} s", lambda value: is_number(value) and 0 <= value <= MOST_TIME, needed=False
+    ),
     "sizes": Entry("settings by name", lambda value: _are_sizes(value), needed=False),
     "validation": Entry("losses by update", lambda value: _are_losses(value), needed=False),
 }
@@ -53,7 +56,7 @@ class PolicyMeta:
         mode: their teleop mode; "mixed" if there were several, "" if they do not say.
         robot: their robot.
         fps: decisions a second [Hz].
-        actions: `realised`, `intent` or `recorded`.
+        actions: one of `ACTION_SPACES`.
         training_seed: of the first weights and the order of samples.
         dataset_draw: seed of the choice of episodes.
         trained_on: `episodes`, `attempts`, `operator_time` [s].
@@ -64,6 +67,7 @@ class PolicyMeta:
         sizes: what the training really used where its settings say 0, a preset's (`Preset`).
         episodes: numbers of the episodes that it learnt from, in order.
         data: digest of what it learnt from.
+        time_limit: that its episodes had at most [s]; 0 if that was the task's own, or they do not say.
         validation: loss on the episodes that were held out, by update.
     """
 
@@ -82,6 +86,7 @@ class PolicyMeta:
     sizes: Mapping[str, Any] = field(default_factory=dict)
     episodes: Sequence[int] = ()
     data: str = ""
+    time_limit: float = 0.0
     validation: Mapping[str, float] = field(default_factory=dict)
 
 

@@ -1,16 +1,19 @@
 """What a policy reads and writes, and how both come from and go to what Handrail records.
 
 It writes the joint velocities that came about, or the operator's own command: both are values on channels, in
-the base's axes like what the policy sees.
+the base's axes like what the policy sees. Or it writes positions that all joints shall go to, as a leader arm
+says them: `q* = q + v / k`, from which the same velocity comes back, `v = k (q* − q)`, and another one where
+the robot is elsewhere. Whatever comes out, the robot's limits bound it.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
+from handrail.collect.operators.human.steering import FOLLOW
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.entries import Entry, is_text, lists
 from handrail.controllers.errors import HandrailError, unknown_name
@@ -22,9 +25,10 @@ from handrail.policies.imitation.interface.relative import RelativeView
 
 Columns = Mapping[str, np.ndarray]
 Mask = tuple[bool, ...]
-ACTIONS = ("realised", "intent")
+ACTIONS = ("realised", "targets", "intent")
 STATE, ENVIRONMENT, ACTION = "observation.state", "observation.environment_state", "action"
-COLUMNS = (STATE, ENVIRONMENT, ACTION, "teleop.values", "teleop.mask")
+MASK = "teleop.mask"
+COLUMNS = (STATE, ENVIRONMENT, ACTION, "teleop.values", MASK)
 _GRIPPER = "gripper"
 _HALF = 0.5  # a gripper command beyond it closes
 _CHANNELS = Entry("names of channels", lists(is_text))
@@ -36,11 +40,12 @@ class PolicyInterface:
     """Between what is recorded and what a policy reads and writes; saved beside every checkpoint.
 
     Attributes:
-        actions: `realised`, the joint velocities that came about, or `intent`, the operator's own command.
+        actions: `realised`, the joint velocities that came about, `targets`, joint positions that lead there,
+            or `intent`, the operator's own command.
         state_names: of `observation.state` as recorded, (s,).
         environment_names: of `observation.environment_state` as recorded, (e,).
         channels: names of the command channels as recorded, (m,).
-        masks: the sets of channels that the operator owned, (m,) each; none for `realised`.
+        masks: the sets of channels that the operator owned, (m,) each; of `intent` alone.
         base_pose: whether it sees where the base is; older checkpoints do not say, and do not.
     """
 
@@ -55,7 +60,7 @@ class PolicyInterface:
     def of_dataset(
         cls,
         features: Mapping[str, Feature],
-        episodes: Sequence[Columns],
+        episodes: Iterable[Columns],
         actions: str,
         base_pose: bool = True,
     ) -> "PolicyInterface":
@@ -63,8 +68,8 @@ class PolicyInterface:
 
         Args:
             features: of the dataset.
-            episodes: `COLUMNS` of each.
-            actions: `realised` or `intent`.
+            episodes: `MASK` of each; read only where the operator's own commands are learnt.
+            actions: one of `ACTIONS`.
             base_pose: whether it shall see where the base is.
 
         Raises:
@@ -72,6 +77,8 @@ class PolicyInterface:
         """
         if actions not in ACTIONS:
             raise unknown_name("action space", actions, ACTIONS)
+        if actions == "targets" and not base_pose:
+            raise HandrailError("--actions targets: expected a policy that sees where the base is, got none")
         state, environment, asked = (_names(features, key) for key in (STATE, ENVIRONMENT, "teleop.values"))
         names = tuple(name for name in asked if name != _GRIPPER)
         masks = _masks_of(_channels(names), episodes) if actions == "intent" else ()
@@ -85,6 +92,8 @@ class PolicyInterface:
     @property
     def action_names(self) -> tuple[str, ...]:
         """Names of what the policy writes: channels, a number for each mask if several, the gripper, (a,)."""
+        if self.actions == "targets":
+            return (*(f"{joint.removeprefix('joint.')}.pos" for joint in self._known.joints), _GRIPPER)
         flags = tuple(f"mask.{index}" for index in range(len(self.masks))) if len(self.masks) > 1 else ()
         return (*(self.channels[index] for index in self.commanded), *flags, _GRIPPER)
 
@@ -104,20 +113,27 @@ class PolicyInterface:
         """Return the actions of a recorded episode, (T, a) float32, from its `COLUMNS`."""
         state = columns[STATE].astype(float)
         values, gripper = self._asked(columns) if self.masks else self._realised(state, columns)
+        if self.actions == "targets":
+            values[:, self._known.joint_slice] = (
+                self._view.positions(state) + values[:, self._known.joint_slice] / FOLLOW
+            )
         pose = self._view.pose(state)
         for pair in self._pairs:
             values[:, pair] = pose.turned(values[:, pair])
-        rows = columns["teleop.mask"][:, : len(self.channels)].astype(bool)
+        rows = columns[MASK][:, : len(self.channels)].astype(bool)
         flags = [(rows == mask).all(axis=1) for mask in self.masks] if len(self.masks) > 1 else []
         return np.column_stack([values[:, self.commanded], *flags, gripper]).astype(np.float32)
 
     def decode(self, action: FloatArray, state: FloatArray) -> Intent:
         """Return what an action (a,) asks for, on the likeliest mask, in an observed state (s,)."""
-        action, pose = np.asarray(action, float), self._view.pose(np.asarray(state, float)[None])
+        action, state = np.asarray(action, float), np.asarray(state, float)[None]
+        pose = self._view.pose(state)
         values, count = np.zeros((1, len(self.channels))), len(self.commanded)
         values[0, self.commanded] = action[:count]
         for pair in self._pairs:
             values[:, pair] = pose.turned_back(values[:, pair])
+        if self.actions == "targets":
+            values[0, self._known.joint_slice] = self._toward(action[:count], self._view.positions(state)[0])
         flags = action[count:-1]
         mask = np.array(self._sets[int(np.argmax(flags)) if len(flags) else 0], dtype=bool)
         return Intent(values[0], mask, gripper=float(action[-1] > _HALF))
@@ -157,6 +173,13 @@ class PolicyInterface:
         values[:, self._known.joint_slice] = np.concatenate([velocities[1:], velocities[-1:]])
         return values, columns[ACTION][:, -1]
 
+    def _toward(self, target: FloatArray, q: FloatArray) -> FloatArray:
+        """Return the velocities that take the joints to a target, (n,); a base turns the shorter way."""
+        way = target - q
+        if self._known.base:
+            way[2] = (way[2] + np.pi) % (2.0 * np.pi) - np.pi
+        return FOLLOW * way
+
     @cached_property
     def _known(self) -> Channels:
         return _channels(self.channels)
@@ -180,18 +203,20 @@ class PolicyInterface:
 
     @cached_property
     def _pairs(self) -> list[list[int]]:
-        """(x, y) pairs along the world's axes; one that a mask splits stays so."""
+        """(x, y) pairs of velocities along the world's axes; one that a mask splits stays so."""
+        if self.actions == "targets":
+            return []
         tool, joint = self._known.tool_slice.start, self._known.joint_slice.start
         starts = (tool, tool + 3, joint) if self._known.base else (tool, tool + 3)
         whole = [start for start in starts if all(mask[start] == mask[start + 1] for mask in self._sets)]
         return [[start, start + 1] for start in whole]
 
 
-def _masks_of(channels: Channels, episodes: Sequence[Columns]) -> tuple[Mask, ...]:
+def _masks_of(channels: Channels, episodes: Iterable[Columns]) -> tuple[Mask, ...]:
     """Return every set of channels that an operator owned in some episodes."""
     masks: set[Mask] = set()
     for columns in episodes:
-        rows = columns["teleop.mask"][:, : channels.size].astype(bool)
+        rows = columns[MASK][:, : channels.size].astype(bool)
         masks |= set(map(tuple, np.unique(rows, axis=0).tolist()))
     if not any(map(any, masks)):
         raise HandrailError("intent as action: expected episodes in which an operator steers, got none")

@@ -2,7 +2,7 @@
 
 import hashlib
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -22,6 +22,7 @@ from handrail.policies.imitation.interface.interface import (
     ACTION,
     COLUMNS,
     ENVIRONMENT,
+    MASK,
     STATE,
     PolicyInterface,
 )
@@ -68,7 +69,7 @@ class Source:
         digest = hashlib.sha256()
         for key, values in sorted(self.columns.items()):
             digest.update(f"{key} {values.dtype} {values.shape}".encode())
-            digest.update(np.ascontiguousarray(values).tobytes())
+            digest.update(np.ascontiguousarray(values).data)
         return digest.hexdigest()[:16]
 
     @property
@@ -207,14 +208,13 @@ def _interpreted(
             f"--actions {actions}: expected the columns that handrail-record writes, found no"
             f" {', '.join(missing)}; for other datasets say --actions recorded"
         )
-    episodes = _rows(info, selection, COLUMNS)
-    interface = PolicyInterface.of_dataset(info.features, episodes, actions, base_pose)
-    observed = [interface.observe(episode[STATE], episode[ENVIRONMENT]) for episode in episodes]
-    columns = {
-        STATE: np.concatenate([state for state, _ in observed]),
-        ENVIRONMENT: np.concatenate([environment for _, environment in observed]),
-        ACTION: np.concatenate([interface.encode(episode) for episode in episodes]),
-    }
+    masks = _each(info, selection, [MASK])
+    interface = PolicyInterface.of_dataset(info.features, masks, actions, base_pose)
+    columns = _joined(
+        dict(zip((STATE, ENVIRONMENT), interface.observe(episode[STATE], episode[ENVIRONMENT]), strict=True))
+        | {ACTION: interface.encode(episode)}
+        for episode in _each(info, selection, COLUMNS)
+    )
     names = dict(zip(columns, (*interface.observation_names, interface.action_names), strict=True))
     columns = {key: values for key, values in columns.items() if values.shape[1]}
     return interface, {key: _feature("float32", (len(names[key]),), names[key]) for key in columns}, columns
@@ -232,19 +232,30 @@ def _recorded(
         raise HandrailError(
             f"dataset {str(info.root)!r}: expected a column 'action', got {', '.join(keys) or 'none'}"
         )
-    episodes = _rows(info, selection, keys)
-    columns = {key: np.concatenate([episode[key] for episode in episodes]) for key in keys}
-    columns = {key: v.astype(np.float32) if v.dtype == np.float64 else v for key, v in columns.items()}
+    columns = _joined(
+        {key: v.astype(np.float32) if v.dtype == np.float64 else v for key, v in episode.items()}
+        for episode in _each(info, selection, keys)
+    )
     features = {key: _feature(f.dtype, f.shape, f.names) for key in keys for f in (info.features[key],)}
     if config.policy in _READ_SCENE and STATE in columns and not (ENVIRONMENT in columns or _pictured(info)):
         features[ENVIRONMENT], columns[ENVIRONMENT] = features[STATE], columns[STATE]
     return features, columns
 
 
-def _rows(info: DatasetInfo, selection: Selection, columns: Sequence[str]) -> list[dict[str, np.ndarray]]:
-    """Return columns of the selected episodes."""
+def _each(info: DatasetInfo, selection: Selection, columns: Sequence[str]) -> Iterator[Columns]:
+    """Yield columns of the selected episodes, one episode in memory at a time."""
     with data_files() as files:
-        return [read_rows_of(info, dict(row), columns, files) for row in selection.rows]
+        for row in selection.rows:
+            yield read_rows_of(info, row, columns, files)
+
+
+def _joined(episodes: Iterable[Columns]) -> Columns:
+    """Return columns of episodes, one after the other."""
+    parts: dict[str, list[np.ndarray]] = {}
+    for episode in episodes:
+        for key, values in episode.items():
+            parts.setdefault(key, []).append(values)
+    return {key: np.concatenate(parts.pop(key)) for key in list(parts)}
 
 
 def _check_inputs(config: TrainConfig, info: DatasetInfo, features: Mapping[str, Any]) -> None:

@@ -3,12 +3,14 @@
 import logging
 import os
 import shutil
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+from handrail.collect.session.build import build_task
+from handrail.collect.session.recorded_settings import COLUMN, recorded_settings
 from handrail.controllers.entries import is_name
 from handrail.controllers.errors import HandrailError
 from handrail.policies.imitation.config import TrainConfig
@@ -190,8 +192,20 @@ def _meta(source: Source, steps: int, losses: Mapping[int, float] | None = None)
         sizes=as_json(resolved(config)),
         episodes=[int(row["episode_index"]) for row in rows],
         data=source.digest,
+        time_limit=_time_limit(rows),
         validation={str(step): loss for step, loss in (losses or {}).items()},
     )
+
+
+def _time_limit(rows: Sequence[Mapping[str, Any]]) -> float:
+    """Return the longest time that episodes were given [s]; 0 for the task's own, or if one does not say."""
+    try:
+        settings = [recorded_settings(row) for row in {str(row.get(COLUMN)): row for row in rows}.values()]
+        if not any(each.time_limit for each in settings):
+            return 0.0
+        return float(max(build_task(each).horizon for each in settings))
+    except HandrailError:
+        return 0.0
 
 
 def _completion(meta: PolicyMeta) -> "Completion":

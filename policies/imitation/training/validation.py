@@ -48,7 +48,8 @@ class Validation:
             ]
         policy.train()
         mean: Any = torch.tensor(sum(losses) / len(self._frames), device=accelerator.device)
-        loss = float(accelerator.reduce(mean, reduction="mean"))
+        reduced: Any = accelerator.reduce(mean, reduction="mean")
+        loss = float(reduced)
         if not np.isfinite(loss):
             raise HandrailError(
                 f"training: expected a finite loss on held-out episodes, got {loss} after {step} updates"

@@ -51,6 +51,7 @@ def recording(cell: Cell, design: StudyDesign, root: Path, so_far: int = 0) -> R
             fps=_FPS,
         ),
         resume=root.exists(),
+        workers=1,  # a job has one core
     )
 
 
@@ -100,6 +101,7 @@ def evaluations(job: Job, design: StudyDesign, folder: str = "policy") -> dict[s
         "seed": seed_of(design, policy.cell),
         "label": policy.label,
         "time_limit": design.tasks[policy.cell.task].rollout_limit,
+        "workers": 1,  # a job has one core
     }
     found = {"nominal": EvaluateConfig(episodes=design.rollouts, **common)}
     if job.robust and more:

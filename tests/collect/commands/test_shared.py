@@ -5,7 +5,11 @@ import shutil
 import signal
 import subprocess
 import sys
+from errno import ENOSPC
+from unittest import mock
 
+import av
+import numpy as np
 import pytest
 from command_helpers import command
 from execution_helpers import is_alive
@@ -46,6 +50,26 @@ def test_any_number_of_workers_records_the_same(workers, alone, tmp_path):
     assert content(tmp_path / "d") == alone
     assert os.listdir(tmp_path) == ["d"]
     assert f"{EPISODES} episodes, " in done.stderr
+
+
+def pictures(root):
+    """Return every picture of a dataset, decoded, in order."""
+    for path in sorted(root.glob("videos/*/*/*.mp4")):
+        with av.open(str(path)) as video:
+            yield from (frame.to_ndarray(format="rgb24") for frame in video.decode(video=0))
+
+
+@pytest.mark.slow
+@pytest.mark.needs_gl
+def test_the_pictures_are_the_same_too(tmp_path):
+    flags = ["--cameras", "wrist", "--image_size", "64"]
+    record(tmp_path / "alone", *flags, "--workers", "1", episodes=8)
+    record(tmp_path / "shared", *flags, "--workers", "2", episodes=8)
+    assert content(tmp_path / "shared") == content(tmp_path / "alone")
+    pairs = list(zip(pictures(tmp_path / "alone"), pictures(tmp_path / "shared"), strict=True))
+    assert len(pairs) == read_info(tmp_path / "alone").frames
+    assert all(np.array_equal(one, other) for one, other in pairs)
+    assert any(np.ptp(one) > 50 for one, _ in pairs)
 
 
 def test_episodes_are_added_to_those_that_one_core_recorded(alone, tmp_path):
@@ -127,6 +151,20 @@ def test_a_merge_that_was_done_is_not_done_again(alone, tmp_path):
     assert not shards.exists()
 
 
+def test_a_disk_that_is_full_when_the_shards_are_put_together_costs_no_episode(alone, tmp_path):
+    root = tmp_path / "d"
+    with mock.patch("handrail.collect.commands.shards.write_anew", side_effect=OSError(ENOSPC, "it is full")):
+        done = command(root, *FLAGS, "--dataset.num_episodes", EPISODES, "--workers", 2)
+    assert done.returncode == 1
+    assert f"cannot write dataset {str(root)!r}: it is full" in done.stderr
+    assert read_info(root).episodes == 0
+    times = {each for path in saved(tmp_path / ".d.shards") for each in started(path.parents[3])}
+    assert len(times) >= 5
+    record(root)
+    assert content(root) == alone
+    assert times <= set(started(root))
+
+
 def test_a_dataset_that_has_changed_meanwhile_is_left_alone(alone, tmp_path):
     root, shards = tmp_path / "d", tmp_path / ".d.shards"
     record(root, episodes=2)
@@ -143,10 +181,31 @@ def test_a_dataset_that_has_changed_meanwhile_is_left_alone(alone, tmp_path):
 
 
 @pytest.mark.parametrize(
+    ("episodes", "settings", "expected"),
+    [
+        (99, {}, 1),
+        (100, {}, 8),
+        (100, {"workers": 1}, 1),
+        (100, {"workers": 3}, 3),
+        (5, {"workers": 3}, 3),
+        (100, {"operator": "browser"}, 1),
+        (100, {"realtime": True}, 1),
+        (100, {"display_web": True}, 1),
+        (100, {"robot": "lekiwi", "robot_client": "lekiwi", "task": "reach"}, 1),
+    ],
+)
+def test_all_cores_record_where_that_pays_and_is_safe(episodes, settings, expected, monkeypatch):
+    monkeypatch.setattr("handrail.collect.execution.config.cores", lambda: 8)
+    config = RecordConfig(dataset=DatasetConfig(root="d", num_episodes=episodes), **settings)
+    config.check()
+    assert config.processes == expected
+
+
+@pytest.mark.parametrize(
     ("flags", "words"),
     [
         (["--realtime"], "--workers 2: expected a recording without --realtime"),
-        (["--operator", "browser"], "--workers 2: expected --operator scripted, got a person"),
+        (["--operator", "browser"], "--workers 2: expected a recording without --operator browser"),
         (["--display_save", "x.rrd"], "--workers 2: expected a recording without --display_save"),
         (["--ray", "auto"], "--ray auto and --workers 2: expected one of them"),
     ],

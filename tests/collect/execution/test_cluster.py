@@ -1,13 +1,18 @@
 """On a Ray cluster of two computers, both here, jobs give what they give anywhere, also when one is lost."""
 
+import io
+import json
 import os
-import threading
-from unittest import mock
+import signal
+import subprocess
+import sys
+import time
 
 import pytest
 from command_helpers import command
 from execution_helpers import dying, noted, refusing, squared, threads
-from places import HELPERS
+from ray_helpers import record_with_a_loss, two_computers
+from rich.console import Console
 from shared_helpers import content, saved, started, wait_until
 
 from handrail.collect.execution.config import ExecutionConfig
@@ -15,32 +20,29 @@ from handrail.collect.execution.engine import TRIES
 from handrail.collect.execution.execution import Execution
 from handrail.collect.execution.job import Job
 
-os.environ["RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER"] = "0"  # else Ray looks for 127.0.0.1 at another address
-utils = pytest.importorskip("ray.cluster_utils", reason="needs Ray: pip install '.[cluster]'")
+pytest.importorskip("ray.cluster_utils", reason="needs Ray: pip install '.[cluster]'")
 pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("ignore")]
-NODE = {"num_cpus": 1, "object_store_memory": 100_000_000, "node_ip_address": "127.0.0.1"}
 EPISODES = 40
-FLAGS = ["--task", "reach", "--time_limit", "1.0", "--seed", "3", "--dataset.num_episodes", str(EPISODES)]
+FLAGS = ["--task", "reach", "--time_limit", "1.0", "--seed", "3"]
 
 
 @pytest.fixture(scope="module")
 def cluster():
-    paths = [str(HELPERS), os.environ.get("PYTHONPATH", "")]  # where the nodes find this test's jobs
-    settings = {
-        "PYTHONPATH": os.pathsep.join(filter(None, paths)),
-        "RAY_USAGE_STATS_ENABLED": "0",
-        "RAY_agent_register_timeout_ms": "300000",  # others may compute here too
-    }
-    with mock.patch.dict(os.environ, settings):
-        made = utils.Cluster(initialize_head=True, head_node_args={**NODE, "include_dashboard": False})
-        made.add_node(**NODE)
-        made.wait_for_nodes(60)
+    with two_computers() as made:
         yield made
-        made.shutdown()
 
 
-def run(jobs, cluster):
-    with Execution(ExecutionConfig(ray=cluster.address), "jobs") as execution:
+@pytest.fixture(scope="module")
+def alone(tmp_path_factory):
+    """What one core records."""
+    root = tmp_path_factory.mktemp("alone") / "d"
+    done = command(root, *FLAGS, "--dataset.num_episodes", EPISODES)
+    assert done.returncode == 0, done.stderr
+    return content(root)
+
+
+def run(jobs, cluster, console=None):
+    with Execution(ExecutionConfig(ray=cluster.address), "jobs", console) as execution:
         return {result.job.name: result for result in execution.run(jobs)}
 
 
@@ -53,7 +55,9 @@ def test_results_and_failures_are_those_of_any_other_place(cluster, tmp_path):
         Job("last", noted, (tmp_path, "last"), needs=("11",)),
         Job("threads", threads),
     ]
-    found = run(jobs, cluster)
+    said = io.StringIO()
+    found = run(jobs, cluster, Console(file=said, width=300))
+    assert f"failed: refused: the disk is full ({log})" in said.getvalue()
     assert [found[str(number)].value for number in range(12)] == [number**2 for number in range(12)]
     assert found["refused"].error == "the disk is full"
     assert "about to fail" in log.read_text()
@@ -74,30 +78,62 @@ def test_a_killed_worker_s_job_runs_again_but_not_for_ever(cluster, tmp_path):
     assert len(list(tmp_path.glob("poison.*"))) == TRIES
 
 
-def test_a_computer_that_is_lost_in_the_middle_costs_no_episode_and_makes_none_twice(cluster, tmp_path):
-    done = command(tmp_path / "alone", *FLAGS)
-    assert done.returncode == 0, done.stderr
-    node, shards = cluster.add_node(**NODE), tmp_path / ".d.shards"
-    kept = []
+def test_a_fresh_process_for_each_job(cluster):
+    jobs = [Job(str(number), threads) for number in range(4)]
+    with Execution(ExecutionConfig(ray=cluster.address), "jobs", fresh=True) as execution:
+        assert len({result.value[1] for result in execution.run(jobs)}) == 4
 
-    def lose():
-        wait_until(lambda: len(saved(shards)) >= EPISODES // 3)
-        kept.extend(saved(shards))
-        cluster.remove_node(node, allow_graceful=False)
 
-    losing = threading.Thread(target=lose)
-    losing.start()
-    done = command(tmp_path / "d", *FLAGS, "--ray", cluster.address)
-    losing.join()
-    assert done.returncode == 0, done.stderr
-    assert EPISODES // 3 <= len(kept) < EPISODES
-    assert content(tmp_path / "d") == content(tmp_path / "alone")
+def test_a_computer_that_is_lost_in_the_middle_costs_no_episode_and_makes_none_twice(
+    cluster, alone, tmp_path
+):
+    loss = record_with_a_loss(cluster, tmp_path / "d", EPISODES, *FLAGS)
+    assert EPISODES // 3 <= loss.kept < EPISODES
+    assert loss.twice == 0
+    assert content(tmp_path / "d") == alone
     assert len(set(started(tmp_path / "d"))) == EPISODES
-    assert sorted(os.listdir(tmp_path)) == ["alone", "d"]
+    assert sorted(os.listdir(tmp_path)) == ["d"]
+
+
+def test_an_interrupt_ends_all_at_once_and_one_core_goes_on(cluster, alone, tmp_path):
+    root, shards = tmp_path / "d", tmp_path / ".d.shards"
+    words = [sys.executable, "-m", "handrail.scripts.record", str(root), *FLAGS, "--ray", cluster.address]
+    process = subprocess.Popen(
+        [*words, "--dataset.num_episodes", str(EPISODES)],
+        stderr=subprocess.PIPE,
+        stdout=subprocess.DEVNULL,
+        text=True,
+    )
+    wait_until(lambda: len(saved(shards)) >= EPISODES // 4 or process.poll() is not None)
+    process.send_signal(signal.SIGINT)
+    _, said = process.communicate(timeout=120)
+    assert process.returncode == 130, said
+    assert "interrupted; what was recorded is kept, and the same flags go on" in said
+    assert "Traceback" not in said
+    kept = {path: path.read_bytes() for path in saved(shards)}
+    assert EPISODES // 4 <= len(kept) < EPISODES
+    time.sleep(3.0)  # what would still record would be heard of by now
+    assert {path: path.read_bytes() for path in saved(shards)} == kept
+    times = {each for path in kept for each in started(path.parents[3])}
+    done = command(root, *FLAGS, "--dataset.num_episodes", EPISODES)
+    assert done.returncode == 0, done.stderr
+    assert content(root) == alone
+    assert times <= set(started(root))
+
+
+def test_the_same_rows_from_one_two_and_three_workers_and_from_the_cluster(cluster, tmp_path):
+    file = tmp_path / "scaling.json"
+    flags = ["--episodes", 12, "--workers", "1,2,3", "--ray", cluster.address, "--folder", tmp_path]
+    done = command(*flags, "--json", file, name="scaling")
+    assert done.returncode == 0, done.stderr
+    runs = json.loads(file.read_text())["runs"]
+    assert [(run["workers"], run["ray"]) for run in runs] == [(1, False), (2, False), (3, False), (2, True)]
+    assert len({run["rows"] for run in runs}) == 1
+    assert "2 on Ray" in done.stdout
 
 
 def test_no_cluster_is_one_line(tmp_path, monkeypatch):
-    done = command(tmp_path / "d", *FLAGS, "--ray", "127.0.0.1:1")
+    done = command(tmp_path / "d", *FLAGS, "--dataset.num_episodes", 1, "--ray", "127.0.0.1:1")
     assert done.returncode == 2
     assert "--ray 127.0.0.1:1: expected a running cluster (`ray start --head`)" in done.stderr
     assert done.stderr.count("\n") == 1

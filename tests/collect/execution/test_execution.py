@@ -8,20 +8,31 @@ import sys
 import time
 
 import pytest
-from execution_helpers import broken, dying, is_alive, leaving, noted, refusing, sleeping, squared, threads
+from execution_helpers import (
+    awaiting,
+    broken,
+    dying,
+    is_alive,
+    leaving,
+    noted,
+    refusing,
+    sleeping,
+    squared,
+    threads,
+)
 from places import ROOT
 from rich.console import Console
 
-from handrail.collect.execution.config import ExecutionConfig
+from handrail.collect.execution.config import ExecutionConfig, cores
 from handrail.collect.execution.engine import TRIES
 from handrail.collect.execution.execution import Execution
 from handrail.collect.execution.job import Job
 from handrail.controllers.errors import HandrailError
 
-EVERYWHERE = [ExecutionConfig(), ExecutionConfig(workers=2)]
+EVERYWHERE = [ExecutionConfig(workers=1), ExecutionConfig(workers=2)]
 
 
-def run(jobs, config=ExecutionConfig(), fresh=False, **settings):  # noqa: B008
+def run(jobs, config=ExecutionConfig(workers=1), fresh=False, **settings):  # noqa: B008
     """Return what came of jobs, by name, in the order in which they were done."""
     with Execution(config, "jobs", fresh=fresh) as execution:
         return {result.job.name: result for result in execution.run(jobs, **settings)}
@@ -73,6 +84,22 @@ def test_what_is_no_longer_wanted_does_not_begin(config, tmp_path):
     found = run(jobs, config, wanted=lambda job: int(job.name) % 2 == 0)
     assert set(found) == {"0", "2", "4"}
     assert sorted(path.stem for path in tmp_path.iterdir()) == ["0", "2", "4"]
+
+
+def test_the_bar_shows_how_far_the_running_jobs_are(tmp_path):
+    said, asked = io.StringIO(), []
+
+    def part(job):
+        asked.append(job.name)
+        (tmp_path / "asked").touch()
+        return 3
+
+    console = Console(file=said, width=100, force_terminal=True)
+    with Execution(ExecutionConfig(workers=2), "jobs", console) as execution:
+        list(execution.run([Job("long", awaiting, (tmp_path / "asked",), size=10)], part=part))
+    assert set(asked) == {"long"}
+    assert " 3/10" in said.getvalue()
+    assert "10/10" in said.getvalue()
 
 
 def test_a_killed_worker_s_job_runs_again_and_no_other_does(tmp_path):
@@ -195,8 +222,23 @@ def test_wrong_settings_are_one_line(settings, words):
         ExecutionConfig(**settings).check_execution()
 
 
-def test_all_cores_are_those_that_this_process_may_use():
-    assert ExecutionConfig(workers=0).processes == len(os.sched_getaffinity(0))
+@pytest.mark.parametrize(
+    ("files", "expected"),
+    [
+        ({}, 8),
+        ({"cpu.max": "max 100000\n"}, 8),
+        ({"cpu.max": "250000 100000\n"}, 2),
+        ({"cpu.max": "50000 100000\n"}, 1),
+        ({"cpu/cpu.cfs_quota_us": "-1\n", "cpu/cpu.cfs_period_us": "100000\n"}, 8),
+        ({"cpu/cpu.cfs_quota_us": "300000\n", "cpu/cpu.cfs_period_us": "100000\n"}, 3),
+    ],
+)
+def test_all_cores_are_those_that_this_process_may_use(files, expected, tmp_path, monkeypatch):
+    monkeypatch.setattr(os, "sched_getaffinity", lambda process: range(8))
+    (tmp_path / "cpu").mkdir()
+    for name, content in files.items():
+        (tmp_path / name).write_text(content)
+    assert cores(tmp_path) == expected
 
 
 def test_a_cluster_without_ray_says_how_to_install_it(monkeypatch):

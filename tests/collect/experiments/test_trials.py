@@ -17,7 +17,8 @@ DONE = Trial("reach", "ee", 0, 0, True, "", 4.0, 80, 0, 0.05, 0, 0, 0.0)
 @pytest.fixture(scope="module")
 def config(tmp_path_factory):
     path = tmp_path_factory.mktemp("trials") / "new" / "trials.json"
-    return TrialsConfig(tasks="reach", modes="ee,decoupled", episodes=3, persons=2, noise=0.5, json=str(path))
+    settings = {"episodes": 3, "persons": 2, "noise": 0.5, "workers": 1}
+    return TrialsConfig(tasks="reach", modes="ee,decoupled", json=str(path), **settings)
 
 
 @pytest.fixture(scope="module")

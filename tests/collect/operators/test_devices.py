@@ -76,6 +76,15 @@ def test_a_leader_starts_without_a_jump_and_never_outruns_its_operator(view):
     assert len({intent.mask.tobytes() for intent in intents}) == 1
 
 
+def test_a_leader_moves_base_and_arm_at_once(view):
+    """Whatever the script attends to."""
+    intents, path = drive(view, "leader", HumanSettings.perfect(), seconds=2.0)
+    moving = np.abs(np.array([intent.values[intent.mask] for intent in intents[1:]])) > 1e-3
+    both = moving[:, :3].any(axis=1) & moving[:, 3:].any(axis=1)
+    assert both.mean() > 0.9
+    assert np.abs(path[-1] - HOME)[:2].max() > 0.05
+
+
 def test_a_still_leader_holds_the_arm(view):
     class Rest(Wisher):
         def motion_goal(self, view):

@@ -10,9 +10,9 @@ from scipy.spatial.transform import Rotation
 from handrail.collect.operators.devices.input_map import StickMap
 from handrail.collect.operators.human.hand import HumanHand, minimum_jerk
 from handrail.collect.operators.human.human import HumanSettings
-from handrail.collect.operators.human.motion_goal import MotionGoal
+from handrail.collect.operators.human.motion_goal import MotionGoal, Target
 from handrail.collect.operators.human.perception import Perception
-from handrail.collect.operators.human.steering import Gains, base_twist, hand_twist
+from handrail.collect.operators.human.steering import Gains, base_twist, hand_errors, hand_twist
 from handrail.collect.operators.modes import MODES
 from handrail.collect.operators.scripts.base_placement import (
     standing_point,
@@ -21,6 +21,7 @@ from handrail.collect.operators.scripts.base_placement import (
 )
 from handrail.collect.operators.scripts.drawer import handle_rotation
 from handrail.collect.operators.scripts.pick_place import grasp_rotation
+from handrail.collect.operators.scripts.scripted import gains_of
 from handrail.collect.tasks.cabinet import HANDLE, inward
 from handrail.collect.tasks.drawer import Drawer
 from handrail.collect.tasks.reach import Reach
@@ -43,7 +44,7 @@ def signal(steps=200):
 
 
 def run(settings, wanted, times, seed=0):
-    hand = HumanHand(settings, FULL, np.random.default_rng(seed))
+    hand = HumanHand(settings, FULL, FULL, np.random.default_rng(seed))
     return np.array([hand.move(row, time) for row, time in zip(wanted, times, strict=True)])
 
 
@@ -103,6 +104,27 @@ def test_the_hand_never_leaves_the_stick():
     assert np.all(np.abs(moved) <= FULL)
 
 
+@pytest.mark.parametrize("name", ["ridgeback_ur10", "ridgeback_panda", "lekiwi"])
+def test_a_person_is_as_exact_at_the_tool_with_joints_as_with_the_hand(name):
+    model, times = load_model(name), PERIOD * np.arange(4000)
+    sticks = StickMap(model, MODES["direct"], Gains().within(model.description.world))
+    tool, joints = sticks.channels.tool_slice, sticks.channels.joint_slice
+    hand = HumanHand(human(drift=0.02, correlation=0.2), sticks.full, sticks.fine, np.random.default_rng(0))
+    wanted = 1e-9 * sticks.full  # touched, and next to nothing
+    moved = np.array([hand.move(wanted, time) for time in times])
+    by_hand = moved[:, tool] / sticks.full[tool]
+    by_joints = moved[:, joints] @ model.jacobian(model.description.home).T / sticks.full[tool]
+    assert np.sqrt(np.mean(by_hand**2)) == pytest.approx(0.02, rel=0.1)
+    assert np.sqrt(np.mean(by_joints**2)) == pytest.approx(0.02, rel=0.1)
+
+
+def test_a_dead_zone_is_a_share_of_what_is_fine():
+    full, fine = np.array([1.0]), np.array([0.4])
+    hand = HumanHand(human(threshold=0.1, refractory=0.05), full, fine, np.random.default_rng(0))
+    moved = [hand.move(np.array([wanted]), float(time))[0] for time, wanted in enumerate((0.5, 0.53, 0.55))]
+    assert moved == [0.5, 0.5, 0.55]
+
+
 @pytest.mark.parametrize("value", [-0.1, np.nan, np.inf])
 def test_wrong_settings_are_refused(value):
     with pytest.raises(HandrailError, match=r"--human\.noise: expected a finite number"):
@@ -156,6 +178,27 @@ def test_what_is_near_is_judged_well():
         assert np.all(seen[:, 3:] == 0.0)
     assert np.all(errors[0.5] != 0.0)
     np.testing.assert_allclose(errors[0.5], 10.0 * errors[0.05])
+
+
+def test_who_thinks_of_joints_errs_as_who_steers_the_hand():
+    """The pose that is seen is as far off as the way that is seen; what is meant stays what it was."""
+    tool, rng = MODEL.pose(HOME), np.random.default_rng(3)
+    for _ in range(5):
+        turn = Rotation.from_rotvec(rng.uniform(-0.8, 0.8, 3)).as_matrix()
+        goal = Pose(tool.position + rng.uniform(-0.5, 0.5, 3), turn @ tool.rotation)
+        wanted = MotionGoal(hand_errors(tool, goal), np.zeros(3), target=Target(goal, HOME[:3]))
+        seen = Perception(human(misjudgement=0.1), rng).see(wanted, tool, 0.0)
+        assert np.linalg.norm(seen.hand - wanted.hand) > 0.01
+        np.testing.assert_allclose(hand_errors(tool, seen.target.hand), seen.hand, atol=1e-9)
+        assert seen.target.identity == wanted.target.identity
+        assert seen.target.meant == goal
+
+
+def test_full_deflection_is_the_same_in_every_mode():
+    """But for one axis at a time, which has its own."""
+    human = HumanSettings()
+    gains = {name: gains_of(MODEL, mode, human) for name, mode in MODES.items()}
+    assert {name for name, each in gains.items() if each != gains["ee"]} == {"direct_single"}
 
 
 def state(q=HOME, time=0.0):

@@ -66,6 +66,14 @@ def test_a_perfect_operator_carries_the_tray_level(robot):
     assert mask == 4  # where and which way; the tilt is the MPC's
 
 
+def test_the_task_s_objectives_are_a_condition_of_their_own():
+    """Without them the hand is steered whole, and a perfect operator who minds the can keeps it upright."""
+    outcome, watcher = run("tray", mode="ee_whole")
+    (mask,) = {np.frombuffer(mask, dtype=bool).sum() for mask in watcher.masks}
+    assert mask == 6
+    assert outcome.contacts == 0
+
+
 def test_who_drives_with_a_tray_minds_its_height():
     """The arm begins nearer to itself than the MPC likes; left alone it would lower the hand by 0.2 m."""
     outcome, watcher = run("tray", mode="switching", noise=1.0, seed=episode_seed(900, 2))

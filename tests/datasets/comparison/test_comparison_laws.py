@@ -17,9 +17,9 @@ from handrail.datasets.comparison.groups import Group
 from handrail.datasets.comparison.outcomes import LIKE_FOR_LIKE, Pair, in_families, judge_pairs
 from handrail.datasets.format.schema import Feature
 from handrail.datasets.quality.catalogue import METRICS
-from handrail.datasets.quality.consistency import frames_of
 from handrail.datasets.quality.demonstration import Demonstration
 from handrail.datasets.quality.measure import measure
+from handrail.datasets.quality.sample import frames_of
 from handrail.datasets.reading.reader import DatasetInfo
 from handrail.datasets.statistics import resampling
 from handrail.datasets.statistics.paired import wilson
@@ -109,13 +109,13 @@ def test_as_many_frames_stand_for_every_group(monkeypatch):
 @pytest.mark.parametrize("most", [1, 7, 100, 101, 10_000])
 def test_frames_of_episodes(most):
     """Exactly as many as asked for if there are; each at most once; the ends of every episode among them."""
-    members = group("a", 5, rng(5)).episodes
-    chosen = frames_of(members, most)
-    assert sum(map(len, chosen)) == min(most, sum(each.count for each in members))
+    lengths = [each.count for each in group("a", 5, rng(5)).episodes]
+    chosen = frames_of(lengths, most)
+    assert sum(map(len, chosen)) == min(most, sum(lengths))
     assert max(map(len, chosen)) - min(map(len, chosen)) <= (1 if most <= 200 else 21)
-    for each, frames in zip(members, chosen, strict=True):
+    for length, frames in zip(lengths, chosen, strict=True):
         assert len(set(frames)) == len(frames)
-        assert set(frames) <= set(range(each.count))
+        assert set(frames) <= set(range(length))
 
 
 def test_words_describe_a_group_and_claim_nothing(tmp_path):

@@ -5,6 +5,7 @@ import shutil
 from itertools import pairwise
 
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
 from command_helpers import command
 from datasets_guillotine import Guillotine
@@ -28,6 +29,7 @@ from hypothesis import strategies as st
 
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.editing.pack import merge_datasets
+from handrail.datasets.format import data_file, metadata
 from handrail.datasets.format.layout import Layout
 from handrail.datasets.reading.check import check_report
 from handrail.datasets.reading.reader import read_episodes, read_frames
@@ -65,6 +67,23 @@ def content(root) -> list[tuple[dict, dict]]:
     ]
 
 
+def numeric_columns(features) -> tuple[str, ...]:
+    """Return the columns of whose statistics earlier versions kept."""
+    return ("timestamp", *(key for key, feature in features.items() if feature.dtype != "string"))
+
+
+def lines_of(root) -> list:
+    """Return the files of lines of metadata."""
+    return [pq.read_table(path) for path in sorted(root.glob("meta/episodes/*/*.parquet"))]
+
+
+def groups_of(path) -> list[list[int]]:
+    """Return the episodes of each row group of a file."""
+    with pq.ParquetFile(path) as file:
+        read = [file.read_row_group(place, ["episode_index"]) for place in range(file.num_row_groups)]
+    return [sorted(set(table["episode_index"].to_pylist())) for table in read]
+
+
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory):
     """Seven episodes recorded one after the other."""
@@ -72,20 +91,29 @@ def whole(tmp_path_factory):
 
 
 @settings(max_examples=6, deadline=None)
-@given(cuts=st.sets(st.integers(1, 6), max_size=3), most=st.integers(1, 8))
-def test_shards_become_what_one_recording_is(whole, tmp_path_factory, cuts, most):
-    """To the byte in all that summarises; whatever the shards and however large a file may grow."""
+@given(
+    cuts=st.sets(st.integers(1, 6), max_size=3),
+    most=st.sampled_from([1, 4000, volume.MOST_ROWS]),
+    rows=st.sampled_from([1, 25, data_file.ROWS]),
+)
+def test_shards_become_what_one_recording_is(whole, tmp_path_factory, cuts, most, rows):
+    """To the byte in all that summarises; whatever the shards, however large a file or a group may be."""
     folder = tmp_path_factory.mktemp("shards")
     bounds = [0, *sorted(cuts), 7]
     roots = [part(folder / str(a), a, b) for a, b in pairwise(bounds)]
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(volume, "MOST_EPISODES", most)
+        patch.setattr(volume, "MOST_ROWS", most)
+        patch.setattr(data_file, "ROWS", rows)
         merge_datasets(roots, folder / "all")
         merge_datasets([folder / "all"], folder / "again")
     assert content(folder / "all") == content(whole)
     files, recorded = tree(folder / "all"), tree(whole)
     assert {name: files[name] for name in SUMMARIES} == {name: recorded[name] for name in SUMMARIES}
-    assert len([name for name in files if name.startswith("data/")]) == -(-7 // most)
+    written = sorted(name for name in files if name.startswith("data/"))
+    assert len(written) in {1: [7], volume.MOST_ROWS: [1]}.get(most, range(2, 7))
+    groups = [group for name in written for group in groups_of(folder / "all" / name)]
+    assert [episode for group in groups for episode in group] == list(range(7))
+    assert all(sum(map(length_of, group)) <= rows for group in groups if len(group) > 1)
     assert tree(folder / "again") == files
     assert repair(folder / "all").clean
     assert not check_report(folder / "all")
@@ -101,7 +129,7 @@ def test_shards_are_added_to_a_dataset_in_its_place(whole, tmp_path):
 
 
 def test_a_packed_dataset_goes_on_and_is_packed_again(whole, tmp_path, monkeypatch):
-    monkeypatch.setattr(volume, "MOST_EPISODES", 3)
+    monkeypatch.setattr(volume, "MOST_ROWS", 4000)
     root = part(tmp_path / "set", 0, 4)
     merge_datasets([root], root)
     with resume(root) as writer:
@@ -111,7 +139,48 @@ def test_a_packed_dataset_goes_on_and_is_packed_again(whole, tmp_path, monkeypat
     assert repair(root).clean
     merge_datasets([root], root)
     assert content(root) == content(whole)[:6]
-    assert len(list(root.glob("data/*/*"))) == 2
+    assert 1 < len(list(root.glob("data/*/*"))) < 6
+
+
+def test_a_dataset_of_an_earlier_version_goes_on_as_it_was(tmp_path, monkeypatch):
+    """It has statistics of all columns and a row group an episode; packed again, it is as others are."""
+    root, new = tmp_path / "set", part(tmp_path / "new", 0, 4)
+    with monkeypatch.context() as earlier:
+        earlier.setattr(metadata, "counted_columns", numeric_columns)
+        earlier.setattr(data_file, "ROWS", 1)
+        part(root, 0, 3)
+        merge_datasets([root], root)
+    before = lines_of(root)[0].schema.remove_metadata()
+    assert "stats/timestamp/mean" in before.names
+    with resume(root) as writer:
+        record_one(writer, cameras=False)
+    schemas = [table.schema.remove_metadata() for table in lines_of(root)]
+    assert schemas == [before, before]  # LeRobot takes no others together
+    assert open_with_lerobot(root).num_episodes == 4
+    assert content(root) == content(new)
+    assert not check_report(root)
+    for each in (root, new):
+        merge_datasets([each], each)
+    assert content(root) == content(new)
+    assert [table.schema.names for table in lines_of(root)] == [t.schema.names for t in lines_of(new)]
+    assert Layout(root).stats.read_bytes() == Layout(new).stats.read_bytes()
+
+
+def test_a_changed_number_is_damage_whatever_column_it_is_in(tmp_path):
+    """Pages have checksums: rows with a wrong number are not taken for rows that another tool wrote."""
+    root = part(tmp_path / "set", 0, 4)
+    merge_datasets([root], root)
+    path = Layout(root).data(0)
+    group = pq.read_metadata(path).row_group(0)
+    raw = path.read_bytes()
+    for place in range(group.num_columns):
+        column = group.column(place)
+        changed = bytearray(raw)
+        changed[column.data_page_offset + column.total_compressed_size - 3] ^= 1
+        path.write_bytes(changed)
+        assert check_report(root), column.path_in_schema
+    path.write_bytes(raw)
+    assert not check_report(root)
 
 
 def test_lerobot_sees_the_same_items(tmp_path):

@@ -2,14 +2,17 @@
 
 import re
 
+import fsspec
 import pytest
 import yaml
 from command_helpers import command
 from datasets_helpers import CAMERAS, tree
 from editing_helpers import record_episodes
+from fsspec.implementations.memory import MemoryFileSystem
 
 from handrail.datasets.format.layout import Layout
 from handrail.datasets.quality.catalogue import METRICS
+from handrail.datasets.reading.check import check_whole
 from handrail.datasets.reading.reader import read_episodes
 
 
@@ -184,3 +187,66 @@ def test_wrong_settings_are_one_line(root, words, told):
     )
     assert (done.returncode, done.stderr.count("\n")) == (2, 1)
     assert told in done.stderr
+
+
+STORE = "memory://bucket/reach"
+
+
+@pytest.fixture
+def store():
+    system = fsspec.filesystem("memory")
+    yield system
+    system.rm("/bucket", recursive=True) if system.exists("/bucket") else None
+
+
+def there(store):
+    return {path.removeprefix("/bucket/reach/"): store.cat(path) for path in store.find("/bucket/reach")}
+
+
+def test_a_store_gets_what_the_hub_gets_and_it_can_be_read(root, hub, store, tmp_path):
+    litter(root)
+    push(root, "--upload")
+    said = push(root, "--to", STORE).stdout
+    assert f"{root} to {STORE}: " in said
+    assert there(store) == {}
+    assert f"sent to {STORE}" in push(root, "--to", STORE, "--upload").stdout
+    assert there(store) == hub.sent
+    store.get("/bucket/reach", str(tmp_path / "back"), recursive=True)
+    check_whole(tmp_path / "back", verify=True)
+
+
+@pytest.mark.parametrize("sent", [0, 1, 5, 16])
+def test_a_copy_that_was_cut_short_is_no_dataset_and_is_made_again(sent, root, store, monkeypatch):
+    left, put = [None] * sent, MemoryFileSystem.put_file
+
+    def failing(system, *arguments, **settings):
+        if not left:
+            raise ConnectionError("the network\nis gone")
+        left.pop()
+        put(system, *arguments, **settings)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(MemoryFileSystem, "put_file", failing)
+        done = push(root, "--to", STORE, "--upload", code=2)
+    assert f"--to {STORE}: the dataset could not be copied there: the network is gone\n" in done.stderr
+    assert len(there(store)) == sent
+    assert "meta/info.json" not in there(store)
+    push(root, "--to", STORE, "--upload")
+    assert len(there(store)) == 17
+
+
+def test_what_is_in_a_store_is_not_replaced(root, store):
+    push(root, "--to", STORE, "--upload")
+    before = there(store)
+    assert "found 17 files" in push(root, "--to", STORE, "--upload", code=2).stderr
+    assert there(store) == before
+    store.pipe("/bucket/reach/thesis.tex", b"mine")
+    store.rm("/bucket/reach/meta/info.json")
+    assert "choose another place" in push(root, "--to", STORE, "--upload", code=2).stderr
+
+
+@pytest.mark.parametrize("to", ["nosuch://bucket/reach", "s3:bucket", "outputs/reach", "file:///proc/reach"])
+def test_a_place_that_is_none_is_one_line(to, root):
+    said = push(root, "--to", to, "--upload", code=2).stderr
+    assert "--to" in said
+    assert said.count("\n") == 1

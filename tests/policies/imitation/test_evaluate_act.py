@@ -11,7 +11,7 @@ def test_an_untrained_act_drives_without_contact_and_repeatably(tmp_path):
         untrained_act(tmp_path / "intent", "intent"),
         untrained_act(tmp_path / "realised", "realised"),
     )
-    config = EvaluateConfig(policy=(intent, realised), episodes=1, time_limit=1.0)
+    config = EvaluateConfig(policy=(intent, realised), episodes=1, time_limit=1.0, workers=1)
     first, again = evaluate(config), evaluate(config)
     assert set(first["arms"]) == {"ee intent", "ee"}
     for label, arm in first["arms"].items():

@@ -54,7 +54,8 @@ def writes(folder, size):
 
 
 def config(*folders, **settings):
-    return EvaluateConfig(policy=tuple(map(str, folders)), **({"episodes": 1, "time_limit": 0.5} | settings))
+    settings = {"episodes": 1, "time_limit": 0.5, "workers": 1} | settings
+    return EvaluateConfig(policy=tuple(map(str, folders)), **settings)
 
 
 def test_a_policy_of_plain_lerobot_drives(honest):
@@ -205,7 +206,7 @@ def test_the_first_policy_that_drove_is_filmed(folder, tmp_path):
 
 
 def test_the_command_names_the_bad_policy_and_ends_with_1(honest, tmp_path):
-    flags = ["--policy", tmp_path / "nothing", honest, "--episodes", 1, "--time_limit", 0.2]
+    flags = ["--policy", tmp_path / "nothing", honest, "--episodes", 1, "--time_limit", 0.2, "--workers", 1]
     done = command(*flags, name="evaluate")
     assert done.returncode == 1
     assert [line for line in done.stderr.splitlines() if line.startswith("error: ")] == [

@@ -1,6 +1,7 @@
 """Training of imitation policies that was cut off, killed or resumed: the same to the bit, or refused."""
 
 import dataclasses
+import json
 import os
 import shutil
 import signal
@@ -14,7 +15,7 @@ from training_helpers import TINY, tiny, weights, write_dataset
 
 from handrail.collect.config import StoredConfig
 from handrail.controllers.errors import HandrailError
-from handrail.policies.imitation.interface.checkpoint import last_checkpoint, read_meta, write_meta
+from handrail.policies.imitation.interface.checkpoint import NAME, last_checkpoint, read_meta, write_meta
 from handrail.policies.imitation.training import presets
 from handrail.policies.imitation.training.curve import read_curve
 from handrail.policies.imitation.training.source import read_source
@@ -70,6 +71,22 @@ def test_a_training_does_not_go_on_with_other_data_fewer_steps_or_other_sizes(
     monkeypatch.setitem(presets.ACT_CPU, "dropout", 0.1)
     with pytest.raises(HandrailError, match=r"dropout 0\.1: expected 0\.0"):
         train(config, quiet=True)
+
+
+def test_a_training_goes_on_with_the_view_that_it_began_with(recorded, tmp_path):
+    """One of an earlier version does not say it: it did not see where the base is."""
+    config = tiny(recorded, tmp_path / "older", base_pose=False)
+    whole = train(config, quiet=True)
+    older = cut(config, tmp_path / "cut")
+    checkpoint = last_checkpoint(tmp_path / "cut")
+    assert checkpoint
+    path = checkpoint / "pretrained_model" / NAME
+    content = json.loads(path.read_text())
+    del content["interface"]["base_pose"], content["training"]["base_pose"]
+    path.write_text(json.dumps(content))
+    with pytest.raises(HandrailError, match="--base_pose True: expected False"):
+        train(dataclasses.replace(older, base_pose=True), quiet=True)
+    assert weights(train(older, quiet=True)) == weights(whole)
 
 
 def test_a_checkpoint_of_an_earlier_version_goes_on_with_as_much_data(recorded, tmp_path):

@@ -95,6 +95,30 @@ def test_a_checkpoint_says_all_that_is_needed(trained, recorded):
     assert (meta.steps, meta.policy, meta.training["batch_size"]) == (6, "act", 8)
 
 
+@pytest.mark.parametrize(
+    ("limits", "longest"), [((), 0.0), ((0.0, 0.0), 0.0), ((12.0, 45.0), 45.0), ((12.0, 0.0), 30.0)]
+)
+def test_a_checkpoint_says_how_long_its_episodes_could_last(limits, longest, tmp_path):
+    """0 is the task's own limit, 30 s of `reach`."""
+    root = write_dataset(tmp_path / "set", lengths=(9, 7), limits=limits)
+    folder = train(tiny(root, tmp_path / "policy", steps=1), quiet=True)
+    assert read_meta(folder)[1].time_limit == longest
+
+
+def test_joint_targets_are_trained_like_any_action(recorded, tmp_path):
+    """A step of the checkpoint's own turns them into velocities of the whole robot."""
+    folder = train(tiny(recorded, tmp_path, actions="targets", steps=1), quiet=True)
+    interface, meta = read_meta(folder)
+    assert interface is not None
+    assert (interface.actions, meta.actions) == ("targets", "targets")
+    policy, frames = load_policy(folder), read_frames(recorded, 0)
+    seen = interface.observe(frames["observation.state"][0], frames["observation.environment_state"][0])
+    intent = interface.decode(policy.act(*seen), frames["observation.state"][0])
+    assert np.isfinite(intent.values).all()
+    with pytest.raises(HandrailError, match="sees where the base is"):
+        train(tiny(recorded, tmp_path / "blind", actions="targets", base_pose=False), quiet=True)
+
+
 def test_a_loaded_policy_acts_like_lerobot_s(trained, recorded):
     from lerobot.policies.act.modeling_act import ACTPolicy
 

@@ -172,6 +172,13 @@ def test_what_is_not_installed_is_said_before_anything_begins(missing, tmp_path,
     assert starter.begun == []
 
 
+def test_a_cluster_may_be_asked_for_without_saying_anything_of_workers(monkeypatch):
+    monkeypatch.setattr("handrail.collect.execution.config.find_spec", lambda name: name)
+    StudyConfig(ray="auto").check_execution()
+    with pytest.raises(HandrailError, match="--ray auto and --workers 3: expected one of them"):
+        StudyConfig(ray="auto", workers=3).check_execution()
+
+
 @pytest.mark.parametrize(
     ("flags", "words"),
     [

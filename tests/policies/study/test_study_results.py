@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -88,7 +89,7 @@ def test_a_contrast_is_what_its_words_say_draw_by_draw(gathered):
             estimate = found[WORDS[name], scope, "success"].estimate
             assert estimate.value == pytest.approx(values.mean())
             assert estimate.replicates == 4
-            by_scipy = stats.ttest_1samp(values, 0.0)
+            by_scipy: Any = stats.ttest_1samp(values, 0.0)
             wider = estimate.error >= values.std(ddof=1) / 2 - 1e-12
             assert wider
             if estimate.error == pytest.approx(values.std(ddof=1) / 2):
@@ -98,7 +99,7 @@ def test_a_contrast_is_what_its_words_say_draw_by_draw(gathered):
 
 
 def test_only_what_is_declared_is_tested_over_all_tasks(gathered):
-    found = contrasts(gathered())
+    found: Any = contrasts(gathered())
     declared = [each for each in found if each.kind == DECLARED]
     assert [each.name for each in declared] == [WORDS[name] for name in FACTORS.primary]
     assert all(each.tasks == ("reach", "tray") for each in declared)
@@ -106,7 +107,7 @@ def test_only_what_is_declared_is_tested_over_all_tasks(gathered):
     others = [each for each in found if each.kind != DECLARED]
     assert others
     assert all(each.p_adjusted is None and not each.detected for each in others)
-    fewer = contrasts(gathered(replace(DESIGN, factors=replace(FACTORS, primary=("controller",)))))
+    fewer: Any = contrasts(gathered(replace(DESIGN, factors=replace(FACTORS, primary=("controller",)))))
     (one,) = [each for each in fewer if each.kind == DECLARED]
     assert one.p_adjusted == one.estimate.p
     same = {each.name for each in fewer if each.kind == EXPLORATORY and each.tasks == ("reach", "tray")}
@@ -128,7 +129,8 @@ def test_draws_that_agree_by_chance_are_not_sure(gathered):
     same = dict.fromkeys(SHARES, (0.5,) * 4)
     sure = {label: (1.0 if label == "ee" else 0.0,) * 4 for label in SHARES}
     for shares in (same, sure):
-        for each in contrasts(gathered(shares=shares)):
+        found: Any = contrasts(gathered(shares=shares))
+        for each in found:
             low, high = each.estimate.interval
             assert high - low > 0.05
             assert 0.0 < each.estimate.p <= 1.0
@@ -147,7 +149,8 @@ def test_what_is_planned_is_detected_in_four_of_five_studies(contrast):
             success = 0.5 + effect * weight / total + rng.normal(0.0, FACTORS.sd, (2, 8))
             shares = rng.binomial(50, np.clip(success, 0.0, 1.0)) / 50
             values += weight * shares.mean(axis=0)
-        found += student(values).p < 0.05 / 3
+        estimate: Any = student(values)
+        found += estimate.p < 0.05 / 3
     assert found / studies == pytest.approx(0.8, abs=0.06)
 
 

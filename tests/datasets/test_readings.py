@@ -1,0 +1,83 @@
+"""Measuring what lies on the disk: as what is in memory, but with one episode in memory at a time."""
+
+import weakref
+
+import numpy as np
+import pytest
+from compare_helpers import handrail_dataset
+from hypothesis import given
+from hypothesis import strategies as st
+
+from handrail.datasets.quality import load
+from handrail.datasets.quality.demonstration import Demonstration
+from handrail.datasets.quality.load import read_demonstrations, recorded_episodes
+from handrail.datasets.quality.measure import measure, measured, read
+from handrail.datasets.quality.pool import Extent, Spread, embed
+
+
+@pytest.fixture(scope="module")
+def root(tmp_path_factory):
+    return handrail_dataset(tmp_path_factory.mktemp("readings") / "set", 3, "ee", 20)
+
+
+def test_what_is_measured_from_the_disk_is_what_is_measured_in_memory(root):
+    """In every view, also where an episode is in several, which is measured once for all."""
+    on_disk, here = recorded_episodes(root), read_demonstrations(root)
+    views = [{"a": slice(0, 12), "b": slice(6, 20)}, {"a": slice(0, 5), "b": slice(6, 9)}]
+    found = read([{label: on_disk[part] for label, part in view.items()} for view in views])
+    for view, readings in zip(views, found, strict=True):
+        expected = measure({label: here[part] for label, part in view.items()}, np.random.default_rng(0))
+        for name, groups in measured(readings, np.random.default_rng(0)).values.items():
+            for label, each in groups.items():
+                other = expected.values[name][label]
+                np.testing.assert_array_equal(each.values, other.values, err_msg=name)
+                assert (each.interval, each.reason) == (other.interval, other.reason)
+
+
+def test_one_episode_is_in_memory_at_a_time(root, monkeypatch):
+    """Beside the first of each group, and the frames that stand for a group."""
+    alive, most = [], []
+
+    def opened(*parts):
+        episode = Demonstration(*parts)
+        alive.append(weakref.ref(episode.frames["action"]))
+        most.append(sum(each() is not None for each in alive))
+        return episode
+
+    monkeypatch.setattr(load, "Demonstration", opened)
+    episodes = recorded_episodes(root)
+    measure({"a": episodes[:10], "b": episodes[10:]}, np.random.default_rng(0))
+    assert len(most) >= 2 * len(episodes)
+    assert max(most) <= 4
+
+
+@given(
+    cuts=st.lists(st.integers(1, 59), max_size=6, unique=True),
+    offset=st.sampled_from([0.0, 1e6]),
+    seed=st.integers(0, 99),
+)
+def test_a_scale_does_not_hang_on_how_the_rows_come(cuts, offset, seed):
+    """Mean, scatter, range and the map onto few numbers are those of all rows at once."""
+    generator = np.random.default_rng(seed)
+    rows = np.column_stack(
+        [generator.normal(size=(60, 3)) + offset, generator.integers(0, 2, 60), np.ones(60)]
+    )
+    spread, extent = Spread(), Extent()
+    for part in np.split(rows, sorted(cuts)):
+        spread.add(part)
+        extent.add(part)
+    away = rows - rows.mean(axis=0)
+    assert spread.count == 60
+    np.testing.assert_allclose(spread.mean, rows.mean(axis=0))
+    np.testing.assert_allclose(spread.scatter, away.T @ away, atol=1e-6)
+    low, high = extent.range
+    np.testing.assert_array_equal(low, rows.min(axis=0))
+    np.testing.assert_array_equal(high[:3], rows.max(axis=0)[:3])
+    np.testing.assert_array_equal(high[3:], low[3:])  # a switch and a constant have no range
+    whole = Spread()
+    whole.add(rows)
+    for most in (None, 2):
+        one, other = embed(spread, most)(rows), embed(whole, most)(rows)
+        np.testing.assert_allclose(np.abs(one), np.abs(other), atol=1e-4)
+    assert embed(spread)(rows).shape == (60, 4)
+    np.testing.assert_allclose(embed(spread)(rows).std(axis=0), 1.0, rtol=1e-6)

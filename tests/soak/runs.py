@@ -1,0 +1,62 @@
+"""Evaluations and replays."""
+
+import shutil
+from pathlib import Path
+
+from child import command
+from whole import Saved, rollouts_of, saved_in
+from work import Work
+from workshop import Recipe, Workshop
+
+
+class Evaluation(Work):
+    """`handrail-evaluate`, with one process or two."""
+
+    _EPISODES = 14
+
+    def __init__(self, folder: Path, workshop: Workshop, workers: int = 1) -> None:
+        super().__init__(folder, workshop)
+        self.many, self._file = workers, folder / "e.json"
+        self.name = "evaluate" + (f" --workers {workers}" if workers > 1 else "")
+        words = ("evaluate", str(workshop.policy()), "--episodes", str(self._EPISODES), "--time_limit", "2")
+        self._words = (*words, "--json", "{}/e.json")
+        whole = workshop.edited("evaluation", self._words, {}, "e.json")
+        self.wanted = rollouts_of(whole)
+
+    def words(self) -> list[str] | None:
+        if self.saved() == self.wanted:
+            return None
+        words = [word.format(self.folder) for word in self._words[1:]]
+        return [command(self._words[0]), *words, *(("--workers", str(self.many)) if self.many > 1 else ())]
+
+    def progress(self) -> int:
+        return len(self.saved())
+
+    def saved(self) -> Saved:
+        return rollouts_of(self._file)
+
+
+class Replaying(Work):
+    """`handrail-replay`: reads only."""
+
+    name = "replay"
+
+    def __init__(self, folder: Path, workshop: Workshop, recipe: Recipe) -> None:
+        super().__init__(folder, workshop)
+        source = workshop.recorded(recipe)
+        shutil.copytree(source, folder / "d")
+        self.wanted, self._runs = workshop.saved(source), 0
+
+    @property
+    def steps(self) -> int:
+        return 0
+
+    def words(self) -> list[str] | None:
+        self._runs += 1
+        return [command("replay"), str(self.folder / "d"), "--episode", "0"] if self._runs < 3 else None
+
+    def progress(self) -> int:
+        return 0
+
+    def saved(self) -> Saved:
+        return saved_in(self.folder / "d")

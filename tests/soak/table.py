@@ -1,0 +1,131 @@
+"""What came of a soak, as a page: `python tests/soak/table.py OUT docs/results/soak.md`.
+
+The tables stand between two marks in the page; the words around them are written by hand.
+"""
+
+import argparse
+import re
+import statistics
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from notes import read
+
+Row = dict[str, Any]
+_HEADINGS = (
+    *("fault", "how often", "during", "the command then", "saved before", "lost"),
+    *("mended by `handrail-repair`", "finished by the same command", "seconds"),
+)
+_SIGNALS = {-9: "killed", -15: "ended by SIGTERM", -1: "hung up"}
+
+
+def main() -> None:
+    """Write the tables into a page."""
+    says = argparse.ArgumentParser(description=__doc__)
+    says.add_argument("out", type=Path)
+    says.add_argument("page", type=Path)
+    given = says.parse_args()
+    text = given.page.read_text()
+    for name, table in tables(given.out).items():
+        begin, end = f"<!-- {name} -->", f"<!-- end of {name} -->"
+        text = re.sub(f"{begin}.*?{end}", lambda _, t=table: f"{begin}\n{t}\n{end}", text, flags=re.DOTALL)  # noqa: B023
+    given.page.write_text(text)
+
+
+def tables(out: Path) -> dict[str, str]:
+    """Return the tables, by the names of their marks."""
+    rounds = [row for row in read(out / "rounds.jsonl") if row.get("struck")]
+    drives = [row for row in read(out / "driving.jsonl") if row.get("struck")]
+    return {
+        "rounds": _by_fault(rounds),
+        "drives": _by_fault(drives),
+        "memory": _memory(read(out / "memory.jsonl")),
+        "sum": _sum(rounds, drives, read(out / "rounds.jsonl")),
+    }
+
+
+def _by_fault(rows: Sequence[Row]) -> str:
+    lines = [_line(_HEADINGS), _line(["---"] * len(_HEADINGS))]
+    for fault in sorted({row["fault"] for row in rows}):
+        some = [row for row in rows if row["fault"] == fault]
+        lines.append(_line([fault, *_cells(some)]))
+    return "\n".join(lines)
+
+
+def _cells(rows: Sequence[Row]) -> list[str]:
+    works = Counter(_kind(row["work"]) for row in rows)
+    ends = Counter(_end(row) for row in rows)
+    goes = [row["goes"] for row in rows if "goes" in row]
+    return [
+        str(len(rows)),
+        _counted(works),
+        _counted(ends),
+        str(sum(row["saved_before"] for row in rows)),
+        str(sum(row["lost"] for row in rows)),
+        str(sum(bool(row.get("mended")) for row in rows)),
+        f"{sum(row['last_code'] in (0, 2) for row in rows if row.get('goes'))} of {sum(map(bool, goes))}",
+        f"{statistics.median(row['seconds'] for row in rows):.0f}",
+    ]
+
+
+def _kind(work: str) -> str:
+    return work.split(",")[0].split(" --ray")[0]
+
+
+def _end(row: Row) -> str:
+    if "code" not in row:
+        return "drove on" if not row["complaints"] else "did not drive on"
+    code = row["code"]
+    if code == 0:
+        return "went on by itself"
+    return "had to be killed" if code is None else _SIGNALS.get(code, f"ended with {code}")
+
+
+def _memory(rows: Sequence[Row]) -> str:
+    """Return memory and files at the beginning, the middle and the end of the longest drive."""
+    drives = Counter(row["drive"] for row in rows)
+    some = [row for row in rows if drives and row["drive"] == drives.most_common(1)[0][0]]
+    heads = ("hours", "saved", *(f"{who}: {what}" for who in ("recording", "server") for what in _WHAT))
+    lines = [_line(heads), _line(["---"] * len(heads))]
+    places = sorted({round(share * (len(some) - 1)) for share in (0.02, 0.25, 0.5, 0.75, 1.0)})
+    for row in (some[place] for place in places if some):
+        cells = [f"{row['seconds'] / 3600:.2f}", str(row["saved"])]
+        for who in ("recording", "server"):
+            had = row.get(who, {})
+            cells += [
+                f"{had.get('rss', 0) / 1024:.0f} MB",
+                str(had.get("files", "")),
+                str(had.get("threads")),
+            ]
+        lines.append(_line(cells))
+    return "\n".join(lines)
+
+
+_WHAT = ("memory", "open files", "threads")
+
+
+def _sum(rounds: Sequence[Row], drives: Sequence[Row], every: Sequence[Row]) -> str:
+    both = [*rounds, *drives]
+    hours = sum(row["seconds"] for row in rounds) / 3600
+    bad = [row for row in both if row["complaints"]]
+    late = sum(not row.get("struck") and "broken" not in row for row in every)
+    return (
+        f"{len(both)} faults ({len(rounds)} in {hours:.1f} hours of rounds, {len(drives)} in the drives);"
+        f" {late} more came when the command was done already. Saved before a fault:"
+        f" {sum(row['saved_before'] for row in both)} pieces; lost: {sum(row['lost'] for row in both)}."
+        f" Rounds with something to complain of: {len(bad)}."
+    )
+
+
+def _counted(what: Counter[str]) -> str:
+    return ", ".join(f"{name} {count}" for name, count in what.most_common())
+
+
+def _line(cells: Sequence[str]) -> str:
+    return "| " + " | ".join(cells) + " |"
+
+
+if __name__ == "__main__":
+    main()
