@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from handrail.datasets.comparison.outcomes import compare_rollouts
+from handrail.datasets.learnability.learnability import CAVEAT
 from handrail.datasets.presentation.table import Cell, Table
 from handrail.datasets.presentation.wording import (
     DASH,
@@ -135,19 +136,20 @@ def _collected(found: Sequence[dict[str, Any]]) -> tuple[str, ...]:
 def quality_table(task: str, results: Results) -> Table:
     """Return the quality metrics of the demonstrations: the mean over draws of the mean over episodes."""
     modes = [mode for mode in results.progress.design.modes if results.collected(task, mode)]
+    found = [[_described(each) for each in results.collected(task, mode)] for mode in modes]
+    names = dict.fromkeys(name for draws in found for each in draws for name in each)
     rows = []
-    for metric in METRICS:
-        means = [
-            [
-                each["quality"][metric.name]
-                for each in results.collected(task, mode)
-                if metric.name in each["quality"]
-            ]
-            for mode in modes
-        ]
-        if any(means):
-            rows.append((metric.title, *(number(float(np.mean(each))) if each else DASH for each in means)))
-    return Table(("metric", *modes), rows, "The demonstrations: described, not tested")
+    for name in names:
+        means = [[each[name] for each in draws if name in each] for draws in found]
+        rows.append((name, *(number(float(np.mean(each))) if each else DASH for each in means)))
+    caption = f"“learnability” and what follows are of all episodes together. {CAVEAT}"
+    return Table(("metric", *modes), rows, "The demonstrations: described, not tested", caption)
+
+
+def _described(result: dict[str, Any]) -> dict[str, float]:
+    """Return the metrics of a draw by title, then how much of its actions can be told."""
+    known = {metric.title: result["quality"].get(metric.name) for metric in METRICS}
+    return {title: value for title, value in known.items() if value is not None} | result["learnability"]
 
 
 def treatments_table(task: str, results: Results) -> Table:

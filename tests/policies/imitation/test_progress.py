@@ -1,0 +1,72 @@
+"""Where a rollout failed: the furthest stage it came to, and how it ended."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from handrail.collect.tasks.pick_place import PickPlace
+from handrail.collect.tasks.reach import Reach
+from handrail.collect.tasks.task import TaskState
+from handrail.controllers.robot.model import Pose, load_model
+from handrail.policies.imitation.evaluation.progress import RolloutProgress
+
+MODEL = load_model()
+START = PickPlace().sample(MODEL, np.random.default_rng(0))
+CUBE, BIN = START.scene.find("cube"), START.scene.find("bin")
+WIDTH = float(CUBE.shape.size[0])
+UP = np.array([0.0, 0.0, 1.0])
+
+
+def state(tool, cube=CUBE.position, opening=1.0):
+    """A moment of `pick_place` with tool and cube anywhere."""
+    poses = {each.name: Pose(each.position, each.rotation) for each in START.scene.objects}
+    poses["cube"] = Pose(np.asarray(cube, float), CUBE.rotation)
+    return TaskState(0.0, Pose(np.asarray(tool, float), np.eye(3)), opening, START, poses)
+
+
+AWAY = state(CUBE.position + 0.5 * UP)
+AT = state(CUBE.position + 1.5 * WIDTH * UP)
+AROUND = state(CUBE.position, opening=0.5)
+LIFTED = state(CUBE.position + 2 * WIDTH * UP, CUBE.position + 2 * WIDTH * UP, 0.5)
+OVER = state(BIN.position + 0.4 * UP, BIN.position + 0.4 * UP, 0.5)
+IN_ORDER = {"approach": AWAY, "grasp": AT, "lift": AROUND, "carry": LIFTED, "place": OVER}
+
+
+def test_every_stage_has_its_moment_in_order():
+    task = PickPlace()
+    assert tuple(IN_ORDER) == task.stages
+    assert [task.stage(moment) for moment in IN_ORDER.values()] == list(task.stages)
+
+
+def watched(states, task=None, reason="timeout"):
+    """Return what is said of a failed rollout that went through some moments."""
+    moments = iter(states)
+    env = SimpleNamespace(task=task or PickPlace(), fps=20, model=MODEL, task_state=lambda: next(moments))
+    progress = RolloutProgress()
+    progress.begin(env, 0)  # type: ignore[arg-type]
+    for _ in states:
+        progress.see(None)  # type: ignore[arg-type]
+    return progress.failed(SimpleNamespace(failure_reason=reason))  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("last", list(IN_ORDER))
+def test_the_furthest_stage_is_told_and_a_hand_that_rests_has_stalled(last):
+    names = list(IN_ORDER)
+    way = [IN_ORDER[name] for name in names[: names.index(last) + 1]]
+    assert watched([*way, *[way[-1]] * 200]) == {"stage": last, "ended": "stalled"}
+
+
+def test_a_hand_that_still_goes_about_has_not_stalled():
+    about = [state(CUBE.position + (0.5 + 0.1 * (k % 2)) * UP) for k in range(200)]
+    assert watched(about) == {"stage": "approach", "ended": "moving"}
+
+
+def test_what_was_lifted_and_is_lost_was_dropped():
+    lost = state(CUBE.position + 0.5 * UP)
+    assert watched([AROUND, LIFTED, *[lost] * 200]) == {"stage": "carry", "ended": "dropped"}
+    assert watched([AWAY, AT], reason="dropped") == {"stage": "grasp", "ended": "dropped"}
+
+
+def test_a_task_without_stages_says_how_it_ended():
+    assert watched([AWAY] * 200, Reach()) == {"ended": "stalled"}
