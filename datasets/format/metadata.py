@@ -13,7 +13,7 @@ from typing import Any
 from handrail.datasets.format.columns import Scalar
 from handrail.datasets.format.layout import DATA_PATH, FILES_IN_A_CHUNK, VIDEO_PATH
 from handrail.datasets.format.manifest import Manifest, json_bytes
-from handrail.datasets.format.schema import AUTOMATIC, Feature, counted_columns, video_keys
+from handrail.datasets.format.schema import AUTOMATIC, Feature, video_keys
 from handrail.datasets.format.stats import Stats, merge_stats, stats_to_lists
 from handrail.datasets.format.video import video_info
 from handrail.datasets.storage.strict_json import read_json
@@ -77,17 +77,13 @@ class Totals:
         episodes: Number of saved episodes.
         frames: Number of their frames.
         tasks: Task sentences; the place is the `task_index`.
-        stats: Statistics over all frames, of some columns.
+        stats: Statistics over all frames.
     """
 
     episodes: int = 0
     frames: int = 0
     tasks: tuple[str, ...] = ()
     stats: Stats | None = field(default=None, compare=False)
-
-    def counted(self, features: Mapping[str, Feature]) -> tuple[str, ...]:
-        """Return the columns of whose statistics the next episode is to have: those that the others have."""
-        return counted_columns(features) if self.stats is None else tuple(self.stats)
 
     def with_tasks(self, tasks: tuple[str, ...]) -> tuple[str, ...]:
         """Return the task sentences after an episode: new ones are appended in their order."""

@@ -72,15 +72,6 @@ def video_keys(features: Mapping[str, Feature]) -> tuple[str, ...]:
     return tuple(key for key, feature in features.items() if feature.is_video)
 
 
-def counted_columns(features: Mapping[str, Feature]) -> tuple[str, ...]:
-    """Return the columns of which statistics are kept: what LeRobot gives to policies, and normalises."""
-    return tuple(
-        key
-        for key, feature in features.items()
-        if feature.is_video or (feature.dtype != "string" and key.startswith(POLICY_PREFIXES))
-    )
-
-
 def check_features(features: Mapping[str, Feature]) -> None:
     """Check a whole schema before anything is created.
 

@@ -5,8 +5,6 @@ import shutil
 from dataclasses import replace as changed
 from pathlib import Path
 
-import numpy as np
-
 from handrail.datasets.format.columns import ColumnTypes, Scalar, fit_columns
 from handrail.datasets.format.cut import cut_video
 from handrail.datasets.format.data_file import data_files
@@ -14,6 +12,7 @@ from handrail.datasets.format.layout import Layout
 from handrail.datasets.format.lines import lines_bytes
 from handrail.datasets.format.manifest import Manifest
 from handrail.datasets.format.metadata import EpisodeRecord, FileSeal, Totals
+from handrail.datasets.format.stats import Stats
 from handrail.datasets.format.tables import data_schema, parquet_bytes
 from handrail.datasets.recording.piece import Piece
 from handrail.datasets.recording.volume import pictures_of
@@ -50,18 +49,18 @@ def append_episode(
     number, staging = totals.episodes, layout.staging
     streams = {layout.data(number): staging / "data.parquet"}
     with data_files() as files:
-        table, tasks, stats = piece.rows(data_schema(manifest.features), manifest, totals, files)
+        table, tasks, stats = piece.rows(data_schema(manifest.features), manifest.fps, totals, files)
     write_synced(staging / "data.parquet", parquet_bytes(table))
     for key, video in piece.videos.items():
         streams[layout.video(key, number)] = staged = staging / f"{key}.mp4"
-        stats[key] = _pictures(piece, key, video, staged, manifest)
+        stats |= _pictures(piece, key, video, staged, manifest)
     record = changed(
         piece.record,
         episode=number,
         start=totals.frames,
         length=piece.length,
         tasks=tasks,
-        stats=stats,
+        stats={**(piece.record.stats or {}), **stats},
         columns=extras,
         files={layout.relative(path): FileSeal.of(staged) for path, staged in streams.items()},
         slot=number,
@@ -75,15 +74,15 @@ def append_episode(
     return record
 
 
-def _pictures(piece: Piece, key: str, video: Path, staged: Path, manifest: Manifest) -> dict[str, np.ndarray]:
-    """Stage a camera's video; return its statistics."""
+def _pictures(piece: Piece, key: str, video: Path, staged: Path, manifest: Manifest) -> Stats:
+    """Stage a camera's video; return its statistics if they are others than before."""
     if piece.record.alone and not piece.is_cut:
         copy_file(video, staged)
-        return piece.saved_stats[key]
+        return {}
     remove(staged)
     cut_video(video, piece.first_picture, piece.length, staged, manifest.fps, manifest.features[key])
     sync_file(staged)
-    return pictures_of(piece, key, manifest)
+    return {key: pictures_of(piece, key, manifest)} if piece.is_cut else {}
 
 
 def copy_file(source: Path, target: Path) -> None:

@@ -1,6 +1,6 @@
 """The episode that is being recorded: rows in memory, pictures on their way into staged mp4 files."""
 
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -101,9 +101,9 @@ class OpenEpisode:
             self._encoders[key] = VideoEncoder(self.staged_video(key), self._manifest.fps, feature)
 
 
-def numeric_stats(columns: Mapping[str, Any], counted: Collection[str]) -> Stats:
-    """Return the statistics of the columns that are counted; of none that holds texts."""
-    return {key: column_stats(columns[key]) for key in counted if isinstance(columns.get(key), np.ndarray)}
+def numeric_stats(columns: Mapping[str, Any]) -> Stats:
+    """Return the statistics of every column that is not a string."""
+    return {key: column_stats(values) for key, values in columns.items() if isinstance(values, np.ndarray)}
 
 
 def _stacked(feature: Feature, rows: list) -> Any:

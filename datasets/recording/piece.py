@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from dataclasses import replace as changed
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -61,11 +62,6 @@ class Piece:
         """Which picture of its videos is the first."""
         return self.record.offset + self.first
 
-    @property
-    def saved_stats(self) -> Stats:
-        """The statistics of the episode, as its line has them."""
-        return self.record.stats or {}
-
     def stretch(self, first: int, length: int) -> "Piece":
         """Return a part of it."""
         return changed(self, first=self.first + first, length=length)
@@ -83,18 +79,18 @@ class Piece:
         return changed(self, sentences=dict(sentences))
 
     def rows(
-        self, schema: pa.Schema, manifest: Manifest, totals: Totals, files: DataFiles
+        self, schema: pa.Schema, fps: int, totals: Totals, files: DataFiles
     ) -> tuple[pa.Table, tuple[str, ...], Stats]:
         """Return the rows in their new place.
 
         Args:
             schema: Of the data files of both datasets.
-            manifest: The schema of the new dataset.
+            fps: Frames a second [Hz].
             totals: What the episodes before it add up to.
             files: Opens the file of the rows.
 
         Returns:
-            The rows, their task sentences in order, and the statistics of those columns that are counted.
+            The rows, their task sentences in order, and the statistics of the columns that have changed.
         """
         whole = files.open(self.data).rows(self.record.episode, self.record.length)
         if whole.num_rows != self.record.length:
@@ -102,14 +98,13 @@ class Piece:
         whole = whole.select(schema.names).cast(schema)
         table = whole.slice(self.first, self.length)
         tasks, places = self._tasks(whole, table, totals)
-        values = self._counters(manifest.fps, totals) | {"task_index": places} | self._ending(table)
+        values = self._counters(fps, totals) | {"task_index": places} | self._ending(table)
         for name, column in values.items():
             place = table.schema.get_field_index(name)
             kind = table.schema.field(place)
             table = table.set_column(place, kind, numbers(column, kind.type))
-        saved = {} if self.is_cut else {k: v for k, v in self.saved_stats.items() if k not in values}
-        counted = [name for name in totals.counted(manifest.features) if name in table.column_names]
-        stats = {name: saved.get(name) or column_stats(_numbers(table, name)) for name in counted}
+        anew = table.column_names if self.is_cut else values
+        stats = {name: column_stats(rows) for name in anew if (rows := _numbers(table, name)) is not None}
         return table, tasks, stats
 
     def _counters(self, fps: int, totals: Totals) -> dict[str, np.ndarray]:
@@ -144,7 +139,10 @@ class Piece:
         return found
 
 
-def _numbers(table: pa.Table, name: str) -> np.ndarray:
-    """Return a column of numbers, (N,) or (N, d)."""
-    flat = flat_numbers(table.column(name))
+def _numbers(table: pa.Table, name: str) -> np.ndarray | None:
+    """Return a column of numbers, (N,) or (N, d); None for texts."""
+    column: Any = table.column(name)
+    if pa.types.is_string(column.type):
+        return None
+    flat = flat_numbers(column)
     return flat if len(flat) == table.num_rows else flat.reshape(table.num_rows, -1)

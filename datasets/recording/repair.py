@@ -227,7 +227,7 @@ def _rebuild(layout: Layout, manifest: Manifest, totals: Totals) -> tuple[str, .
     encodings = read_encodings(layout.info, manifest)
     wanted = {
         layout.tasks: tasks_bytes(totals.tasks) if totals.tasks else None,
-        layout.stats: stats_bytes(totals.stats) if totals.stats is not None else None,
+        layout.stats: stats_bytes(totals.stats) if totals.stats else None,
         layout.info: info_bytes(manifest, totals, encodings),
     }
     return tuple(layout.relative(path) for path, data in wanted.items() if _settle(layout, path, data))

@@ -89,9 +89,10 @@ class _Volume:
         """Append an episode and return its line."""
         known: dict[str, Scalar] = {n: value for n, value in piece.columns.items() if value is not None}
         extras = fit_columns(known, self._types)
-        table, tasks, stats = piece.rows(self._schema, self._manifest, totals, files)
+        table, tasks, stats = piece.rows(self._schema, self._manifest.fps, totals, files)
         for key, stretch in stretches.items():
-            stats[key] = pictures_of(piece, key, self._manifest)
+            if piece.is_cut:
+                stats |= {key: pictures_of(piece, key, self._manifest)}
             self._joins[key].add(stretch)
         self._rows.add(table)
         record = changed(
@@ -100,7 +101,7 @@ class _Volume:
             start=totals.frames,
             length=piece.length,
             tasks=tasks,
-            stats=stats,
+            stats={**(piece.record.stats or {}), **stats},
             columns=extras,
             slot=self._slot,
             offset=totals.frames - self._start,
@@ -146,8 +147,6 @@ def _stretches(piece: Piece, manifest: Manifest, opened: Videos, staging: Path) 
 
 
 def pictures_of(piece: Piece, key: str, manifest: Manifest) -> dict[str, np.ndarray]:
-    """Return the statistics of one camera of a stretch: as saved, or of the pictures that are left."""
-    if not piece.is_cut:
-        return piece.saved_stats[key]
+    """Return the statistics of one camera of a stretch."""
     height, width = manifest.features[key].shape[:2]
     return decoded_stats(piece.videos[key], piece.length, height, width, piece.first_picture, manifest.fps)

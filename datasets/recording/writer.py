@@ -223,7 +223,7 @@ class EpisodeWriter:
             start=self.num_frames,
             length=episode.length,
             tasks=tuple(dict.fromkeys(episode.tasks)),
-            stats=numeric_stats(columns, self._totals.counted(self.features)) | stats,
+            stats=numeric_stats(columns) | stats,
             columns=extras,
             files={self._layout.relative(path): FileSeal.of(staged) for staged, path in self._streams()},
             slot=self.num_episodes,

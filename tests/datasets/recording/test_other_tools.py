@@ -77,7 +77,7 @@ def test_statistics_that_lerobot_computed_anew_are_replaced(tmp_path):
     text = path.read_text()
     assert "NaN" not in text
     assert "Infinity" not in text
-    assert json.loads(text)["action"]["count"] == [12 + length_of(1)]
+    assert json.loads(text)["index"]["count"] == [12 + length_of(1)]
 
 
 def test_statistics_never_come_from_the_file(root):

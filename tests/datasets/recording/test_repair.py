@@ -133,7 +133,7 @@ def test_a_damaged_episode_is_named_and_costs_no_other(root, stream, harm):
         assert record_one(writer, cameras=True) == 3
     dataset = open_with_lerobot(root)
     assert dataset.num_episodes == 4
-    assert dataset.meta.stats["action"]["count"].tolist() == [len(dataset)]
+    assert dataset.meta.stats["index"]["count"].tolist() == [len(dataset)]
 
 
 def test_pictures_move_up_with_their_episode(root):
