@@ -52,10 +52,10 @@ def main(config: InspectConfig) -> int:
 def _learnability(folder: Path, console: "Console") -> int:
     import numpy as np
 
+    from handrail.datasets.demonstrations.demonstration import DoesNotApply
+    from handrail.datasets.demonstrations.load import recorded_episodes
     from handrail.datasets.learnability.learnability import learnability
     from handrail.datasets.learnability.tables import learnability_tables, learnability_words
-    from handrail.datasets.quality.demonstration import DoesNotApply
-    from handrail.datasets.quality.load import recorded_episodes
     from handrail.policies.imitation.interface.policy_rows import policy_rows
 
     try:

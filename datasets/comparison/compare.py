@@ -21,10 +21,10 @@ from handrail.datasets.comparison.differences import Difference, differences
 from handrail.datasets.comparison.evaluations import Condition, read_evaluations
 from handrail.datasets.comparison.groups import Group, baseline_of, group_of, load_groups, unlike
 from handrail.datasets.comparison.outcomes import LIKE_FOR_LIKE, Outcomes, Pair, judge_pairs
+from handrail.datasets.demonstrations.demonstration import DoesNotApply
 from handrail.datasets.learnability.learnability import Learnability, learnability
 from handrail.datasets.learnability.policy_rows import PolicyView, recorded_view
 from handrail.datasets.learnability.sample import shared_budget
-from handrail.datasets.quality.demonstration import DoesNotApply
 from handrail.datasets.quality.group_reading import Reading
 from handrail.datasets.quality.measure import Measurements, measured, read
 from handrail.datasets.reading.check import check_whole

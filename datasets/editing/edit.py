@@ -9,13 +9,13 @@ from pathlib import Path
 import pyarrow as pa
 
 from handrail.controllers.errors import unknown_name
+from handrail.datasets.demonstrations.demonstration import Demonstration
 from handrail.datasets.editing.config import EditConfig
 from handrail.datasets.editing.idle import STATE, SUCCESS, moving_stretch
 from handrail.datasets.editing.pack import Edited, check_free, merge_datasets, taken
 from handrail.datasets.editing.selection import chosen_episodes, split_parts
 from handrail.datasets.editing.source import Source
 from handrail.datasets.format.columns import ColumnTypes
-from handrail.datasets.quality.demonstration import Demonstration
 from handrail.datasets.reading.reader import read_rows_of
 from handrail.datasets.recording.piece import TRIMMED, Piece
 from handrail.datasets.recording.rewrite import write_anew

@@ -3,8 +3,8 @@
 import numpy as np
 
 from handrail.controllers.arrays import BoolArray, FloatArray
+from handrail.datasets.demonstrations.demonstration import Demonstration
 from handrail.datasets.format.video import GROUP
-from handrail.datasets.quality.demonstration import Demonstration
 from handrail.datasets.quality.motion import FLOOR
 
 _SHARE = 0.01  # of an entry's range in the episode

@@ -6,7 +6,7 @@ import numpy as np
 
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.numerics.rotation import turned
-from handrail.datasets.quality.demonstration import Demonstration, DoesNotApply
+from handrail.datasets.demonstrations.demonstration import Demonstration, DoesNotApply
 from handrail.datasets.quality.motion import phase_boundaries
 
 BASE_POSE, TIME, GOAL, PREVIOUS = "base pose", "time", "end pose", "previous action"

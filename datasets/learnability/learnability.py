@@ -10,13 +10,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from handrail.controllers.arrays import BoolArray, FloatArray, IntArray
+from handrail.datasets.demonstrations.demonstration import DoesNotApply
+from handrail.datasets.demonstrations.episode import Episode
 from handrail.datasets.learnability.kernel_ridge import held_out
 from handrail.datasets.learnability.parts import ALL, GRIPPER, parts
 from handrail.datasets.learnability.policy_rows import PolicyView, recorded_view
 from handrail.datasets.learnability.sample import Budget, Sample, take
 from handrail.datasets.learnability.two_heaps import NEIGHBOURS, two_heaps
-from handrail.datasets.quality.demonstration import DoesNotApply
-from handrail.datasets.quality.episode import Episode
 from handrail.datasets.quality.pool import Spread, embed
 from handrail.datasets.statistics.resampling import Interval, percentiles
 

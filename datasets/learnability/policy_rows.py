@@ -8,9 +8,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from handrail.controllers.arrays import FloatArray
+from handrail.datasets.demonstrations.demonstration import Demonstration, DoesNotApply
+from handrail.datasets.demonstrations.naming import is_velocity
 from handrail.datasets.learnability.candidates import BASE, BASE_POSE
-from handrail.datasets.quality.demonstration import Demonstration, DoesNotApply
-from handrail.datasets.quality.naming import is_velocity
 
 
 @dataclass(frozen=True)

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray, IntArray
+from handrail.datasets.demonstrations.demonstration import Demonstration, DoesNotApply
+from handrail.datasets.demonstrations.episode import Episode
+from handrail.datasets.demonstrations.load import each_opened
 from handrail.datasets.learnability.candidates import PREVIOUS, before, hidden_variables
 from handrail.datasets.learnability.policy_rows import Actions, PolicyRows, PolicyView
-from handrail.datasets.quality.demonstration import Demonstration, DoesNotApply
-from handrail.datasets.quality.episode import Episode
-from handrail.datasets.quality.load import each_opened
 from handrail.datasets.quality.sample import frames_of
 
 EPISODES, FRAMES = 200, 4000  # of a group at most

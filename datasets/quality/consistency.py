@@ -8,7 +8,7 @@ from scipy.spatial.distance import cdist
 from scipy.special import digamma, gammaln
 
 from handrail.controllers.arrays import FloatArray, IntArray
-from handrail.datasets.quality.demonstration import DoesNotApply
+from handrail.datasets.demonstrations.demonstration import DoesNotApply
 from handrail.datasets.quality.metric import Metric
 from handrail.datasets.quality.pool import Pool
 from handrail.datasets.quality.sample import Sample

@@ -9,7 +9,7 @@ the others are common in teleoperation.
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray
-from handrail.datasets.quality.demonstration import Demonstration, DoesNotApply
+from handrail.datasets.demonstrations.demonstration import Demonstration, DoesNotApply
 from handrail.datasets.quality.metric import metric
 from handrail.datasets.quality.pool import Pool
 

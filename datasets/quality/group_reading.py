@@ -7,9 +7,9 @@ from functools import cached_property
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray
-from handrail.datasets.quality.demonstration import Demonstration
-from handrail.datasets.quality.episode import Episode
-from handrail.datasets.quality.load import each_opened
+from handrail.datasets.demonstrations.demonstration import Demonstration
+from handrail.datasets.demonstrations.episode import Episode
+from handrail.datasets.demonstrations.load import each_opened
 from handrail.datasets.quality.metric import Metric
 from handrail.datasets.quality.pool import Pool
 from handrail.datasets.quality.sample import Sample

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray
+from handrail.datasets.demonstrations.demonstration import DoesNotApply
 from handrail.datasets.quality.catalogue import METRICS
-from handrail.datasets.quality.demonstration import DoesNotApply
 from handrail.datasets.quality.group_reading import Reading
 from handrail.datasets.quality.metric import Metric
 from handrail.datasets.quality.readings import Groups, read_views

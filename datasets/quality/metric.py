@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray
-from handrail.datasets.quality.demonstration import Demonstration
+from handrail.datasets.demonstrations.demonstration import Demonstration
 from handrail.datasets.quality.pool import Pool
 from handrail.datasets.quality.sample import Sample
 

@@ -9,10 +9,10 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from handrail.controllers.arrays import IntArray
-from handrail.datasets.quality.demonstration import Demonstration, DoesNotApply
-from handrail.datasets.quality.episode import Episode
+from handrail.datasets.demonstrations.demonstration import Demonstration, DoesNotApply
+from handrail.datasets.demonstrations.episode import Episode
+from handrail.datasets.demonstrations.load import each_opened
 from handrail.datasets.quality.group_reading import Reading
-from handrail.datasets.quality.load import each_opened
 from handrail.datasets.quality.metric import Metric
 from handrail.datasets.quality.pool import FRAMES, Pool
 from handrail.datasets.quality.sample import frames_of

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from handrail.controllers.arrays import FloatArray
-from handrail.datasets.quality.demonstration import Demonstration, DoesNotApply
+from handrail.datasets.demonstrations.demonstration import Demonstration, DoesNotApply
 from handrail.datasets.quality.metric import metric
 from handrail.datasets.quality.pool import Pool
 

@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray
+from handrail.datasets.demonstrations.demonstration import Demonstration, DoesNotApply
+from handrail.datasets.demonstrations.load import each_demonstration
 from handrail.datasets.format.columns import CLIENT
 from handrail.datasets.quality import motion, safety
-from handrail.datasets.quality.demonstration import Demonstration, DoesNotApply
-from handrail.datasets.quality.load import each_demonstration
 from handrail.datasets.quality.metric import Metric
 from handrail.datasets.quality.metrics import corrections, high_frequency_content, rate_of_change
 from handrail.datasets.quality.pool import Pool

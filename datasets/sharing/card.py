@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 
 from handrail.controllers.errors import HandrailError
+from handrail.datasets.demonstrations.episode import Episode
+from handrail.datasets.demonstrations.load import recorded_episodes
 from handrail.datasets.presentation.markdown import markdown_table
 from handrail.datasets.presentation.table import Table
 from handrail.datasets.presentation.wording import DASH, number, percent
 from handrail.datasets.quality.catalogue import METRICS
-from handrail.datasets.quality.episode import Episode
-from handrail.datasets.quality.load import recorded_episodes
 from handrail.datasets.quality.measure import measure
 from handrail.datasets.storage.atomic import explained, write_whole
 

@@ -8,7 +8,7 @@ import sys
 
 import numpy as np
 
-from handrail.datasets.quality.load import read_demonstrations
+from handrail.datasets.demonstrations.load import read_demonstrations
 from handrail.datasets.quality.metrics import sparc
 
 

@@ -241,7 +241,17 @@ def saved_after(root, number, process):
 def test_an_interrupt_keeps_the_saved_episodes(number, tmp_path):
     root = tmp_path / "d"
     process = subprocess.Popen(
-        [*RECORD, "--task", "reach", "--dataset.num_episodes", "500", "--dataset.root", str(root)],
+        [
+            *RECORD,
+            "--dataset.num_episodes",
+            "500",
+            "--workers",
+            "1",
+            "--task",
+            "reach",
+            "--dataset.root",
+            str(root),
+        ],
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
         text=True,
@@ -260,7 +270,17 @@ def test_kill_at_random_moments_loses_at_most_the_open_episode(tmp_path):
     """The real command, killed 20 times, resumed each time."""
     rng = np.random.default_rng(0)
     root, kept, saved = tmp_path / "d", {}, 0
-    arguments = [*RECORD, "--task", "reach", "--dataset.num_episodes", "500", "--dataset.root", str(root)]
+    arguments = [
+        *RECORD,
+        "--dataset.num_episodes",
+        "500",
+        "--workers",
+        "1",
+        "--task",
+        "reach",
+        "--dataset.root",
+        str(root),
+    ]
     for kill in range(20):
         process = subprocess.Popen(
             [*arguments, *(["--resume"] if kill else [])],

@@ -2,8 +2,8 @@
 
 import math
 
+from handrail.datasets.demonstrations.demonstration import Demonstration, DoesNotApply
 from handrail.datasets.quality.catalogue import METRICS
-from handrail.datasets.quality.demonstration import Demonstration, DoesNotApply
 from handrail.datasets.quality.metric import metric
 from handrail.datasets.quality.pool import Pool
 

@@ -9,9 +9,9 @@ import numpy as np
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.comparison.people.folder import StudyFolder
 from handrail.datasets.comparison.people.measures import MEASURES
-from handrail.datasets.quality.columns import ColumnNames
-from handrail.datasets.quality.episode import Episode
-from handrail.datasets.quality.load import recorded_episodes
+from handrail.datasets.demonstrations.columns import ColumnNames
+from handrail.datasets.demonstrations.episode import Episode
+from handrail.datasets.demonstrations.load import recorded_episodes
 from handrail.datasets.quality.measure import measure
 
 SCRIPTED = "scripted"  # the name of the operator, as handrail-record writes it

@@ -4,10 +4,10 @@ import io
 from typing import Any
 
 from handrail.datasets.comparison.groups import Group
+from handrail.datasets.demonstrations.episode import Episode
 from handrail.datasets.format.path_pattern import fill
 from handrail.datasets.format.schema import video_keys
 from handrail.datasets.presentation.drawing import address
-from handrail.datasets.quality.episode import Episode
 from handrail.datasets.reading.reader import DatasetInfo
 
 _EPISODES = 3  # shown of each group

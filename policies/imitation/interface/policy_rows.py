@@ -3,9 +3,9 @@
 import numpy as np
 
 from handrail.controllers.errors import HandrailError
+from handrail.datasets.demonstrations.demonstration import Demonstration
 from handrail.datasets.learnability.candidates import BASE_POSE
 from handrail.datasets.learnability.policy_rows import Actions, PolicyRows, recorded_view
-from handrail.datasets.quality.demonstration import Demonstration
 from handrail.policies.imitation.interface.interface import (
     ACTIONS,
     COLUMNS,

@@ -12,7 +12,6 @@ import torch
 from handrail.collect.operators.modes import MODES
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.format.data_file import data_files
-from handrail.datasets.format.schema import Feature
 from handrail.datasets.format.stats import column_stats
 from handrail.datasets.reading.check import check_whole
 from handrail.datasets.reading.reader import DatasetInfo, read_episodes, read_info, read_rows_of, with_success
@@ -25,6 +24,12 @@ from handrail.policies.imitation.interface.interface import (
     MASK,
     STATE,
     PolicyInterface,
+)
+from handrail.policies.imitation.training.columns import (
+    described,
+    described_cameras,
+    picture_stats,
+    pictured,
 )
 from handrail.policies.imitation.training.memory import MemoryDataset, MemoryMeta
 from handrail.policies.imitation.training.selection import Row, Selection, hold_out, select, select_again
@@ -110,7 +115,7 @@ class Source:
         pictures = None
         if cameras:
             pictures = self._pictures({key: stamps[key] for key in cameras if key in stamps})
-            stats |= {key: _picture_stats(pictures, key) for key in cameras}
+            stats |= {key: picture_stats(pictures, key) for key in cameras}
         windows = {
             key: offsets
             for key, offsets in get_delta_indices(stamps, meta.fps).items()
@@ -168,7 +173,7 @@ def read_source(config: TrainConfig, began: PolicyMeta | None = None) -> Source:
     else:
         interface, features, columns = _interpreted(info, selection, config.actions, config.base_pose)
     if config.images:
-        features |= _cameras(info)
+        features |= described_cameras(info)
     return Source(config, info, selection, interface, features, columns | _counters(selection, info.fps))
 
 
@@ -217,7 +222,7 @@ def _interpreted(
     )
     names = dict(zip(columns, (*interface.observation_names, interface.action_names), strict=True))
     columns = {key: values for key, values in columns.items() if values.shape[1]}
-    return interface, {key: _feature("float32", (len(names[key]),), names[key]) for key in columns}, columns
+    return interface, {key: described("float32", (len(names[key]),), names[key]) for key in columns}, columns
 
 
 def _recorded(
@@ -236,8 +241,8 @@ def _recorded(
         {key: v.astype(np.float32) if v.dtype == np.float64 else v for key, v in episode.items()}
         for episode in _each(info, selection, keys)
     )
-    features = {key: _feature(f.dtype, f.shape, f.names) for key in keys for f in (info.features[key],)}
-    if config.policy in _READ_SCENE and STATE in columns and not (ENVIRONMENT in columns or _pictured(info)):
+    features = {key: described(f.dtype, f.shape, f.names) for key in keys for f in (info.features[key],)}
+    if config.policy in _READ_SCENE and STATE in columns and not (ENVIRONMENT in columns or pictured(info)):
         features[ENVIRONMENT], columns[ENVIRONMENT] = features[STATE], columns[STATE]
     return features, columns
 
@@ -261,7 +266,7 @@ def _joined(episodes: Iterable[Columns]) -> Columns:
 def _check_inputs(config: TrainConfig, info: DatasetInfo, features: Mapping[str, Any]) -> None:
     """Check that there is what the policy reads, before LeRobot stumbles over what is not there."""
     numbers = [key for key in features if key.startswith("observation")]
-    dataset, cameras = f"dataset {str(info.root)!r}", _pictured(info)
+    dataset, cameras = f"dataset {str(info.root)!r}", pictured(info)
     if STATE not in numbers and config.policy in _READ_STATE:
         beside = " beside pictures (--images)" if cameras else ""
         raise HandrailError(
@@ -274,21 +279,6 @@ def _check_inputs(config: TrainConfig, info: DatasetInfo, features: Mapping[str,
             f"{dataset}: expected {ENVIRONMENT!r} or --images for policy {config.policy};"
             f" there are pictures ({', '.join(cameras)}): say --images"
         )
-
-
-def _pictured(info: DatasetInfo) -> dict[str, Feature]:
-    return {
-        key: feature
-        for key, feature in info.features.items()
-        if feature.dtype in ("video", "image") and key.startswith("observation")
-    }
-
-
-def _cameras(info: DatasetInfo) -> dict[str, dict[str, Any]]:
-    found = _pictured(info)
-    if not found:
-        raise HandrailError(f"--images: expected cameras in {str(info.root)!r}, found none")
-    return {key: _feature(f.dtype, f.shape, f.names) for key, f in found.items()}
 
 
 def _counters(selection: Selection, fps: float) -> Columns:
@@ -305,16 +295,3 @@ def _counters(selection: Selection, fps: float) -> Columns:
         np.repeat([task[sentence] for sentence in sentences], lengths),
     )
     return dict(zip(_COUNTERS, values, strict=True))
-
-
-def _picture_stats(pictures: "LeRobotDataset", key: str) -> dict[str, np.ndarray]:
-    from lerobot.datasets.factory import IMAGENET_STATS
-
-    stats = {name: np.asarray(value) for name, value in (pictures.meta.stats or {}).get(key, {}).items()}
-    if not all(np.isfinite(value).all() for value in stats.values()):
-        raise HandrailError(f"meta/stats.json: expected finite numbers for {key}; compute them anew")
-    return stats | {name: np.asarray(value, np.float32) for name, value in IMAGENET_STATS.items()}
-
-
-def _feature(dtype: str, shape: Sequence[int], names: Sequence[str] | None) -> dict[str, Any]:
-    return {"dtype": dtype, "shape": tuple(shape), "names": None if names is None else list(names)}

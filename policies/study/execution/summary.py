@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from handrail.datasets.demonstrations.demonstration import DoesNotApply
+from handrail.datasets.demonstrations.load import Recorded, recorded_episodes
 from handrail.datasets.learnability.learnability import learnability
-from handrail.datasets.quality.demonstration import DoesNotApply
-from handrail.datasets.quality.load import Recorded, recorded_episodes
 from handrail.datasets.quality.measure import measure
 from handrail.datasets.reading.digest import digest_of_rows
 from handrail.policies.imitation.interface.policy_rows import policy_rows

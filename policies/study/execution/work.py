@@ -89,7 +89,7 @@ def work(job: Job, design: StudyDesign, layout: Layout) -> dict[str, Any]:
     if job.policy:
         return _train_and_evaluate(job, job.policy, design, layout)
     root, before = layout.dataset(job.cell), note_of(job, layout)
-    _collect(job.cell, design, root)
+    collect(job.cell, design, root)
     found = summary(root, design.seed)
     same = before.get("settings") == fingerprint(job, design)
     expected = before.get("result", {}).get("digest", found["digest"])
@@ -99,7 +99,7 @@ def work(job: Job, design: StudyDesign, layout: Layout) -> dict[str, Any]:
     return found
 
 
-def _collect(cell: Cell, design: StudyDesign, root: Path) -> None:
+def collect(cell: Cell, design: StudyDesign, root: Path) -> None:
     """Record in turns of a few episodes, each by another person, until there is enough."""
     from handrail.collect.commands.record import record
 

@@ -16,8 +16,8 @@ from handrail.datasets.comparison.config import CompareConfig
 from handrail.datasets.comparison.evaluations import FORMAT
 from handrail.datasets.comparison.findings import findings, headline
 from handrail.datasets.comparison.report.report import as_json, write_report
+from handrail.datasets.demonstrations.load import read_demonstrations
 from handrail.datasets.quality.catalogue import METRICS
-from handrail.datasets.quality.load import read_demonstrations
 from handrail.datasets.quality.measure import measure
 from handrail.scripts import cli
 from handrail.scripts.compare import main

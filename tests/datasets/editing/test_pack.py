@@ -1,6 +1,5 @@
 """Packed or not, in shards or not: the same rows, pictures, lines and summaries, for us and for LeRobot."""
 
-import os
 import shutil
 from itertools import pairwise
 
@@ -11,11 +10,7 @@ from command_helpers import command
 from datasets_guillotine import Guillotine
 from datasets_helpers import (
     CAMERAS,
-    TASKS,
-    TINY_FEATURES,
     check_pictures,
-    create,
-    frame_of,
     length_of,
     open_with_lerobot,
     record,
@@ -23,7 +18,7 @@ from datasets_helpers import (
     resume,
     tree,
 )
-from editing_helpers import record_episodes
+from editing_helpers import content, part, record_episodes
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -32,39 +27,12 @@ from handrail.datasets.editing.pack import merge_datasets
 from handrail.datasets.format import data_file
 from handrail.datasets.format.layout import Layout
 from handrail.datasets.reading.check import check_report
-from handrail.datasets.reading.reader import read_episodes, read_frames
+from handrail.datasets.reading.reader import read_episodes
 from handrail.datasets.recording import volume
 from handrail.datasets.recording.repair import repair
-from handrail.datasets.recording.rewrite import settle
 
 GUILLOTINE = Guillotine()
 SUMMARIES = ("meta/info.json", "meta/stats.json", "meta/tasks.parquet", "meta/handrail.json")
-
-
-def part(root, first: int, end: int):
-    """Record some of the episodes that `record` makes."""
-    with create(root) as writer:
-        for episode in range(first, end):
-            for index in range(length_of(episode)):
-                writer.add_frame(frame_of(episode, index, cameras=False), TASKS[episode // 2 % 2])
-            said = {"success": episode % 2 == 0, "failure_reason": None, "seed": episode}
-            writer.save_episode(said)
-    return root
-
-
-def content(root) -> list[tuple[dict, dict]]:
-    """Return line and rows of every episode; where they lie does not count."""
-    return [
-        (
-            {
-                name: value
-                for name, value in row.items()
-                if "chunk_index" not in name and "file_index" not in name
-            },
-            {name: values.tolist() for name, values in read_frames(root, row["episode_index"]).items()},
-        )
-        for row in read_episodes(root)
-    ]
 
 
 def groups_of(path) -> list[list[int]]:
@@ -244,44 +212,6 @@ def test_a_file_named_after_an_episode_of_a_packed_file_is_no_episode(tmp_path):
     assert report.moved == ("data/chunk-000/file-002.parquet",)
     assert report.complete
     assert content(root) == before
-
-
-def test_a_merge_that_fails_changes_nothing(tmp_path):
-    root, other = part(tmp_path / "one", 0, 2), part(tmp_path / "two", 2, 4)
-    os.truncate(Layout(other).data(1), 30)
-    before = tree(tmp_path)
-    for output in (tmp_path / "new", root):
-        with pytest.raises(HandrailError, match=r"two.*damaged"):
-            merge_datasets([root, other], output)
-        assert tree(tmp_path) == before
-
-
-@pytest.mark.parametrize("in_place", [False, True])
-def test_a_merge_killed_at_every_change_to_the_disk(tmp_path, monkeypatch, in_place):
-    """The sources stay whole, the new dataset is there whole or not at all, and doing it again does it."""
-    monkeypatch.setattr(os, "fsync", lambda descriptor: None)  # a killed process needs no wait for the disk
-    made = tmp_path / "made"
-    one, other = (record(made / name, 2, features=TINY_FEATURES) for name in ("one", "other"))
-    shard = tree(other)
-    merge_datasets([one, other], tmp_path / "wanted")
-    wanted, before = content(tmp_path / "wanted"), content(one)
-    lived, k = False, 0
-    while not lived:
-        k += 1
-        folder = shutil.copytree(made, tmp_path / str(k))
-        roots = [folder / "one", folder / "other"]
-        target = roots[0] if in_place else folder / "both"
-        lived = GUILLOTINE.run(folder, k, lambda roots=roots, target=target: merge_datasets(roots, target))
-        assert tree(roots[1]) == shard
-        settle(target)  # as the next edit in its place would
-        assert in_place or content(roots[0]) == before
-        found = content(target) if target.exists() else None
-        assert found in ((before, wanted) if in_place else (None, wanted))
-        if found != wanted:
-            merge_datasets(roots, target)
-        assert content(target) == wanted
-        assert repair(target).clean
-    assert k > 8
 
 
 def test_the_commands_say_what_they_wrote(whole, tmp_path):

@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from handrail.datasets.demonstrations.demonstration import Demonstration
 from handrail.datasets.format.schema import Feature
-from handrail.datasets.quality.demonstration import Demonstration
 from handrail.datasets.reading.reader import DatasetInfo
 
 STATE = ("x.pos", "y.pos", "theta.pos", "elbow.pos", "elbow.vel")

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from handrail.datasets.demonstrations.demonstration import DoesNotApply
 from handrail.datasets.learnability.learnability import learnability
 from handrail.datasets.learnability.policy_rows import recorded_view
 from handrail.datasets.learnability.sample import Budget, take
-from handrail.datasets.quality.demonstration import DoesNotApply
 
 
 def linear(state, seen, hidden, rng):

@@ -9,7 +9,7 @@ from handrail.datasets.format.data_file import DataFiles
 from handrail.datasets.reading.reader import DatasetInfo
 
 if TYPE_CHECKING:
-    from handrail.datasets.quality.demonstration import Demonstration
+    from handrail.datasets.demonstrations.demonstration import Demonstration
 
 
 class Episode(ABC):

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from handrail.datasets.demonstrations.columns import ColumnNames
+from handrail.datasets.demonstrations.demonstration import Demonstration
+from handrail.datasets.demonstrations.episode import Episode
 from handrail.datasets.format.data_file import DataFiles, data_files
-from handrail.datasets.quality.columns import ColumnNames
-from handrail.datasets.quality.demonstration import Demonstration
-from handrail.datasets.quality.episode import Episode
 from handrail.datasets.reading.reader import DatasetInfo, read_episodes, read_info, read_rows_of, with_success
 
 

@@ -9,16 +9,16 @@ import numpy as np
 
 from handrail.controllers.arrays import FloatArray, IntArray
 from handrail.controllers.errors import HandrailError
-from handrail.datasets.format.data_file import DataFiles
-from handrail.datasets.quality.columns import ColumnNames
-from handrail.datasets.quality.episode import Episode
-from handrail.datasets.quality.naming import (
+from handrail.datasets.demonstrations.columns import ColumnNames
+from handrail.datasets.demonstrations.episode import Episode
+from handrail.datasets.demonstrations.naming import (
     gripper_entry,
     is_velocity,
     point_entries,
     position_entries,
     same_thing,
 )
+from handrail.datasets.format.data_file import DataFiles
 from handrail.datasets.reading.reader import DatasetInfo
 
 

@@ -1,0 +1,55 @@
+"""A merge that fails or is killed changes nothing, or has done it all."""
+
+import os
+import shutil
+
+import pytest
+from datasets_guillotine import Guillotine
+from datasets_helpers import TINY_FEATURES, record, tree
+from editing_helpers import content, part
+
+from handrail.controllers.errors import HandrailError
+from handrail.datasets.editing.pack import merge_datasets
+from handrail.datasets.format.layout import Layout
+from handrail.datasets.recording.repair import repair
+from handrail.datasets.recording.rewrite import settle
+
+GUILLOTINE = Guillotine()
+
+
+def test_a_merge_that_fails_changes_nothing(tmp_path):
+    root, other = part(tmp_path / "one", 0, 2), part(tmp_path / "two", 2, 4)
+    os.truncate(Layout(other).data(1), 30)
+    before = tree(tmp_path)
+    for output in (tmp_path / "new", root):
+        with pytest.raises(HandrailError, match=r"two.*damaged"):
+            merge_datasets([root, other], output)
+        assert tree(tmp_path) == before
+
+
+@pytest.mark.parametrize("in_place", [False, True])
+def test_a_merge_killed_at_every_change_to_the_disk(tmp_path, monkeypatch, in_place):
+    """The sources stay whole, the new dataset is there whole or not at all, and doing it again does it."""
+    monkeypatch.setattr(os, "fsync", lambda descriptor: None)  # a killed process needs no wait for the disk
+    made = tmp_path / "made"
+    one, other = (record(made / name, 2, features=TINY_FEATURES) for name in ("one", "other"))
+    shard = tree(other)
+    merge_datasets([one, other], tmp_path / "wanted")
+    wanted, before = content(tmp_path / "wanted"), content(one)
+    lived, k = False, 0
+    while not lived:
+        k += 1
+        folder = shutil.copytree(made, tmp_path / str(k))
+        roots = [folder / "one", folder / "other"]
+        target = roots[0] if in_place else folder / "both"
+        lived = GUILLOTINE.run(folder, k, lambda roots=roots, target=target: merge_datasets(roots, target))
+        assert tree(roots[1]) == shard
+        settle(target)  # as the next edit in its place would
+        assert in_place or content(roots[0]) == before
+        found = content(target) if target.exists() else None
+        assert found in ((before, wanted) if in_place else (None, wanted))
+        if found != wanted:
+            merge_datasets(roots, target)
+        assert content(target) == wanted
+        assert repair(target).clean
+    assert k > 8
