@@ -18,6 +18,7 @@ from workshop import EPISODES, Recipe, Workshop
 from handrail.datasets.format.layout import Layout
 from handrail.datasets.format.lines import count_lines, rows_of_lines
 
+os.environ["RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER"] = "0"  # else Ray looks for 127.0.0.1 at another address
 _CLUSTER_STARTS, _CLUSTER_ENDS = 600.0, 120.0  # [s]
 
 
