@@ -18,7 +18,7 @@ from handrail.controllers.arrays import FloatArray
 
 @dataclass(frozen=True)
 class TouchBall:
-    """Bring the tip of the hand within 3 cm of a ball that hangs in front of the robot."""
+    """Bring the tip of the hand within 5 cm of a ball that hangs in front of the robot."""
 
     description: str = "Touch the ball."
     horizon: float = 20.0  # [s]
@@ -37,7 +37,7 @@ class TouchBall:
 
     def outcome(self, state: TaskState) -> Verdict:
         """Say whether it is done."""
-        return Verdict(bool(np.linalg.norm(state.tool.position - state.pose("ball").position) < 0.03))
+        return Verdict(bool(np.linalg.norm(state.tool.position - state.pose("ball").position) < 0.05))
 
 
 SCRIPT = "handrail.collect.operators.scripts.reach:ReachScript"  # goes to the goal that an episode names

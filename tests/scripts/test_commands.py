@@ -16,6 +16,7 @@ from handrail.datasets.reading.reader import read_episodes, read_frames, read_in
 
 RECORD = [sys.executable, "-m", "handrail.scripts.record"]
 REACH = ["--task", "reach", "--dataset.num_episodes", "2"]
+MANY = [*RECORD, "--task", "reach", "--dataset.num_episodes", "500", "--workers", "1"]
 
 
 def in_its_own_process(*arguments):
@@ -241,17 +242,7 @@ def saved_after(root, number, process):
 def test_an_interrupt_keeps_the_saved_episodes(number, tmp_path):
     root = tmp_path / "d"
     process = subprocess.Popen(
-        [
-            *RECORD,
-            "--dataset.num_episodes",
-            "500",
-            "--workers",
-            "1",
-            "--task",
-            "reach",
-            "--dataset.root",
-            str(root),
-        ],
+        [*MANY, "--dataset.root", str(root)],
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
         text=True,
@@ -270,17 +261,7 @@ def test_kill_at_random_moments_loses_at_most_the_open_episode(tmp_path):
     """The real command, killed 20 times, resumed each time."""
     rng = np.random.default_rng(0)
     root, kept, saved = tmp_path / "d", {}, 0
-    arguments = [
-        *RECORD,
-        "--dataset.num_episodes",
-        "500",
-        "--workers",
-        "1",
-        "--task",
-        "reach",
-        "--dataset.root",
-        str(root),
-    ]
+    arguments = [*MANY, "--dataset.root", str(root)]
     for kill in range(20):
         process = subprocess.Popen(
             [*arguments, *(["--resume"] if kill else [])],
