@@ -24,7 +24,8 @@ def note_design(layout: Layout, design: StudyDesign) -> None:
 def designs(layout: Layout) -> list[dict[str, str]]:
     """Return the designs that the folder was run with, the first one first: `digest`, `since`."""
     found = read_json(layout.designs).get("designs", [])
-    return [each for each in found if isinstance(each, dict) and {"digest", "since"} <= each.keys()]
+    listed = found if isinstance(found, list) else []
+    return [each for each in listed if isinstance(each, dict) and {"digest", "since"} <= each.keys()]
 
 
 def check_cell(name: str, jobs: Sequence[Job]) -> None:

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 
 from handrail.datasets.comparison.outcomes import compare_rollouts
-from handrail.datasets.learnability.learnability import CAVEAT
 from handrail.datasets.presentation.table import Cell, Table
 from handrail.datasets.presentation.wording import (
     DASH,
@@ -142,8 +141,7 @@ def quality_table(task: str, results: Results) -> Table:
     for name in names:
         means = [[each[name] for each in draws if name in each] for draws in found]
         rows.append((name, *(number(float(np.mean(each))) if each else DASH for each in means)))
-    caption = f"“learnability” and what follows are of all episodes together. {CAVEAT}"
-    return Table(("metric", *modes), rows, "The demonstrations: described, not tested", caption)
+    return Table(("metric", *modes), rows, "The demonstrations: described, not tested")
 
 
 def _described(result: dict[str, Any]) -> dict[str, float]:

@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
+from handrail.datasets.learnability.learnability import CAVEAT
 from handrail.datasets.presentation.wording import p_value, percent, points, points_span
 from handrail.policies.imitation.training.plateau import Plateau
 from handrail.policies.study.design.design import StudyDesign
@@ -127,6 +128,7 @@ def _how(design: StudyDesign, results: Results, found: Sequence[Contrast]) -> It
             "A system claim compares a policy and a controller with a policy alone. The other side is the"
             " best of the unprotected ones, chosen afterwards, which is in its favour."
         )
+    yield f"“Learnability” is the R² of the actions from what policies see, on held-out episodes. {CAVEAT}"
     yield plan(design)
 
 
