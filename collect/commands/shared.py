@@ -83,7 +83,7 @@ def _record_all(config: RecordConfig, shards: Shards, log: RecordingLog, executi
         Job(name, record_shard, (config, each.folder, each.first, each.episodes), (), each.episodes, each.log)
         for name, each in parts.items()
     ]
-    goes_on = "what was recorded is kept, and the same flags go on"
+    goes_on = f"what was recorded is kept in {shards.folder}, and the same flags go on"
     try:
         with _merging(shards) as take:
             for result in execution.run(jobs, part=lambda job: parts[job.name].saved):

@@ -9,6 +9,8 @@ from pathlib import Path
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.editing.merge import check_alike, merged_encodings, merged_types
 from handrail.datasets.editing.source import Source
+from handrail.datasets.format.layout import Layout
+from handrail.datasets.format.lines import rows_of_lines
 from handrail.datasets.recording.checksums import Checksums
 from handrail.datasets.recording.drop import check_nothing_set_aside
 from handrail.datasets.recording.repair import tidy_locked
@@ -43,7 +45,7 @@ def merge_datasets(
     """Write the episodes of datasets, in their order, as one dataset with files of many episodes.
 
     Args:
-        roots: Their folders, one or more.
+        roots: Their folders, one or more; some of several may have no episode yet.
         output: Folder of the new dataset, missing or empty; or one of `roots`, which is replaced at once when
             the new dataset is whole.
         name: Of the new dataset, `owner/name`; that of the first folder when empty.
@@ -53,8 +55,9 @@ def merge_datasets(
         HandrailError: Robot, rate or columns differ, a dataset is not Handrail's, is damaged or in use, or
             the disk does not take it. Nothing has been changed then.
     """
-    places = [Path(root).expanduser().absolute() for root in roots]
     target = Path(output).expanduser().absolute()
+    given = [Path(root).expanduser().absolute() for root in roots]
+    places = [root for root in given if root == target or not _is_empty(root)] or given
     with explained(f"cannot write {str(target)!r}"):
         if target not in places:
             check_free(target)
@@ -62,6 +65,11 @@ def merge_datasets(
         with taken(target, verify) as own:
             sources = [own if place == target else Source.open(place, verify) for place in places]
             return _merged(sources, target, name, in_place=True)
+
+
+def _is_empty(root: Path) -> bool:
+    """Return whether a dataset was begun, and nothing has been recorded."""
+    return Layout(root).manifest.is_file() and not rows_of_lines(Layout(root))
 
 
 def check_free(target: Path) -> None:

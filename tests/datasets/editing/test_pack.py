@@ -214,6 +214,16 @@ def test_a_file_named_after_an_episode_of_a_packed_file_is_no_episode(tmp_path):
     assert content(root) == before
 
 
+def test_datasets_without_an_episode_add_none(whole, tmp_path):
+    empty = part(tmp_path / "empty", 0, 0)
+    merge_datasets([empty, whole, empty], tmp_path / "both")
+    assert content(tmp_path / "both") == content(whole)
+    for roots, said in (([empty, empty], "an episode or more"), ([whole, tmp_path / "none"], "none")):
+        with pytest.raises(HandrailError, match=said):
+            merge_datasets(roots, tmp_path / "new")
+        assert not (tmp_path / "new").exists()
+
+
 def test_the_commands_say_what_they_wrote(whole, tmp_path):
     done = command(whole, "--output", tmp_path / "packed", name="pack")
     assert done.stdout == f"{tmp_path / 'packed'}: 7 episodes, 74 frames (of 74)\n"
