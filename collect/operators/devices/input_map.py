@@ -19,9 +19,9 @@ from handrail.controllers.interface.controller import State
 from handrail.controllers.numerics.rotation import turned
 from handrail.controllers.robot.model import RobotModel
 
-_DAMPING = 0.03
-_BASE_WEIGHT = 0.15
-_POSTURE = 0.1  # weight of the arm's posture at home, so that it does not fold the wrong way
+_DAMPING = 0.006  # beside the hand's weight of 1, like the two below: larger ones hold it off its goal
+_BASE_WEIGHT = 0.03
+_POSTURE = 0.02  # weight of the arm's posture at home, so that it does not fold the wrong way
 _LARGE = 2.0  # turn of the hand from which on the expert thinks of where the arm's joints belong [rad]
 _RETURN = 0.5  # how fast it would go back there [1/s]
 

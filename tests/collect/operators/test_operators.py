@@ -132,6 +132,15 @@ def test_joint_inputs_move_the_hand_as_wished():
     np.testing.assert_allclose(twist, motion_goal().hand, atol=0.02)
 
 
+def test_neither_posture_nor_base_holds_the_hand_off_its_goal():
+    inputs, rng = sticks(MODES["direct"]), np.random.default_rng(0)
+    goal = MotionGoal(np.array([0.0, 0.0, 0.02, 0.0, 0.0, 0.0]), np.array([-0.1, 0.0, 0.0]))  # slowly up
+    for _ in range(20):
+        q = HOME + np.concatenate([np.zeros(3), rng.uniform(-0.6, 0.6, 6)])
+        velocities = inputs.wanted(goal, replace(state(), q=q))[1][inputs.channels.joint_slice]
+        np.testing.assert_allclose(MODEL.jacobian(q) @ velocities, goal.hand, atol=2e-3)
+
+
 def test_steering_points_at_the_goal():
     rng = np.random.default_rng(0)
     for _ in range(20):
