@@ -8,9 +8,9 @@ from compare_helpers import handrail_dataset
 from hypothesis import given
 from hypothesis import strategies as st
 
+from handrail.datasets.demonstrations import load
 from handrail.datasets.demonstrations.demonstration import Demonstration
 from handrail.datasets.demonstrations.load import read_demonstrations, recorded_episodes
-from handrail.datasets.quality import load
 from handrail.datasets.quality.measure import measure, measured, read
 from handrail.datasets.quality.pool import Extent, Spread, embed
 
