@@ -127,7 +127,7 @@ def test_an_interrupt_ends_all_workers_and_one_core_goes_on(number, alone, tmp_p
     process.send_signal(number)
     _, said = process.communicate(timeout=120)
     assert process.returncode == 130
-    assert "interrupted; what was recorded is kept, and the same flags go on" in said
+    assert "interrupted; what was recorded is kept in" in said
     assert "Traceback" not in said
     assert workers
     assert not any(map(is_alive, workers))
