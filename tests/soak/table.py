@@ -88,7 +88,7 @@ def _cells(rows: Sequence[Row], all_of: Callable[[Iterable[int]], int]) -> list[
 
 
 def _kind(work: str) -> str:
-    return work.split(",")[0].split(" --ray")[0]
+    return work.split(",")[0]
 
 
 def _end(row: Row) -> str:
