@@ -12,12 +12,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from child import Child, members
+from child import Child, members, wait_until
 
 KILLED, HUNG_UP, ASKED = {-signal.SIGKILL}, {-signal.SIGHUP}, {130, -signal.SIGTERM}
 FINE, FAILED = {0}, {0, 1, 2}  # a failure that comes too late for the command to notice is none
 CLUSTER = "cluster.json"  # in the folder of work that is done on a cluster
 _DAY = 86_400.0  # [s]
+_BEGUN = 600.0  # a command has workers by then [s]
 
 
 @dataclass(frozen=True)
@@ -64,6 +65,7 @@ def _kill_slowly(child: Child, folder: Path, rng: np.random.Generator) -> None:
 
 
 def _kill_worker(child: Child, folder: Path, rng: np.random.Generator) -> None:
+    wait_until(lambda: child.workers or not child.runs, _BEGUN)
     if workers := child.workers:
         _send(int(rng.choice(workers)), signal.SIGKILL)
 

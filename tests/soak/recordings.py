@@ -79,15 +79,15 @@ class RayRecording(Recording):
 
     def __init__(self, folder: Path, workshop: Workshop, recipe: Recipe) -> None:
         said = folder / CLUSTER
-        self._cluster = subprocess.Popen(
-            [sys.executable, str(Path(__file__).with_name("ray_nodes.py")), str(said)],
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-            start_new_session=True,
-        )
-        if not wait_until(said.exists, _CLUSTER_STARTS):
+        words, log = [str(Path(__file__).with_name("ray_nodes.py")), str(said)], folder / "cluster.log"
+        with open(log, "w") as file:
+            self._cluster = subprocess.Popen(
+                [sys.executable, *words], stdout=file, stderr=file, start_new_session=True
+            )
+        wait_until(lambda: said.exists() or self._cluster.poll() is not None, _CLUSTER_STARTS)
+        if not said.exists():
             self.close()
-            raise TimeoutError("no Ray cluster")
+            raise TimeoutError(f"no Ray cluster: {log.read_text()[-300:]}")
         address = json.loads(said.read_text())["address"]
         super().__init__(folder, workshop, recipe, ("--ray", address))
         self.name = "record --ray"

@@ -20,6 +20,8 @@ _HEADINGS = (
     *("fault", "how often", "during", "the command then", "saved before", "lost", "complaints"),
     *("mended by `handrail-repair`", "finished by the same command", "seconds"),
 )
+_PLACES = r"/[\w./-]*/(?=round-|driven-|workshop|tests/soak)"  # on the computer where it was done
+_THIN = 15  # of as many looks at the memory one goes to the JSON file
 _SIGNALS = {-9: "killed", -15: "ended by SIGTERM", -1: "hung up"}
 
 
@@ -36,8 +38,10 @@ def main() -> None:
     given.page.write_text(text)
     names = ("rounds", "driving", "memory")
     kept = {name: read(given.out / f"{name}.jsonl") for name in names}
+    kept["memory"] = kept["memory"][::_THIN]
     lines = [f'"{name}": [\n{",\n".join(map(json.dumps, rows))}\n]' for name, rows in kept.items()]
-    given.page.with_suffix(".json").write_text("{" + ",\n".join(lines) + "}\n")
+    text = re.sub(_PLACES, "", "{" + ",\n".join(lines) + "}\n")
+    given.page.with_suffix(".json").write_text(text)
 
 
 def tables(out: Path) -> dict[str, str]:
@@ -84,7 +88,7 @@ def _cells(rows: Sequence[Row], all_of: Callable[[Iterable[int]], int]) -> list[
 
 
 def _kind(work: str) -> str:
-    return work.split(",")[0].split(" --ray")[0]
+    return work.split(",")[0]
 
 
 def _end(row: Row) -> str:
@@ -135,7 +139,7 @@ def _sum(rounds: Sequence[Row], drives: Sequence[Row], every: Sequence[Row]) -> 
 
 
 def _counted(what: Counter[str]) -> str:
-    return ", ".join(f"{name} {count}" for name, count in what.most_common())
+    return ", ".join(f"{name} ({count})" for name, count in what.most_common())
 
 
 def _line(cells: Sequence[str]) -> str:
