@@ -7,7 +7,6 @@ from handrail.datasets.demonstrations.demonstration import Demonstration
 from handrail.datasets.learnability.candidates import BASE_POSE
 from handrail.datasets.learnability.policy_rows import Actions, PolicyRows, recorded_view
 from handrail.policies.imitation.interface.interface import (
-    ACTIONS,
     COLUMNS,
     ENVIRONMENT,
     STATE,
@@ -30,12 +29,12 @@ def policy_rows(episode: Demonstration) -> PolicyRows:
     if not set(COLUMNS) <= set(columns):
         return recorded_view(episode)
     try:
-        seen = PolicyInterface.of_dataset(features, [], ACTIONS[0])
+        seen = PolicyInterface.of_dataset(features, [], "realised")
         state, environment = columns[STATE].astype(float), columns[ENVIRONMENT].astype(float)
         rows = np.hstack(seen.observe(state, environment)).astype(float)
         everything = (True,) * len(seen.channels)
         asked = PolicyInterface(
-            ACTIONS[1], seen.state_names, seen.environment_names, seen.channels, (everything,)
+            "intent", seen.state_names, seen.environment_names, seen.channels, (everything,)
         )
         given = {**columns, _VALUES: np.where(columns[_MASK], columns[_VALUES], 0.0)}
         actions = {
