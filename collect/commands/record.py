@@ -1,6 +1,5 @@
 """Records episodes into a dataset, with a progress bar, and says what came of it."""
 
-import os
 from typing import Any
 
 from rich.console import Console
@@ -78,8 +77,6 @@ def record(config: RecordConfig) -> int:
 def _opened(config: RecordConfig, interactive: bool) -> tuple[HandrailEnv, Any]:
     """Return the environment; and the link to a robot, if it is no simulation."""
     if not config.robot_client:
-        if not interactive:  # threads of Mesa's software rendering cost more than they save in small pictures
-            os.environ.setdefault("LP_NUM_THREADS", "0")
         return build_env(config, config.dataset.fps, render=interactive), None
     from handrail.collect.lekiwi.client_env import open_client  # loads LeRobot
 
