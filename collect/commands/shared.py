@@ -17,6 +17,7 @@ from handrail.collect.commands.shards import Shard, Shards
 from handrail.collect.config import RecordConfig
 from handrail.collect.envs.env import HandrailEnv
 from handrail.collect.execution.execution import Execution
+from handrail.collect.execution.forking import RECORDING
 from handrail.collect.execution.interrupts import Interrupts
 from handrail.collect.execution.job import Job
 from handrail.collect.session.build import build_env, build_session
@@ -33,7 +34,6 @@ INTERRUPTED = 130
 FAILED = 1
 _DYING = 60.0  # of a worker whose parent or computer is lost [s]
 _MOMENT = 0.1  # [s]
-_PRELOAD = ("handrail.collect.commands.shared",)
 _RECORDINGS: dict[RecordConfig, Recording] = {}
 
 
@@ -55,7 +55,7 @@ def record_shared(config: RecordConfig, console: Console) -> int:
         shards.check()
         config = replace(config, resume=Layout(shards.root).manifest.is_file(), overwrite=False)
     with (
-        Execution(config, "recording", console, _PRELOAD) as execution,
+        Execution(config, "recording", console, RECORDING) as execution,
         closing(build_env(config, config.dataset.fps)) as env,
     ):
         build_session(config, env)  # a wrong mask, or cameras without GL, show before anything is written

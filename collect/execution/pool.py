@@ -1,21 +1,19 @@
 """Runs jobs in processes of this computer, forked from a server that has loaded what they need."""
 
-import multiprocessing
 import signal
 from collections import Counter
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
-from multiprocessing import forkserver
 from multiprocessing.connection import Connection, wait
 from multiprocessing.context import ForkServerContext
 from multiprocessing.process import BaseProcess
 
 from handrail.collect.execution.engine import TRIES
+from handrail.collect.execution.forking import begin_loading
 from handrail.collect.execution.job import Job, Result
 from handrail.collect.execution.worker import serve
 
-_PRELOAD = "handrail.collect.execution.preload"
 _MOMENT = 0.2  # [s]
 _GRACE = 10.0  # for what a process saves just now, before it is killed [s]
 
@@ -42,9 +40,7 @@ class Pool:
 
     def __init__(self, capacity: int, preload: Sequence[str] = (), fresh: bool = False) -> None:
         self.capacity = capacity
-        self._context = multiprocessing.get_context("forkserver")
-        self._context.set_forkserver_preload([_PRELOAD, *preload])
-        forkserver.ensure_running()  # it loads while the caller gets ready
+        self._context = begin_loading(preload)
         self._fresh = fresh
         self._workers: dict[Connection, _Worker] = {}
         self._lost = Counter[str]()
