@@ -5,6 +5,7 @@
 """
 
 from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 import pyarrow as pa
@@ -51,6 +52,16 @@ def lists(values: pa.Array, lengths: Sequence[int]) -> pa.Array:
     """
     offsets = numbers(np.concatenate(([0], np.cumsum(lengths, dtype=int))), pa.int32())
     return pa.ListArray.from_arrays(offsets, values)
+
+
+def equal_lists(values: pa.Array, length: int) -> pa.Array:
+    """Return values as an Arrow array of lists that are equally long, as `lists` would."""
+    return pa.ListArray.from_arrays(_equal_offsets(len(values), length), values)
+
+
+@lru_cache(maxsize=256)
+def _equal_offsets(count: int, length: int) -> pa.Array:
+    return numbers(np.arange(0, count + 1, length), pa.int32())
 
 
 def scalars(values: Sequence[str | bool | int | float | None], kind: pa.DataType) -> pa.Array:

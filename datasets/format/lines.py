@@ -17,7 +17,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from handrail.controllers.errors import HandrailError
-from handrail.datasets.format.arrow import flat_numbers, lists, numbers, plain_values, scalars, strings
+from handrail.datasets.format.arrow import equal_lists, flat_numbers, lists, numbers, plain_values, scalars, strings
 from handrail.datasets.format.columns import ColumnTypes, is_extra
 from handrail.datasets.format.info_fields import MOST_EPISODES, MOST_FRAMES, whole_number
 from handrail.datasets.format.layout import Layout, chunk_and_file, slot_of
@@ -277,7 +277,7 @@ def _stats_array(values: np.ndarray, name: str) -> pa.Array:
     """
     found = numbers(values.reshape(-1), pa.int64() if name == "count" else pa.float64())
     for size in reversed(values.shape[1:]):
-        found = lists(found, [size] * (len(found) // size))
+        found = equal_lists(found, size)
     return found
 
 
