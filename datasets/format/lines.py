@@ -17,7 +17,15 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from handrail.controllers.errors import HandrailError
-from handrail.datasets.format.arrow import equal_lists, flat_numbers, lists, numbers, plain_values, scalars, strings
+from handrail.datasets.format.arrow import (
+    equal_lists,
+    flat_numbers,
+    lists,
+    numbers,
+    plain_values,
+    scalars,
+    strings,
+)
 from handrail.datasets.format.columns import ColumnTypes, is_extra
 from handrail.datasets.format.info_fields import MOST_EPISODES, MOST_FRAMES, whole_number
 from handrail.datasets.format.layout import Layout, chunk_and_file, slot_of
