@@ -1,5 +1,6 @@
 """Runs jobs on a Ray cluster; Ray runs again what is lost with a process or a computer."""
 
+import os
 import socket
 from contextlib import suppress
 from dataclasses import replace
@@ -15,6 +16,9 @@ from handrail.controllers.errors import HandrailError, message_of
 
 _MOMENT = 0.2  # [s]
 _PATIENCE = 10.0  # [s]
+_SETTINGS = b"\x04"  # the kind of frame that opens a connection of HTTP/2, which Ray's control server speaks
+_GREETING = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n" + bytes(3) + _SETTINGS + bytes(5)
+_TOKEN = "; if it wants a token: export RAY_AUTH_MODE=token (see docs/cluster.md)"
 _AHEAD = 2  # jobs given to the cluster for each of its cores, so that none waits for the next
 
 
@@ -38,7 +42,7 @@ class Cluster:
             except Exception as error:  # Ray says it in many ways
                 raise HandrailError(
                     f"--ray {address}: expected a running cluster (`ray start --head`), got"
-                    f" {message_of(error)}"
+                    f" {message_of(error)}{_TOKEN if 'RAY_AUTH_MODE' not in os.environ else ''}"
                 ) from error
         once: dict[str, Any] = {"max_calls": 1} if fresh else {}
         self._attempt: Any = ray.remote(num_cpus=1, max_retries=TRIES - 1, **once)(alone)
@@ -89,11 +93,18 @@ class Cluster:
 
 
 def _knock(address: str) -> None:
-    """Check that something listens at an address that has a port; Ray would look for it for minutes.
+    """Check that a control server answers at an address that has a port; Ray would look for it for minutes.
 
     Raises:
-        OSError, ValueError: nothing does.
+        OSError, ValueError: none does.
     """
     host, colon, port = address.rpartition(":")
-    if colon and "/" not in address:
-        socket.create_connection((host, int(port)), _PATIENCE).close()
+    if not colon or "/" in address:
+        return
+    with socket.create_connection((host, int(port)), _PATIENCE) as line:
+        if os.environ.get("RAY_USE_TLS", "0") != "0":
+            return
+        line.sendall(_GREETING)
+        answer = line.recv(9)
+    if answer[3:4] != _SETTINGS:
+        raise OSError(f"something else listens there, it answered {answer!r}")
