@@ -2,11 +2,13 @@
 
 import importlib.metadata
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 from handrail.collect.session.build import software_versions
+from handrail.datasets.comparison.prediction import MetricPrediction
+from handrail.datasets.comparison.report.prediction import prediction_table, prediction_words
 from handrail.datasets.comparison.report.report import json_text
 from handrail.datasets.presentation import markup
 from handrail.datasets.presentation.drawing import png, svg
@@ -19,6 +21,7 @@ from handrail.policies.study.design.progress import StudyProgress
 from handrail.policies.study.report import tables
 from handrail.policies.study.report.contrasts import DECLARED, EXPLORATORY, SYSTEM, Contrast, contrasts
 from handrail.policies.study.report.figures import figures
+from handrail.policies.study.report.prediction import predicted
 from handrail.policies.study.report.results import Condition, Results, gather
 from handrail.policies.study.report.words import answer, cautions, how
 
@@ -30,6 +33,7 @@ _CAPTIONS = {
     "robustness": "Success disturbed and undisturbed.",
     "sweep": "How human the operator is, and what that does to policies and to the operator's time.",
 }
+_PREDICTION = "Which metric of the demonstrations predicts success"
 _FORMAT = "handrail.study/2"
 _OF_TASK = (
     tables.conditions_table,
@@ -39,6 +43,38 @@ _OF_TASK = (
     tables.treatments_table,
     tables.sweep_table,
 )
+
+
+@dataclass(frozen=True)
+class _Findings:
+    """What is reported.
+
+    Attributes:
+        config: how the study was called.
+        results: of its jobs.
+        contrasts: of its policies.
+        predictions: which metric of the demonstrations goes with success.
+        figures: by name.
+    """
+
+    config: StudyConfig
+    results: Results
+    contrasts: Sequence[Contrast]
+    predictions: Sequence[MetricPrediction]
+    figures: Mapping[str, Any]
+
+    @property
+    def answer(self) -> str:
+        return " ".join(answer(self.contrasts, self.results))
+
+    @property
+    def of_all(self) -> list[Table]:
+        kinds = (DECLARED, SYSTEM, EXPLORATORY)
+        made = [tables.contrasts_table(self.contrasts, kind, self.results) for kind in kinds]
+        return [table for table in made if table.rows]
+
+    def of_task(self, task: str) -> list[Table]:
+        return [table for make in _OF_TASK if (table := make(task, self.results)).rows]
 
 
 def write_study(config: StudyConfig, progress: StudyProgress) -> list[Path]:
@@ -53,51 +89,41 @@ def write_study(config: StudyConfig, progress: StudyProgress) -> list[Path]:
     """
     root, results = progress.layout.root, gather(progress)
     found = contrasts(results)
-    drawn = figures(results, found)
-    files = {
-        root / "report.html": _html(config, results, found, drawn),
-        root / "study.json": _json(config, results, found),
-    }
+    findings = _Findings(config, results, found, predicted(results), figures(results, found))
+    files = {root / "report.html": _html(findings), root / "study.json": _json(findings)}
     with explained("study: expected a folder that can be written"):
         for path, text in files.items():
             write_whole(path, text.encode())
         written = list(files)
         if config.page:
-            written += _write_page(config, results, found, drawn)
+            written += _write_page(findings)
     return written
 
 
-def _of_all(results: Results, found: Sequence[Contrast]) -> list[Table]:
-    made = [tables.contrasts_table(found, kind, results) for kind in (DECLARED, SYSTEM, EXPLORATORY)]
-    return [table for table in made if table.rows]
-
-
-def _of_task(task: str, results: Results) -> list[Table]:
-    return [table for make in _OF_TASK if (table := make(task, results)).rows]
-
-
-def _html(config: StudyConfig, results: Results, found: Sequence[Contrast], drawn: Mapping[str, Any]) -> str:
-    progress = results.progress
-    title = f"Study {progress.design.name}: {', '.join(progress.design.modes)}"
-    parts = [markup.paragraph(" ".join(answer(found, results)), "headline")]
+def _html(findings: _Findings) -> str:
+    results, design = findings.results, findings.results.progress.design
+    parts = [markup.paragraph(findings.answer, "headline")]
     parts.append(markup.items(("caution", text) for text in cautions(results)))
-    pictures = [(_CAPTIONS[name], "", svg(figure)) for name, figure in drawn.items()]
+    pictures = [(_CAPTIONS[name], "", svg(figure)) for name, figure in findings.figures.items()]
     parts += [markup.section("Figures", markup.panels(pictures, "wide"))] if pictures else []
-    if tested := _of_all(results, found):
-        parts.append(markup.section("Contrasts", *tested))
-    parts += [markup.section(_title(task), *_of_task(task, results)) for task in progress.design.tasks]
-    parts.append(markup.section("How to read this", markup.paragraph(how(results, found))))
-    again = tables.times_table(results), tables.cells_table(results, config.preset)
+    if findings.of_all:
+        parts.append(markup.section("Contrasts", *findings.of_all))
+    parts += [markup.section(_title(task), *findings.of_task(task)) for task in design.tasks]
+    if findings.predictions:
+        words = markup.paragraph(prediction_words(findings.predictions))
+        parts.append(markup.section(_PREDICTION, words, prediction_table(findings.predictions)))
+    parts.append(markup.section("How to read this", markup.paragraph(how(results, findings.contrasts))))
+    again = tables.times_table(results), tables.cells_table(results, findings.config.preset)
     parts.append(markup.section("Again", *(table for table in again if table.rows)))
-    return markup.page(title, *parts)
+    return markup.page(f"Study {design.name}: {', '.join(design.modes)}", *parts)
 
 
 def _title(task: str) -> str:
     return task.replace("_", " ").capitalize()
 
 
-def _json(config: StudyConfig, results: Results, found: Sequence[Contrast]) -> str:
-    progress = results.progress
+def _json(findings: _Findings) -> str:
+    progress = findings.results.progress
     done = {job.name: note for job in progress.jobs if (note := progress.note(job))}
     took = [note.get("took", {}) for note in done.values()]
     content = {
@@ -106,13 +132,14 @@ def _json(config: StudyConfig, results: Results, found: Sequence[Contrast]) -> s
         "designs": designs(progress.layout),
         "missing": progress.missing,
         "versions": software_versions() | {"torch": importlib.metadata.version("torch")},
-        "answer": answer(found, results),
-        "contrasts": [asdict(each) for each in found],
-        "conditions": [_numbers(noise, each) for (noise, *_), each in results.conditions.items()],
+        "answer": answer(findings.contrasts, findings.results),
+        "contrasts": [asdict(each) for each in findings.contrasts],
+        "conditions": [_numbers(noise, each) for (noise, *_), each in findings.results.conditions.items()],
+        "predictions": [asdict(each) for each in findings.predictions],
         "jobs": {name: {"result": note["result"], "took": note.get("took")} for name, note in done.items()},
         "seconds": sum(each.get("seconds", 0.0) for each in took),
         "processor_seconds": sum(each.get("processor_seconds", 0.0) for each in took),
-        "again": tables.cell_command(config.preset, "TASK/MODE/DRAW"),
+        "again": tables.cell_command(findings.config.preset, "TASK/MODE/DRAW"),
     }
     return json_text(content)
 
@@ -134,32 +161,34 @@ def _numbers(noise: float, condition: Condition) -> dict[str, Any]:
     }
 
 
-def _write_page(
-    config: StudyConfig, results: Results, found: Sequence[Contrast], drawn: Mapping[str, Any]
-) -> list[Path]:
+def _write_page(findings: _Findings) -> list[Path]:
     """Put tables and figures between the study's marks; figures and JSON go beside the page."""
-    page, design = Path(config.page).expanduser(), results.progress.design
+    results, preset = findings.results, findings.config.preset
+    page, design = Path(findings.config.page).expanduser(), results.progress.design
     stem = f"{page.stem}_{design.name}"
-    parts = [" ".join(answer(found, results)), "\n".join(f"- {text}" for text in cautions(results))]
+    parts = [findings.answer, "\n".join(f"- {text}" for text in cautions(results))]
     written = [page]
-    for name, figure in drawn.items():
+    for name, figure in findings.figures.items():
         picture = page.parent / f"{stem}_{name}.png"
         write_whole(picture, png(figure))
         parts.append(f"![{_CAPTIONS[name]}]({picture.name})")
         written.append(picture)
-    parts += map(markdown_table, _of_all(results, found))
+    parts += map(markdown_table, findings.of_all)
     for task in design.tasks:
-        if of_task := _of_task(task, results):
+        if of_task := findings.of_task(task):
             parts += [f"### {_title(task)}", *map(markdown_table, of_task)]
-    parts += ["### How to read this", how(results, found)]
+    if findings.predictions:
+        parts += [f"### {_PREDICTION}", prediction_words(findings.predictions)]
+        parts.append(markdown_table(prediction_table(findings.predictions)))
+    parts += ["### How to read this", how(results, findings.contrasts)]
     times = tables.times_table(results)
     parts += [markdown_table(times)] if times.rows else []
-    again = tables.cell_command(config.preset, "TASK/MODE/DRAW")
+    again = tables.cell_command(preset, "TASK/MODE/DRAW")
     parts.append(
-        f"`handrail-study --preset {config.preset}` wrote this, design `{design.digest}`. `{again}` runs one"
+        f"`handrail-study --preset {preset}` wrote this, design `{design.digest}`. `{again}` runs one"
         " cell anew, with the same rows and the same rollouts; digests are in the JSON."
     )
     data = page.parent / f"{stem}.json"
-    write_whole(data, _json(config, results, found).encode())
+    write_whole(data, _json(findings).encode())
     write_part(page, "Teleoperation modes", f"study {design.name}", "\n\n".join(filter(None, parts)))
     return [*written, data]
