@@ -2,6 +2,7 @@
 
 import hashlib
 import itertools
+import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -14,12 +15,14 @@ from handrail.controllers.baselines.catalogue import CONTROLLERS
 from handrail.controllers.entries import is_count
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.robot.catalogue import ROBOTS
-from handrail.datasets.storage.strict_json import load_json
+from handrail.datasets.storage.strict_json import load_json, read_json
 from handrail.policies.imitation.evaluation.config import EvaluateConfig
 from handrail.policies.imitation.evaluation.features import pictures, place_of
 from handrail.policies.imitation.interface.checkpoint import NAME, PolicyMeta, model_folder, read_meta
 from handrail.policies.imitation.interface.interface import PolicyInterface
 from handrail.policies.imitation.interface.trust import check_policy_folder
+
+_TRAINED = "train_config.json"  # of LeRobot's: how a policy was trained, not how it drives
 
 
 @dataclass(frozen=True)
@@ -33,7 +36,7 @@ class Checkpoint:
         pictures: height and width of what it sees, by camera [px].
         movers: how many moving obstacles it knows of.
         joined: whether it reads robot and scene as one vector.
-        digest: of all its files.
+        digest: of all that decides how it drives; not of where and when it was trained.
     """
 
     folder: Path
@@ -124,7 +127,7 @@ def read_checkpoint(folder: Path, config: EvaluateConfig) -> Checkpoint:
 
 def _plain(place: Path, settings: Mapping[str, Any], config: EvaluateConfig) -> PolicyMeta:
     """Return what is known of a policy of plain `lerobot-train`."""
-    path = place / "train_config.json"
+    path = place / _TRAINED
     training = load_json(path, "settings of LeRobot") if path.is_file() else {}
     seed = training.get("seed") if isinstance(training, dict) else None
     step = place.parent.name
@@ -215,8 +218,15 @@ def own_protection(mode: str) -> str:
 def _digest(folder: Path) -> str:
     digest = hashlib.sha256()
     for path in sorted(folder.iterdir()):
-        if path.is_file():
+        if path.is_file() and path.name != _TRAINED:
             digest.update(path.name.encode())
+            if path.name == NAME:
+                digest.update(_without_training(path))
+                continue
             with open(path, "rb") as file:
                 hashlib.file_digest(file, lambda: digest)  # adds the file to it
     return digest.hexdigest()[:16]
+
+
+def _without_training(path: Path) -> bytes:
+    return json.dumps({key: value for key, value in read_json(path).items() if key != "training"}).encode()
