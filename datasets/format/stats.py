@@ -114,26 +114,45 @@ def _many_rows_stats(rows: np.ndarray) -> dict[str, np.ndarray]:
     variance = np.mean(rows**2, axis=0) - mean**2
     stats = {"min": low, "max": high, "mean": mean, "std": np.sqrt(np.maximum(0, variance))}
     edges = np.linspace(low - 1e-10, high + 1e-10, BINS + 1)  # (BINS + 1, d)
-    columns = [_quantiles(column, edges[:, i]) for i, column in enumerate(rows.T)]
-    stats |= {name: np.array([column[name] for column in columns]) for name in QUANTILES}
+    stats |= _quantiles(rows, edges)
     return {name: value.astype(np.float64) for name, value in stats.items()} | {
         "count": np.array([len(rows)])
     }
 
 
-def _quantiles(
-    values: np.ndarray, edges: np.ndarray, weights: np.ndarray | None = None
-) -> dict[str, np.floating]:
-    """Return the quantiles of values, interpolated inside the first bin up to which enough of them lie."""
-    bins = np.minimum(np.searchsorted(edges, values, side="right"), BINS) - 1  # the last one is closed
-    counts = np.bincount(bins, weights, minlength=BINS)
+def _quantiles(values: np.ndarray, edges: np.ndarray) -> dict[str, np.ndarray]:
+    """Return the quantiles of columns, interpolated inside the first bin up to which enough values lie.
+
+    Args:
+        values: `(N, d)`.
+        edges: of the bins of each column, `(BINS + 1, d)`.
+    """
+    targets, columns = (_SHARES * len(values))[:, None], np.arange(values.shape[1])
+    bins = np.sort([_bins(*each) for each in zip(values.T, edges.T, strict=True)]).T
+    chosen = bins[np.ceil(targets[:, 0]).astype(int) - 1]  # (quantiles, d)
+    before, inside = (each(bins, chosen[:, None]).sum(axis=1) for each in (np.less, np.equal))
+    found = _inside(edges[chosen, columns], edges[chosen + 1, columns], chosen, (targets - before) / inside)
+    return dict(zip(QUANTILES, found, strict=True))
+
+
+def _quantiles_of_counts(values: np.ndarray, counts: np.ndarray, edges: np.ndarray) -> dict[str, np.floating]:
+    """Return the same of one column in which each value occurs some times, `(N,)`."""
+    counts = np.bincount(_bins(values, edges), counts, minlength=BINS)
     ranks = np.cumsum(counts)
     targets = _SHARES * ranks[-1]
     chosen = np.searchsorted(ranks, targets)
-    before = ranks[chosen] - counts[chosen]
-    width = np.where(chosen > 0, edges[chosen + 1] - edges[chosen], 0.0)
-    found = edges[chosen] + (targets - before) / counts[chosen] * width
-    return dict(zip(QUANTILES, found, strict=True))
+    share = (targets - (ranks[chosen] - counts[chosen])) / counts[chosen]
+    return dict(zip(QUANTILES, _inside(edges[chosen], edges[chosen + 1], chosen, share), strict=True))
+
+
+def _bins(values: np.ndarray, edges: np.ndarray) -> np.ndarray:
+    """Return the bin of each value; the last bin is closed."""
+    return np.minimum(np.searchsorted(edges, values, side="right"), BINS) - 1
+
+
+def _inside(lower: np.ndarray, upper: np.ndarray, chosen: np.ndarray, share: np.ndarray) -> np.ndarray:
+    """Return where in its bin a quantile is; in the first one, at its lower edge, as LeRobot has it."""
+    return lower + share * np.where(chosen > 0, upper - lower, 0.0)
 
 
 def _level_stats(counts: np.ndarray) -> dict[str, float | np.floating]:
@@ -142,7 +161,7 @@ def _level_stats(counts: np.ndarray) -> dict[str, float | np.floating]:
     mean = counts @ _LEVELS / total
     low, high = np.float32(present[0]), np.float32(present[-1])
     edges = np.linspace(low - 1e-10, high + 1e-10, BINS + 1)
-    quantiles = _quantiles(_LEVELS[present], edges, counts[present])
+    quantiles = _quantiles_of_counts(_LEVELS[present], counts[present], edges)
     spread = np.sqrt(max(0.0, counts @ _LEVELS**2 / total - mean**2))
     return {"min": float(low), "max": float(high), "mean": mean, "std": spread, **quantiles}
 
