@@ -14,7 +14,7 @@ from handrail.datasets.reading.reader import read_episodes, read_info, read_rows
 
 CLOCKS = ("wall_clock", "controller.solve_time")  # of frames
 EPISODE_CLOCKS = ("started", "wall_time")
-PLACES = ("data/", "meta/")  # in which file
+PLACES = ("data/", "meta/", "videos/")  # in which file
 
 
 def content(root):
