@@ -41,6 +41,8 @@ class TrainConfig:
     """Let the policy see where the base is, as operators do who plan where to stand."""
     images: bool = False
     """Let the policy see the cameras too."""
+    scene: bool = True
+    """Let the policy see where things are; with --no_scene it has to find them in the pictures."""
     mode: str = ""
     """Only episodes of this teleop mode."""
     success_only: bool = False
@@ -106,6 +108,8 @@ class TrainConfig:
             raise HandrailError(f"--patience {self.patience}: expected 0 or more")
         if self.patience and not self.eval_split:
             raise HandrailError("--patience: expected --eval_split too, the share of episodes to measure on")
+        if not self.scene and not self.images:
+            raise HandrailError("--no_scene: expected --images too, else the policy sees nothing of its task")
         if self.resume and self.overwrite:
             raise HandrailError("--resume and --overwrite: expected one of them, got both")
         self.options()

@@ -13,7 +13,7 @@ from handrail.policies.imitation.training.presets import resolved
 if TYPE_CHECKING:
     from handrail.policies.imitation.training.source import Source
 
-_OLDER = {"base_pose": False}  # of a training before that could be said
+_OLDER = {"base_pose": False, "scene": True}  # of a training before that could be said
 
 
 def check_settings(config: TrainConfig, began: PolicyMeta) -> None:

@@ -174,6 +174,9 @@ def read_source(config: TrainConfig, began: PolicyMeta | None = None) -> Source:
         interface, features, columns = _interpreted(info, selection, config.actions, config.base_pose)
     if config.images:
         features |= described_cameras(info)
+    if not config.scene:
+        features.pop(ENVIRONMENT, None)
+        columns.pop(ENVIRONMENT, None)
     return Source(config, info, selection, interface, features, columns | _counters(selection, info.fps))
 
 

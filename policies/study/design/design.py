@@ -37,6 +37,10 @@ intents = ["ee"]                of these modes also the operator's intent is lea
 draws = 2                       on the first so many draws
 same_number = 1                 draws of which policies also learn from `episodes` demonstrations each
 
+[pictures]                      optional: policies see these in place of where things are
+cameras = ["wrist", "scene"]
+size = 96                       of a picture, its height and width [px]
+
 [robustness]                    optional, exploratory: what else policies go through
 perturbations = ["push", "shift", "delay"]      each a condition of its own
 protections = ["mpc", "filter"] of policies that command joint velocities
@@ -112,6 +116,14 @@ class Beside:
 
 
 @dataclass(frozen=True)
+class Pictures:
+    """What policies see in place of where things are; explained above."""
+
+    cameras: tuple[str, ...] = ("wrist", "scene")
+    size: int = 96
+
+
+@dataclass(frozen=True)
 class Robustness:
     """What else policies of the main design go through; explained above."""
 
@@ -150,6 +162,7 @@ class StudyDesign:
     flat: Flat | None = None
     factors: Factors | None = None
     beside: Beside | None = None
+    pictures: Pictures | None = None
     robustness: Robustness | None = None
     sweep: Sweep | None = None
     digest: str = ""

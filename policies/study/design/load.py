@@ -16,6 +16,7 @@ from handrail.policies.study.design.design import (
     Beside,
     Factors,
     Flat,
+    Pictures,
     Robustness,
     StudyDesign,
     Sweep,
@@ -27,7 +28,14 @@ PRESETS = Path(__file__).parent / "presets"
 _NAME = Entry("no name: a study is called after its file", lambda _: False, needed=False)
 _DIGEST = Entry("no digest: it follows from the rest", lambda _: False, needed=False)
 _TASKS = Entry("a table of tasks", lambda value: is_table(value) and all(map(is_name, value)))
-_PARTS = {"flat": Flat, "factors": Factors, "beside": Beside, "robustness": Robustness, "sweep": Sweep}
+_PARTS = {
+    "flat": Flat,
+    "factors": Factors,
+    "beside": Beside,
+    "pictures": Pictures,
+    "robustness": Robustness,
+    "sweep": Sweep,
+}
 
 
 def design_names() -> list[str]:

@@ -37,6 +37,8 @@ def recording(cell: Cell, design: StudyDesign, root: Path, so_far: int = 0) -> R
         root: folder of the dataset.
         so_far: episodes in it.
     """
+    seen = design.pictures
+    pictured = {"cameras": ",".join(seen.cameras), "image_size": seen.size} if seen else {}
     return RecordConfig(
         task=cell.task,
         mode=cell.mode,
@@ -52,6 +54,7 @@ def recording(cell: Cell, design: StudyDesign, root: Path, so_far: int = 0) -> R
         ),
         resume=root.exists(),
         workers=1,  # a job has one core
+        **pictured,
     )
 
 
@@ -83,6 +86,7 @@ def training(policy: StudyPolicy, design: StudyDesign, dataset: Path, output: Pa
         episodes=0 if timed else task.episodes,
         resume=True,
         **ended,
+        **({"images": True, "scene": False} if design.pictures else {}),
     )
 
 
@@ -121,7 +125,8 @@ def fingerprint(job: Job, design: StudyDesign) -> dict[str, Any]:
     if job.policy is None:
         return _of_cell(job.cell, design)
     config = training(job.policy, design, Path("dataset"), Path("policy"))
-    learnt = _some(config, (*_LEARNT, *_ENDED)) | {"sizes": as_json(resolved(config))}
+    seen = ("images", "scene") if design.pictures else ()
+    learnt = _some(config, (*_LEARNT, *_ENDED, *seen)) | {"sizes": as_json(resolved(config))}
     driven = {what: _some(each, _DRIVEN) for what, each in evaluations(job, design).items()}
     return _of_cell(job.cell, design) | {"training": learnt, "evaluations": driven}
 
@@ -162,7 +167,8 @@ def check_policies(design: StudyDesign) -> None:
 def _of_cell(cell: Cell, design: StudyDesign) -> dict[str, Any]:
     task = design.tasks[cell.task]
     config, turns = recording(cell, design, Path("dataset")), {"persons": design.persons, "turn": BATCH}
-    recorded = _some(config, _RECORDED) | turns | {"fps": config.dataset.fps}
+    seen = ("cameras", "image_size") if design.pictures else ()
+    recorded = _some(config, (*_RECORDED, *seen)) | turns | {"fps": config.dataset.fps}
     return {"recording": recorded, "wanted": {"episodes": task.episodes, "minutes": task.minutes}}
 
 

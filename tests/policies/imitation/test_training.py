@@ -213,13 +213,27 @@ def test_a_policy_sees_cameras_where_it_is_asked_to(tmp_path):
     folder = train(config, quiet=True)
     policy = load_policy(folder)
     assert list(policy.policy.config.image_features) == ["observation.images.wrist"]
+    assert "observation.environment_state" in policy.policy.config.input_features
+    assert pictures_matter(policy)
+
+
+def test_a_policy_that_is_told_nothing_of_the_scene_sees_it(tmp_path):
+    root = write_dataset(tmp_path / "set", lengths=(5, 6), cameras=("wrist",))
+    options = "replace_final_stride_with_dilation=0"
+    config = tiny(root, tmp_path / "policy", options, steps=1, images=True, scene=False)
+    policy = load_policy(train(config, quiet=True))
+    assert "observation.environment_state" not in policy.policy.config.input_features
+    assert pictures_matter(policy)
+
+
+def pictures_matter(policy):
     sizes = [feature.shape[0] for feature in policy.policy.config.input_features.values()]
     dark, light = (np.full((16, 16, 3), level, np.uint8) for level in (0, 255))
     acted = []
     for picture in (dark, light):
         policy.reset()
         acted.append(policy.act(np.zeros(sizes[0]), np.zeros(sizes[1]), {"wrist": picture}))
-    assert not np.array_equal(*acted)
+    return not np.array_equal(*acted)
 
 
 @pytest.mark.parametrize(
@@ -232,6 +246,7 @@ def test_a_policy_sees_cameras_where_it_is_asked_to(tmp_path):
         ({"policy_options": ("n_action_steps=500",)}, "policy act: .*n_action_steps"),
         ({"device": "tpu"}, "expected one of cpu"),
         ({"images": True}, "expected cameras"),
+        ({"scene": False}, "--no_scene: expected --images too"),
         ({"steps": -1}, "expected 0 or more"),
         ({"threads": 0}, "expected 1 or more"),
         ({"resume": True, "overwrite": True}, "expected one of them"),

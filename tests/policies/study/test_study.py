@@ -2,6 +2,7 @@
 
 import errno
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -9,9 +10,11 @@ from study_helpers import DESIGN, Starter, run_here
 
 from handrail.controllers.errors import HandrailError
 from handrail.policies.study.config import StudyConfig
+from handrail.policies.study.design.design import Pictures
 from handrail.policies.study.design.jobs import jobs
 from handrail.policies.study.design.load import design_names, load_design
 from handrail.policies.study.design.progress import read_json, write_json
+from handrail.policies.study.design.settings import fingerprint, recording, training
 
 
 @pytest.fixture
@@ -120,6 +123,19 @@ def test_presets_are_whole(name):
     names = [job.name for job in jobs(design)]
     assert len(set(names)) == len(names)
     assert {need for job in jobs(design) for need in job.needs} <= set(names)
+
+
+def test_policies_that_see_pictures_are_recorded_and_trained_so():
+    design = load_design("pictures")
+    job = next(job for job in jobs(design) if job.policy)
+    recorded = recording(job.cell, design, Path("d"))
+    assert (recorded.cameras, recorded.image_size) == ("wrist,scene", 96)
+    learnt = training(job.policy, design, Path("d"), Path("p"))
+    assert (learnt.images, learnt.scene) == (True, False)
+    plain = replace(design, pictures=None)
+    other, wider = fingerprint(job, plain), replace(design, pictures=Pictures(("wrist",)))
+    assert fingerprint(job, design)["recording"] != fingerprint(job, wider)["recording"]
+    assert not {"cameras", "images"} & {*other["recording"], *other["training"]}
 
 
 def test_notes_are_whole_or_not_there(tmp_path):
