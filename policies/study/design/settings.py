@@ -84,9 +84,10 @@ def training(policy: StudyPolicy, design: StudyDesign, dataset: Path, output: Pa
         policy_options=task.policy_options,
         minutes=task.minutes if timed else 0.0,
         episodes=0 if timed else task.episodes,
+        images=design.pictures is not None,
+        scene=design.pictures is None,
         resume=True,
         **ended,
-        **({"images": True, "scene": False} if design.pictures else {}),
     )
 
 
