@@ -15,7 +15,7 @@ from handrail.collect.execution.worker import alone
 from handrail.controllers.errors import HandrailError, message_of
 
 _MOMENT = 0.2  # [s]
-_PATIENCE = 10.0  # [s]
+PATIENCE = 10.0  # [s]
 _SETTINGS = b"\x04"  # the kind of frame that opens a connection of HTTP/2, which Ray's control server speaks
 _GREETING = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n" + bytes(3) + _SETTINGS + bytes(5)
 _TOKEN = "; if it wants a token: export RAY_AUTH_MODE=token (see docs/cluster.md)"
@@ -101,7 +101,7 @@ def _knock(address: str) -> None:
     host, colon, port = address.rpartition(":")
     if not colon or "/" in address:
         return
-    with socket.create_connection((host, int(port)), _PATIENCE) as line:
+    with socket.create_connection((host, int(port)), PATIENCE) as line:
         if os.environ.get("RAY_USE_TLS", "0") != "0":
             return
         line.sendall(_GREETING)

@@ -18,7 +18,7 @@ cluster = pytest.importorskip(
     [(b"", "timed out"), (b"HTTP/1.1 400 Bad Request\r\n\r\n", "something else listens there, it answered")],
 )
 def test_something_else_at_the_address_is_one_line(answer, words, monkeypatch):
-    monkeypatch.setattr(cluster, "_PATIENCE", 0.3)
+    monkeypatch.setattr(cluster, "PATIENCE", 0.3)
     with socket.create_server(("127.0.0.1", 0)) as server:
         lines = []
 

@@ -28,7 +28,6 @@ from handrail.policies.study.design.progress import StudyProgress
 from handrail.policies.study.report import tables
 from handrail.policies.study.report.contrasts import DECLARED, EXPLORATORY, SYSTEM, WORDS, contrasts
 from handrail.policies.study.report.figures import figures
-from handrail.policies.study.report.prediction import predicted
 from handrail.policies.study.report.results import gather
 from handrail.policies.study.report.words import answer, cautions, how
 
@@ -290,20 +289,3 @@ def test_a_share_of_few_is_never_certain():
     assert variance_of_share(0, 50, 50) > 0.0
     assert student([0.5]).interval is None
     assert json.dumps(student([0.5, 0.7]).value)
-
-
-def test_a_metric_that_goes_with_success_is_seen_and_one_that_does_not_is_not(tmp_path):
-    layout, rng = Layout(tmp_path / "study"), np.random.default_rng(1)
-    for job in jobs(DESIGN):
-        make(job, DESIGN, layout, SHARES)
-        if job.policy is None:
-            note = json.loads(layout.done(job).read_text())
-            note["result"]["quality"] = {"jerk": -SHARES[job.cell.mode][job.cell.draw], "path": rng.normal()}
-            note["result"]["learnability"] = {}
-            layout.done(job).write_text(json.dumps(note))
-    found = {each.metric: each for each in predicted(gather(StudyProgress(DESIGN, layout)))}
-    assert found["jerk"].between.units == 8
-    assert found["jerk"].within.units == 32
-    assert found["jerk"].between.estimate < -0.9
-    assert found["jerk"].detected
-    assert not found["path"].detected
