@@ -21,7 +21,7 @@ _HEADINGS = (
     *("mended by `handrail-repair`", "finished by the same command", "seconds"),
 )
 _PLACES = (  # on the computer where it was done
-    r"(?:/[\w./-]*/)?round-[\d-]+/disk/work/|/[\w./-]*/(?=round-|driven-|workshop|tests/soak)"
+    r"(?:/[\w./-]*/)?round-[\d-]+/disk/\w+/|/[\w./-]*/(?=round-|driven-|workshop|tests/soak)"
 )
 _THIN = 15  # of as many looks at the memory one goes to the JSON file
 _SIGNALS = {-9: "killed", -15: "ended by SIGTERM", -1: "hung up"}
