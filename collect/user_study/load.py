@@ -20,7 +20,6 @@ from handrail.controllers.entries import (
 from handrail.controllers.errors import HandrailError, shown, unknown_name
 from handrail.controllers.fields import check_fields
 from handrail.controllers.robot.catalogue import ROBOTS
-from handrail.controllers.strict_toml import read_toml
 
 _MOST_TRIALS, _MOST_POINTS, _LONGEST_PAGE = 100, 21, 20_000
 
@@ -72,15 +71,6 @@ _OF_KIND: Mapping[str, Mapping[str, Entry]] = {
     "choice": {"choices": Entry("a list of two texts or more", lists(is_text))},
     "text": {},
 }
-
-
-def load_study(path: Path) -> UserStudy:
-    """Return the study of a TOML file.
-
-    Raises:
-        HandrailError: it cannot be read, or something in it is wrong; one line.
-    """
-    return parse_study(read_toml(path, "study"), f"study {path}")
 
 
 def parse_study(content: Any, where: str) -> UserStudy:

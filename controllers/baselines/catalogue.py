@@ -15,7 +15,6 @@ class ControllerSpec:
         name: that a teleop mode says.
         build: `(model, period [s]) -> Controller`, or where that is, `module:name`.
         help: what becomes of the command, in one line.
-        completes: whether it moves channels that nobody commands.
         protects: whether it keeps more than the joints' limits.
         objectives: whether `build` also takes what robot and task bring, `(model, period, objectives)`.
     """
@@ -23,7 +22,6 @@ class ControllerSpec:
     name: str
     build: Callable[..., Any] | str
     help: str
-    completes: bool = False
     protects: bool = False
     objectives: bool = False
 
@@ -39,13 +37,12 @@ CONTROLLERS = Registry(
     "controller",
     ControllerSpec,
     (
-        ControllerSpec("mpc", _masked_mpc, "the masked MPC", completes=True, protects=True, objectives=True),
+        ControllerSpec("mpc", _masked_mpc, "the masked MPC", protects=True, objectives=True),
         ControllerSpec("direct", f"{_HERE}.baselines.direct:DirectController", "clipped to joint limits"),
         ControllerSpec(
             "dls",
             f"{_HERE}.baselines.twist_completion:least_squares_controller",
             "damped least squares of the whole body, clipped to joint limits",
-            completes=True,
         ),
         ControllerSpec(
             "filter", f"{_HERE}.mpc.safety_filter:safety_filter", "multi-step safety filter", protects=True
@@ -57,7 +54,6 @@ CONTROLLERS = Registry(
             "split",
             f"{_HERE}.baselines.split_controller:split_controller",
             "inverse kinematics of the arm alone",
-            completes=True,
         ),
     ),
 )

@@ -63,7 +63,7 @@ def robot_like(model, mode, task, human):
 
 
 PRESS = TaskSpec("press", Press, PressScript, "press a button")
-DLS = ControllerSpec("dls", dls, "damped least squares", completes=True)
+DLS = ControllerSpec("dls", dls, "damped least squares")
 HAND = TeleopMode("hand", always("ee"), "press_kit:DLS", "steer the hand by damped least squares")
 EXACT = OperatorSpec("exact", robot_like, "a hand without faults")
 TWIN = RobotSpec("twin", ROBOTS["ridgeback_ur10"].file)

@@ -31,14 +31,6 @@ def seconds(process: int) -> float:
     return 0.0
 
 
-def memory(process: int) -> float:
-    """Return how much memory a process holds [MB]."""
-    with contextlib.suppress(OSError, StopIteration):
-        lines = Path(f"/proc/{process}/status").read_text().splitlines()
-        return int(next(line.split()[1] for line in lines if line.startswith("VmRSS"))) / 1024
-    return 0.0
-
-
 @contextlib.contextmanager
 def busy(programs: int) -> Iterator[None]:
     """Keep processors busy with programs that do nothing else."""

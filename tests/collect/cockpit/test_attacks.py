@@ -13,12 +13,19 @@ import pytest
 from cockpit_helpers import ask, drive, page
 from websockets.exceptions import ConnectionClosed
 
-from handrail.collect.experiments.latency.machine import family, memory
+from handrail.collect.experiments.latency.machine import family
 from handrail.datasets.reading.reader import read_episodes, read_frames
 
 pytestmark = pytest.mark.slow
 ROUNDS = 2  # the first one shows how much room the server takes, the second that it takes no more
 MOST_GROWTH = 20.0  # from one round to the next [MB]
+
+
+def memory(process):
+    """Return how much memory a process holds [MB]; 0 once it has ended."""
+    status = Path(f"/proc/{process}/status")
+    lines = status.read_text().splitlines() if status.exists() else []
+    return sum(int(line.split()[1]) / 1024 for line in lines if line.startswith("VmRSS"))
 
 
 class Owner:

@@ -6,7 +6,7 @@ import pytest
 
 from handrail.collect.user_study.design import Practice
 from handrail.collect.user_study.folder import StudyFolder
-from handrail.collect.user_study.load import load_study, parse_study
+from handrail.collect.user_study.load import parse_study
 from handrail.controllers.errors import HandrailError
 
 GOOD = {"title": "t", "consent": "c", "modes": ["ee", "direct"], "tasks": ["reach"]}
@@ -60,7 +60,7 @@ def test_what_is_not_said_is_as_by_default():
 
 def test_the_example_is_a_study_and_explains_every_entry(tmp_path):
     path = StudyFolder(tmp_path).write_example()
-    study = load_study(path)
+    study = StudyFolder(tmp_path).study()
     assert len(study.modes) == 3
     assert {question.kind for question in study.questions} == {"likert", "number", "choice", "text"}
     said = tomllib.loads(path.read_text())
