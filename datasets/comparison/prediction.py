@@ -10,13 +10,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from handrail.datasets.learnability.learnability import LEARNABILITY, TWO_HEAPS
+from handrail.datasets.learnability.learnability import LEARNABILITY, TITLES, TWO_HEAPS
 from handrail.datasets.quality.catalogue import METRICS
 from handrail.datasets.statistics.proportions import LEVEL, holm
 from handrail.datasets.statistics.ranks import RankCorrelation, rank_correlation
 
 _GOOD = {metric.name: metric.good for metric in METRICS} | {LEARNABILITY: "higher", TWO_HEAPS: "lower"}
-_TITLES = {metric.name: metric.title for metric in METRICS} | {LEARNABILITY: "learnability (R²)"}
+_TITLES = {metric.name: metric.title for metric in METRICS} | TITLES
 
 
 @dataclass(frozen=True)

@@ -25,6 +25,7 @@ CAVEAT = (
     " 95 %. Look at it beside what policies did, and rank nothing by it."
 )
 LEARNABILITY, TWO_HEAPS = "learnability", "two_heaps"
+TITLES = {LEARNABILITY: "learnability (R²)", TWO_HEAPS: "two heaps"}
 _FOLDS = 5
 _RESAMPLES = 1000
 _COMPONENTS = 8  # of what is seen, to find like observations

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from handrail.datasets.comparison.outcomes import compare_rollouts
+from handrail.datasets.learnability.learnability import TITLES
 from handrail.datasets.presentation.table import Cell, Table
 from handrail.datasets.presentation.wording import (
     DASH,
@@ -147,7 +148,8 @@ def quality_table(task: str, results: Results) -> Table:
 def _described(result: dict[str, Any]) -> dict[str, float]:
     """Return the metrics of a draw by title, then how much of its actions can be told."""
     known = {metric.title: result["quality"].get(metric.name) for metric in METRICS}
-    return {title: value for title, value in known.items() if value is not None} | result["learnability"]
+    told = {TITLES.get(name, name): value for name, value in result["learnability"].items()}
+    return {title: value for title, value in known.items() if value is not None} | told
 
 
 def treatments_table(task: str, results: Results) -> Table:

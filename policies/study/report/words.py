@@ -12,6 +12,8 @@ from handrail.policies.study.design.power import plan
 from handrail.policies.study.report.contrasts import DECLARED, SYSTEM, WORDS, Contrast
 from handrail.policies.study.report.results import Results
 
+_NAMES = {"act": "ACT", "diffusion": "Diffusion"}
+
 
 def answer(found: Sequence[Contrast], results: Results) -> list[str]:
     """Return the answer, a sentence each: the controller, the input and their interaction, and the limits."""
@@ -58,8 +60,7 @@ def _subject(contrast: Contrast, name: str) -> str:
         "controller": f"policies that learnt from demonstrations with the MPC succeeded in {one}, without in"
         f" {other}",
         "input": f"with the hand steered it was {one}, with the joints {other}",
-        "interaction": f"what the MPC adds is {points(contrast.estimate.value)} points more with the hand"
-        " than with the joints",
+        "interaction": "what the MPC adds with the hand, less what it adds with the joints",
     }[name]
 
 
@@ -69,10 +70,11 @@ def _limits(declared: Sequence[Contrast], results: Results) -> str:
         f"{done} of {design.draws} draws so far, " if results.progress.missing else f"{design.draws} draws, "
     )
     minutes = ", ".join(f"{task.minutes:g} min of {name}" for name, task in design.tasks.items())
+    learner = _NAMES.get(design.policy, design.policy)
     return (
-        f"this holds for {partly}scripted operators and one simulated robot, for {design.policy} policies"
-        f" that write joint velocities unprotected, and for {minutes} of operator time in each mode; it says"
-        " nothing of people, of other learners, or of a policy that the MPC completes"
+        f"this holds for {partly}scripted operators and one simulated robot, for {learner} policies that"
+        f" write joint velocities unprotected, and for {minutes} of operator time in each mode; it"
+        " says nothing of people, of other learners, or of a policy that the MPC completes"
     )
 
 
