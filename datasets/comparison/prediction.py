@@ -2,7 +2,8 @@
 
 A cell is a recording and the policies that learnt from it. Ranks are compared within a task, since tasks
 differ in metrics and in success alike: between modes, each the mean of its recordings; and between recordings
-of one mode, which says whether a metric tells a better recording from a worse one.
+of one mode, which says whether a metric tells a better recording from a worse one. A mode in two tasks is one
+mode, and a draw in all modes one draw, of the same persons: these are exchanged as a whole.
 """
 
 from collections.abc import Mapping, Sequence
@@ -116,10 +117,12 @@ def _between(cells: Sequence[PolicyCell], name: str, rng: np.random.Generator) -
     if not members:
         return None
     means = np.array([np.mean(each, axis=0) for each in members.values()])
-    return rank_correlation(means[:, 0], means[:, 1], [task for task, _ in members], rng)
+    tasks, conditions = zip(*members, strict=True)
+    return rank_correlation(means[:, 0], means[:, 1], tasks, conditions, rng)
 
 
 def _within(cells: Sequence[PolicyCell], name: str, rng: np.random.Generator) -> RankCorrelation | None:
     values = np.array([np.nan if (v := cell.metrics.get(name)) is None else v for cell in cells], float)
     success = np.array([cell.success for cell in cells])
-    return rank_correlation(values, success, [(cell.task, cell.condition) for cell in cells], rng)
+    strata = [(cell.task, cell.condition) for cell in cells]
+    return rank_correlation(values, success, strata, [cell.draw for cell in cells], rng)

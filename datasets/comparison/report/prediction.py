@@ -4,7 +4,8 @@ from collections.abc import Sequence
 
 from handrail.datasets.comparison.prediction import MetricPrediction
 from handrail.datasets.presentation.table import Cell, Table
-from handrail.datasets.presentation.wording import DASH, number, p_value, span
+from handrail.datasets.presentation.wording import DASH, number, p_value, signed, span
+from handrail.datasets.statistics.proportions import LEVEL
 from handrail.datasets.statistics.ranks import RankCorrelation
 
 _CAPTION = (
@@ -21,26 +22,34 @@ def prediction_words(found: Sequence[MetricPrediction]) -> str:
         return (
             "Which metric predicts success cannot be said: that takes policies of two recordings of a task."
         )
+    told = ", ".join(f"{each.title} ({_how(each)})" for each in seen)
+    words = f"Of {len(found)} metrics of the demonstrations these were seen to go with success: {told}."
     if not seen:
-        return (
-            f"No metric of the demonstrations was seen to predict success, of {len(found)}. With so few"
-            " recordings that does not show that none does: look at the intervals."
+        words = (
+            f"No metric of the demonstrations was seen to predict success, of {len(found)}. That does not"
+            " show that none does: look at the intervals."
         )
-    told = ", ".join(f"{each.title}{_against(each)}" for each in seen)
-    return f"Of {len(found)} metrics of the demonstrations these were seen to go with success: {told}."
+    return words + _impossible(found)
 
 
 def prediction_table(found: Sequence[MetricPrediction]) -> Table:
     """Return how the ranks of each metric go with those of success, the closest first."""
-    headings = ("metric", "thought better", "between modes", "modes", "between recordings", "recordings")
+    headings = (
+        "metric",
+        "thought better",
+        "between modes",
+        "modes",
+        "between recordings of a mode",
+        "recordings",
+    )
     rows = [
         [
             each.title,
             each.good or DASH,
             _cell(each.between, each.p_between, each.between_detected),
-            str(each.between.units) if each.between else DASH,
+            str(each.between.blocks) if each.between else DASH,
             _cell(each.within, each.p_within, each.within_detected),
-            str(each.within.units) if each.within else DASH,
+            str(each.within.blocks) if each.within else DASH,
         ]
         for each in found
     ]
@@ -54,8 +63,30 @@ def _cell(found: RankCorrelation | None, p: float, detected: bool) -> Cell:
     return Cell(number(found.estimate), look, below=f"{span(found.interval)}; {p_value(p)}")
 
 
-def _against(each: MetricPrediction) -> str:
-    """Return that a metric went the other way than was thought, or nothing."""
-    part = each.between if each.between_detected else each.within
+def _how(each: MetricPrediction) -> str:
+    """Return where a metric goes with success, and whether the other way than was thought."""
     thought = {"higher": 1.0, "lower": -1.0}.get(each.good, 0.0)
-    return " (the other way than was thought)" if part and thought * part.estimate < 0.0 else ""
+    sides = {
+        "between modes": each.between if each.between_detected else None,
+        "between recordings of a mode": each.within if each.within_detected else None,
+    }
+    return "; ".join(
+        f"{where}, ρ {signed(part.estimate)}"
+        + (", the other way than was thought" if thought * part.estimate < 0.0 else "")
+        for where, part in sides.items()
+        if part
+    )
+
+
+def _impossible(found: Sequence[MetricPrediction]) -> str:
+    """Return that so few modes or recordings cannot show anything, whatever the metric."""
+    words = ""
+    for where, name in (("between", "modes"), ("within", "recordings of a mode")):
+        known = [part for each in found if (part := getattr(each, where))]
+        least = min((part.least_p for part in known), default=0.0)
+        if least * len(known) >= LEVEL:
+            words += (
+                f" Between {name} none can be, with {known[0].blocks} of them and {len(known)} metrics: even"
+                " if the ranks agree wholly, that is not rare enough."
+            )
+    return words

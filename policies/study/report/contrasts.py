@@ -3,6 +3,8 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from handrail.datasets.statistics.proportions import holm
 from handrail.datasets.statistics.student import Estimate, student
 from handrail.policies.study.design.design import CONTRASTS, StudyDesign
@@ -105,27 +107,34 @@ def _pair(results: Results, one: str, other: str, tasks: tuple[str, ...]) -> Con
 
 
 def _systems(results: Results, design: StudyDesign, tasks: tuple[str, ...]) -> Iterator[Contrast | None]:
-    """Yield intents completed by the MPC against the policies of joint velocities that did best."""
+    """Yield intents completed by the MPC against what did best of joint velocities in the same measure."""
     for mode in design.beside.intents if design.beside else ():
         intent = [results.find(task, f"{mode} intent") for task in tasks]
         if not all(intent):
             continue
         draws = set.intersection(*(set(each.draws) for each in intent if each))
-        means = {label: _mean([results.find(task, label) for task in tasks], draws) for label in design.modes}
-        known = {label: mean for label, mean in means.items() if mean is not None}
-        if known:
-            best = max(known, key=lambda label: known[label])
-            parts = {f"{mode} intent": 1.0, best: -1.0}
-            title = f"{mode} intent + MPC − {best}, the best policy of joint velocities, unprotected"
-            yield _contrast(results, title, SYSTEM, tasks, parts)
-            yield _contrast(results, title, SYSTEM, tasks, parts, "contact")
+        for measure, sign in (("success", 1.0), ("contact", -1.0)):
+            rivals = [[results.find(task, label) for task in tasks] for label in design.modes]
+            means = {
+                label: sign * mean
+                for label, each in zip(design.modes, rivals, strict=True)
+                if (mean := _mean(each, draws, measure)) is not None
+            }
+            if means:
+                best = max(means, key=means.__getitem__)
+                parts = {f"{mode} intent": 1.0, best: -1.0}
+                title = (
+                    f"{mode} intent + MPC − {best}, of the unprotected policies of joint velocities the best"
+                )
+                yield _contrast(results, title, SYSTEM, tasks, parts, measure)
 
 
-def _mean(conditions: Sequence[Condition | None], draws: set[int]) -> float | None:
-    """Return the mean success over conditions and some draws; None where one is missing."""
-    shares = [each.shares.get(draw) if each else None for each in conditions for draw in draws]
-    known = [share for share in shares if share is not None]
-    return sum(known) / len(known) if known and len(known) == len(shares) else None
+def _mean(conditions: Sequence[Condition | None], draws: set[int], measure: str) -> float | None:
+    """Return the mean of a measure over conditions and some draws; None where one is missing."""
+    known = [each for each in conditions if each and draws <= each.draws.keys()]
+    if len(known) < len(conditions):
+        return None
+    return float(np.mean([each.draws[draw].values(measure).mean() for each in known for draw in draws]))
 
 
 def _contrast(

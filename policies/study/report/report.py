@@ -178,8 +178,9 @@ def _write_page(findings: _Findings) -> list[Path]:
         if of_task := findings.of_task(task):
             parts += [f"### {_title(task)}", *map(markdown_table, of_task)]
     if findings.predictions:
+        table = prediction_table(findings.predictions)
         parts += [f"### {_PREDICTION}", prediction_words(findings.predictions)]
-        parts.append(markdown_table(prediction_table(findings.predictions)))
+        parts += [markdown_table(table), table.caption]
     parts += ["### How to read this", how(results, findings.contrasts)]
     times = tables.times_table(results)
     parts += [markdown_table(times)] if times.rows else []

@@ -55,8 +55,10 @@ def contrasts_table(found: Sequence[Contrast], kind: str, results: Results) -> T
         tail = [p_alone(p), p_alone(each.p_adjusted), expected.get(each.name, DASH)]
         rows.append([*cells, *(tail + [DASH if seen is None else f"{100 * seen:.0f}"] if tested else [])])
     headings = ["contrast", "tasks", "of", "points", "95 %", "draws"]
-    headings += ["p", "p (Holm)", "detectable, planned", "detectable, as it came out"] if tested else []
-    title = _TITLES.get(kind, "A claim about a system: a policy and a controller, against a policy alone")
+    headings += ["p", "p (Holm)", "detectable, planned", "detectable, from the spread seen"] if tested else []
+    title = _TITLES.get(
+        kind, "A claim about a system, not tested: a policy and a controller, against a policy alone"
+    )
     return Table(headings, rows, title)
 
 
@@ -79,6 +81,7 @@ def conditions_table(task: str, results: Results) -> Table:
 def _condition(each: Condition, results: Results) -> tuple[str, ...]:
     learnt = results.trained(each)
     episodes = [one["trained_on"].get("episodes", 0.0) for one in learnt]
+    held = [one["trained_on"].get("held_out", 0.0) for one in learnt]
     minutes = [one["trained_on"].get("operator_time", 0.0) / 60.0 for one in learnt]
     steps = sorted(one["steps"] for one in learnt)
     return (
@@ -88,7 +91,7 @@ def _condition(each: Condition, results: Results) -> tuple[str, ...]:
         ", ".join(f"{100 * share:.0f}" for share in each.shares.values()),
         percent(float(each.rolled("contact").mean())),
         number(each.mean("length")),
-        f"{np.mean(episodes):.0f} episodes, {np.mean(minutes):.1f} min",
+        f"{np.mean(episodes):.0f} episodes + {np.mean(held):.0f} held out, {np.mean(minutes):.1f} min",
         f"{steps[0]}" if steps[0] == steps[-1] else f"{steps[0]} to {steps[-1]}",
     )
 

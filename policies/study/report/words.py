@@ -23,7 +23,7 @@ def answer(found: Sequence[Contrast], results: Results) -> list[str]:
         return [_undeclared(design)]
     sentences = [_effect(declared.get(WORDS["controller"]), "controller", results)]
     both = [_effect(declared.get(WORDS[name]), name, results) for name in ("input", "interaction")]
-    sentences.append("; ".join(filter(None, both)))
+    sentences.append("; ".join(filter(None, (*both, _simple(found, results)))))
     return [_begun(each) for each in (*filter(None, sentences), _limits(list(declared.values()), results))]
 
 
@@ -64,6 +64,22 @@ def _subject(contrast: Contrast, name: str) -> str:
     }[name]
 
 
+def _simple(found: Sequence[Contrast], results: Results) -> str:
+    """Return what the MPC adds with each input: where that differs, a mean over both misleads."""
+    factors, tasks = results.progress.design.factors, tuple(results.progress.design.tasks)
+    assert factors is not None
+    pairs = {
+        f"{factors.hand_mpc} − {factors.hand_none}": "hand",
+        f"{factors.joint_mpc} − {factors.joint_none}": "joints",
+    }
+    told = [
+        f"{points(each.estimate.value)} points with the {pairs[each.name]} (95 % {points_span(interval)})"
+        for each in found
+        if each.name in pairs and each.tasks == tasks and (interval := each.estimate.interval)
+    ]
+    return f"explored, not tested: the MPC adds {' and '.join(told)}" if told else ""
+
+
 def _limits(declared: Sequence[Contrast], results: Results) -> str:
     design, done = results.progress.design, min(each.estimate.replicates for each in declared)
     partly = (
@@ -71,10 +87,11 @@ def _limits(declared: Sequence[Contrast], results: Results) -> str:
     )
     minutes = ", ".join(f"{task.minutes:g} min of {name}" for name, task in design.tasks.items())
     learner = _NAMES.get(design.policy, design.policy)
+    seen = f"see {len(design.pictures.cameras)} cameras" if design.pictures else "see where things are"
     return (
-        f"this holds for {partly}scripted operators and one simulated robot, for {learner} policies that"
-        f" write joint velocities unprotected, and for {minutes} of operator time in each mode; it"
-        " says nothing of people, of other learners, or of a policy that the MPC completes"
+        f"this was measured for {partly}scripted operators and one simulated robot, for {learner} policies"
+        f" that {seen} and write joint velocities unprotected, and for {minutes} of operator time in each"
+        " mode; it says nothing of people, of other learners, or of a policy that the MPC completes"
     )
 
 
@@ -99,7 +116,7 @@ def _how(design: StudyDesign, results: Results, found: Sequence[Contrast]) -> It
             f" at least) was flat: the best of {design.flat.patience} measurements, one every"
             f" {design.flat.every} updates, not {percent(design.flat.improvement)} below the best before;"
             " then the learning rate fell to zero over a last fifth of the updates. The last checkpoint"
-            " counts."
+            " counts. A loss that falls no longer does not show that success would rise no longer."
         )
     else:
         yield "Every policy got the same number of updates; whether its loss was flat by then is not known."
@@ -122,13 +139,13 @@ def _how(design: StudyDesign, results: Results, found: Sequence[Contrast]) -> It
     if declared:
         yield (
             f"Only the {len(declared)} declared contrasts are tested, p after Holm over these. All others"
-            " explore: their intervals are not adjusted, and with so many of them some leave out zero by"
-            " chance."
+            " explore. No interval is adjusted: with so many contrasts some leave out zero by chance."
         )
     if any(each.kind == SYSTEM for each in found):
         yield (
             "A system claim compares a policy and a controller with a policy alone. The other side is the"
-            " best of the unprotected ones, chosen afterwards, which is in its favour."
+            " best of the unprotected ones in this very measure, chosen afterwards, which is in its favour."
+            " It does not tell whether the intent or the MPC does it."
         )
     yield f"“Learnability” is the R² of the actions from what policies see, on held-out episodes. {CAVEAT}"
     yield plan(design)

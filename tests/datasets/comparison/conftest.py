@@ -7,5 +7,6 @@ import pytest
 def few_resamples():
     """Few resamples: what is tested with them does not hang on the third digit of p."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("handrail.datasets.statistics.resampling.RESAMPLES", 500)
+        for module in ("resampling", "ranks"):
+            patch.setattr(f"handrail.datasets.statistics.{module}.RESAMPLES", 500)
         yield

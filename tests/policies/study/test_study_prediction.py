@@ -14,9 +14,12 @@ from handrail.policies.study.report.results import gather
 TASK = TaskDesign(minutes=1.0, episodes=5, steps=10)
 SHARES = {
     "ee": (0.95, 0.9, 1.0, 0.9),
-    "decoupled": (0.7, 0.6, 0.8, 0.75),
-    "joints": (0.8, 0.75, 0.9, 0.8),
+    "decoupled": (0.6, 0.5, 0.7, 0.65),
+    "joints": (0.85, 0.8, 0.9, 0.8),
     "direct": (0.8, 0.7, 0.85, 0.75),
+    "leader": (0.4, 0.5, 0.45, 0.4),
+    "ee_dls": (0.7, 0.75, 0.8, 0.65),
+    "switching": (0.3, 0.2, 0.3, 0.25),
 }
 DESIGN = StudyDesign("made", tuple(SHARES), {"reach": TASK, "tray": TASK}, "direct", draws=4, rollouts=20)
 
@@ -31,8 +34,8 @@ def test_a_metric_that_goes_with_success_is_seen_and_one_that_does_not_is_not(tm
             note["result"]["learnability"] = {}
             layout.done(job).write_text(json.dumps(note))
     found = {each.metric: each for each in predicted(gather(StudyProgress(DESIGN, layout)))}
-    assert found["jerk"].between.units == 8
-    assert found["jerk"].within.units == 32
+    assert found["jerk"].between.units == 14
+    assert found["jerk"].within.units == 56
     assert found["jerk"].between.estimate < -0.9
     assert found["jerk"].detected
     assert not found["path"].detected

@@ -165,12 +165,20 @@ def test_a_plan_says_what_can_be_detected_before_anything_is_there():
 
 
 def test_a_system_is_compared_with_the_best_policy_alone_and_named_so(gathered):
-    found = [each for each in contrasts(gathered()) if each.kind == SYSTEM]
+    results = gathered()
+    found = [each for each in contrasts(results) if each.kind == SYSTEM]
     assert {each.measure for each in found} == {"success", "contact"}
-    assert all(each.name.startswith("ee intent + MPC − ee,") for each in found)
-    worse = dict(SHARES, ee=(0.1,) * 4)
-    found = [each for each in contrasts(gathered(shares=worse)) if each.kind == SYSTEM]
-    assert all("− joints," in each.name for each in found)
+    succeeded = [each for each in found if each.measure == "success"]
+    assert all(each.name.startswith("ee intent + MPC − ee,") for each in succeeded)
+    for each in (each for each in found if each.measure == "contact"):  # the rival that touches the least
+        conditions = [[results.find(task, mode) for task in each.tasks] for mode in MODES]
+        touched = [np.mean([one.rolled("contact").mean() for one in some]) for some in conditions]
+        assert each.sides[1] == pytest.approx(min(touched))
+        assert f"− {MODES[int(np.argmin(touched))]}," in each.name
+    worse = gathered(shares=dict(SHARES, ee=(0.1,) * 4))
+    rivals = {"success": "joints", "contact": "ee"}  # all touch alike: the first of them
+    for each in (each for each in contrasts(worse) if each.kind == SYSTEM):
+        assert f"− {rivals[each.measure]}," in each.name
 
 
 def test_the_answer_is_three_sentences_and_claims_no_more_than_was_detected(gathered):
@@ -187,6 +195,9 @@ def test_the_answer_is_three_sentences_and_claims_no_more_than_was_detected(gath
     assert "a difference of +" in said[0]
     assert said[1].count("no difference detected") == 2
     assert said[1].count("would often go unseen") == 2
+    for mpc, none, name in (("ee", "decoupled", "hand"), ("joints", "direct", "joints")):
+        assert f"{100 * (shares[mpc] - shares[none]):+.0f} points with the {name} (95 %" in said[1]
+    assert "explored, not tested" in said[1]
     assert "scripted operators" in said[2]
     assert "2 draws" not in said[2]
     nothing = gathered(shares=dict.fromkeys(SHARES, (0.5,) * 4))
