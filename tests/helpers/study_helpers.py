@@ -119,7 +119,8 @@ def make(job, design, layout, shares=None):
             for perturbation, protection in product(config.perturbations, config.protections):
                 rollouts = [made_up(seed, bool(rng.random() < share)) for seed in config.seeds]
                 entry = {"training_seed": job.cell.draw, "dataset_draw": job.cell.draw, "rollouts": rollouts}
-                ending = {"protected": protection, "disturbed": perturbation.words, "nominal": ""}[what]
+                protected = "unprotected" if protection == "none" else protection
+                ending = {"protected": protected, "disturbed": perturbation.words, "nominal": ""}[what]
                 arms[f"{job.policy.label} {ending}".strip()] = [entry]
             write_json(layout.evaluation(job.policy, what), {"format": FORMAT, "arms": arms})
     result = LEARNT if job.policy else COLLECTED

@@ -42,8 +42,8 @@ cameras = ["wrist", "scene"]
 size = 96                       of a picture, its height and width [px]
 
 [robustness]                    optional, exploratory: what else policies go through
-perturbations = ["push", "shift", "delay"]      each a condition of its own
-protections = ["mpc", "filter"] of policies that command joint velocities
+perturbations = ["push", "shift", "delay"]      each a condition of its own; [] for none
+protections = ["mpc", "filter"] of policies that command joint velocities; "none": of intents, without the MPC
 rollouts = 50                   under each condition
 draws = 1                       the first so many
 
@@ -132,6 +132,11 @@ class Robustness:
     rollouts: int = 50
     draws: int = 1
 
+    def protections_of(self, actions: str) -> tuple[str, ...]:
+        """Return what else stands between robot and policies of some actions, `realised` or `intent`."""
+        unprotected = actions == "intent"
+        return tuple(each for each in self.protections if (each == "none") == unprotected)
+
 
 @dataclass(frozen=True)
 class Sweep:
@@ -206,7 +211,7 @@ class StudyDesign:
         if self.factors:
             yield from (("factors", self.factors.modes), ("factors.primary", self.factors.primary))
         if self.robustness:
-            yield "robustness.perturbations", self.robustness.perturbations
+            yield "robustness", (*self.robustness.perturbations, *self.robustness.protections)
         if self.sweep:
             yield from (("sweep.tasks", self.sweep.tasks), ("sweep.noises", self.sweep.noises))
 

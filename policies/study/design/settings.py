@@ -111,9 +111,10 @@ def evaluations(job: Job, design: StudyDesign, folder: str = "policy") -> dict[s
     found = {"nominal": EvaluateConfig(episodes=design.rollouts, **common)}
     if job.robust and more:
         common["episodes"] = min(design.rollouts, more.rollouts)
-        found["disturbed"] = EvaluateConfig(perturbation=",".join(more.perturbations), **common)
-        if policy.actions == "realised" and more.protections:
-            found["protected"] = EvaluateConfig(protection=",".join(more.protections), **common)
+        if more.perturbations:
+            found["disturbed"] = EvaluateConfig(perturbation=",".join(more.perturbations), **common)
+        if protections := more.protections_of(policy.actions):
+            found["protected"] = EvaluateConfig(protection=",".join(protections), **common)
     return found
 
 

@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -158,21 +159,26 @@ def _described(result: dict[str, Any]) -> dict[str, float]:
 def treatments_table(task: str, results: Results) -> Table:
     """Return disturbed and protected policies beside the same rollouts without."""
     headings = (
-        "policy", "disturbed or protected by", "success", "without", "points", "points 95 %", "with contact",
+        "policy", "treatment", "success", "without it", "points", "points 95 %", "contact", "without it",
     )  # fmt: skip
     rows = [_treatment(each, results) for each in results.of_task(task, treated=True)]
-    return Table(headings, rows, "Disturbed, protected; beside the same policies in the same scenes without")
+    return Table(
+        headings,
+        rows,
+        "Disturbed, or otherwise protected; beside the same policies in the same scenes without it",
+    )
 
 
 def _treatment(each: Condition, results: Results) -> tuple[str, ...]:
-    whole, shown = results.find(each.task, each.label), [DASH] * 3
+    whole, shown, before = results.find(each.task, each.label), [DASH] * 3, DASH
     same = _same(whole, each) if whole else []
     if same:
         change = compare_rollouts(_runs(each), same)
         share = np.concatenate([run.values for run in same]).mean()
         shown = [percent(float(share)), points(change.estimate), points_span(change.interval)]
+        before = percent(float(np.concatenate([run.values for run in _same(whole, each, "contact")]).mean()))
     touched = float(each.rolled("contact").mean())
-    return each.label, each.treatment, percent(float(each.rolled().mean())), *shown, percent(touched)
+    return each.label, each.treatment, percent(float(each.rolled().mean())), *shown, percent(touched), before
 
 
 def _runs(condition: Condition) -> list[Run]:
@@ -181,15 +187,15 @@ def _runs(condition: Condition) -> list[Run]:
     ]
 
 
-def _same(whole: Condition, treated: Condition) -> list[Run]:
+def _same(whole: Condition, treated: Condition, measure: str = "success") -> list[Run]:
     """Return the runs of a condition in the scenes of another; none where it lacks one."""
     found = []
     for run in _runs(treated):
         driven = whole.draws.get(run.draw)
         if driven is None or not set(run.seeds) <= driven.rollouts.keys():
             return []
-        values = np.array([driven.rollouts[seed]["success"] for seed in run.seeds], float)
-        found.append(Run(run.draw, run.draw, run.seeds, values))
+        kept = replace(driven, rollouts={seed: driven.rollouts[seed] for seed in sorted(run.seeds)})
+        found.append(Run(run.draw, run.draw, run.seeds, kept.values(measure)))
     return found
 
 

@@ -71,7 +71,7 @@ def preset(tmp_path):
         (("rollouts = 40", "rollouts = 2000000"), "--episodes 2000000"),
         (("rollouts = 20", "rollouts = -5"), "rollouts: expected a whole number, 0 or more, got -5"),
         (('["push"]', '["pusch"]'), "pusch"),
-        (('["push"]', "[]"), "robustness.perturbations expected some"),
+        (('["push"]\nprotections = ["filter"]', "[]\nprotections = []"), "robustness expected some"),
         (('["filter"]', '["fltr"]'), "unknown protection 'fltr'"),
         (("rollouts = 20\ndraws = 2", "draws = 3"), "robustness.draws expected a whole number from 0 to 2"),
         (("noises = [0.0]\ndraws = 1", "noises = [0.0]\ndraws = 9"), "sweep.draws expected"),

@@ -238,6 +238,18 @@ def test_undisturbed_beside_disturbed_is_the_same_policies_in_the_same_scenes(ga
             assert set(each.rollouts) < set(whole.draws[draw].rollouts)
 
 
+def test_intents_without_the_mpc_and_velocities_through_it_stand_beside_what_they_were(gathered):
+    robust = replace(DESIGN, robustness=Robustness((), ("mpc", "none"), rollouts=8, draws=2))
+    results = gathered(robust)
+    treated = {(each.label, each.treatment) for each in results.of_task("reach", treated=True)}
+    assert treated == {*((mode, "mpc") for mode in MODES), ("ee intent", "unprotected")}
+    for row in tables.treatments_table("reach", results).rows:
+        whole = results.find("reach", row[0])
+        assert row[3] != "–"
+        assert row[-1] == "50 %"  # every other scene has contact, whatever the policy
+        assert set(whole.draws) >= {0, 1}
+
+
 def test_failures_are_counted_by_stage(gathered):
     results = gathered()
     table = tables.failures_table("reach", results)
