@@ -152,7 +152,8 @@ def quality_table(task: str, results: Results) -> Table:
 def _described(result: dict[str, Any]) -> dict[str, float]:
     """Return the metrics of a draw by title, then how much of its actions can be told."""
     known = {metric.title: result["quality"].get(metric.name) for metric in METRICS}
-    told = {TITLES.get(name, name): value for name, value in result["learnability"].items()}
+    scores: dict[str, float] = result["learnability"]
+    told = {TITLES.get(name, name): score for name, score in scores.items()}
     return {title: value for title, value in known.items() if value is not None} | told
 
 
@@ -162,21 +163,18 @@ def treatments_table(task: str, results: Results) -> Table:
         "policy", "treatment", "success", "without it", "points", "points 95 %", "contact", "without it",
     )  # fmt: skip
     rows = [_treatment(each, results) for each in results.of_task(task, treated=True)]
-    return Table(
-        headings,
-        rows,
-        "Disturbed, or otherwise protected; beside the same policies in the same scenes without it",
-    )
+    title = "Disturbed, or otherwise protected; beside the same policies in the same scenes without it"
+    return Table(headings, rows, title)
 
 
 def _treatment(each: Condition, results: Results) -> tuple[str, ...]:
     whole, shown, before = results.find(each.task, each.label), [DASH] * 3, DASH
-    same = _same(whole, each) if whole else []
-    if same:
+    if whole and (same := _same(whole, each)):
         change = compare_rollouts(_runs(each), same)
         share = np.concatenate([run.values for run in same]).mean()
         shown = [percent(float(share)), points(change.estimate), points_span(change.interval)]
-        before = percent(float(np.concatenate([run.values for run in _same(whole, each, "contact")]).mean()))
+        touching = _same(whole, each, "contact")
+        before = percent(float(np.concatenate([run.values for run in touching]).mean()))
     touched = float(each.rolled("contact").mean())
     return each.label, each.treatment, percent(float(each.rolled().mean())), *shown, percent(touched), before
 
