@@ -1,0 +1,23 @@
+"""What a study gathers of made-up rollouts."""
+
+import pytest
+from made_study import DESIGN, SHARES
+from study_helpers import make
+
+from handrail.policies.study.design.jobs import Layout, jobs
+from handrail.policies.study.design.progress import StudyProgress
+from handrail.policies.study.report.results import gather
+
+
+@pytest.fixture
+def gathered(tmp_path):
+    """Return what a study gathers of made-up rollouts; some of its jobs may be missing."""
+
+    def found(design=DESIGN, shares=SHARES, missing=lambda job: False):
+        layout = Layout(tmp_path / "study")
+        for job in jobs(design):
+            if not missing(job):
+                make(job, design, layout, shares)
+        return gather(StudyProgress(design, layout))
+
+    return found
