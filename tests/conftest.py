@@ -39,6 +39,20 @@ def _checksums_elsewhere(tmp_path_factory: pytest.TempPathFactory):
         yield
 
 
+@pytest.fixture(autouse=True, scope="session")
+def _disks_at_rest():
+    """Wait for no disk: what is not on it yet is lost with the machine's power, and with nothing a test does.
+
+    Tests of the order in which things reach the disk put an `os.fsync` of their own in its place.
+    """
+
+    def at_once(descriptor: int) -> None:
+        """Write nothing through."""
+
+    with mock.patch("os.fsync", at_once):
+        yield
+
+
 def pytest_runtest_setup(item: pytest.Item) -> None:
     if item.get_closest_marker("needs_gl") and graphics_trouble():
         pytest.skip(f"needs OpenGL: {graphics_trouble()}")

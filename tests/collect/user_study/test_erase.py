@@ -16,11 +16,6 @@ from handrail.datasets.reading.check import check_report
 GUILLOTINE = Guillotine()
 
 
-@pytest.fixture
-def quick_disk(monkeypatch):
-    monkeypatch.setattr("os.fsync", lambda descriptor: None)
-
-
 @pytest.fixture(scope="module")
 def two(tmp_path_factory):
     folder = study_folder(tmp_path_factory.mktemp("two"), forms=["sus", "questions"])
@@ -73,13 +68,13 @@ def erased_in_two_goes(two, root, k):
     return lived
 
 
-def test_an_erasure_that_is_killed_is_finished_by_the_next(two, tmp_path, quick_disk):
+def test_an_erasure_that_is_killed_is_finished_by_the_next(two, tmp_path):
     for k in random.Random(1).sample(range(1, 100), 3):
         erased_in_two_goes(two, tmp_path / str(k), k)
 
 
 @pytest.mark.slow
-def test_an_erasure_that_is_killed_anywhere_is_finished_by_the_next(two, tmp_path, quick_disk):
+def test_an_erasure_that_is_killed_anywhere_is_finished_by_the_next(two, tmp_path):
     k = 1
     while not erased_in_two_goes(two, tmp_path / str(k), k):
         shutil.rmtree(tmp_path / str(k))

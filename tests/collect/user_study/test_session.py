@@ -189,18 +189,13 @@ def killed_and_resumed(root, k):
     return lived
 
 
-@pytest.fixture
-def quick_disk(monkeypatch):
-    monkeypatch.setattr("os.fsync", lambda descriptor: None)
-
-
-def test_killed_at_some_changes_to_the_disk_nothing_is_lost_or_done_twice(tmp_path, quick_disk):
+def test_killed_at_some_changes_to_the_disk_nothing_is_lost_or_done_twice(tmp_path):
     for k in random.Random(0).sample(range(1, 160), 5):
         killed_and_resumed(tmp_path / str(k), k)
 
 
 @pytest.mark.slow
-def test_killed_at_every_change_to_the_disk_nothing_is_lost_or_done_twice(tmp_path, quick_disk):
+def test_killed_at_every_change_to_the_disk_nothing_is_lost_or_done_twice(tmp_path):
     k = 1
     while not killed_and_resumed(tmp_path / str(k), k):
         shutil.rmtree(tmp_path / str(k))
