@@ -27,7 +27,7 @@ def test_a_merge_that_fails_changes_nothing(tmp_path):
         assert tree(tmp_path) == before
 
 
-@pytest.mark.parametrize("step", [4, pytest.param(1, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("step", [8, pytest.param(1, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("in_place", [False, True])
 def test_a_merge_killed_at_changes_to_the_disk(tmp_path, in_place, step):
     """The sources stay whole, the new dataset is there whole or not at all, and doing it again does it."""
