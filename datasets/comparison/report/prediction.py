@@ -85,8 +85,9 @@ def _impossible(found: Sequence[MetricPrediction]) -> str:
         known = [part for each in found if (part := getattr(each, where))]
         least = min((part.least_p for part in known), default=0.0)
         if least * len(known) >= LEVEL:
+            most = max(part.blocks for part in known)
             words += (
-                f" Between {name} none can be, with {known[0].blocks} of them and {len(known)} metrics: even"
+                f" Between {name} none can be, with {most} of them and {len(known)} metrics: even"
                 " if the ranks agree wholly, that is not rare enough."
             )
     return words

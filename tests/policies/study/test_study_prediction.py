@@ -3,22 +3,19 @@
 import json
 
 import numpy as np
+from made_study import MODES, TASK
+from made_study import SHARES as MADE
 from study_helpers import make
 
-from handrail.policies.study.design.design import StudyDesign, TaskDesign
+from handrail.policies.study.design.design import StudyDesign
 from handrail.policies.study.design.jobs import Layout, jobs
 from handrail.policies.study.design.progress import StudyProgress
 from handrail.policies.study.report.prediction import predicted
 from handrail.policies.study.report.results import gather
 
-TASK = TaskDesign(minutes=1.0, episodes=5, steps=10)
-SHARES = {
-    "ee": (0.95, 0.9, 1.0, 0.9),
-    "decoupled": (0.6, 0.5, 0.7, 0.65),
-    "joints": (0.85, 0.8, 0.9, 0.8),
-    "direct": (0.8, 0.7, 0.85, 0.75),
+SHARES = {mode: MADE[mode] for mode in MODES} | {
     "leader": (0.4, 0.5, 0.45, 0.4),
-    "ee_dls": (0.7, 0.75, 0.8, 0.65),
+    "ee_dls": (0.6, 0.55, 0.6, 0.5),
     "switching": (0.3, 0.2, 0.3, 0.25),
 }
 DESIGN = StudyDesign("made", tuple(SHARES), {"reach": TASK, "tray": TASK}, "direct", draws=4, rollouts=20)
