@@ -22,13 +22,13 @@ WORDS = {
 
 @dataclass(frozen=True)
 class Contrast:
-    """A weighted sum of the success, or of the contacts, of conditions, over the draws that all of them have.
+    """A weighted sum of one measure of conditions, over the draws that all of them have.
 
     Attributes:
         name: what is compared.
         kind: `declared` before the run and tested, `exploratory`, or a claim about a `system`.
         tasks: over which, with equal weight.
-        measure: `success` or `contact`.
+        measure: one of `MEASURES`.
         estimate: over draws, each draw's conditions met the same scenes.
         sides: the mean of what is added, and of what is taken off.
         p_adjusted: by Holm over what is declared; None where nothing is tested, or not yet.
@@ -76,8 +76,10 @@ def _exploratory(results: Results, design: StudyDesign) -> Iterator[Contrast | N
             if scope != tasks or name not in factors.primary:  # pyright: ignore[reportOptionalMemberAccess]
                 yield _factor(results, design, name, scope, EXPLORATORY)
         if factors:
-            yield _pair(results, factors.hand_mpc, factors.hand_none, scope)
-            yield _pair(results, factors.joint_mpc, factors.joint_none, scope)
+            for measure in ("success", "clean"):
+                yield _pair(results, factors.hand_mpc, factors.hand_none, scope, measure)
+                yield _pair(results, factors.joint_mpc, factors.joint_none, scope, measure)
+                yield _pair(results, factors.hand_mpc, factors.joint_none, scope, measure)
         for mode in () if factors else design.modes:
             if mode != design.baseline:
                 yield _pair(results, mode, design.baseline, scope)
@@ -85,6 +87,7 @@ def _exploratory(results: Results, design: StudyDesign) -> Iterator[Contrast | N
         for name in CONTRASTS if factors else ():
             yield _factor(results, design, name, scope, EXPLORATORY, " same number")
             yield _factor(results, design, name, scope, EXPLORATORY, "", "contact")
+            yield _factor(results, design, name, scope, EXPLORATORY, "", "clean")
 
 
 def _factor(
@@ -102,8 +105,10 @@ def _factor(
     return _contrast(results, title, kind, tasks, parts, measure)
 
 
-def _pair(results: Results, one: str, other: str, tasks: tuple[str, ...]) -> Contrast | None:
-    return _contrast(results, f"{one} − {other}", EXPLORATORY, tasks, {one: 1.0, other: -1.0})
+def _pair(
+    results: Results, one: str, other: str, tasks: tuple[str, ...], measure: str = "success"
+) -> Contrast | None:
+    return _contrast(results, f"{one} − {other}", EXPLORATORY, tasks, {one: 1.0, other: -1.0}, measure)
 
 
 def _systems(results: Results, design: StudyDesign, tasks: tuple[str, ...]) -> Iterator[Contrast | None]:

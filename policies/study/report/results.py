@@ -15,7 +15,11 @@ from handrail.datasets.statistics.student import Estimate, student, variance_of_
 from handrail.policies.study.design.jobs import Cell, Job, StudyPolicy
 from handrail.policies.study.design.progress import StudyProgress, read_json
 
-MEASURES = ("success", "contact")  # of a rollout: whether it succeeded, whether it touched anything
+MEASURES = {
+    "success": "success",
+    "contact": "rollouts with contact",
+    "clean": "success without contact",
+}
 
 
 @dataclass(frozen=True)
@@ -33,11 +37,12 @@ class Driven:
     rollouts: Mapping[int, Mapping[str, Any]]
 
     def values(self, measure: str = "success") -> FloatArray:
-        """Return whether each rollout succeeded, or touched anything, (R,), by seed."""
+        """Return one of `MEASURES` of each rollout, 0 or 1, (R,), by seed."""
         rows = [self.rollouts[seed] for seed in sorted(self.rollouts)]
-        if measure == "contact":
-            return np.array([row.get("contacts", 0) > 0 for row in rows], float)
-        return np.array([row["success"] for row in rows], float)
+        touched = np.array([row.get("contacts", 0) > 0 for row in rows], bool)
+        succeeded = np.array([row["success"] for row in rows], bool)
+        found = {"success": succeeded, "contact": touched, "clean": succeeded & ~touched}
+        return found[measure].astype(float)
 
     @property
     def failures(self) -> Counter[str]:

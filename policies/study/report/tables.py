@@ -24,7 +24,7 @@ from handrail.datasets.quality.catalogue import METRICS
 from handrail.datasets.statistics.resampling import Run
 from handrail.policies.study.design.power import detectable
 from handrail.policies.study.report.contrasts import CONTRASTS, DECLARED, EXPLORATORY, WORDS, Contrast
-from handrail.policies.study.report.results import Condition, Results
+from handrail.policies.study.report.results import MEASURES, Condition, Results
 
 _TITLES = {
     DECLARED: "Declared before the run: policy success",
@@ -46,7 +46,7 @@ def contrasts_table(found: Sequence[Contrast], kind: str, results: Results) -> T
         cells = [
             each.name,
             ", ".join(each.tasks),
-            "rollouts with contact" if each.measure == "contact" else "success",
+            MEASURES[each.measure],
             Cell(points(estimate.value), "detected" if each.detected else ""),
             points_span(estimate.interval) if estimate.interval else DASH,
             str(estimate.replicates),
@@ -70,7 +70,8 @@ def conditions_table(task: str, results: Results) -> Table:
         "success",
         "95 %",
         "each draw",
-        "rollouts with contact",
+        MEASURES["contact"],
+        MEASURES["clean"],
         "length s",
         "learnt from",
         "updates",
@@ -84,13 +85,14 @@ def _condition(each: Condition, results: Results) -> tuple[str, ...]:
     episodes = [one["trained_on"].get("episodes", 0.0) for one in learnt]
     held = [one["trained_on"].get("held_out", 0.0) for one in learnt]
     minutes = [one["trained_on"].get("operator_time", 0.0) / 60.0 for one in learnt]
-    steps = sorted(one["steps"] for one in learnt)
+    steps, touched = sorted(one["steps"] for one in learnt), each.rolled("contact")
     return (
         each.label,
         percent(each.success.value),
         percent_span(each.interval),
         ", ".join(f"{100 * share:.0f}" for share in each.shares.values()),
-        percent(float(each.rolled("contact").mean())),
+        f"{touched.sum():.0f} of {len(touched)}",
+        percent(float(each.rolled("clean").mean())),
         number(each.mean("length")),
         f"{np.mean(episodes):.0f} episodes + {np.mean(held):.0f} held out, {np.mean(minutes):.1f} min",
         f"{steps[0]}" if steps[0] == steps[-1] else f"{steps[0]} to {steps[-1]}",

@@ -23,7 +23,7 @@ def answer(found: Sequence[Contrast], results: Results) -> list[str]:
         return [_undeclared(design)]
     sentences = [_effect(declared.get(WORDS["controller"]), "controller", results)]
     both = [_effect(declared.get(WORDS[name]), name, results) for name in ("input", "interaction")]
-    sentences.append("; ".join(filter(None, (*both, _simple(found, results)))))
+    sentences.append("; ".join(filter(None, (*both, _simple(found, results), _clean(found, results)))))
     return [_begun(each) for each in (*filter(None, sentences), _limits(list(declared.values()), results))]
 
 
@@ -75,9 +75,22 @@ def _simple(found: Sequence[Contrast], results: Results) -> str:
     told = [
         f"{points(each.estimate.value)} points with the {pairs[each.name]} (95 % {points_span(interval)})"
         for each in found
-        if each.name in pairs and each.tasks == tasks and (interval := each.estimate.interval)
+        if (each.name in pairs, each.tasks, each.measure) == (True, tasks, "success")
+        and (interval := each.estimate.interval)
     ]
     return f"explored, not tested: the MPC adds {' and '.join(told)}" if told else ""
+
+
+def _clean(found: Sequence[Contrast], results: Results) -> str:
+    """Return the factors where a success counts only if nothing was touched."""
+    tasks, names = tuple(results.progress.design.tasks), {words: name for name, words in WORDS.items()}
+    told = [
+        f"{names[each.name]} {points(each.estimate.value)} (95 % {points_span(interval)})"
+        for each in found
+        if (each.name in names, each.tasks, each.measure) == (True, tasks, "clean")
+        and (interval := each.estimate.interval)
+    ]
+    return f"counted only where nothing was touched: {', '.join(told)}" if told else ""
 
 
 def _limits(declared: Sequence[Contrast], results: Results) -> str:
