@@ -29,7 +29,7 @@ hand_mpc = "ee"                 the mode that is each cell
 hand_none = "ee_dls"
 joint_mpc = "joints"
 joint_none = "direct"
-primary = ["input", "controller", "interaction"]        declared before the run: what is tested
+primary = ["input", "controller", "interaction"]        declared before the run, tested; [] for none
 sd = 0.1                        of a policy's success from draw to draw, for the power
 
 [beside]                        optional, exploratory: more policies
@@ -104,6 +104,17 @@ class Factors:
     def modes(self) -> tuple[str, str, str, str]:
         """The four cells."""
         return self.hand_mpc, self.hand_none, self.joint_mpc, self.joint_none
+
+    @property
+    def pairs(self) -> tuple[tuple[str, str], ...]:
+        """Cells that are compared by themselves: that differ in one thing, and the two of a user's choice."""
+        return (
+            (self.hand_mpc, self.hand_none),
+            (self.joint_mpc, self.joint_none),
+            (self.hand_mpc, self.joint_mpc),
+            (self.hand_none, self.joint_none),
+            (self.hand_mpc, self.joint_none),
+        )
 
 
 @dataclass(frozen=True)
@@ -209,7 +220,10 @@ class StudyDesign:
         """Yield what there has to be one of, by name."""
         yield "modes", self.modes
         if self.factors:
-            yield from (("factors", self.factors.modes), ("factors.primary", self.factors.primary))
+            yield from (
+                ("factors", self.factors.modes),
+                ("factors.primary", self.factors.primary or CONTRASTS),
+            )
         if self.robustness:
             yield "robustness", (*self.robustness.perturbations, *self.robustness.protections)
         if self.sweep:

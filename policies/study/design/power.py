@@ -28,19 +28,21 @@ def detectable(design: StudyDesign, contrast: str, tasks: int = 0, tests: int = 
         design: of the study; it has factors, and two draws or more.
         contrast: which.
         tasks: T; 0 for all of the study.
-        tests: m; 0 for as many as are declared.
+        tests: m; 0 for as many as are declared, 1 where nothing is.
     """
     factors = design.factors
     assert factors is not None
     one = factors.sd**2 + _WORST / design.rollouts
     variance = one * sum(weight**2 for weight in weights(factors, contrast).values())
     replicates = design.draws * (tasks or len(design.tasks))
-    return reach(tests or len(factors.primary), design.draws - 1) * float(np.sqrt(variance / replicates))
+    return reach(tests or max(1, len(factors.primary)), design.draws - 1) * float(
+        np.sqrt(variance / replicates)
+    )
 
 
 def plan(design: StudyDesign) -> str:
     """Return in words what is declared and what it can detect."""
-    if not design.factors:
+    if not design.factors or not design.factors.primary:
         return "Nothing is declared: whatever comes out is exploratory."
     names = ", ".join(design.factors.primary)
     said = f"Declared: {names}, over {', '.join(design.tasks)} together, by Student's t over draws."

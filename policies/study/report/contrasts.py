@@ -76,10 +76,10 @@ def _exploratory(results: Results, design: StudyDesign) -> Iterator[Contrast | N
             if scope != tasks or name not in factors.primary:  # pyright: ignore[reportOptionalMemberAccess]
                 yield _factor(results, design, name, scope, EXPLORATORY)
         if factors:
-            for measure in ("success", "clean"):
-                yield _pair(results, factors.hand_mpc, factors.hand_none, scope, measure)
-                yield _pair(results, factors.joint_mpc, factors.joint_none, scope, measure)
-                yield _pair(results, factors.hand_mpc, factors.joint_none, scope, measure)
+            for one, other in factors.pairs:
+                yield _pair(results, one, other, scope)
+                yield _pair(results, one, other, scope, "", "clean")
+                yield _pair(results, one, other, scope, " same number")
         for mode in () if factors else design.modes:
             if mode != design.baseline:
                 yield _pair(results, mode, design.baseline, scope)
@@ -101,14 +101,23 @@ def _factor(
 ) -> Contrast | None:
     assert design.factors is not None
     parts = {f"{mode}{ending}": weight for mode, weight in weights(design.factors, name).items()}
-    title = WORDS[name] + (f" ({ending.strip()})" if ending else "")
-    return _contrast(results, title, kind, tasks, parts, measure)
+    return _contrast(results, f"{WORDS[name]}{_of(ending)}", kind, tasks, parts, measure)
 
 
 def _pair(
-    results: Results, one: str, other: str, tasks: tuple[str, ...], measure: str = "success"
+    results: Results,
+    one: str,
+    other: str,
+    tasks: tuple[str, ...],
+    ending: str = "",
+    measure: str = "success",
 ) -> Contrast | None:
-    return _contrast(results, f"{one} − {other}", EXPLORATORY, tasks, {one: 1.0, other: -1.0}, measure)
+    parts = {f"{one}{ending}": 1.0, f"{other}{ending}": -1.0}
+    return _contrast(results, f"{one} − {other}{_of(ending)}", EXPLORATORY, tasks, parts, measure)
+
+
+def _of(ending: str) -> str:
+    return f" ({ending.strip()})" if ending else ""
 
 
 def _systems(results: Results, design: StudyDesign, tasks: tuple[str, ...]) -> Iterator[Contrast | None]:

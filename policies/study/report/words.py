@@ -12,6 +12,7 @@ from handrail.policies.study.design.power import plan
 from handrail.policies.study.report.contrasts import DECLARED, SYSTEM, WORDS, Contrast
 from handrail.policies.study.report.results import Results
 
+_LEVELS = ("the hand", "the joints"), ("the MPC", "none")  # of what is steered, and of the controller
 _NAMES = {"act": "ACT", "diffusion": "Diffusion"}
 
 
@@ -28,7 +29,7 @@ def answer(found: Sequence[Contrast], results: Results) -> list[str]:
 
 
 def _undeclared(design: StudyDesign) -> str:
-    if design.factors:
+    if design.factors and design.factors.primary:
         return "No draw has all cells of the 2 × 2 on all tasks yet: nothing can be said."
     return "No contrast was declared before the run: what is shown explores, and nothing is tested." + (
         " With one draw it does not say how much another recording would differ." * (design.draws < 2)
@@ -65,20 +66,21 @@ def _subject(contrast: Contrast, name: str) -> str:
 
 
 def _simple(found: Sequence[Contrast], results: Results) -> str:
-    """Return what the MPC adds with each input: where that differs, a mean over both misleads."""
+    """Return each factor at each level of the other: where these differ, a mean over both misleads."""
     factors, tasks = results.progress.design.factors, tuple(results.progress.design.tasks)
     assert factors is not None
-    pairs = {
-        f"{factors.hand_mpc} − {factors.hand_none}": "hand",
-        f"{factors.joint_mpc} − {factors.joint_none}": "joints",
-    }
-    told = [
-        f"{points(each.estimate.value)} points with the {pairs[each.name]} (95 % {points_span(interval)})"
+    named = zip(factors.pairs, ("the hand", "the joints", "the MPC", "none"), strict=False)
+    at = {f"{one} − {other}": words for (one, other), words in named}
+    told = {
+        at[each.name]: f"{points(each.estimate.value)} with {at[each.name]} (95 % {points_span(interval)})"
         for each in found
-        if (each.name in pairs, each.tasks, each.measure) == (True, tasks, "success")
+        if (each.name in at, each.tasks, each.measure) == (True, tasks, "success")
         and (interval := each.estimate.interval)
-    ]
-    return f"explored, not tested: the MPC adds {' and '.join(told)}" if told else ""
+    }
+    if len(told) < len(at):
+        return ""
+    adds, steered = (" and ".join(told[each] for each in some) for some in _LEVELS)
+    return f"explored, not tested: the MPC adds {adds}; the hand less the joints is {steered}"
 
 
 def _clean(found: Sequence[Contrast], results: Results) -> str:
@@ -90,7 +92,7 @@ def _clean(found: Sequence[Contrast], results: Results) -> str:
         if (each.name in names, each.tasks, each.measure) == (True, tasks, "clean")
         and (interval := each.estimate.interval)
     ]
-    return f"counted only where nothing was touched: {', '.join(told)}" if told else ""
+    return f"where a success counts only without any contact: {', '.join(told)}" if told else ""
 
 
 def _limits(declared: Sequence[Contrast], results: Results) -> str:
@@ -121,7 +123,8 @@ def _how(design: StudyDesign, results: Results, found: Sequence[Contrast]) -> It
     yield (
         f"A draw is a fresh recording (other scenes, {design.persons} other scripted persons), one training"
         f" seed and {design.rollouts} beginnings of its own; it is the same for all modes, so draws are"
-        " pairs. Every mode got the same operator time, failed attempts included."
+        " pairs. Every mode got the same operator time, failed attempts included: that is not the same number"
+        " of demonstrations. The metrics are of all that was recorded, failures included."
     )
     if design.flat:
         yield (

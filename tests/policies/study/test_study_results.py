@@ -14,6 +14,7 @@ from handrail.datasets.statistics.student import student, variance_of_share
 from handrail.policies.study.design.power import detectable, plan, weights
 from handrail.policies.study.report import tables
 from handrail.policies.study.report.contrasts import DECLARED, EXPLORATORY, SYSTEM, WORDS, contrasts
+from handrail.policies.study.report.results import MEASURES
 from handrail.policies.study.report.words import answer, cautions, how
 
 
@@ -60,6 +61,22 @@ def test_only_what_is_declared_is_tested_over_all_tasks(gathered):
     assert one.p_adjusted == one.estimate.p
     same = {each.name for each in fewer if each.kind == EXPLORATORY and each.tasks == ("reach", "tray")}
     assert {WORDS["input"], WORDS["interaction"]} <= same
+
+
+def test_a_success_without_contact_is_both_in_the_same_rollout(gathered):
+    rows = {
+        7: {"success": True, "contacts": 0},
+        5: {"success": True, "contacts": 2},
+        6: {"success": False, "contacts": 0},
+        4: {"success": False, "contacts": 1},
+    }
+    (driven, *_) = gathered().find("reach", "ee").draws.values()
+    driven = replace(driven, rollouts=rows)
+    assert {name: driven.values(name).tolist() for name in MEASURES} == {
+        "success": [0, 1, 0, 1],
+        "contact": [1, 1, 0, 0],
+        "clean": [0, 0, 0, 1],
+    }
 
 
 def test_only_draws_that_are_whole_count(gathered):
@@ -144,7 +161,10 @@ def test_the_answer_is_three_sentences_and_claims_no_more_than_was_detected(gath
     assert said[1].count("no difference detected") == 2
     assert said[1].count("would often go unseen") == 2
     for mpc, none, name in (("ee", "decoupled", "hand"), ("joints", "direct", "joints")):
-        assert f"{100 * (shares[mpc] - shares[none]):+.0f} points with the {name} (95 %" in said[1]
+        assert f"{100 * (shares[mpc] - shares[none]):+.0f} with the {name} (95 %" in said[1]
+    for hand, joints, words in (("ee", "joints", "the MPC"), ("decoupled", "direct", "none")):
+        less = f"{100 * (shares[hand] - shares[joints]):+.0f} with {words} (95 %".replace("-", "−")
+        assert less in said[1]
     assert "explored, not tested" in said[1]
     assert "scripted operators" in said[2]
     assert "2 draws" not in said[2]
@@ -159,6 +179,15 @@ def test_without_factors_or_with_one_draw_nothing_is_claimed(gathered):
     assert not [each for each in found if each.kind == DECLARED]
     assert "ee − direct" in {each.name for each in found}
     assert "No contrast was declared" in answer(found, plain)[0]
+    open_ended = gathered(replace(DESIGN, factors=replace(FACTORS, primary=())))
+    found = contrasts(open_ended)
+    assert {each.kind for each in found} == {EXPLORATORY, SYSTEM}
+    assert {(WORDS[name], ("reach", "tray"), "success") for name in WORDS} <= {
+        (each.name, each.tasks, each.measure) for each in found
+    }
+    assert all(each.p_adjusted is None for each in found)
+    assert "No contrast was declared" in answer(found, open_ended)[0]
+    assert "Nothing is declared" in plan(open_ended.progress.design)
     single = gathered(replace(DESIGN, draws=1, beside=None))
     found = contrasts(single)
     assert all(each.estimate.interval is None and each.p_adjusted is None for each in found)
