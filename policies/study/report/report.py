@@ -64,8 +64,8 @@ class _Findings:
     figures: Mapping[str, Any]
 
     @property
-    def answer(self) -> str:
-        return " ".join(answer(self.contrasts, self.results))
+    def answer(self) -> list[str]:
+        return answer(self.contrasts, self.results)
 
     @property
     def of_all(self) -> list[Table]:
@@ -102,8 +102,10 @@ def write_study(config: StudyConfig, progress: StudyProgress) -> list[Path]:
 
 def _html(findings: _Findings) -> str:
     results, design = findings.results, findings.results.progress.design
-    parts = [markup.paragraph(findings.answer, "headline")]
-    parts.append(markup.items(("caution", text) for text in cautions(results)))
+    first, *others = findings.answer
+    parts = [markup.paragraph(first, "headline")]
+    told = [("", text) for text in others] + [("caution", text) for text in cautions(results)]
+    parts.append(markup.items(told))
     pictures = [(_CAPTIONS[name], "", svg(figure)) for name, figure in findings.figures.items()]
     parts += [markup.section("Figures", markup.panels(pictures, "wide"))] if pictures else []
     if findings.of_all:
@@ -166,7 +168,7 @@ def _write_page(findings: _Findings) -> list[Path]:
     results, preset = findings.results, findings.config.preset
     page, design = Path(findings.config.page).expanduser(), results.progress.design
     stem = f"{page.stem}_{design.name}"
-    parts = [findings.answer, "\n".join(f"- {text}" for text in cautions(results))]
+    parts = ["\n".join(f"- {text}" for text in (*findings.answer, *cautions(results)))]
     written = [page]
     for name, figure in findings.figures.items():
         picture = page.parent / f"{stem}_{name}.png"

@@ -1,4 +1,4 @@
-"""What a study says in words: an answer of three sentences, and how to read the rest."""
+"""What a study says in words: an answer of a few sentences, and how to read the rest."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
@@ -12,20 +12,23 @@ from handrail.policies.study.design.power import plan
 from handrail.policies.study.report.contrasts import DECLARED, SYSTEM, WORDS, Contrast
 from handrail.policies.study.report.results import Results
 
-_LEVELS = ("the hand", "the joints"), ("the MPC", "none")  # of what is steered, and of the controller
+_LEVELS = (
+    ("with the hand", "with the joints"),
+    ("with the MPC", "without it"),
+)  # of what is steered, and of the controller
 _NAMES = {"act": "ACT", "diffusion": "Diffusion"}
 
 
 def answer(found: Sequence[Contrast], results: Results) -> list[str]:
-    """Return the answer, a sentence each: the controller, the input and their interaction, and the limits."""
+    """Return the answer, a sentence each: what was declared, what stands behind it, and the limits."""
     design = results.progress.design
     declared = {each.name: each for each in found if each.kind == DECLARED}
     if not declared:
         return [_undeclared(design)]
-    sentences = [_effect(declared.get(WORDS["controller"]), "controller", results)]
-    both = [_effect(declared.get(WORDS[name]), name, results) for name in ("input", "interaction")]
-    sentences.append("; ".join(filter(None, (*both, _simple(found, results), _clean(found, results)))))
-    return [_begun(each) for each in (*filter(None, sentences), _limits(list(declared.values()), results))]
+    names = ("controller", "input", "interaction")
+    sentences = [_effect(declared.get(WORDS[name]), name, results) for name in names]
+    sentences += [_simple(found, results), _clean(found, results), _limits(list(declared.values()), results)]
+    return [_begun(each) for each in sentences if each]
 
 
 def _undeclared(design: StudyDesign) -> str:
@@ -60,7 +63,7 @@ def _subject(contrast: Contrast, name: str) -> str:
     return {
         "controller": f"policies that learnt from demonstrations with the MPC succeeded in {one}, without in"
         f" {other}",
-        "input": f"with the hand steered it was {one}, with the joints {other}",
+        "input": f"with the hand steered they succeeded in {one}, with the joints in {other}",
         "interaction": "what the MPC adds with the hand, less what it adds with the joints",
     }[name]
 
@@ -69,10 +72,10 @@ def _simple(found: Sequence[Contrast], results: Results) -> str:
     """Return each factor at each level of the other: where these differ, a mean over both misleads."""
     factors, tasks = results.progress.design.factors, tuple(results.progress.design.tasks)
     assert factors is not None
-    named = zip(factors.pairs, ("the hand", "the joints", "the MPC", "none"), strict=False)
+    named = zip(factors.pairs, (*_LEVELS[0], *_LEVELS[1]), strict=False)
     at = {f"{one} − {other}": words for (one, other), words in named}
     told = {
-        at[each.name]: f"{points(each.estimate.value)} with {at[each.name]} (95 % {points_span(interval)})"
+        at[each.name]: f"{points(each.estimate.value)} {at[each.name]} (95 % {points_span(interval)})"
         for each in found
         if (each.name in at, each.tasks, each.measure) == (True, tasks, "success")
         and (interval := each.estimate.interval)
@@ -92,7 +95,7 @@ def _clean(found: Sequence[Contrast], results: Results) -> str:
         if (each.name in names, each.tasks, each.measure) == (True, tasks, "clean")
         and (interval := each.estimate.interval)
     ]
-    return f"where a success counts only without any contact: {', '.join(told)}" if told else ""
+    return f"explored, where a success counts only without any contact: {', '.join(told)}" if told else ""
 
 
 def _limits(declared: Sequence[Contrast], results: Results) -> str:
