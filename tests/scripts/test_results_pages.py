@@ -88,6 +88,30 @@ def test_the_answer_is_told_as_it_came_out():
         assert f"{low} to {high}" in answer, name
 
 
+@pytest.mark.parametrize("ending", ["", " (same number)"])
+def test_what_the_same_number_gives_is_told_as_it_came_out(ending):
+    page = words((RESULTS / "teleop_modes_beside.md").read_text())
+    study = json.loads((RESULTS / "teleop_modes_beside_number.json").read_text())
+    assert study["missing"] == []
+    names = (
+        "ee − ee_dls",
+        "joints − direct",
+        "interaction: what the MPC adds with the hand − with the joints",
+        "ee − direct",
+    )
+    found = {each["name"]: each["estimate"] for each in study["contrasts"] if each["measure"] == "success"}
+    for name in names:
+        estimate = found[name + ending]
+        value, low, high = (
+            f"{100 * each:+.0f}".replace("-", "−") for each in (estimate["value"], *estimate["interval"])
+        )
+        assert f"{value} ({low} to {high})" in page, name
+    label = ending.replace(" (", " ").replace(")", "")
+    shares = {each["label"]: each["success"]["value"] for each in study["conditions"]}
+    told = ", ".join(f"{100 * shares[mode + label]:.0f}" for mode in ("ee", "ee_dls", "joints", "direct"))
+    assert f"{told} %" in page
+
+
 def test_the_readme_s_results_are_those_of_the_pages():
     readme = words((ROOT / "README.md").read_text())
     reached = {
