@@ -181,7 +181,7 @@ def test_the_closed_loop_is_told_as_it_came_out():
         in TEXT
     )
     assert f"it is {1e3 * after['mean']:.1f} mm and {1e3 * after['max']:.1f} mm" in TEXT
-    assert ("**It does**" in TEXT) == (after["mean"] < before["mean"] and after["max"] < before["max"] < 0.01)
+    assert ("**That is so**" in TEXT) == (after["mean"] < before["mean"] and after["max"] < before["max"] < 0.01)
 
 
 def test_time_is_told_by_the_update_and_its_rate():
