@@ -181,7 +181,9 @@ def test_the_closed_loop_is_told_as_it_came_out():
         in TEXT
     )
     assert f"it is {1e3 * after['mean']:.1f} mm and {1e3 * after['max']:.1f} mm" in TEXT
-    assert ("**That is so**" in TEXT) == (after["mean"] < before["mean"] and after["max"] < before["max"] < 0.01)
+    assert ("**That is so**" in TEXT) == (
+        after["mean"] < before["mean"] and after["max"] < before["max"] < 0.01
+    )
 
 
 def test_time_is_told_by_the_update_and_its_rate():
@@ -206,6 +208,6 @@ def test_what_the_low_pass_does_for_rivals_is_told():
 
 
 def test_a_page_of_one_run_has_tables_of_one_run():
-    assert "All tables are of one run" in TEXT
+    assert "all tables are of one run" in TEXT
     assert all("updates_per_s" in run["controllers"]["mpc"] for run in runs().values())
     assert {run["machine"]["cores"] for run in runs().values()} == {2}
