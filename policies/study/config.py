@@ -10,7 +10,7 @@ from handrail.controllers.errors import HandrailError
 
 @dataclass(frozen=True)
 class StudyConfig(ExecutionConfig):
-    """Collect, train, evaluate and compare: teleop modes × tasks × training seeds, from one design."""
+    """Collect, train, evaluate and compare: teleop modes × tasks × draws, from one design."""
 
     preset: str = "quick"
     """Which study: quick, full, factors, number, learner, pictures, protected, or a file of your own that

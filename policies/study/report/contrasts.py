@@ -101,7 +101,7 @@ def _factor(
 ) -> Contrast | None:
     assert design.factors is not None
     parts = {f"{mode}{ending}": weight for mode, weight in weights(design.factors, name).items()}
-    return _contrast(results, f"{WORDS[name]}{_of(ending)}", kind, tasks, parts, measure)
+    return _contrast(results, f"{WORDS[name]}{_bracketed(ending)}", kind, tasks, parts, measure)
 
 
 def _pair(
@@ -113,10 +113,10 @@ def _pair(
     measure: str = "success",
 ) -> Contrast | None:
     parts = {f"{one}{ending}": 1.0, f"{other}{ending}": -1.0}
-    return _contrast(results, f"{one} − {other}{_of(ending)}", EXPLORATORY, tasks, parts, measure)
+    return _contrast(results, f"{one} − {other}{_bracketed(ending)}", EXPLORATORY, tasks, parts, measure)
 
 
-def _of(ending: str) -> str:
+def _bracketed(ending: str) -> str:
     return f" ({ending.strip()})" if ending else ""
 
 

@@ -134,7 +134,7 @@ def _json(findings: _Findings) -> str:
         "designs": designs(progress.layout),
         "missing": progress.missing,
         "versions": software_versions() | {"torch": importlib.metadata.version("torch")},
-        "answer": answer(findings.contrasts, findings.results),
+        "answer": findings.answer,
         "contrasts": [asdict(each) for each in findings.contrasts],
         "conditions": [_numbers(noise, each) for (noise, *_), each in findings.results.conditions.items()],
         "predictions": [asdict(each) for each in findings.predictions],

@@ -167,6 +167,10 @@ def test_the_answer_is_what_was_declared_and_claims_no_more_than_was_detected(ga
         less = f"{100 * (shares[hand] - shares[joints]):+.0f} {words} (95 %".replace("-", "−")
         assert less in said[3]
     assert all(sentence.startswith("Explored") for sentence in said[3:5])
+    clean = {
+        each.name: each.estimate.value for each in found if each.measure == "clean" and len(each.tasks) == 2
+    }
+    assert f"controller {100 * clean[WORDS['controller']]:+.0f} (95 %" in said[4]
     assert "scripted operators" in said[-1]
     assert "2 draws" not in said[-1]
     nothing = gathered(shares=dict.fromkeys(SHARES, (0.5,) * 4))
