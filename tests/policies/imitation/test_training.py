@@ -215,6 +215,10 @@ def test_a_file_in_the_place_of_the_training_is_one_line(resume, recorded, tmp_p
         ({"policy_options": ("chunk_size",)}, "expected key=value"),
         ({"policy_options": ("chunk_size=many",)}, "policy act: .*chunk_size"),
         ({"policy_options": ("n_action_steps=500",)}, "policy act: .*n_action_steps"),
+        (
+            {"policy_options": ("n_action_steps=5", "temporal_ensemble_coeff=0.01")},
+            "policy act: .*ensembling",
+        ),
         ({"device": "tpu"}, "expected one of cpu"),
         ({"images": True}, "expected cameras"),
         ({"scene": False}, "--no_scene: expected --images too"),
