@@ -170,7 +170,7 @@ def gather(progress: StudyProgress) -> Results:
 def _place(draws: Mapping[int, Driven]) -> tuple[bool, bool]:
     """Sort the main design before what is beside it; else as the jobs come."""
     policy = next(iter(draws.values())).policy
-    return policy.budget == "number", policy.actions == "intent"
+    return policy.budget == "number", policy.actions != "realised"
 
 
 def _driven(job: Job, progress: StudyProgress) -> Iterable[Driven]:
