@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 from collect_helpers import environment
 from device_helpers import MODEL, PERIOD, at
+from hidden_helpers import declared, hidden_table, parts_of
 
-from handrail.collect.operators.human.hidden import Hidden, declared, hidden_table, parts_of
+from handrail.collect.operators.human.hidden import Hidden
 from handrail.collect.operators.human.human import HumanSettings
 from handrail.collect.operators.modes import MODES
 from handrail.collect.operators.operator import View
