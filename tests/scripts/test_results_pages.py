@@ -88,10 +88,10 @@ def test_the_answer_is_told_as_it_came_out():
         assert f"{low} to {high}" in answer, name
 
 
-@pytest.mark.parametrize("ending", ["", " (same number)"])
-def test_what_the_same_number_gives_is_told_as_it_came_out(ending):
+@pytest.mark.parametrize(("study", "ending"), [("number", ""), ("number", " (same number)"), ("learner", "")])
+def test_what_is_beside_the_study_is_told_as_it_came_out(study, ending):
     page = words((RESULTS / "teleop_modes_beside.md").read_text())
-    study = json.loads((RESULTS / "teleop_modes_beside_number.json").read_text())
+    study = json.loads((RESULTS / f"teleop_modes_beside_{study}.json").read_text())
     assert study["missing"] == []
     names = (
         "ee − ee_dls",
