@@ -93,9 +93,13 @@ def _boolean(argument: str) -> str:
 
 def _one_line(message: str, prog: str) -> str:
     """Return what a boxed message says, in one line."""
-    lines = [line.strip(" │╭╮╰╯─┌┐└┘┤├━") for line in message.splitlines()]
-    titles = ("Parsing error", "Value error", "Unrecognized options", "Required options", "For full helptext")
-    said = [line for line in lines if line and line not in titles and not line.startswith(titles[-1])]
+    stripped = [line.strip(" │╭╮╰╯─┌┐└┘┤├━") for line in message.splitlines()]
+    lines = [line for line in stripped if line.strip("-")]  # a terminal without Unicode has rules of these
+    titles = (
+        "Parsing error", "Value error", "Invalid choice", "Unrecognized options", "Required options",
+        "For full helptext",
+    )  # fmt: skip
+    said = [line for line in lines if line not in titles and not line.startswith(titles[-1])]
     if "Argument helptext:" in said:
         said = said[: said.index("Argument helptext:")]
     return f"{' '.join(said) or 'bad command line'} (see {prog} --help)"

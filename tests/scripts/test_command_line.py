@@ -38,6 +38,23 @@ def test_every_command_says_its_version(name):
     assert re.fullmatch(rf"{name} \d+\.\d+\.\d+\n", done.stdout)
 
 
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ("x --actions foo", "invalid choice 'foo' for argument '--actions'. Expected one of"),
+        ("x --steps many", "Error parsing --steps: invalid literal for int"),
+        ("x --stepz 3", "Unrecognized options: --stepz"),
+    ],
+)
+def test_a_wrong_flag_is_one_line_that_begins_with_what_is_wrong(words, said, capsys):
+    with pytest.raises(SystemExit) as stopped:
+        cli.parse(CONFIGS["handrail-train"], "handrail-train", shlex.split(words))
+    line = capsys.readouterr().err
+    assert (stopped.value.code, line.count("\n")) == (2, 1)
+    assert line.startswith(f"error: {said}")
+    assert line.endswith("(see handrail-train --help)\n")
+
+
 @pytest.mark.parametrize("name", STORED)
 def test_a_dataset_is_a_folder_or_lerobot_s_flag_and_never_both(name, monkeypatch):
     config = CONFIGS[f"handrail-{name}"]
