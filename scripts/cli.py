@@ -66,6 +66,8 @@ def command[Config](
 
 def run(main: Callable[[], int | None]) -> NoReturn:
     """Run a command's body; an expected error becomes one line and exit code 2."""
+    if isinstance(sys.stdout, io.TextIOWrapper):  # one that is not Unicode gets a "?" for what it lacks
+        sys.stdout.reconfigure(errors="replace")
     tell_when_compiling(lambda: print(COMPILING, file=sys.stderr, flush=True))
     try:
         sys.exit(main())

@@ -55,6 +55,14 @@ def test_a_wrong_flag_is_one_line_that_begins_with_what_is_wrong(words, said, ca
     assert line.endswith("(see handrail-train --help)\n")
 
 
+def test_a_terminal_without_unicode_gets_the_words_it_can_show(monkeypatch):
+    written = io.BytesIO()
+    monkeypatch.setattr("sys.stdout", io.TextIOWrapper(written, "ascii"))
+    with pytest.raises(SystemExit) as stopped:
+        cli.run(lambda: print("pick × place", flush=True))
+    assert (stopped.value.code, written.getvalue()) == (None, b"pick ? place\n")
+
+
 @pytest.mark.parametrize("name", STORED)
 def test_a_dataset_is_a_folder_or_lerobot_s_flag_and_never_both(name, monkeypatch):
     config = CONFIGS[f"handrail-{name}"]
