@@ -112,6 +112,24 @@ def test_what_is_beside_the_study_is_told_as_it_came_out(study, ending):
     assert f"{told} %" in page
 
 
+def test_what_was_tried_of_direct_is_told_as_it_came_out():
+    page = words((RESULTS / "diagnosis_direct.md").read_text())
+    study = json.loads((RESULTS / "diagnosis_direct_diagnosis.json").read_text())
+    assert study["missing"] == []
+    for each in study["conditions"]:
+        mode, actions = (*each["label"].split(), "")[:2]
+        what = ", joint positions" if actions else "" if each["noise"] else ", no human error"
+        low, high = (f"{100 * end:.0f}" for end in each["interval"])
+        failed = each["failures"]
+        assert (
+            f"| `{mode}`{what} | {100 * each['success']['value']:.0f} % ({low} to {high}) |"
+            f" {failed['lift, stalled']} | {failed['carry, dropped']} |"
+        ) in page
+    (worse,) = [each for each in study["contrasts"] if each["name"] == "direct targets − direct"]
+    low, high = (f"{100 * end:.0f}".replace("-", "−") for end in worse["estimate"]["interval"])
+    assert f"{100 * worse['estimate']['value']:.0f} points ({low} to {high})".replace("-", "−") in page
+
+
 def test_the_readme_s_results_are_those_of_the_pages():
     readme = words((ROOT / "README.md").read_text())
     reached = {

@@ -163,7 +163,8 @@ def _sweep(tasks: Sequence[str], results: Results) -> Any:
             left.errorbar(noises, 100 * shares, yerr=100 * np.abs(spans.T - shares), **style)
             right.plot(noises, seconds, **style)
         left.set(title=task.replace("_", " "), ylabel="policy success [%], 95 %", ylim=(-3, 103))
-        right.set(title="operator's time", ylabel="s a successful demonstration", ylim=(0, None))
+        highest = max(seconds for *_, seconds in found)
+        right.set(title="operator's time", ylabel="s a successful demonstration", ylim=(0, 1.1 * highest))
         for axes in (left, right):
             axes.set(xlabel="operator's noise: 0 perfect, 1 as people are")
             tidy(axes)
