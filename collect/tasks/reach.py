@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from handrail.collect.simulation.scene import Part, Scene, SceneObject, Viewpoint
-from handrail.collect.tasks.goal_reaching import pose_error, reached
+from handrail.collect.tasks.goal_reaching import POSITION_TOLERANCE, pose_error, reached
 from handrail.collect.tasks.goals import sample_goal_for
 from handrail.collect.tasks.moving import mover_features, mover_names, sample_movers
 from handrail.collect.tasks.task import Start, TaskState, Verdict
@@ -16,6 +16,7 @@ from handrail.controllers.robot.shape import Shape
 
 _COLOURS = ((0.85, 0.15, 0.15, 1.0), (0.15, 0.7, 0.2, 1.0), (0.15, 0.3, 0.9, 1.0))
 _ARROW = 0.18  # length of the marker's axes [m]
+_STAGES = ("approach", "turn")
 
 
 @dataclass(frozen=True)
@@ -53,6 +54,16 @@ class Reach:
         goal = _goal(state)
         movers = mover_features(state.start.scene, state.time, self.moving_obstacles)
         return np.concatenate([goal.position, quaternion_from_matrix(goal.rotation), movers])
+
+    @property
+    def stages(self) -> tuple[str, ...]:
+        """What is done one after the other."""
+        return _STAGES
+
+    def stage(self, state: TaskState) -> str:
+        """Return what is to be done: get to the goal, or turn there."""
+        d_p, _ = pose_error(state.tool.position, state.tool.rotation, _goal(state))
+        return "turn" if d_p / state.scale <= POSITION_TOLERANCE else "approach"
 
     def outcome(self, state: TaskState) -> Verdict:
         """Judge by the distance and the orientation error."""

@@ -3,11 +3,13 @@
 from types import SimpleNamespace
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 from handrail.collect.tasks.pick_place import PickPlace
 from handrail.collect.tasks.reach import Reach
 from handrail.collect.tasks.task import TaskState
+from handrail.collect.tasks.tray import Tray
 from handrail.controllers.robot.model import Pose, load_model
 from handrail.policies.imitation.evaluation.progress import RolloutProgress
 
@@ -68,5 +70,20 @@ def test_what_was_lifted_and_is_lost_was_dropped():
     assert watched([AWAY, AT], reason="dropped") == {"stage": "grasp", "ended": "dropped"}
 
 
+def test_a_hand_that_was_at_the_goal_had_only_to_turn():
+    task = Reach()
+    start = task.sample(MODEL, np.random.default_rng(0))
+
+    def at(away, turned):
+        tool = Pose(start.goal.position + away * UP, start.goal.rotation @ pin.exp3(turned * UP))
+        return TaskState(0.0, tool, 1.0, start, {})
+
+    far, near, there = at(0.11, 0.0), at(0.09, 1.0), at(0.09, 0.4)
+    assert [task.stage(moment) for moment in (far, near)] == list(task.stages)
+    assert [task.outcome(moment).success for moment in (far, near, there)] == [False, False, True]
+    assert watched([far] * 200, task) == {"stage": "approach", "ended": "stalled"}
+    assert watched([near, *[far] * 200], task) == {"stage": "turn", "ended": "stalled"}
+
+
 def test_a_task_without_stages_says_how_it_ended():
-    assert watched([AWAY] * 200, Reach()) == {"ended": "stalled"}
+    assert watched([AWAY] * 200, Tray()) == {"ended": "stalled"}
