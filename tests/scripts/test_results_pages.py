@@ -7,6 +7,7 @@ import pytest
 from places import ROOT
 
 from handrail.datasets.statistics.proportions import holm
+from handrail.datasets.statistics.student import student
 
 RESULTS = ROOT / "docs" / "results"
 LIMITS = (
@@ -125,6 +126,13 @@ def test_what_was_tried_of_direct_is_told_as_it_came_out():
             f"| `{mode}`{what} | {100 * each['success']['value']:.0f} % ({low} to {high}) |"
             f" {failed['lift, stalled']} | {failed['carry, dropped']} |"
         ) in page
+    drawn = {(each["label"], each["noise"]): each["draws"] for each in study["conditions"]}
+    for mode in ("ee", "direct"):
+        lost = student([drawn[mode, 1.0][draw] - drawn[mode, 0.0][draw] for draw in "0123"])
+        low, high = (f"{100 * end:.0f}" for end in lost.interval or ())
+        told = re.search(rf"`{mode}` (?:loses )?(\d+) (?:points )?\({low} to {high}\)", page)
+        assert told
+        assert int(told[1]) == pytest.approx(100 * lost.value, abs=0.51)
     (worse,) = [each for each in study["contrasts"] if each["name"] == "direct targets − direct"]
     low, high = (f"{100 * end:.0f}".replace("-", "−") for end in worse["estimate"]["interval"])
     assert f"{100 * worse['estimate']['value']:.0f} points ({low} to {high})".replace("-", "−") in page
