@@ -1,5 +1,7 @@
 """What the tests of imitation training share: a small dataset such as Handrail records, a tiny policy."""
 
+import dataclasses
+import shutil
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -85,6 +87,13 @@ def tiny(root: Path, output: Path, *options: str, **settings) -> TrainConfig:
     source = StoredConfig("handrail/test", str(root))
     size = {"steps": 6, "batch_size": 8, "save_freq": 3, "policy_options": (*TINY, *options)} | settings
     return TrainConfig(source, str(output), **size)
+
+
+def cut(config: TrainConfig, folder: Path) -> TrainConfig:
+    """Copy a training without its last checkpoint; return the settings that go on with it."""
+    shutil.copytree(config.folder, folder, symlinks=True)
+    shutil.rmtree(folder / "checkpoints" / "000006")
+    return dataclasses.replace(config, output=str(folder), resume=True)
 
 
 def weights(folder):

@@ -139,7 +139,6 @@ class Source:
                 root=self.info.root,
                 episodes=[row["episode_index"] for row in self.selection.rows],
                 delta_timestamps=dict(stamps) or None,
-                return_uint8=True,
             )
         except HFValidationError as error:
             raise HandrailError(

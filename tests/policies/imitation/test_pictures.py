@@ -2,17 +2,20 @@
 
 import numpy as np
 import pytest
-from training_helpers import tiny, write_dataset
+import torch
+from training_helpers import cut, tiny, weights, write_dataset
 
 from handrail.policies.imitation.interface.checkpoint import load_policy
 from handrail.policies.imitation.training.training import train
 
 pytestmark = pytest.mark.filterwarnings("ignore:.*(torchcodec|pin_memory|video).*")
 
+SMALL = "replace_final_stride_with_dilation=0"
+
 
 def test_a_policy_sees_cameras_where_it_is_asked_to(tmp_path):
     root = write_dataset(tmp_path / "set", lengths=(5, 6), cameras=("wrist",))
-    config = tiny(root, tmp_path / "policy", "replace_final_stride_with_dilation=0", steps=1, images=True)
+    config = tiny(root, tmp_path / "policy", SMALL, steps=1, images=True)
     folder = train(config, quiet=True)
     policy = load_policy(folder)
     assert list(policy.policy.config.image_features) == ["observation.images.wrist"]
@@ -22,11 +25,41 @@ def test_a_policy_sees_cameras_where_it_is_asked_to(tmp_path):
 
 def test_a_policy_that_is_told_nothing_of_the_scene_sees_it(tmp_path):
     root = write_dataset(tmp_path / "set", lengths=(5, 6), cameras=("wrist",))
-    options = "replace_final_stride_with_dilation=0"
-    config = tiny(root, tmp_path / "policy", options, steps=1, images=True, scene=False)
+    config = tiny(root, tmp_path / "policy", SMALL, steps=1, images=True, scene=False)
     policy = load_policy(train(config, quiet=True))
     assert "observation.environment_state" not in policy.policy.config.input_features
     assert pictures_matter(policy)
+
+
+def test_a_policy_sees_the_same_picture_while_it_acts_as_while_it_learnt(tmp_path, monkeypatch):
+    """To the normalised pixel: LeRobot's training divides pictures by 255 itself, before what normalises."""
+    from lerobot.datasets.lerobot_dataset import LeRobotDataset
+    from lerobot.policies.act.modeling_act import ACTPolicy
+
+    learnt, acted = [], []
+    for name, batches in (("forward", learnt), ("select_action", acted)):
+        monkeypatch.setattr(ACTPolicy, name, keeping(batches, getattr(ACTPolicy, name)))
+    root = write_dataset(tmp_path / "set", lengths=(5, 6), cameras=("wrist",))
+    config = tiny(root, tmp_path / "policy", SMALL, steps=1, batch_size=11, images=True)
+    policy = load_policy(train(config, quiet=True))
+    recorded, key = LeRobotDataset("handrail/test", root=root, return_uint8=True), "observation.images.wrist"
+    sizes = [feature.shape[0] for feature in policy.policy.config.input_features.values()]
+    for frame, index in enumerate(learnt[0]["index"].tolist()):
+        picture = recorded[index][key].permute(1, 2, 0).numpy()
+        policy.act(np.zeros(sizes[0]), np.zeros(sizes[1]), {"wrist": picture})
+        torch.testing.assert_close(learnt[0][key][frame], acted[-1][key][0])
+    assert len(acted) == 11
+
+
+def test_a_training_on_pictures_goes_on_to_the_bit(tmp_path):
+    root = write_dataset(tmp_path / "set", lengths=(130, 130), cameras=("wrist",))  # a count beyond a byte
+    config = tiny(root, tmp_path / "policy", SMALL, images=True)
+    whole = train(config, quiet=True)
+    assert weights(train(cut(config, tmp_path / "cut"), quiet=True)) == weights(whole)
+
+
+def keeping(batches, method):
+    return lambda policy, batch: batches.append(batch) or method(policy, batch)
 
 
 def pictures_matter(policy):

@@ -11,7 +11,7 @@ import time
 
 import numpy as np
 import pytest
-from training_helpers import TINY, tiny, weights, write_dataset
+from training_helpers import TINY, cut, tiny, weights, write_dataset
 
 from handrail.collect.config import StoredConfig
 from handrail.controllers.errors import HandrailError
@@ -33,13 +33,6 @@ def test_a_resumed_training_is_the_same_to_the_bit(trained, tmp_path):
     assert weights(train(again, quiet=True)) == weights(folder)
     longer = train(dataclasses.replace(again, steps=8), quiet=True)
     assert read_meta(longer)[1].steps == 8
-
-
-def cut(config, folder):
-    """Copy a training without its last checkpoint; return the settings that go on with it."""
-    shutil.copytree(config.folder, folder, symlinks=True)
-    shutil.rmtree(folder / "checkpoints" / "000006")
-    return dataclasses.replace(config, output=str(folder), resume=True)
 
 
 def test_a_training_goes_on_with_its_own_episodes_however_the_dataset_grew(recorded, tmp_path):
