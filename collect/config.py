@@ -54,7 +54,7 @@ class SessionConfig:
     operator: Annotated[str, one_of(OPERATORS)] = "scripted"
     """Who steers."""
     noise: float = 1.0
-    """How human the scripted hand is: 0 perfect, 1 as measured in people."""
+    """How human the scripted hand is: 0 perfect, 1 the default, partly from studies of people."""
     human: HumanSettings = field(default_factory=HumanSettings)
     person: int = 0
     """Which person the scripted operator is; persons differ in delay, noise and all the rest."""

@@ -13,7 +13,7 @@ class HandrailScriptedConfig(TeleoperatorConfig):
     """A script with a human-like hand steers `handrail_sim`.
 
     Attributes:
-        noise: how human the hand is: 0 perfect, 1 as measured in people.
+        noise: how human the hand is: 0 perfect, 1 the default, partly from studies of people.
         person: which person it is; persons differ in delay, noise and all the rest.
         episode_time_s: the same as `--dataset.episode_time_s`; 0 to begin anew whenever the task is done.
         reset_time_s: the same as `--dataset.reset_time_s`.

@@ -2,6 +2,8 @@
 
 import json
 import re
+import tarfile
+from collections import Counter
 
 import pytest
 from places import ROOT
@@ -89,6 +91,35 @@ def test_the_answer_is_told_as_it_came_out():
         assert f"{low} to {high}" in answer, name
 
 
+def test_failures_with_and_without_contact_are_told_as_they_came_out():
+    answer = words((RESULTS / "teleop_modes.md").read_text().split("\n## ")[0])
+    failed = Counter()
+    with tarfile.open(RESULTS / "teleop_modes_factors.tar.xz") as archive:
+        for member in archive:
+            place = re.fullmatch(
+                r"(?:\./)?evaluations/(\w+)/(\w+)/\d/nominal/realised-time.json", member.name
+            )
+            if place:
+                content = json.load(archive.extractfile(member))
+                (policies,) = content["arms"].values()
+                rollouts = [rollout for policy in policies for rollout in policy["rollouts"]]
+                failed.update(
+                    (*place.groups(), each["contacts"] > 0) for each in rollouts if not each["success"]
+                )
+    ways = [
+        [f"{failed[task, mode, touched]}" for mode in ("ee", "ee_dls")]
+        for touched in (True, False)
+        for task in ("reach", "pick_place")
+    ]
+    with_contact, and_pick_place, without, and_there = ways
+    assert (
+        f"{with_contact[0]} of `ee` and {with_contact[1]} of `ee_dls` failed after a contact on `reach`"
+        in answer
+    )
+    assert f"(`pick_place`: {' and '.join(and_pick_place)}), {' and '.join(without)} without one" in answer
+    assert f"without one ({' and '.join(and_there)})" in answer
+
+
 @pytest.mark.parametrize(("study", "ending"), [("number", ""), ("number", " (same number)"), ("learner", "")])
 def test_what_is_beside_the_study_is_told_as_it_came_out(study, ending):
     page = words((RESULTS / "teleop_modes_beside.md").read_text())
@@ -119,12 +150,15 @@ def test_what_was_tried_of_direct_is_told_as_it_came_out():
     assert study["missing"] == []
     for each in study["conditions"]:
         mode, actions = (*each["label"].split(), "")[:2]
-        what = ", joint positions" if actions else "" if each["noise"] else ", no human error"
+        what = ", joint positions" if actions else "" if each["noise"] else ", `--noise 0`"
         low, high = (f"{100 * end:.0f}" for end in each["interval"])
-        failed = each["failures"]
+        grasp, lift = (
+            sum(count for way, count in each["failures"].items() if way.startswith(stage))
+            for stage in ("grasp", "lift")
+        )
         assert (
             f"| `{mode}`{what} | {100 * each['success']['value']:.0f} % ({low} to {high}) |"
-            f" {failed['lift, stalled']} | {failed['carry, dropped']} |"
+            f" {grasp} | {lift} | {each['failures']['carry, dropped']} |"
         ) in page
     drawn = {(each["label"], each["noise"]): each["draws"] for each in study["conditions"]}
     for mode in ("ee", "direct"):

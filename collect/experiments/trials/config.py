@@ -26,7 +26,7 @@ class TrialsConfig(ExecutionConfig):
     persons: int = 5
     """Scripted operators, who take turns episode by episode."""
     noise: float = 1.0
-    """How human they are: 0 perfect, 1 as measured in people."""
+    """How human they are: 0 perfect, 1 the default, partly from studies of people."""
     robot: str = "ridgeback_ur10"
     """A robot that comes with Handrail, or a `.toml` file."""
     seed: int = 900

@@ -166,7 +166,7 @@ def _sweep(tasks: Sequence[str], results: Results) -> Any:
         highest = max(seconds for *_, seconds in found)
         right.set(title="operator's time", ylabel="s a successful demonstration", ylim=(0, 1.1 * highest))
         for axes in (left, right):
-            axes.set(xlabel="operator's noise: 0 perfect, 1 as people are")
+            axes.set(xlabel="operator's noise: 0 perfect, 1 the default")
             tidy(axes)
         right.legend(fontsize=8, frameon=False, loc="center left", bbox_to_anchor=(1.0, 0.5))
     return figure

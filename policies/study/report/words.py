@@ -132,7 +132,7 @@ def _how(design: StudyDesign, results: Results, found: Sequence[Contrast]) -> It
     if design.flat:
         yield (
             f"Each policy was trained until its loss on held-out episodes ({percent(design.flat.held_out)}, 5"
-            f" at least) was flat: the best of {design.flat.patience} measurements, one every"
+            f" at least) fell no longer: the best of {design.flat.patience} measurements, one every"
             f" {design.flat.every} updates, not {percent(design.flat.improvement)} below the best before;"
             " then the learning rate fell to zero over a last fifth of the updates. The last checkpoint"
             " counts. A loss that falls no longer does not show that success would rise no longer."
@@ -192,8 +192,8 @@ def _cautions(results: Results) -> Iterator[str]:
         yield f"Recorded again, and the rows were others than before: {', '.join(again)}."
     flat = progress.design.flat
     capped = [
-        condition.label
-        for condition in results.conditions.values()
+        condition.label if noise == 1.0 else f"{condition.label} with noise {noise:g}"
+        for (noise, *_), condition in results.conditions.items()
         if flat and any(_capped(each, progress.design, condition.task) for each in results.trained(condition))
     ]
     if capped:
