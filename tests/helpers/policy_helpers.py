@@ -32,7 +32,7 @@ class StandIn:
         self._steps = 0
         self._rng = np.random.default_rng(0)
 
-    def act(self, state, environment, images):
+    def act(self, state, environment, images, task):
         self._steps += 1
         return np.asarray(getattr(self, f"_{self._kind}")(state, environment), np.float32)
 
@@ -116,6 +116,7 @@ def checkpoint(
 
 def untrained_act(folder, actions):
     """Write a small ACT that nobody trained."""
+    import torch
     from lerobot.configs.types import FeatureType, PolicyFeature
     from lerobot.policies.act.configuration_act import ACTConfig
     from lerobot.policies.act.modeling_act import ACTPolicy
@@ -147,7 +148,9 @@ def untrained_act(folder, actions):
         push_to_hub=False,
         pretrained_backbone_weights=None,
     )
-    ACTPolicy(config).save_pretrained(folder)
+    with torch.random.fork_rng():
+        torch.manual_seed(0)  # others, with ill luck, drive into something
+        ACTPolicy(config).save_pretrained(folder)
     for processor in make_pre_post_processors(config):
         processor.save_pretrained(folder)
     meta = PolicyMeta("reach", "ee", "ridgeback_ur10", 20, actions, 0, 0, {"episodes": 1}, "act", 0)

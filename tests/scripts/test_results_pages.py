@@ -144,6 +144,20 @@ def test_what_is_beside_the_study_is_told_as_it_came_out(study, ending):
     assert f"{told} %" in page
 
 
+def test_what_came_of_pictures_is_told_as_it_came_out():
+    page = words((RESULTS / "teleop_modes_beside.md").read_text())
+    study = json.loads((RESULTS / "teleop_modes_beside_pictures.json").read_text())
+    assert study["missing"] == []
+    reached, turned = [], []
+    for each in study["conditions"]:
+        low, high = (f"{100 * end:.0f}" for end in each["interval"])
+        reached.append(f"{each['successes']} ({low} to {high} %)")
+        turned.append(f"{each['failures']['turn, moving']}")
+        assert f"none of {each['rollouts']} goals each" in page
+    assert f"| success | {' | '.join(reached)} |" in page
+    assert f"| hand was at the goal, but not turned | {' | '.join(turned)} |" in page
+
+
 def test_what_was_tried_of_direct_is_told_as_it_came_out():
     page = words((RESULTS / "diagnosis_direct.md").read_text())
     study = json.loads((RESULTS / "diagnosis_direct_diagnosis.json").read_text())

@@ -80,6 +80,7 @@ class PolicyOperator:
         interface: what it reads and writes.
         channels: of the robot.
         mode: name of the teleop mode that the intents carry.
+        task: one sentence: what to do.
 
     Attributes:
         malformed: unusable actions of this episode so far.
@@ -91,11 +92,13 @@ class PolicyOperator:
         interface: PolicyInterface | AsRecorded | AsSteered,
         channels: Channels,
         mode: str,
+        task: str = "",
     ) -> None:
         self._policy = policy
         self._interface = interface
         self._channels = channels
         self._mode = mode
+        self._task = task
         self.malformed = 0
 
     def reset(self, view: View, rng: np.random.Generator) -> None:
@@ -107,7 +110,7 @@ class PolicyOperator:
         """Return the intent now."""
         seen = view.observation
         observed = self._interface.observe(seen["agent_pos"], seen["environment_state"])
-        action = np.asarray(self._policy.act(*observed, seen.get("pixels", {})))
+        action = np.asarray(self._policy.act(*observed, seen.get("pixels", {}), self._task))
         if action.shape != (len(self._interface.action_names),) or not np.all(np.isfinite(action)):
             self.malformed += 1
             return self._unusable(view.state.time)

@@ -56,7 +56,7 @@ def run_rollout(
     channels = Channels.of(env.model.description)
     interface = policy.interface or _columns(checkpoint, channels)
     with threads(1), repeatable(seed):
-        operator = PolicyOperator(policy, interface, channels, meta.mode)
+        operator = PolicyOperator(policy, interface, channels, meta.mode, env.task_description)
         late = DelayedOperator(operator, perturbation.delay)
         pushers = (Pusher(perturbation.push),) if perturbation.push else ()
         progress = RolloutProgress()

@@ -117,6 +117,7 @@ class TrainedPolicy:
         state: FloatArray,
         environment: FloatArray | None = None,
         images: Mapping[str, np.ndarray] | None = None,
+        task: str = "",
     ) -> FloatArray:
         """Return the next action, (a,) float32.
 
@@ -124,10 +125,11 @@ class TrainedPolicy:
             state: as the interface observes it, (s',).
             environment: the same, (e',); None or empty if there is none.
             images: pictures by camera, (height, width, 3) uint8 each.
+            task: one sentence: what to do; for policies that read it.
         """
         import torch
 
-        batch = {
+        batch: dict[str, Any] = {
             key: torch.from_numpy(np.asarray(values, np.float32))[None]
             for key, values in zip((STATE, ENVIRONMENT), (state, environment), strict=True)
             if key in self.policy.config.input_features and values is not None and np.size(values)
@@ -135,6 +137,7 @@ class TrainedPolicy:
         for camera, picture in (images or {}).items():
             pixels = torch.from_numpy(np.ascontiguousarray(picture)).permute(2, 0, 1)
             batch[f"observation.images.{camera}"] = pixels[None].float() / 255.0
+        batch["task"] = [task]
         try:
             with torch.inference_mode():
                 return self.after(self.policy.select_action(self.before(batch)))[0].cpu().numpy()

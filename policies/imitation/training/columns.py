@@ -12,6 +12,9 @@ from handrail.datasets.reading.reader import DatasetInfo
 if TYPE_CHECKING:
     from lerobot.datasets.lerobot_dataset import LeRobotDataset
 
+_FLOOR = 1e-2  # [m, rad, m/s, …] least spread of a number: what hardly moved in training must not explode
+_RANGES = (("min", "max"), ("q01", "q99"), ("q10", "q90"))
+
 
 def pictured(info: DatasetInfo) -> dict[str, Feature]:
     """Return the cameras of a dataset's observations."""
@@ -38,14 +41,29 @@ def picture_stats(pictures: "LeRobotDataset", key: str) -> dict[str, np.ndarray]
     """Return what LeRobot knows of a camera's pictures, brightness as ImageNet has it.
 
     Raises:
-        HandrailError: the dataset says no finite numbers.
+        HandrailError: they are distances, or the dataset says no finite numbers.
     """
     from lerobot.datasets.factory import IMAGENET_STATS
 
+    if key in pictures.meta.depth_keys:
+        raise HandrailError(f"--images: expected pictures in colour, found distances in {key}")
     stats = {name: np.asarray(value) for name, value in (pictures.meta.stats or {}).get(key, {}).items()}
     if not all(np.isfinite(value).all() for value in stats.values()):
         raise HandrailError(f"meta/stats.json: expected finite numbers for {key}; compute them anew")
     return stats | {name: np.asarray(value, np.float32) for name, value in IMAGENET_STATS.items()}
+
+
+def steadied(stats: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Return statistics in which nothing is steadier than 0.01.
+
+    A number that was the same throughout would otherwise be divided by (almost) nothing, and the least
+    change of it when the policy drives would be huge.
+    """
+    stats = dict(stats, std=np.maximum(stats["std"], _FLOOR))
+    for low, high in _RANGES:
+        lack = np.maximum(0.0, _FLOOR - (stats[high] - stats[low]) / 2.0)
+        stats |= {low: stats[low] - lack, high: stats[high] + lack}
+    return stats
 
 
 def described(dtype: str, shape: Sequence[int], names: Sequence[str] | None) -> dict[str, Any]:

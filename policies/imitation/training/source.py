@@ -30,6 +30,7 @@ from handrail.policies.imitation.training.columns import (
     described_cameras,
     picture_stats,
     pictured,
+    steadied,
 )
 from handrail.policies.imitation.training.memory import MemoryDataset, MemoryMeta
 from handrail.policies.imitation.training.selection import Row, Selection, hold_out, select, select_again
@@ -40,12 +41,11 @@ if TYPE_CHECKING:
 
 Columns = dict[str, np.ndarray]
 _LEARNT = ("observation", "action", "next.")
+_NORMALISED = ("observation", "action")  # LeRobot rounds their statistics to the type that they come in
 _COUNTERS = ("timestamp", "frame_index", "episode_index", "index", "task_index")
 _NOWHERE = "handrail/local--only"  # no name on the hub, from where LeRobot would fetch what is missing
-_FLOOR = 1e-2  # [m, rad, m/s, …] least spread of a number: what hardly moved in training must not explode
 _READ_STATE = ("act", "diffusion", "multi_task_dit", "vqbet")  # of LeRobot's, what cannot do without it
 _READ_SCENE = ("act", "diffusion")  # what needs pictures or the environment's state
-_RANGES = (("min", "max"), ("q01", "q99"), ("q10", "q90"))
 
 
 @dataclass(frozen=True)
@@ -193,19 +193,6 @@ def _check_one_mode(selection: Selection, said: str) -> None:
     )
 
 
-def steadied(stats: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Return statistics in which nothing is steadier than 0.01.
-
-    A number that was the same throughout would otherwise be divided by (almost) nothing, and the least
-    change of it when the policy drives would be huge.
-    """
-    stats = dict(stats, std=np.maximum(stats["std"], _FLOOR))
-    for low, high in _RANGES:
-        lack = np.maximum(0.0, _FLOOR - (stats[high] - stats[low]) / 2.0)
-        stats |= {low: stats[low] - lack, high: stats[high] + lack}
-    return stats
-
-
 def _interpreted(
     info: DatasetInfo, selection: Selection, actions: str, base_pose: bool
 ) -> tuple[PolicyInterface, dict[str, dict[str, Any]], Columns]:
@@ -240,7 +227,10 @@ def _recorded(
             f"dataset {str(info.root)!r}: expected a column 'action', got {', '.join(keys) or 'none'}"
         )
     columns = _joined(
-        {key: v.astype(np.float32) if v.dtype == np.float64 else v for key, v in episode.items()}
+        {
+            key: v.astype(np.float32) if v.dtype == np.float64 or key.startswith(_NORMALISED) else v
+            for key, v in episode.items()
+        }
         for episode in _each(info, selection, keys)
     )
     features = {key: described(f.dtype, f.shape, f.names) for key in keys for f in (info.features[key],)}

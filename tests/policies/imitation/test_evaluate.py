@@ -114,10 +114,11 @@ def test_resume_runs_only_what_is_missing(folder, tmp_path):
 
 def test_what_was_done_is_kept_when_a_rollout_fails(folder, tmp_path):
     class Breaking(StandIn):
-        def act(self, state, environment, images):
+        def act(self, state, environment, images, task):
+            assert task == "Move the gripper to the goal frame."
             if len(done) == 4:  # made, and begun three times
                 raise RuntimeError("broken")
-            return super().act(state, environment, images)
+            return super().act(state, environment, images, task)
 
         def reset(self):
             done.append(1)

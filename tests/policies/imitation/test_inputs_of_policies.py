@@ -1,6 +1,7 @@
 """Data that a policy cannot be trained on: one line that says what is missing, or which flag is."""
 
 import dataclasses
+import json
 
 import numpy as np
 import pytest
@@ -38,13 +39,13 @@ CASES = {
 }
 
 
-def write(root, keys):
+def write(root, keys, dtype="float32"):
     """Write a dataset with these columns and nothing else, as any recorder might."""
-    vector, camera = Feature("float32", (2,), ("a.pos", "b.pos")), Feature("video", (32, 48, 3))
+    vector, camera = Feature(dtype, (2,), ("a.pos", "b.pos")), Feature("video", (32, 48, 3))
     features = {key: camera if key == PICTURES else vector for key in keys}
     with EpisodeWriter.create(root, Manifest("any/body", 20, "so101", features)) as writer:
         for index in range(12):
-            frame = {key: np.full(2, index / 12) for key in keys}
+            frame = {key: np.full(2, index if dtype == "int64" else index / 12, dtype) for key in keys}
             frame |= {key: np.full((32, 48, 3), 20 * index, np.uint8) for key in keys if key == PICTURES}
             writer.add_frame(frame, "wave")
         writer.save_episode({})
@@ -61,3 +62,29 @@ def test_what_is_missing_is_said_in_one_line(case, tmp_path):
     assert "\n" not in str(error.value)
     assert str(error.value).startswith("dataset ")
     assert not (tmp_path / "policy").exists()
+
+
+def test_whole_numbers_are_normalised_like_others(tmp_path, monkeypatch):
+    """LeRobot turns the statistics of a column into the type of the column: a spread of 0.8 would be 0."""
+    from lerobot.policies.act.modeling_act import ACTPolicy
+
+    forward, learnt = ACTPolicy.forward, []
+    monkeypatch.setattr(
+        ACTPolicy, "forward", lambda self, batch: learnt.append(batch) or forward(self, batch)
+    )
+    root = write(tmp_path / "set", (STATE, "action"), "int64")
+    train(tiny(root, tmp_path / "policy", actions="recorded", steps=1, batch_size=12), quiet=True)
+    expected = (np.arange(12) - 5.5) / np.std(np.arange(12))
+    for key in (STATE, "action"):
+        seen = learnt[0][key].reshape(12, -1)[:, 0].numpy()
+        np.testing.assert_allclose(np.sort(seen), expected, atol=1e-5)
+
+
+def test_distances_are_not_taken_for_colours(tmp_path):
+    root = write(tmp_path / "set", (STATE, PICTURES, "action"))
+    info = json.loads((root / "meta" / "info.json").read_text())
+    info["features"][PICTURES].setdefault("info", {})["is_depth_map"] = True
+    (root / "meta" / "info.json").write_text(json.dumps(info))
+    config = tiny(root, tmp_path / "policy", actions="recorded", images=True)
+    with pytest.raises(HandrailError, match=f"pictures in colour, found distances in {PICTURES}"):
+        train(config, quiet=True)

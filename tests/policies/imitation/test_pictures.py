@@ -1,5 +1,8 @@
 """Policies that see cameras: beside where things are, or in place of it."""
 
+from dataclasses import replace
+from typing import Any
+
 import numpy as np
 import pytest
 import torch
@@ -45,7 +48,8 @@ def test_a_policy_sees_the_same_picture_while_it_acts_as_while_it_learnt(tmp_pat
     recorded, key = LeRobotDataset("handrail/test", root=root, return_uint8=True), "observation.images.wrist"
     sizes = [feature.shape[0] for feature in policy.policy.config.input_features.values()]
     for frame, index in enumerate(learnt[0]["index"].tolist()):
-        picture = recorded[index][key].permute(1, 2, 0).numpy()
+        sample: Any = recorded[int(index)]
+        picture = sample[key].permute(1, 2, 0).numpy()
         policy.act(np.zeros(sizes[0]), np.zeros(sizes[1]), {"wrist": picture})
         torch.testing.assert_close(learnt[0][key][frame], acted[-1][key][0])
     assert len(acted) == 11
@@ -56,6 +60,17 @@ def test_a_training_on_pictures_goes_on_to_the_bit(tmp_path):
     config = tiny(root, tmp_path / "policy", SMALL, images=True)
     whole = train(config, quiet=True)
     assert weights(train(cut(config, tmp_path / "cut"), quiet=True)) == weights(whole)
+
+
+def test_a_policy_is_told_what_to_do(tmp_path):
+    """Few policies read it: ours say to their processors what LeRobot's rollouts say, too."""
+    root = write_dataset(tmp_path / "set", lengths=(5, 6))
+    policy = load_policy(train(tiny(root, tmp_path / "policy", steps=1), quiet=True))
+    sizes = [feature.shape[0] for feature in policy.policy.config.input_features.values()]
+    told = []
+    listening = replace(policy, before=lambda batch: told.append(batch["task"]) or policy.before(batch))
+    listening.act(np.zeros(sizes[0]), np.zeros(sizes[1]), task="Move to the goal.")
+    assert told == [["Move to the goal."]]
 
 
 def keeping(batches, method):

@@ -21,8 +21,9 @@ from handrail.policies.imitation.config import TrainConfig
 from handrail.policies.imitation.interface.checkpoint import load_policy, read_meta
 from handrail.policies.imitation.interface.interface import PolicyInterface
 from handrail.policies.imitation.training import presets
+from handrail.policies.imitation.training.columns import steadied
 from handrail.policies.imitation.training.presets import policy_config
-from handrail.policies.imitation.training.source import read_source, steadied
+from handrail.policies.imitation.training.source import read_source
 from handrail.policies.imitation.training.training import train
 
 pytestmark = pytest.mark.filterwarnings("ignore:.*(torchcodec|pin_memory|video).*")
