@@ -112,6 +112,16 @@ def test_failures_with_and_without_contact_are_told_as_they_came_out():
         for task in ("reach", "pick_place")
     ]
     with_contact, and_pick_place, without, and_there = ways
+    study = json.loads((RESULTS / "teleop_modes_factors.json").read_text())
+    touched = {(each["task"], each["label"]): each["touched"] for each in study["conditions"]}
+    hand, joints = (
+        f"{50 * (touched['reach', mode] + touched['pick_place', mode]):.0f} %"
+        for mode in ("ee_dls", "direct")
+    )
+    assert f"touched something in {hand} of their rollouts, those of the joints in {joints}" in answer
+    for task in ("reach", "pick_place"):
+        hand, joints = (100 * touched[task, mode] for mode in ("ee", "joints"))
+        assert f"{hand:.0f} and {joints:.0f} % on `{task}`" in answer
     assert (
         f"{with_contact[0]} of `ee` and {with_contact[1]} of `ee_dls` failed after a contact on `reach`"
         in answer
@@ -125,12 +135,13 @@ def test_what_is_beside_the_study_is_told_as_it_came_out(study, ending):
     page = words((RESULTS / "teleop_modes_beside.md").read_text())
     study = json.loads((RESULTS / f"teleop_modes_beside_{study}.json").read_text())
     assert study["missing"] == []
-    names = (
+    names = [
         "ee − ee_dls",
         "joints − direct",
         "interaction: what the MPC adds with the hand − with the joints",
         "ee − direct",
-    )
+    ]
+    names += ["ee − joints"] if ending else []
     found = {each["name"]: each["estimate"] for each in study["contrasts"] if each["measure"] == "success"}
     for name in names:
         estimate = found[name + ending]

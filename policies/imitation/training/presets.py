@@ -114,6 +114,7 @@ def policy_config(config: TrainConfig) -> "PreTrainedConfig":
         policy: Any = draccus.decode(kind, settings)
     except draccus.utils.DecodingError as error:
         raise HandrailError(f"policy {config.policy}: {message_of(error)}") from error
+    # LeRobot's ACT raises NotImplementedError at averaging with more than one action a look
     except (draccus.utils.ParsingError, ValueError, TypeError, NotImplementedError) as error:
         raise HandrailError(f"policy {config.policy}: {message_of(error.__cause__ or error)}") from error
     mapping = policy.normalization_mapping
