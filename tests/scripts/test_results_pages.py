@@ -130,7 +130,9 @@ def test_failures_with_and_without_contact_are_told_as_they_came_out():
     assert f"without one ({' and '.join(and_there)})" in answer
 
 
-@pytest.mark.parametrize(("study", "ending"), [("number", ""), ("number", " (same number)"), ("learner", "")])
+@pytest.mark.parametrize(
+    ("study", "ending"), [("number", ""), ("number", " (same number)"), ("learner", ""), ("early", "")]
+)
 def test_what_is_beside_the_study_is_told_as_it_came_out(study, ending):
     page = words((RESULTS / "teleop_modes_beside.md").read_text())
     study = json.loads((RESULTS / f"teleop_modes_beside_{study}.json").read_text())
