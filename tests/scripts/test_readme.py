@@ -74,6 +74,11 @@ def test_every_page_with_commands_is_pasted():
     assert {page for page in pages if page_commands(page)} == set(PAGES)
 
 
+def test_a_line_is_one_command():
+    lines = [words for page in PAGES for words in page_commands(page)]
+    assert not [words for words in lines if {"&&", "||", "|", ";", "&", ">"} & set(words)]
+
+
 def test_the_readme_s_python_runs_and_the_base_makes_way(capsys):
     readme = (ROOT / "README.md").read_text()
     (source,) = re.findall(r"^```python\n(.*?)^```", readme, re.DOTALL | re.MULTILINE)

@@ -11,23 +11,18 @@ import subprocess
 import sys
 import time
 from contextlib import contextmanager
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 pytest.importorskip("playwright.sync_api", reason="the extra 'dev' is not installed")
 from cockpit_witness import Relay, Witness, closing, is_moving, is_still
-from page_driver import CHROMIUM, PageDriver, browser
+from page_driver import PageDriver
 
 from handrail.collect.experiments.latency.machine import family
 from handrail.datasets.reading.reader import read_episodes, read_frames
 
-PROGRAM = next((path for path in CHROMIUM if Path(path).exists()), None)
-pytestmark = [
-    pytest.mark.slow,
-    pytest.mark.skipif(PROGRAM is None, reason=f"no Chromium at {', '.join(CHROMIUM)}"),
-]
+pytestmark = pytest.mark.slow
 WITHIN = 0.3  # [s]
 KEEP_SOCKETS = """
 window.sockets = [];
@@ -92,12 +87,6 @@ def witness(recording):
         if made.until(bool)["phase"] != "ready":  # after a law that failed
             made.end_episode()
         made.until(lambda frame: frame["phase"] == "ready")
-        yield made
-
-
-@pytest.fixture(scope="module")
-def chromium():
-    with browser(PROGRAM) as made:
         yield made
 
 

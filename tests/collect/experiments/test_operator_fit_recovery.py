@@ -30,12 +30,13 @@ def test_known_numbers_are_found_again(seed, numbers, tmp_path):
         truth = numbers.get(name, getattr(HumanSettings(), name))
         low, high = each.interval or (np.nan, np.nan)
         assert low / _WIDER <= truth <= high * _WIDER, (name, each)
+    differing = {name for name, each in found.items() if each.differs}
+    assert differing <= set(numbers)  # nothing is said to differ that does not
     if not numbers:
         assert fit.likeness.default < 2.0
-        assert not [name for name, each in found.items() if each.differs]
     else:
         assert fit.likeness.fitted < 0.5 * fit.likeness.default
-        assert {name for name, each in found.items() if each.differs} == {"delay", "briskness"}
+        assert differing >= {"delay", "briskness"}
 
 
 @pytest.mark.slow

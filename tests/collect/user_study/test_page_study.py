@@ -5,24 +5,18 @@ import subprocess
 import sys
 from contextlib import contextmanager
 from itertools import combinations
-from pathlib import Path
 
 import pytest
 from command_helpers import command
 from user_study_helpers import study_folder
 
 pytest.importorskip("playwright.sync_api", reason="the extra 'dev' is not installed")
-from page_driver import CHROMIUM, browser
 from participant_driver import REMARK, ParticipantDriver
 from playwright.sync_api import expect
 
 from handrail.collect.user_study.design import DEMO_NOTE
 
-PROGRAM = next((path for path in CHROMIUM if Path(path).exists()), None)
-pytestmark = [
-    pytest.mark.slow,
-    pytest.mark.skipif(PROGRAM is None, reason=f"no Chromium at {', '.join(CHROMIUM)}"),
-]
+pytestmark = pytest.mark.slow
 MODES, TASKS = ("ee", "base+ee", "direct"), ("reach", "pick_place")
 SCALES = ("mental", "physical", "temporal", "performance", "effort", "frustration")
 QUESTIONS = """
@@ -58,22 +52,6 @@ def running(root, name):
         if process.poll() is None:
             process.terminate()
         process.communicate(timeout=60)
-
-
-@pytest.fixture(scope="module")
-def chromium():
-    with browser(PROGRAM) as made:
-        yield made
-
-
-@pytest.fixture
-def page(chromium):
-    made = chromium.new_page(viewport={"width": 1280, "height": 720})
-    errors = []
-    made.on("pageerror", lambda error: errors.append(str(error)))
-    yield made
-    made.close()
-    assert not errors
 
 
 def half_a_form(driver):
@@ -121,7 +99,8 @@ def by_hand(answers, mode):
     }
 
 
-def test_a_study_of_two_through_the_page_killed_and_resumed(page, tmp_path):
+def test_a_study_of_two_through_the_page_killed_and_resumed(new_page, tmp_path):
+    page = new_page(viewport={"width": 1280, "height": 720})
     root = tmp_path / "study"
     folder = study_folder(root, QUESTIONS, modes=MODES, tasks=TASKS, forms=["tlx", "sus"])
     said, driven = {}, {}
