@@ -2,6 +2,7 @@
 
 import contextlib
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -51,7 +52,7 @@ class ClientPlant:
     def state(self) -> State:
         """Return where it is; the time stands still, and controllers brake, while nothing usable is heard."""
         now = self._link.state
-        return State(now.q, now.v, now.time - self._start, now.commanded)
+        return replace(now, time=now.time - self._start)
 
     def send(self, command: ArrayLike) -> NDArray[np.floating[Any]]:
         """Send a command, and let the period pass; return what was sent."""

@@ -1,5 +1,9 @@
 """The link to a robot through its LeRobot client: one command out and one observation in, a period."""
 
+import contextlib
+import logging
+import math
+import threading
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -18,7 +22,9 @@ from handrail.controllers.interface.controller import State
 from handrail.controllers.robot.model import RobotModel
 
 _BACKLOG = 1000  # observations that may have waited
+_LATE = 1.5  # periods after a command, from which the next one is late
 _GONE = 2.0  # without a usable observation for so long, the robot is gone [s]
+_log = logging.getLogger(__name__)
 
 
 class Client(Protocol):
@@ -49,6 +55,9 @@ class Client(Protocol):
 class Link:
     """Keeps the beat: a command is sent, the period passes, the robot is heard.
 
+    A LeKiwi goes on as it was told last, for half a second. So while the next command is late, a thread sends
+    it the full stop, period by period.
+
     Args:
         client: LeRobot's, not connected.
         name: of the robot.
@@ -64,6 +73,7 @@ class Link:
     Attributes:
         body: what is known of the robot.
         state: of the robot; its time stands still while nothing usable is heard.
+        late: periods in which it was sent the full stop because the next command was late.
     """
 
     state: State
@@ -89,6 +99,8 @@ class Link:
             )
         self.body = WholeBody(model, units, period)
         self._said: Mapping[str, Any] = {}
+        self._sent_at, self.late = math.inf, 0
+        self._lock, self._closed = threading.Lock(), threading.Event()
         self._episode, self._extras = 0, {}
         try:
             client.connect()
@@ -100,6 +112,7 @@ class Link:
         except BaseException:
             client.disconnect()
             raise
+        threading.Thread(target=self._watch, daemon=True).start()
 
     def begin(self, seed: int) -> None:
         """Begin an episode; our own simulation is told which, in every command, until it has heard."""
@@ -115,16 +128,22 @@ class Link:
         Raises:
             HandrailError: the robot cannot be reached, or has said nothing usable for two seconds.
         """
-        action = {**self.body.send(command), **self._extras}
-        if self._simulated:
-            action[SENT] = time.time()
         try:
-            self._client.send_action(action)
+            with self._lock:
+                self._send(command)
         except Exception as error:  # whatever a driver's code raises
             raise HandrailError(f"robot {self._name}: cannot be reached: {message_of(error)}") from error
+        sent = self.body.sent
         self._wait()
         self._listen()
-        return self.body.sent
+        return sent
+
+    def brake_if_late(self) -> None:
+        """Send the robot a period of the full stop, if the command after the last one is late."""
+        with self._lock:
+            if self._clock() - self._sent_at > _LATE * self.period and self.body.velocity.any():
+                self._send(())
+                self.late += 1
 
     def pictures(self, cameras: tuple[str, ...], size: tuple[int, int]) -> dict[str, NDArray[np.uint8]]:
         """Return what cameras of ours see, (height, width, 3), in a size (height, width).
@@ -150,7 +169,24 @@ class Link:
 
     def close(self) -> None:
         """Let it go; its own watchdog stops what still moves."""
-        self._client.disconnect()
+        self._closed.set()
+        with self._lock:
+            self._client.disconnect()
+        if self.late:
+            _log.warning("robot %s: commands were late; it braked for %d periods", self._name, self.late)
+
+    def _send(self, command: ArrayLike) -> None:
+        action = {**self.body.send(command), **self._extras}
+        if self._simulated:
+            action[SENT] = time.time()
+        self._client.send_action(action)
+        self._sent_at = self._clock()
+
+    def _watch(self) -> None:
+        """Brake while commands are late; what a driver's code raises here, it raises in the loop as well."""
+        while not self._closed.wait(0.5 * self.period):
+            with contextlib.suppress(Exception):
+                self.brake_if_late()
 
     def _wait(self) -> None:
         self._deadline += self.period
@@ -174,7 +210,8 @@ class Link:
         except Exception as error:  # whatever a driver's code raises
             raise HandrailError(f"robot {self._name}: cannot be heard: {message_of(error)}") from error
         now = self._clock()
-        state, self._said = self.body.observe(said, now), said
+        with self._lock:
+            state, self._said = self.body.observe(said, now), said
         if not self.body.trouble:
             self.state, self._heard = state, now
             return

@@ -113,7 +113,7 @@ class Stepwise:
             wall_clock=wall_clock,
             number=self._steps,
             safe=self._steps + 1,
-            plan=self._driver.command,
+            plan=self._driver.command.plan or self._driver.command,
             commanded=commanded,
         )
         self._steps += 1

@@ -71,7 +71,7 @@ class MaskedMpcStep(RobotActionProcessorStep):
         settings: what shall differ of `MpcSettings`.
         timeout: age from which an observation is stale [s].
         clock: [s]; not saved.
-        counts: how often it braked, and why.
+        counts: how often it braked, and why; `late`: updates that came later than the masked MPC certifies.
         diagnostics: how the controller fared in the last update.
     """
 
@@ -110,7 +110,9 @@ class MaskedMpcStep(RobotActionProcessorStep):
         self._body = WholeBody(model, units, 1.0 / self.fps, self.timeout)
         self._action_names = units.action_names
         centring = narrow_joint_centring(channels, model.description.limits, _CENTRED)
-        self._mpc = MaskedMpc(model, self._mpc_settings(model.description.world.scale), centring)
+        settings = self._mpc_settings(model.description.world.scale)
+        settings.check_period(1.0 / self.fps, f"fps of {NAME}")
+        self._mpc = MaskedMpc(model, settings, centring)
         self.reset()
 
     def reset(self) -> None:
@@ -118,7 +120,7 @@ class MaskedMpcStep(RobotActionProcessorStep):
         self._body.reset(self.start)
         self._intent.reset()
         self._mpc.reset(self._around)
-        self._braking = ""
+        self._braking, self._before = "", math.inf
 
     def action(self, action: RobotAction) -> RobotAction:
         """Return the whole robot's action.
@@ -127,6 +129,7 @@ class MaskedMpcStep(RobotActionProcessorStep):
             HandrailError: no observation so far has the numbers that the robot's units name.
         """
         now = float(self.clock())
+        self._note_lateness(now)
         state = self._body.observe(self.transition.get(TransitionKey.OBSERVATION), now)
         intent = self._intent.read(action, self._body.targets, self._body.opening, now)
         if self._body.trouble:
@@ -156,6 +159,14 @@ class MaskedMpcStep(RobotActionProcessorStep):
             if why != self._braking:
                 _log.warning("handrail: braking: %s", why)
         self._braking = why
+
+    def _note_lateness(self, now: float) -> None:
+        """Count an update that comes too late, and say so the first time."""
+        if now - self._before > self._mpc.settings.dt:
+            if not self.counts["late"]:
+                _log.warning("handrail: the loop is late: %.2f s between two updates", now - self._before)
+            self.counts["late"] += 1
+        self._before = now
 
     def _check(self) -> None:
         numbers = {"fps": self.fps, "timeout": self.timeout}

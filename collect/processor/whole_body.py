@@ -15,7 +15,8 @@ from handrail.controllers.interface.controller import State
 from handrail.controllers.numerics.rotation import turned
 from handrail.controllers.robot.model import RobotModel
 
-_LEAD = 0.3  # how far a joint's target may be ahead of where the joint is [rad, m]
+_LEAD = 0.2  # how far a joint's target may be ahead of where the joint is [rad, m]
+_HOLD = 0.5  # for how long a base may go on as it was sent: LeKiwi's watchdog [s]
 _STROKES = 1.5  # of a gripper whose speed nobody knows [1/s]
 
 
@@ -24,7 +25,7 @@ class WholeBody:
 
     A joint that takes positions is sent the path of its velocity, `r⁺ = r + ½ h (v + v⁺)`: on from the target
     before, not from where it is, so that a joint that sags under its weight sags no further. It goes no
-    farther ahead of the joint than 0.3 rad; where it would, the joint counts as standing still.
+    farther ahead of the joint than 0.2 rad; where it would, the joint counts as standing still.
 
     A robot without odometry is where its base's velocities have led. An observation that makes no sense, or
     the very same object again, is none: the base goes on as it was sent, until the next one.
@@ -61,6 +62,7 @@ class WholeBody:
         self._heard, self._time, self._sent_at = -math.inf, -math.inf, -math.inf
         self._held = np.zeros(self._model.size, dtype=bool)
         self._twist, self.trouble, self._grip = np.zeros(3), "", 0.0
+        self._under_way, self._rested = np.zeros(3), 0.0
         self.sent = np.zeros(self._model.size + 1)
         self.targets = np.zeros(self._model.size - self._b)
 
@@ -90,6 +92,7 @@ class WholeBody:
         """
         reading = self._units.read(observation)
         nonsense = "malformed_observation" if reading is None else ""
+        self._go_on(now)
         if reading is not None and observation is not self._said:
             self._take(reading, now)
         self._said = observation
@@ -103,7 +106,9 @@ class WholeBody:
         if math.isfinite(now):
             self._time = now
         v = np.where(self._held, 0.0, self.velocity)
-        return State(np.append(self._now(), self._reading.arm), v, now, self.velocity)
+        arm = np.where(self._units.sends_position, self.targets, self._reading.arm)
+        expected = np.append(self._expected()[: self._b], arm)
+        return State(np.append(self._now(), self._reading.arm), v, now, self.velocity, expected)
 
     def send(self, command: ArrayLike) -> dict[str, float]:
         """Return the robot's action for a command, inside the limits.
@@ -112,12 +117,12 @@ class WholeBody:
             command: velocities at the end of a period, the base's in the world, and gripper, (n + 1,).
         """
         assert self._reading is not None
-        b, base = self._b, self._now()
+        b, base = self._b, self._expected()
         if self._time - self._sent_at > self._timeout:  # meanwhile joints stand at their targets
             self._gate.velocity[b:][self._units.sends_position] = 0.0
         self._sent_at = self._time
         before = self._gate.velocity
-        self.sent = self._gate.limit(command, np.append(base, self.targets))
+        self.sent = self._gate.limit(command, np.append(base[:b], self.targets))
         way = 0.5 * self._period * (before + self._gate.velocity)[b:]
         wanted, arm = self.targets + way, self._reading.arm
         self.targets = np.clip(wanted, arm - _LEAD, arm + _LEAD)
@@ -126,9 +131,18 @@ class WholeBody:
         self._grip += float(np.clip(self._gate.gripper - self._grip, -self._grip_step, self._grip_step))
         return self._units.action(self.targets, self._gate.velocity[b:], self._twist, self._grip)
 
+    def _go_on(self, now: float) -> None:
+        """Take note of how far the base was sent, which it says later: `sent - said`, 0 after a rest."""
+        passed = now - self._time
+        passed = min(max(passed, 0.0), _HOLD) if math.isfinite(passed) else 0.0
+        self._rested = 0.0 if self._twist.any() else self._rested + passed
+        going = moved(self._expected(), self._twist, passed) - self._base
+        most = _HOLD * self._model.description.limits.velocity[:3]
+        self._under_way = np.zeros(3) if self._rested > _HOLD else np.clip(going, -most, most)
+
     def _take(self, reading: Reading, now: float) -> None:
         """Take an observation that makes sense."""
-        before = self._reading
+        before, base = self._reading, self._base
         if before is None:
             self.targets = reading.arm.copy()
             self._grip = 1.0 - reading.opening
@@ -136,8 +150,14 @@ class WholeBody:
             self._base = moved(self._base, 0.5 * (before.twist + reading.twist), self._since(now))
         if reading.pose is not None:
             self._base = reading.pose
+        if before is not None:
+            self._under_way -= self._base - base
         self._reading = reading
         self._heard = now if math.isfinite(now) else self._heard
+
+    def _expected(self) -> FloatArray:
+        """Return where the base will be when it has done what it was sent so far, (3,)."""
+        return self._base + self._under_way
 
     def _now(self) -> FloatArray:
         """Return where the base is, (b,): since it was last heard of it goes on as it was sent."""

@@ -79,6 +79,7 @@ class Tally:
         self._contacts: list[int] = []
         self._smallest = np.inf
         self._spent: dict[str, float] = {}
+        self.solve_times: list[float] = []
 
     @property
     def elapsed(self) -> float:
@@ -94,6 +95,7 @@ class Tally:
 
     def updated(self, command: Command) -> None:
         """Count an update of the controller."""
+        self.solve_times.append(command.diagnostics.solve_time)
         self._brakes += Status(command.diagnostics.status).brakes
         self._smallest = min(self._smallest, command.diagnostics.smallest_distance)
 

@@ -8,6 +8,7 @@ view ─▶ operator ─ intent ─▶ controller ─ command ─▶ env.step �
 """
 
 import gc
+import logging
 from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import replace
@@ -25,6 +26,7 @@ from handrail.controllers.interface.intent import Intent
 from handrail.controllers.numerics.threads import single_threaded
 from handrail.datasets.recording.frames import Frame
 
+_log = logging.getLogger(__name__)
 _CREEP = 1e-3  # slower, a paused robot is sent rest [m/s, rad/s]
 _LONG_AGO = -1e6  # when nobody who steers has asked last [s]
 
@@ -142,8 +144,20 @@ class Session:
                         self._tally.pace()
             finally:
                 self.env.robot.stop()
+                self._warn_if_slow()
             paused = self._event is EpisodeEvent.PAUSE
             return self._tally.outcome(self._info, None if paused else self._event)
+
+    def _warn_if_slow(self) -> None:
+        """Warn when more than one update in a hundred took longer than the period, in real time."""
+        slow = [seconds for seconds in self._tally.solve_times if seconds > self._control_period]
+        often = 100 * len(slow) > len(self._tally.solve_times)
+        if often and (self._realtime or self.env.real):
+            _log.warning(
+                "controller: %d of %d updates took longer than the period of %.0f ms, the longest %.0f ms",
+                *(len(slow), len(self._tally.solve_times)),
+                *(1e3 * self._control_period, 1e3 * max(slow)),
+            )
 
     def _begin(self, seed: int) -> None:
         if self._realtime:
@@ -225,7 +239,7 @@ class Session:
             number=self._number,
             safe=self._marked.number if self._marked else self._number + 1,
             undos=self._tally.undos,
-            plan=self._driver.command,
+            plan=self._driver.command.plan or self._driver.command,
             commanded=commanded,
         )
 

@@ -29,7 +29,9 @@ class ControllerSpec:
 def _masked_mpc(model: Any, period: float, objectives: tuple[Any, ...]) -> Any:
     from handrail.controllers.mpc.masked_mpc import MaskedMpc
 
-    return MaskedMpc(model, objectives=objectives)
+    mpc = MaskedMpc(model, objectives=objectives)
+    mpc.settings.check_period(period, "control rate [Hz]")
+    return mpc
 
 
 _HERE = "handrail.controllers"

@@ -54,7 +54,10 @@ class Command(Trajectory):
     Attributes:
         gripper: 0 open, 1 closed.
         diagnostics: how the controller fared.
+        plan: what the controller intends beyond what it has certified, to be shown; None where it has no
+            plan. The robot is not sent it.
     """
 
     gripper: float = 0.0
     diagnostics: Diagnostics = field(default_factory=Diagnostics)
+    plan: Trajectory | None = None

@@ -24,12 +24,15 @@ class State:
         commanded: the velocity that the robot was sent last, (n,). It alone knows, for what is asked may be
             limited on the way: controllers do not remember it. Left out of a robot that moves as it is told,
             which is `v`.
+        expected: where it will be when it has done what it was sent so far, (n,): a robot that takes
+            positions, or is far away, lags behind. Left out of one that does not, which is `q`.
     """
 
     q: FloatArray
     v: FloatArray
     time: float = 0.0
     commanded: FloatArray = None  # type: ignore[assignment]
+    expected: FloatArray = None  # type: ignore[assignment]
 
     def __post_init__(self) -> None:
         """Copy the arrays and make them read-only.
@@ -41,11 +44,13 @@ class State:
             object.__setattr__(self, "commanded", self.v)
         for name in ("q", "v", "commanded"):
             object.__setattr__(self, name, frozen(getattr(self, name), what=f"{name} of a state"))
+        expected = self.q if self.expected is None else frozen(self.expected, what="expected of a state")
+        object.__setattr__(self, "expected", expected)
         object.__setattr__(self, "time", real(self.time, "time of a state"))
 
     def is_of(self, size: int) -> bool:
         """Whether all of it but the time are finite numbers for a robot with `size` coordinates."""
-        return _known(self.q, size) and _known(self.v, size) and _known(self.commanded, size)
+        return all(_known(each, size) for each in (self.q, self.v, self.commanded, self.expected))
 
     def sent(self, limits: Limits) -> FloatArray:
         """Return the velocity with which every command begins, (n,): the one sent last, within the limits.

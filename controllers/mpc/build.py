@@ -63,7 +63,7 @@ class ProblemBuilder:
         reference = _asked(self._reference, predicted, intent.mask, self._largest)
         parameters[self._residuals.parameter_slice("tracking")] = intent.frames.parameters
         return Problem(
-            q=state.q,
+            q=state.expected,
             v=resumed(state.sent(self._limits), state.v, self._tolerance),
             dt=settings.dt,
             reference=reference,

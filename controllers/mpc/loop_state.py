@@ -53,7 +53,7 @@ class LoopState(NamedTuple):
 
     def facing(self, state: State, intent: Intent) -> "LoopState":
         """Return the state in which the problem of a robot's state and an intent is built."""
-        around, predict = self.surroundings.known_at(state.q), after(self.predict, intent)
+        around, predict = self.surroundings.known_at(state.expected), after(self.predict, intent)
         if around is self.surroundings and predict is self.predict:
             return self
         return self._replace(surroundings=around, predict=predict)
@@ -84,5 +84,7 @@ class LoopState(NamedTuple):
         """Return the accelerations that the robot follows from a time on, (N, n): the warm start."""
         if self.command is None:
             return np.zeros((horizon, size))
-        followed = self.command if self.plan is None else Trajectory(self.plan.v, self.command.dt)
-        return followed.accelerations(horizon, self.elapsed(time))
+        elapsed = self.elapsed(time)
+        on_plan = self.plan is not None and self.stored is not None and not self.stored.is_over(elapsed)
+        followed = Trajectory(self.plan.v, self.command.dt) if on_plan and self.plan else self.command
+        return followed.accelerations(horizon, elapsed)

@@ -54,23 +54,29 @@ class Supervisor:
             status = Status.BACKUP
         diagnostics = _diagnostics(plan, status, start, distances, loop.surroundings)
         gripper = _gripper(loop, intent, status)
-        command = Command(motion.velocities, motion.dt, motion.elapsed, gripper, diagnostics)
+        planned_path = Trajectory(plan.v, self.settings.dt) if plan is not None and planned else None
+        command = Command(motion.velocities, motion.dt, motion.elapsed, gripper, diagnostics, planned_path)
         loop = loop.following(command, state.time, self.settings.dt)
         return command, loop._replace(plan=plan if planned else None, stored=stored)
 
     def _motion(
         self, loop: LoopState, state: State, plan: Plan | None, distances: FloatArray | None, halt: bool
     ) -> tuple[Trajectory, Trajectory, bool]:
-        """Return how the robot moves, to rest at last; what is stored; whether it begins with the plan."""
+        """Return how the robot moves, to rest at last; what is stored; whether it begins with the plan.
+
+        Of a plan only what was certified is sent, and then the stop that was certified with it: if the next
+        update is late, nothing moves the robot that nobody has checked.
+        """
         dt = self.settings.dt
         if distances is None:
             stop = full_stop(self.limiter, self._sent_unseen(loop, state), dt)
             return stop, stop, False
         sent, elapsed = state.sent(self.limiter.limits), loop.elapsed(state.time)
-        situation = Situation(state.q, sent, distances, loop.stored, elapsed)
-        way = self._backup(loop).choose(situation, plan, halt)
+        situation = Situation(state.expected, sent, distances, loop.stored, elapsed)
+        lag = None if state.expected is state.q else state.q - state.expected
+        way = self._backup(loop, lag).choose(situation, plan, halt)
         if plan is not None and way.planned:
-            return Trajectory(self.limiter.to_rest(plan.v, dt), dt), way.motion, True
+            return Trajectory(self.limiter.to_rest(way.motion.velocities, dt), dt), way.motion, True
         return way.motion, way.motion, False
 
     def _sent_unseen(self, loop: LoopState, state: State) -> FloatArray:
@@ -80,17 +86,19 @@ class Supervisor:
             return state.sent(limits)
         return loop.command.velocity(loop.elapsed(state.time))
 
-    def _backup(self, loop: LoopState) -> Backup:
+    def _backup(self, loop: LoopState, lag: FloatArray | None) -> Backup:
         settings = self.settings
         least, span = settings.margin_share * loop.surroundings.margins, settings.horizon * settings.dt
-        certificate = StopCertificate(self.limiter, loop.surroundings.collision, least, span)
+        certificate = StopCertificate(self.limiter, loop.surroundings.collision, least, span, lag)
         return Backup(certificate, self.limiter, settings.dt)
 
     def _distances(self, loop: LoopState, state: State, plan: Plan | None) -> FloatArray | None:
         """Return the signed distances now, (P,); None where nobody knows where the robot is."""
         if not state.is_of(len(self.limiter.limits.velocity)):
             return None
-        return loop.surroundings.collision.values(state.q[None, :])[0] if plan is None else plan.distances
+        return (
+            loop.surroundings.collision.values(state.expected[None, :])[0] if plan is None else plan.distances
+        )
 
 
 def _gripper(loop: LoopState, intent: Intent, status: Status) -> float:

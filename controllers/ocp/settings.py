@@ -94,6 +94,22 @@ class MpcSettings:
         if not self.length:
             raise HandrailError("MPC setting length: expected a number > 0, got 0")
 
+    def check_period(self, period: float, name: str) -> None:
+        """Check that a loop is fast enough: only the plan's first stage is certified.
+
+        Args:
+            period: from one update to the next [s].
+            name: of the setting that says so.
+
+        Raises:
+            HandrailError: it is longer than a stage.
+        """
+        if period > self.dt * (1.0 + 1e-9):
+            raise HandrailError(
+                f"{name} {1.0 / period:g}: expected at least {1.0 / self.dt:g} Hz; the masked MPC certifies "
+                f"{self.dt:g} s at a time, then the robot brakes"
+            )
+
     @property
     def discounts(self) -> np.ndarray:
         """Share of the tracking weight at every stage: γᵏ while tracked, (N,)."""

@@ -41,12 +41,14 @@ class StopCertificate(NamedTuple):
         collision: the pairs.
         least: distance of each pair that is kept, (P,) [m].
         span: time for which the robot has to be safe, where obstacles move [s].
+        lag: how far the robot is from where it is expected, (n,): a motion has to be safe there, too.
     """
 
     limiter: Limiter
     collision: CollisionModel
     least: FloatArray
     span: float
+    lag: FloatArray | None = None
 
     def violation(
         self, q: FloatArray, v: FloatArray, now: tuple[FloatArray, FloatArray], delay: float = 0.0
@@ -79,9 +81,12 @@ class StopCertificate(NamedTuple):
 
     def along(self, path: FloatArray, times: FloatArray, now: tuple[FloatArray, FloatArray]) -> FloatArray:
         """Return the same at every point of a motion, hard and of all, (K, 2)."""
+        if self.lag is not None:
+            path, times = np.vstack([path, path + self.lag]), np.tile(times, 2)
         distances = self.collision.values(path, times, now, self.least)
         bounds = self.limiter.limits.position_lower, self.limiter.limits.position_upper
-        return _violations(path, distances, *now, self.least, self.collision.kinds, *bounds)
+        found = _violations(path, distances, *now, self.least, self.collision.kinds, *bounds)
+        return found if self.lag is None else np.maximum(*np.split(found, 2))
 
 
 @jit

@@ -7,6 +7,10 @@ solution is the nearest point to `-f` within the rows `m_p = (L⁻¹ c_p, -a_p /
 one, the most violated first, while all multipliers stay ≥ 0 (D. Goldfarb, A. Idnani, Mathematical Programming
 27, 1983). Only rows that are met are ever transformed: one that is far from binding costs a comparison. Begun
 with the rows that were active in the last update, it needs few changes.
+
+Work is counted in numbers touched, `N n (active rows + band)` a change, never by the clock: the same update
+takes the same work on every machine. An answer that has no work left is the nearest point within the rows that
+are active so far; it may violate others.
 """
 
 from typing import NamedTuple
@@ -23,6 +27,7 @@ from handrail.controllers.solvers.constraints import Constraints, existing, most
 
 _DEPENDENT = 1e-12  # squared sine to the active rows, below which a row is a combination of them
 _CHANGES = 10  # of the active rows, for each variable: an answer that takes more is none
+_BAND = 30  # numbers touched for each variable and change besides the active rows
 NOTHING_ACTIVE = np.arange(SLACKS)  # only the slacks are at rest: none is negative
 
 
@@ -43,13 +48,14 @@ class QuadraticProgram(NamedTuple):
 
 
 class Answer(NamedTuple):
-    """Whether the QP was solved, σ (4,), change of the cost, changes of rows, numbers of the active ones."""
+    """Whether there is one, σ (4,), change of the cost, changes of rows, the active ones, the work left."""
 
     solved: bool
     slack: FloatArray
     descent: float
     changes: int
     active: IntArray
+    work_left: float = 0.0
 
 
 class ActiveSet:
@@ -67,26 +73,37 @@ class ActiveSet:
         self.motion = np.zeros((horizon, 3, size))
         self._held = active_rows(horizon, size)
 
-    def solve(self, program: QuadraticProgram, active: IntArray = NOTHING_ACTIVE) -> Answer:
-        """Solve a QP, begun with the rows that are expected to be active, as those of the last one were."""
+    def solve(
+        self, program: QuadraticProgram, active: IntArray = NOTHING_ACTIVE, work: float = np.inf
+    ) -> Answer:
+        """Solve a QP, begun with the rows that are expected to be active, as those of the last one were.
+
+        Args:
+            program: the QP.
+            active: numbers of the rows to begin with.
+            work: that may be done; where it ends, the answer is the point reached.
+        """
         changes = 0
         if factor(program.band):
             limit = _CHANGES * len(program.gradient)
             for warm in (active, NOTHING_ACTIVE):
-                slack, descent, solved, changes, count = solve(program, warm, limit, self._held, self.motion)
+                slack, descent, solved, changes, count, work = solve(
+                    program, warm, limit, float(work), self._held, self.motion
+                )
                 if solved:
-                    return Answer(True, slack, descent, changes, self._held.rows[:count].copy())
+                    return Answer(True, slack, descent, changes, self._held.rows[:count].copy(), work)
         return Answer(False, np.zeros(SLACKS), 0.0, changes, NOTHING_ACTIVE)
 
 
 @jit
-def solve(program, warm, limit, held, motion):
-    """Solve the QP; return σ (4,), `gᵀ s + ½ sᵀ H s`, whether that is the solution, changes, active rows.
+def solve(program, warm, limit, work, held, motion):
+    """Solve the QP; return σ (4,), `gᵀ s + ½ sᵀ H s`, whether there is an answer, changes, active, work left.
 
     Args:
         program: with L in place of H.
         warm: numbers of rows to begin with, those that do not exist left out, (k,).
         limit: of the number of changes.
+        work: that may be done.
         held: room; the active rows' numbers and multipliers are left in it.
         motion: filled with the changes of (q, v, u) after every stage, (N, 3, n).
     """
@@ -103,6 +120,7 @@ def solve(program, warm, limit, held, motion):
     s, slack = np.empty(size), np.empty(SLACKS)
     warm = existing(constraints, warm)
     count = _begin(band, root, constraints, warm, free, held, y, new, along, shares, normal)
+    work -= len(warm) * len(free) * (0.5 * len(warm) + _BAND)
     changes, settled = 0, 0
     while True:
         copy(y, size, s)
@@ -111,9 +129,9 @@ def solve(program, warm, limit, held, motion):
             slack[index] = y[size + index] / root
         to_motion(constraints.matrix, s, motion)
         row = most_violated(constraints, s, motion, slack, held.rows[:count])
-        if row < 0:
-            if settled == changes:
-                return slack, _descent(gradient, s, y), True, changes, count
+        if row < 0 or work <= 0.0:
+            if settled == changes or work <= 0.0:
+                return slack, _descent(gradient, s, y), True, changes, count, work
             settled = changes  # without the rounding errors of the changes
             settle(held, count, free, shares, y)
             continue
@@ -121,10 +139,11 @@ def solve(program, warm, limit, held, motion):
         multiplier = 0.0
         while True:
             changes += 1
+            work -= len(free) * (count + _BAND)
             square = project(held, count, new, along, shares, normal)
             step, blocking = _step(held, count, new, upper, shares, square, y)
             if step == np.inf or changes > limit:
-                return slack, 0.0, False, changes, count
+                return slack, 0.0, False, changes, count, work
             for i in range(count):
                 held.multipliers[i] -= step * shares[i]
             multiplier += step

@@ -73,7 +73,7 @@ def solved_by_ours(program, warm=NONE, limit=2000):
     assert factor(factored.band)
     horizon = len(program.gradient) // N
     held, motion = active_rows(horizon, N), np.zeros((horizon, 3, N))
-    slack, descent, solved, changes, count = solve(factored, warm, limit, held, motion)
+    slack, descent, solved, changes, count, _ = solve(factored, warm, limit, np.inf, held, motion)
     s = variables(motion)
     if solved:
         hessian = same.hessian[: len(s), : len(s)]
@@ -156,6 +156,29 @@ def test_a_qp_begins_with_the_rows_that_were_active():
     assert again.solved
     assert again.changes == 0
     assert qp.solve(program._replace(band=program.band.copy())).changes == first.changes
+
+
+def test_work_is_counted_and_where_it_ends_the_rows_met_so_far_hold():
+    program = random_program(np.random.default_rng(7), 6, 40, 0.05)
+    qp = ActiveSet(6, N)
+
+    def solved(work):
+        return qp.solve(program._replace(band=program.band.copy()), work=work)
+
+    def cost(answer):
+        linear, quadratic = program.penalty
+        return answer.descent + linear * answer.slack.sum() + 0.5 * quadratic * answer.slack @ answer.slack
+
+    whole = solved(1e9)
+    spent = 1e9 - whole.work_left
+    assert solved(1e9).work_left == whole.work_left  # no clock
+    assert solved(1.01 * spent).changes == whole.changes
+    for share in (0.2, 0.5, 0.8):
+        part = solved(share * spent)
+        assert part.solved
+        assert part.work_left <= 0.0
+        assert part.changes < whole.changes
+        assert cost(part) < cost(whole)  # fewer rows hold it back: the cost falls farther
 
 
 def test_a_hessian_that_is_not_positive_is_no_solution():

@@ -190,8 +190,19 @@ class _Around:
         return f"robot at {np.abs(state.v).max():.2f}, nearest that stands {still:.3f} m{turned}"
 
 
-def run(model: RobotModel, controller, seed: int, seconds: float, movers: int = 0) -> FuzzResult:
-    """Drive a robot through a scene of a seed with whatever comes; return what happened."""
+def run(
+    model: RobotModel, controller, seed: int, seconds: float, movers: int = 0, gap: float = PERIOD
+) -> FuzzResult:
+    """Drive a robot through a scene of a seed with whatever comes; return what happened.
+
+    Args:
+        model: of the robot.
+        controller: asked every `gap`; in between the robot follows its last command.
+        seed: of the scene and the intents.
+        seconds: how long.
+        movers: how many things move.
+        gap: between two updates, a multiple of the robot's period [s].
+    """
     rng = np.random.default_rng([seed, movers])
     scene, q = cluttered(model, movers, rng)
     simulation = Simulation(model, scene, q, PERIOD, gate=OpenGate(model, PERIOD))
@@ -202,14 +213,15 @@ def run(model: RobotModel, controller, seed: int, seconds: float, movers: int = 
     rude = RudeOperator(controller.channels, limits, rng)
     moving = {item.name for item in scene.movers}
     standing = {item.name for item in scene.objects} - moving | {"floor"}
-    previous = np.zeros(model.size)
-    for _ in range(int(seconds / PERIOD)):
+    previous, every = np.zeros(model.size), round(gap / PERIOD)
+    for step in range(int(seconds / PERIOD)):
         state, hand = simulation.state(), simulation.tool.position
-        if movers:
-            controller.update_scene(scene.obstacles(state.time))
-        command = controller.update(state, rude.intent(state.time))
-        velocity = command.velocity(PERIOD)
-        result.statuses[command.diagnostics.status.value] += 1
+        if step % every == 0:
+            if movers:
+                controller.update_scene(scene.obstacles(state.time))
+            command = controller.update(state, rude.intent(state.time))
+            result.statuses[command.diagnostics.status.value] += 1
+        velocity = command.velocity((step % every + 1) * PERIOD)
         excess = np.abs(velocity) / limits.velocity - 1.0
         result.velocity_excess = max(result.velocity_excess, float(np.max(excess)))
         excess = np.abs(velocity - previous) / (limits.acceleration * PERIOD) - 1.0

@@ -1,14 +1,23 @@
 """A LeKiwi behind a client in this process: simulated, in time that passes only when somebody sleeps."""
 
+import json
 from typing import Any
 
+import numpy as np
+from fuzz_helpers import RudeOperator
 from processor_helpers import Clock
 
 from handrail.collect.envs.env import HandrailEnv
 from handrail.collect.lekiwi.body import LeKiwiBody
-from handrail.collect.lekiwi.host_loop import SEED
+from handrail.collect.lekiwi.client_plant import plant_of
+from handrail.collect.lekiwi.host_config import HostConfig
+from handrail.collect.lekiwi.host_loop import SEED, LeKiwiLoop
+from handrail.collect.lekiwi.link import Link
 from handrail.collect.processor.units import robot_units
+from handrail.collect.tasks.pick_place import PickPlace
 from handrail.collect.tasks.reach import Reach
+from handrail.controllers.mpc.masked_mpc import MaskedMpc
+from handrail.controllers.robot.model import load_model
 
 ZERO = ("x.vel", "y.vel", "theta.vel")
 
@@ -59,3 +68,76 @@ class PlayedClient:
             self.body.advance(self.clock.now - self.began)
             self.last, self.said_at = {**self.body.observation(), **self.cameras}, self.clock.now
         return self.last
+
+
+class FarClient:
+    """A simulated LeKiwi's host behind a network that is late and loses messages; time passes in `sleep`."""
+
+    def __init__(self, latency: float, drop: float, seed: int) -> None:
+        self.clock = Clock()
+        env = HandrailEnv(PickPlace(), "lekiwi", fps=60, observes=False)
+        self.body = LeKiwiBody(env, robot_units("lekiwi", env.model.description))
+        config = HostConfig(task="pick_place", latency=latency, drop=drop, seed=seed)
+        self.loop = LeKiwiLoop(self.body, config, self.clock.now)
+        self.action_features = dict.fromkeys(self.body.observation(), float)
+        self.link: Link | None = None
+        self._commands: list[bytes] = []
+        self._said: dict[str, Any] = {}
+        self._turn = self.clock.now
+        self.sleep(2.0 * latency + 0.1)
+
+    def connect(self) -> None:
+        pass
+
+    def disconnect(self) -> None:
+        pass
+
+    def sleep(self, seconds: float) -> None:
+        """Let time pass for the host, and for the link's own thread."""
+        end = self.clock.now + seconds
+        while self.clock.now < end - 1e-9:
+            self.clock.now = min(end, self.clock.now + 0.01)
+            if self.clock.now - self._turn >= 1 / 30 - 1e-9:
+                self._turn = self.clock.now
+                if parts := self.loop.tick(self.clock.now, self._commands[-1:]):
+                    self._said = {
+                        name: value for name, value in json.loads(parts[0]).items() if name[0] != "_"
+                    }
+                self._commands = []
+            if self.link:
+                self.link.brake_if_late()
+
+    def send_action(self, action: dict[str, Any]) -> None:
+        self._commands.append(json.dumps(action).encode())
+
+    def get_observation(self) -> dict[str, Any]:
+        return self._said
+
+
+def rude_drive(gap: float, latency: float, drop: float, seed: int, seconds: float) -> tuple[int, float]:
+    """Drive a LeKiwi over a network with rude intents; return its contacts, and the base's way [m].
+
+    Args:
+        gap: by which every update is late [s].
+        latency: of commands and observations, each [s].
+        drop: share of the messages that are lost.
+        seed: of the scene and the intents.
+        seconds: how long.
+    """
+    client, model = FarClient(latency, drop, seed), load_model("lekiwi")
+    link = client.link = Link(client, "lekiwi", model, 0.05, True, client.clock, client.sleep)
+    plant = plant_of(link, lambda: seed)
+    env = HandrailEnv(PickPlace(), "lekiwi", fps=20, observes=False, real=True, plant=plant)
+    env.reset(seed=seed)
+    mpc = MaskedMpc(model)
+    mpc.reset(env.world.obstacles())
+    rude = RudeOperator(mpc.channels, model.description.limits, np.random.default_rng([seed, 7]))
+    before, begun, way, place = client.body.contacts, client.clock.now, 0.0, env.state().q
+    while client.clock.now - begun < seconds:
+        client.sleep(gap)
+        state = env.state()
+        way, place = way + float(np.linalg.norm(state.q[:2] - place[:2])), state.q
+        command = mpc.update(state, rude.intent(state.time))
+        env.robot.send(np.append(command.velocity(0.05), 0.0))
+    link.close()
+    return client.body.contacts - before, way

@@ -224,6 +224,7 @@ def test_it_says_the_robot_s_own_action():
         ({"settings": {"horizons": 3}}, "expected numbers for some of horizon"),
         ({"obstacles": [{"name": "a"}]}, "expected an entry 'kind'"),
         ({"fps": 0}, "fps"),
+        ({"fps": 9}, "at least 10 Hz"),
         ({"start": [0, 0]}, "start"),
         ({"tool_frame": "moon"}, "tool_frame"),
     ],

@@ -10,6 +10,7 @@ from fuzz_helpers import failing, run
 from handrail.controllers.mpc.masked_mpc import MaskedMpc
 from handrail.controllers.mpc.safety_filter import safety_filter
 from handrail.controllers.numerics.threads import single_threaded
+from handrail.controllers.ocp.settings import MpcSettings
 from handrail.controllers.robot.description import robot_names
 from handrail.controllers.robot.model import load_model
 
@@ -68,6 +69,33 @@ class Frozen(MaskedMpc):
 def test_a_controller_that_freezes_fails():
     with pytest.raises(AssertionError, match="travelled"):
         check([1000], 5.0, make=Frozen)
+
+
+def late(robot, gaps, seeds, seconds, horizon=10):
+    """Run seeds with so long between two updates; return how far the hand went. Nothing is touched."""
+    model, travelled = load_model(robot), {}
+    controller = MaskedMpc(model, MpcSettings.of(model.description.world.scale, horizon=horizon))
+    with single_threaded():
+        for gap in gaps:
+            runs = {seed: run(model, controller, seed, seconds, gap=gap) for seed in seeds}
+            assert not {seed: (r.own, r.standing) for seed, r in runs.items() if r.own or r.standing}, gap
+            travelled[gap] = np.median([r.travelled for r in runs.values()])
+    print(f"{robot}, N = {horizon}: the hand went {travelled} m")
+    return travelled
+
+
+@pytest.mark.parametrize("robot", robot_names())
+def test_late_updates_touch_nothing(robot):
+    """Beyond what was certified the robot is sent the stop that was certified with it."""
+    late(robot, (0.3, 0.5, 1.0), range(1000, 1003), 8.0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("horizon", [10, 40])
+@pytest.mark.parametrize("robot", robot_names())
+def test_late_updates_touch_nothing_at_length(robot, horizon):
+    travelled = late(robot, (0.05, 0.1, 0.2, 0.3, 0.5, 1.0, 2.0), range(1000, 1012), 15.0, horizon)
+    assert travelled[0.1] > 0.7 * travelled[0.05]  # updates on time stop nothing
 
 
 @pytest.mark.slow

@@ -1,6 +1,7 @@
 """What a person may say of an episode: done, gone wrong, throw away, begin again, wait. And being late."""
 
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,18 +9,27 @@ import pytest
 from handrail.collect.commands.record import record
 from handrail.collect.commands.recording import episode_seed
 from handrail.collect.config import DatasetConfig, RecordConfig, SessionConfig
+from handrail.collect.operators.modes import MODES
 from handrail.collect.operators.operator import EpisodeEvent
 from handrail.collect.session import build
-from handrail.collect.session.build import build_env, build_modes, session_features
+from handrail.collect.session.build import (
+    build_controller,
+    build_env,
+    build_modes,
+    build_session,
+    session_features,
+)
 from handrail.collect.session.outcome import Tally
 from handrail.collect.session.recorder import Recorder
 from handrail.collect.session.rehearsal import Rehearsal
 from handrail.collect.session.session import Session
 from handrail.controllers.baselines.direct import DirectController
+from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.command import Status
 from handrail.controllers.interface.intent import Intent
 from handrail.controllers.mpc.masked_mpc import MaskedMpc
+from handrail.controllers.robot.model import load_model
 from handrail.datasets.format.manifest import Manifest
 from handrail.datasets.reading.reader import read_episodes, read_frames
 from handrail.datasets.recording.writer import EpisodeWriter
@@ -231,3 +241,25 @@ def test_three_rates(env):
     np.testing.assert_allclose(updates, 0.1 * np.arange(24), atol=1e-9)
     np.testing.assert_array_equal([frame.action for frame in frames], sent[3::4])
     assert np.all(np.diff([v[0] for v in sent[:8]]) > 0.0)  # also between two updates
+
+
+def test_a_loop_slower_than_what_is_certified_is_refused():
+    with pytest.raises(HandrailError, match=r"control rate .* 5: expected at least 10 Hz"):
+        build_controller(MODES.find("ee"), load_model(), 5.0)
+    assert build_controller(MODES.find("direct"), load_model(), 5.0)
+
+
+def test_updates_that_take_longer_than_the_period_are_told(caplog, monkeypatch):
+    update = MaskedMpc.update
+    config = SessionConfig(task="reach", mode="ee", realtime=True, time_limit=0.3)
+    env = build_env(config, 20)
+    for seconds in (0.0, 0.2):
+
+        def taking(self, state, intent, seconds=seconds):
+            command = update(self, state, intent)
+            return replace(command, diagnostics=replace(command.diagnostics, solve_time=seconds))
+
+        monkeypatch.setattr(MaskedMpc, "update", taking)
+        caplog.clear()
+        build_session(config, env).run(1)
+        assert ("took longer than the period of 50 ms" in caplog.text) is bool(seconds)

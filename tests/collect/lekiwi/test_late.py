@@ -1,0 +1,41 @@
+"""A LeKiwi goes on as it was told last: what is late, in the loop or the network, makes it touch nothing."""
+
+import logging
+
+import pytest
+from lekiwi_helpers import FarClient, rude_drive
+
+from handrail.collect.lekiwi.link import Link
+from handrail.controllers.numerics.threads import single_threaded
+from handrail.controllers.robot.model import load_model
+
+
+@pytest.mark.parametrize(("gap", "latency", "drop"), [(0.25, 0.0, 0.0), (0.45, 0.0, 0.0), (0.0, 0.1, 0.1)])
+def test_delays_touch_nothing(gap, latency, drop):
+    with single_threaded():
+        contacts, way = rude_drive(gap, latency, drop, seed=0, seconds=10.0)
+    assert contacts == 0
+    assert gap or way > 0.3  # a robot that never moves touches nothing, too
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("gap", "latency", "drop"),
+    [(0.1, 0, 0), (0.25, 0, 0), (0.45, 0, 0), (1.0, 0, 0), (0, 0.05, 0), (0, 0.1, 0.1), (0, 0.3, 0)],
+)
+def test_delays_touch_nothing_at_length(gap, latency, drop):
+    with single_threaded():
+        assert not {seed for seed in range(12) if rude_drive(gap, latency, drop, seed, 15.0)[0]}
+
+
+def test_a_base_whose_next_command_is_late_is_sent_the_stop_and_that_is_said(caplog):
+    client = FarClient(0.0, 0.0, 0)
+    link = client.link = Link(client, "lekiwi", load_model("lekiwi"), 0.05, False, client.clock, client.sleep)
+    for _ in range(10):
+        link.exchange([0.1, 0, 0, 0, 0, 0, 0, 0, 0])
+    assert client.body.speed > 0.08
+    client.sleep(0.45)  # less than the host's watchdog takes
+    assert client.body.speed < 0.01
+    with caplog.at_level(logging.WARNING):
+        link.close()
+    assert "commands were late" in caplog.text
