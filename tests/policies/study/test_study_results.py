@@ -114,7 +114,7 @@ def test_what_is_planned_is_detected_in_four_of_five_studies(contrast):
             success = 0.5 + effect * weight / total + rng.normal(0.0, FACTORS.sd, (2, 8))
             shares = rng.binomial(50, np.clip(success, 0.0, 1.0)) / 50
             values += weight * shares.mean(axis=0)
-        estimate: Any = student(values)
+        estimate: Any = student(values, least=0.0)
         found += estimate.p < 0.05 / 3
     assert found / studies == pytest.approx(0.8, abs=0.06)
 
@@ -203,5 +203,5 @@ def test_without_factors_or_with_one_draw_nothing_is_claimed(gathered):
 
 def test_a_share_of_few_is_never_certain():
     assert variance_of_share(0, 50, 50) > 0.0
-    assert student([0.5]).interval is None
-    assert json.dumps(student([0.5, 0.7]).value)
+    assert student([0.5], least=0.0).interval is None
+    assert json.dumps(student([0.5, 0.7], least=0.0).value)
