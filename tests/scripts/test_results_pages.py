@@ -167,9 +167,11 @@ def test_failures_with_and_without_contact_are_told_as_they_came_out():
         for task in ("reach", "pick_place")
     ]
     with_contact, and_pick_place, without, and_there = ways
-    assert f"{with_contact[0]} of `ee` and {with_contact[1]} of `ee_dls` failed after one" in page
+    assert f"{with_contact[0]} of `ee` and {with_contact[1]} of `ee_dls` failed after one on `reach`" in page
     assert f"(`pick_place`: {' and '.join(and_pick_place)}), {' and '.join(without)} without one" in page
     assert f"without one ({' and '.join(and_there)})" in page
+    took = [f"{np.percentile(ended['reach', mode, '0'], 95):.1f}" for mode in ("ee", "ee_dls")]
+    assert f"successes took ({' and '.join(took)} s)" in page
 
 
 def test_what_the_same_number_takes_off_the_interaction_has_the_floor_of_the_report():
