@@ -120,7 +120,8 @@ def test_a_reader_can_repeat_every_table_and_test_from_the_episodes(label):
                 known = np.array([each for each in values if each is not None], float)
                 if len(known):
                     summary = run["profiles"][profile][name][metric]
-                    found = (known.mean(), known.std(ddof=1), known.min(), known.max())
+                    spread = known.std(ddof=1) if len(known) > 1 else 0.0
+                    found = (known.mean(), spread, known.min(), known.max())
                     told = [summary[key] for key in ("mean", "std", "min", "max")]
                     assert found == pytest.approx(told, rel=1e-9)
         for name in others:
