@@ -49,8 +49,9 @@ def damped_least_squares(matrix: FloatArray, values: FloatArray, inverse: FloatA
 
 
 def blended(operator: Completion, autonomy: Completion, share: float = 0.5) -> Completion:
-    """Return `v = α v_operator + (1 − α) v_autonomy`: weighted averaging, the paper's blended control.
+    """Return `v = α v_operator + (1 − α) v_autonomy`: the weighted mean of two rules.
 
+    Neither is an actor with a goal of its own, as in the blended control that the paper cites.
     What both do with the hand passes whole, since a twist is linear in v; of what only one of them does with
     it, its share passes. An actor that knows nothing of the hand thus takes 1 − α of the operator's command.
 

@@ -9,8 +9,8 @@ one, the most violated first, while all multipliers stay ≥ 0 (D. Goldfarb, A. 
 with the rows that were active in the last update, it needs few changes.
 
 Work is counted in numbers touched, `N n (active rows + band)` a change, never by the clock: the same update
-takes the same work on every machine. An answer that has no work left is the nearest point within the rows that
-are active so far; it may violate others.
+takes the same work on every machine. An answer that has no work left is the nearest point within the rows
+that are active so far; it may violate others.
 """
 
 from typing import NamedTuple

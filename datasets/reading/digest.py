@@ -1,28 +1,65 @@
-"""One number for all rows of a dataset but its clocks: the same recording has the same, however it came."""
+"""Numbers that tell a recording apart by all that it holds but its clocks: the same one has the same."""
 
 import hashlib
+from collections.abc import Iterable, Mapping
 from pathlib import Path
+from typing import Any
 
 from handrail.datasets.format.data_file import data_files
-from handrail.datasets.reading.reader import read_episodes, read_info, read_rows_of
+from handrail.datasets.format.join import Videos, videos
+from handrail.datasets.format.path_pattern import fill
+from handrail.datasets.format.schema import video_keys
+from handrail.datasets.reading.reader import DatasetInfo, read_episodes, read_info, read_rows_of
 
 CLOCKS = ("wall_clock", "controller.solve_time")  # columns that no two recordings share
 
 
-def digest_of_rows(root: Path) -> str:
-    """Return a digest of every value of every row of a dataset that is in its tables, without the clocks.
+def digest_of_dataset(root: Path) -> str:
+    """Return a digest of every value of every row without the clocks, then one of the pictures, if any.
 
     Raises:
         HandrailError: there is no dataset, or it cannot be read.
     """
     digest = hashlib.sha256()
-    info = read_info(root)
+    info, rows = read_info(root), read_episodes(root)
     names = [name for name, each in info.features.items() if name not in CLOCKS and each.dtype != "video"]
     with data_files() as files:
-        for row in read_episodes(root):
+        for row in rows:
             frames = read_rows_of(info, row, names, files)
             for name in sorted(frames):
                 values = frames[name]
                 digest.update(f"{name} {values.shape} ".encode())
                 digest.update(repr(values.tolist()).encode() if values.dtype == object else values.tobytes())
-    return digest.hexdigest()[:16]
+    return digest.hexdigest()[:16] + digest_of_pictures(info, rows)
+
+
+def digest_of_pictures(info: DatasetInfo, rows: Iterable[Mapping[str, Any]]) -> str:
+    """Return a digest of every encoded picture of episodes, which packing and merging copy; "" of no camera.
+
+    Args:
+        info: of the dataset.
+        rows: the episodes' lines of metadata.
+
+    Raises:
+        HandrailError: a video cannot be read.
+    """
+    digest, cameras = hashlib.sha256(), video_keys(info.features)
+    with videos(info.fps) as opened:
+        for row in rows:
+            for camera in cameras:
+                digest.update(f"{camera} {row['length']} ".encode())
+                for data in _encoded(info, row, camera, opened):
+                    digest.update(data)
+    return digest.hexdigest()[:16] if cameras else ""
+
+
+def _encoded(
+    info: DatasetInfo, row: Mapping[str, Any], camera: str, opened: Videos
+) -> Iterable[bytes | memoryview]:
+    """Return an episode's packets; all of the file where another tool encoded episodes into each other."""
+    chunk, file, start = (
+        row[f"videos/{camera}/{name}"] for name in ("chunk_index", "file_index", "from_timestamp")
+    )
+    path = info.root / fill(info.video_path, chunk, file, camera)
+    stretch = opened.stretch(path, round(start * info.fps), row["length"], camera)
+    return [memoryview(packet) for packet in stretch.packets] if stretch else [path.read_bytes()]

@@ -35,7 +35,7 @@ class Estimate:
         return None if self.error is None else reach(tests, self.replicates - 1) * self.error
 
 
-def student(values: FloatArray | Sequence[float], least: float = 0.0) -> Estimate:
+def student(values: FloatArray | Sequence[float], least: float) -> Estimate:
     """Return the mean of replicates, with error √(max(s², v) / n) and n − 1 degrees of freedom.
 
     Args:

@@ -45,14 +45,19 @@ def load_json(path: Path, what: str) -> Any:
         raise HandrailError(f"{str(path)!r}: expected {what}, got {message_of(error)}") from error
 
 
-def write_json(path: Path, content: Any) -> None:
+def write_json(path: Path, content: Any, indent: int | None = 1) -> None:
     """Write a file that `read_json` takes, whole or not at all; what is no finite number becomes null.
+
+    Args:
+        path: of the file.
+        content: to write.
+        indent: spaces a level; None writes one line.
 
     Raises:
         OSError: The disk is full, or the folder cannot be made or written.
     """
     finite = json.loads(json.dumps(content), parse_constant=lambda _: None)
-    write_whole(path, (json.dumps(finite, indent=1) + "\n").encode())
+    write_whole(path, (json.dumps(finite, indent=indent) + "\n").encode())
 
 
 def parse_json(data: bytes) -> Any:

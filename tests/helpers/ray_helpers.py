@@ -17,7 +17,7 @@ from command_helpers import command
 from places import HELPERS
 from shared_helpers import content, saved, started, wait_until
 
-from handrail.datasets.reading.digest import digest_of_rows
+from handrail.datasets.reading.digest import digest_of_dataset
 
 os.environ["RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER"] = "0"  # else Ray looks for 127.0.0.1 at another address
 NODE = {"num_cpus": 1, "object_store_memory": 100_000_000, "node_ip_address": "127.0.0.1"}
@@ -92,9 +92,9 @@ def main(episodes):
         one, other, start = Path(folder, "one"), Path(folder, "other"), time.monotonic()
         done = command(one, *flags, "--dataset.num_episodes", episodes)
         assert done.returncode == 0, done.stderr
-        print(f"one worker: {time.monotonic() - start:.1f} s, rows {digest_of_rows(one)}")
+        print(f"one worker: {time.monotonic() - start:.1f} s, rows {digest_of_dataset(one)}")
         loss = record_with_a_loss(cluster, other, episodes, *flags)
-        print(f"three computers, one lost: {loss.seconds:.1f} s, rows {digest_of_rows(other)}")
+        print(f"three computers, one lost: {loss.seconds:.1f} s, rows {digest_of_dataset(other)}")
         print(f"saved when it was lost: {loss.kept}; of these recorded once more: {loss.twice}")
         times = started(other)
         print(f"episodes: {len(times)}, recorded at as many different times: {len(set(times)) == len(times)}")

@@ -1,46 +1,19 @@
-"""What the pages of results say in words agrees with the JSON beside them; limits come before rankings."""
+"""What the pages of the study say in words agrees with the JSON and the archive beside them."""
 
 import json
 import re
 import tarfile
 from collections import Counter
 
+import numpy as np
 import pytest
 from places import ROOT
+from results_helpers import RESULTS, words
 
+from handrail.controllers.ocp.settings import MpcSettings
+from handrail.controllers.robot.model import load_model
 from handrail.datasets.statistics.proportions import holm
-from handrail.datasets.statistics.student import student
-
-RESULTS = ROOT / "docs" / "results"
-LIMITS = (
-    "scripts, not people",
-    "is not the same thing twice",
-    "probably better than people are",
-    "policies see where things are",
-    "chosen on `ee`",
-    "a flat loss does not show",
-    "was chosen so that policies neither all fail nor all succeed",
-)
-OLD_LIMITS = ("input and controller are not told apart", "was not declared before", "seeds of one recording")
-
-
-def words(text):
-    """Return a text without the parts that commands write, on one line."""
-    written = r"<!-- (?P<label>[^>]+) -->.*?<!-- end (?:of )?(?P=label) -->"
-    return " ".join(re.sub(written, "", text, flags=re.DOTALL).split())
-
-
-TEXT = words((RESULTS / "goal_reaching.md").read_text())
-
-
-def runs():
-    """Return what the goal-reaching page keeps, by kind of run."""
-    files = sorted(RESULTS.glob("goal_reaching_*.json"))
-    return {file.stem.removeprefix("goal_reaching_"): json.loads(file.read_text()) for file in files}
-
-
-def nominal(seed, name, metric, digits):
-    return f"{runs()[f'nominal_seed_{seed}']['controllers'][name][metric]['mean']:.{digits}f}"
+from handrail.datasets.statistics.student import student, variance_of_share
 
 
 def contrast(name, kind):
@@ -60,74 +33,159 @@ def shares(name, kind):
     return [f"{100 * side:.0f}" for side in contrast(name, kind)["sides"]]
 
 
-def test_limits_of_the_study_come_before_its_figures():
-    page = (RESULTS / "teleop_modes.md").read_text()
-    before = words(page.split("<!-- study factors -->")[0]).lower()
-    assert [limit for limit in LIMITS if limit not in before] == []
-    earlier = words(page.split("<!-- end of study factors -->")[1].split("What came out of the earlier")[0])
-    assert [limit for limit in OLD_LIMITS if limit not in earlier.lower()] == []
-    assert "97 %" not in earlier  # what `ee` had
+def points(*values):
+    """Return shares as the pages write points: `+24 (+19 to +30)`, or one of them alone."""
+    value, *ends = (f"{100 * each:+.0f}".replace("-", "−") for each in values)
+    return f"{value} ({' to '.join(ends)})" if ends else value
 
 
-def test_the_answer_is_told_as_it_came_out():
-    """The page's own three sentences, and the README's."""
-    answer = words((RESULTS / "teleop_modes.md").read_text().split("\n## ")[0])
+def told(estimate):
+    return points(estimate["value"], *estimate["interval"])
+
+
+def floor_of(condition):
+    """Return the variance of a draw's share if only its rollouts were drawn anew."""
+    rollouts, draws = condition["rollouts"], len(condition["draws"])
+    return variance_of_share(condition["successes"], rollouts, rollouts // draws)
+
+
+def over_draws(*parts):
+    """Return a weighted sum of conditions' successes over draws, with the floor that the report has."""
+    values = [sum(weight * one["draws"][draw] for weight, one in parts) for draw in parts[0][1]["draws"]]
+    return student(values, sum(weight**2 * floor_of(one) for weight, one in parts))
+
+
+def test_the_answer_begins_with_the_interaction():
+    """The page's first table, and the README's sentence."""
+    answer = words((RESULTS / "teleop_modes.md").read_text().split("\n## ")[0]).replace("**", "")
     readme = words((ROOT / "README.md").read_text())
-    with_mpc, without = shares("controller", "declared")
-    hand, hand_without = shares("ee − ee_dls", "exploratory")
-    joints, joints_without = shares("joints − direct", "exploratory")
-    for text in (answer, readme):
-        assert f"with the MPC succeeded in {with_mpc} %, " in text
-        assert f"without it in {without} %" in text
-        assert f"{hand} instead of {hand_without} %" in text
-        assert f"({joints} and {joints_without} %" in text
-        assert "scripted" in text
-        assert "nothing of people" in text
-    steered, joints = shares("input", "declared")
-    assert f"({steered} and {joints} %; " in answer
-    for name in ("controller", "input", "interaction"):
-        ends = contrast(name, "declared")["estimate"]["interval"]
-        low, high = (f"{100 * end:+.0f}".replace("-", "−") for end in ends)
-        assert f"{low} to {high}" in answer, name
+    for one, other in (("ee", "ee_dls"), ("joints", "direct")):
+        name = f"{one} − {other}"
+        with_mpc, without = shares(name, "exploratory")
+        gain = told(contrast(name, "exploratory")["estimate"])
+        assert f"| `{one}` {with_mpc} % | `{other}` {without} % | {gain}, explored |" in answer
+    tested = contrast("interaction", "declared")
+    assert tested["p_adjusted"] < 0.001
+    assert f"the interaction | | | {told(tested['estimate'])}, declared and tested, p < 0.001" in answer
+    for name, detected in (("controller", ""), ("input", ", not detected")):
+        inside = told(contrast(name, "declared")["estimate"]).removesuffix(")")
+        assert f"{inside}{detected}; {' and '.join(shares(name, 'declared'))} %)" in answer
+    assert answer.index("interaction") < answer.index("MPC − none")
+    (hand, bare), (joints, direct) = (
+        shares(name, "exploratory") for name in ("ee − ee_dls", "joints − direct")
+    )
+    gains = [
+        f"{100 * contrast(name, 'exploratory')['estimate']['value']:.0f}"
+        for name in ("ee − ee_dls", "joints − direct")
+    ]
+    assert f"adds {gains[0]} points of policy success where the hand is steered ({hand} instead" in readme
+    assert (
+        f"of {bare} %), and {gains[1]}, not detected, where the joints are ({joints} and {direct} %)"
+        in readme
+    )
+    for name in ("controller", "input"):
+        assert " and ".join(shares(name, "declared")) not in readme
+
+
+def test_where_the_lead_over_direct_is_undecided_is_told_beside_it():
+    answer = words((RESULTS / "teleop_modes.md").read_text().split("\n## ")[0])
+    number = json.loads((RESULTS / "teleop_modes_beside_number.json").read_text())
+    study = json.loads((RESULTS / "teleop_modes_factors.json").read_text())
+    found = [
+        contrast("ee − direct", "exploratory"),
+        *(each for each in number["contrasts"] if each["name"] == "ee − direct (same number)"),
+        *(
+            each
+            for each in study["contrasts"]
+            if (each["name"], each["tasks"], each["measure"]) == ("ee − direct", ["pick_place"], "clean")
+        ),
+    ]
+    first, second, third = (told(each["estimate"]) for each in found)
+    low, high = found[1]["estimate"]["interval"]
+    assert low < 0 < high
+    low, high = found[2]["estimate"]["interval"]
+    assert low < 0 < high
+    assert f"is {first}." in answer
+    assert f"on `reach` ({second.replace(' (', ', ')}" in answer
+    assert f"contact count ({third.replace(' (', ', ')}" in answer
+
+
+def test_how_damped_least_squares_weighs_is_told_from_the_robot():
+    """`W = diag(1 / v_max)`: what a radian of a joint costs beside a metre of the base."""
+    speeds = load_model("ridgeback_ur10").description.limits.velocity
+    cheaper = (speeds[3:] / speeds[0]) ** 2
+    answer = words((RESULTS / "teleop_modes.md").read_text().split("\n## ")[0])
+    assert f"costs {cheaper.min():.0f} to {cheaper.max():.0f} times less than a metre of the base" in answer
+    settings = MpcSettings()
+    assert settings.base_velocity < settings.arm_velocity  # it moves the base first
+    assert f"looks {settings.horizon * settings.dt:.0f} s ahead" in answer
+    assert f"looks {settings.horizon * settings.dt:.0f} s ahead" in words(
+        (RESULTS / "operators.md").read_text()
+    )
+
+
+def test_success_and_contact_are_told_as_they_came_out():
+    page = words((RESULTS / "teleop_modes.md").read_text())
+    study = json.loads((RESULTS / "teleop_modes_factors.json").read_text())
+    found = {(each["task"], each["label"]): each for each in study["conditions"] if each["treatment"] == ""}
+    clean = {
+        (task, mode): side
+        for each in study["contrasts"]
+        if each["measure"] == "clean" and len(each["tasks"]) == 1 and ":" not in each["name"]
+        for task in each["tasks"]
+        for mode, side in zip(each["name"].split(" − "), each["sides"], strict=True)
+    }
+    for what, modes in (("hand", ("ee", "ee_dls")), ("joints", ("joints", "direct"))):
+        both = [(task, mode) for task in ("reach", "pick_place") for mode in modes]
+        cells = [
+            f"`{mode}` {100 * found[task, mode]['success']['value']:.0f} %"
+            f" ({round(found[task, mode]['touched'] * found[task, mode]['rollouts'])})"
+            for task, mode in both
+        ]
+        assert f"| {' | '.join(cells)} |" in page
+        cells = [f"{100 * clean[cell]:.0f} %" for cell in both]
+        assert f"| success without contact: {what} | {' | '.join(cells)} |" in page
 
 
 def test_failures_with_and_without_contact_are_told_as_they_came_out():
-    answer = words((RESULTS / "teleop_modes.md").read_text().split("\n## ")[0])
-    failed = Counter()
+    page = words((RESULTS / "teleop_modes.md").read_text())
+    failed, ended = Counter(), {}
     with tarfile.open(RESULTS / "teleop_modes_factors.tar.xz") as archive:
         for member in archive:
             place = re.fullmatch(
-                r"(?:\./)?evaluations/(\w+)/(\w+)/\d/nominal/realised-time.json", member.name
+                r"(?:\./)?evaluations/(\w+)/(\w+)/(\d)/nominal/realised-time.json", member.name
             )
             if place:
-                content = json.load(archive.extractfile(member))
-                (policies,) = content["arms"].values()
+                task, mode, draw = place.groups()
+                (policies,) = json.load(archive.extractfile(member))["arms"].values()
                 rollouts = [rollout for policy in policies for rollout in policy["rollouts"]]
-                failed.update(
-                    (*place.groups(), each["contacts"] > 0) for each in rollouts if not each["success"]
-                )
+                failed.update((task, mode, each["contacts"] > 0) for each in rollouts if not each["success"])
+                ended[task, mode, draw] = [each["length"] for each in rollouts if each["success"]]
     ways = [
         [f"{failed[task, mode, touched]}" for mode in ("ee", "ee_dls")]
         for touched in (True, False)
         for task in ("reach", "pick_place")
     ]
     with_contact, and_pick_place, without, and_there = ways
-    study = json.loads((RESULTS / "teleop_modes_factors.json").read_text())
-    touched = {(each["task"], each["label"]): each["touched"] for each in study["conditions"]}
-    hand, joints = (
-        f"{50 * (touched['reach', mode] + touched['pick_place', mode]):.0f} %"
-        for mode in ("ee_dls", "direct")
-    )
-    assert f"touched something in {hand} of their rollouts, those of the joints in {joints}" in answer
-    for task in ("reach", "pick_place"):
-        hand, joints = (100 * touched[task, mode] for mode in ("ee", "joints"))
-        assert f"{hand:.0f} and {joints:.0f} % on `{task}`" in answer
-    assert (
-        f"{with_contact[0]} of `ee` and {with_contact[1]} of `ee_dls` failed after a contact on `reach`"
-        in answer
-    )
-    assert f"(`pick_place`: {' and '.join(and_pick_place)}), {' and '.join(without)} without one" in answer
-    assert f"without one ({' and '.join(and_there)})" in answer
+    assert f"{with_contact[0]} of `ee` and {with_contact[1]} of `ee_dls` failed after one on `reach`" in page
+    assert f"(`pick_place`: {' and '.join(and_pick_place)}), {' and '.join(without)} without one" in page
+    assert f"without one ({' and '.join(and_there)})" in page
+    took = [f"{np.percentile(ended['reach', mode, '0'], 95):.1f}" for mode in ("ee", "ee_dls")]
+    assert f"successes took ({' and '.join(took)} s)" in page
+
+
+def test_what_the_same_number_takes_off_the_interaction_has_the_floor_of_the_report():
+    """Computed from the conditions: the report has both interactions, not their difference."""
+    page = words((RESULTS / "teleop_modes_beside.md").read_text())
+    study = json.loads((RESULTS / "teleop_modes_beside_number.json").read_text())
+    found = {each["label"]: each for each in study["conditions"]}
+    signs = {"ee": 1.0, "ee_dls": -1.0, "joints": -1.0, "direct": 1.0}
+    parts = [(sign, found[mode]) for mode, sign in signs.items()]
+    parts += [(-sign, found[f"{mode} same number"]) for mode, sign in signs.items()]
+    less = over_draws(*parts)
+    assert (100 * np.array(less.interval)).round(1).tolist() == [-0.7, 31.7]
+    low, high = (points(end) for end in less.interval or ())
+    assert f"{100 * less.value:.0f} points less ({low} to {high})" in page
 
 
 @pytest.mark.parametrize(
@@ -169,6 +227,8 @@ def test_what_came_of_pictures_is_told_as_it_came_out():
         assert f"none of {each['rollouts']} goals each" in page
     assert f"| success | {' | '.join(reached)} |" in page
     assert f"| hand was at the goal, but not turned | {' | '.join(turned)} |" in page
+    losses = study["jobs"]["policy/reach/ee/0/realised-time"]["result"]["validation"]
+    assert f"its loss on held-out episodes is {list(losses.values())[-1]:.3f} in the end" in page
 
 
 def test_what_was_tried_of_direct_is_told_as_it_came_out():
@@ -187,30 +247,16 @@ def test_what_was_tried_of_direct_is_told_as_it_came_out():
             f"| `{mode}`{what} | {100 * each['success']['value']:.0f} % ({low} to {high}) |"
             f" {grasp} | {lift} | {each['failures']['carry, dropped']} |"
         ) in page
-    drawn = {(each["label"], each["noise"]): each["draws"] for each in study["conditions"]}
+    found = {(each["label"], each["noise"]): each for each in study["conditions"]}
     for mode in ("ee", "direct"):
-        lost = student([drawn[mode, 1.0][draw] - drawn[mode, 0.0][draw] for draw in "0123"])
+        lost = over_draws((1.0, found[mode, 1.0]), (-1.0, found[mode, 0.0]))
         low, high = (f"{100 * end:.0f}" for end in lost.interval or ())
-        told = re.search(rf"`{mode}` (?:loses )?(\d+) (?:points )?\({low} to {high}\)", page)
-        assert told
-        assert int(told[1]) == pytest.approx(100 * lost.value, abs=0.51)
+        said = re.search(rf"`{mode}` (?:loses )?(\d+) (?:points )?\({low} to {high}\)", page)
+        assert said
+        assert int(said[1]) == pytest.approx(100 * lost.value, abs=0.51)
     (worse,) = [each for each in study["contrasts"] if each["name"] == "direct targets − direct"]
     low, high = (f"{100 * end:.0f}".replace("-", "−") for end in worse["estimate"]["interval"])
     assert f"{100 * worse['estimate']['value']:.0f} points ({low} to {high})".replace("-", "−") in page
-
-
-def test_the_readme_s_results_are_those_of_the_pages():
-    readme = words((ROOT / "README.md").read_text())
-    reached = {
-        name: sum(
-            round(run["success"]["mean"] * run["episodes"])
-            for run in (runs()[f"nominal_seed_{seed}"]["controllers"][name] for seed in (1, 2, 3))
-        )
-        for name in ("mpc", "mink")
-    }
-    assert f"reached {reached['mpc']} of 300 goals without contact; `mink` {reached['mink']}" in readme
-    clutter = runs()["nominal_clutter_seed_1"]["controllers"]["mpc"]
-    assert f"touched nothing, and reached {100 * clutter['success']['mean']:.0f} of 100" in readme
 
 
 def test_the_families_of_p_values_follow_from_the_study_s_json():
@@ -233,68 +279,3 @@ def test_the_families_of_p_values_follow_from_the_study_s_json():
         cells = [f"{adjusted[key]:.2g}" if key in adjusted else "–" for key in shown]
         assert f" {len(family)} " in page
         assert f"| {' | '.join(cells)} |" in page
-
-
-@pytest.mark.parametrize(
-    ("metric", "digits", "called"),
-    [
-        ("arm_effort", 1, "Arm effort"),
-        ("jerkiness", 3, "jerkiness"),
-        ("base_path", 2, "base path"),
-    ],
-)
-def test_the_mpc_s_figures_are_those_of_the_tables(metric, digits, called):
-    one, two, three = (nominal(seed, "mpc", metric, digits) for seed in (1, 2, 3))
-    assert f"{called} {one}, {two} and {three}" in TEXT
-
-
-def test_the_paper_s_horizon_is_told_as_it_came_out():
-    found = {
-        metric: nominal(1, "mpc_paper", metric, digits)
-        for metric, digits in (("arm_effort", 1), ("jerkiness", 3), ("base_path", 2), ("length", 0))
-    }
-    assert (
-        f"effort {found['arm_effort']}, jerkiness {found['jerkiness']}, base path {found['base_path']} m,"
-        f" {found['length']} steps (published"
-    ) in TEXT
-
-
-def test_the_closed_loop_is_told_as_it_came_out():
-    mpc = runs()["nominal_closed_loop_whole_seed_1"]["controllers"]["mpc"]
-    before, after = mpc["planned_position_error"], mpc["final_position_error"]
-    missed = f"{mpc['beyond_aim']['planned_position_error']} of {mpc['episodes']} goals beyond 10 mm"
-    assert (
-        f"{1e3 * before['mean']:.1f} mm off in the mean and {1e3 * before['max']:.1f} mm at worst, {missed}"
-        in TEXT
-    )
-    assert f"it is {1e3 * after['mean']:.1f} mm and {1e3 * after['max']:.1f} mm" in TEXT
-    assert ("**That is so**" in TEXT) == (
-        after["mean"] < before["mean"] and after["max"] < before["max"] < 0.01
-    )
-
-
-def test_time_is_told_by_the_update_and_its_rate():
-    took = [nominal(1, name, "update_ms_median", 2) for name in ("mpc", "rl")]
-    rates = [nominal(1, name, "updates_per_s", 0) for name in ("mpc", "rl")]
-    assert f"{took[0]} against {took[1]} ms" in TEXT
-    assert f"{rates[0]} against {rates[1]} a second" in TEXT
-    pages = (*RESULTS.glob("*.md"), *(ROOT / "docs").glob("*.md"), ROOT / "README.md", ROOT / "CHANGELOG.md")
-    for document in pages:
-        assert not re.search(r"% of the actor's (wall )?time", words(document.read_text()))
-
-
-def test_what_the_low_pass_does_for_rivals_is_told():
-    profiles = runs()["profiles_seed_1"]["profiles"]
-    for profile in ("steps", "quantised"):
-        for rival in ("mink", "rl"):
-            bare, smooth = (
-                f"{100 * profiles[profile][name]['success']['mean']:.0f}"
-                for name in (rival, f"{rival}_low_pass")
-            )
-            assert f"`{rival}` {smooth} instead of {bare} of 100 goals ({profile})" in TEXT
-
-
-def test_a_page_of_one_run_has_tables_of_one_run():
-    assert "all tables are of one run" in TEXT
-    assert all("updates_per_s" in run["controllers"]["mpc"] for run in runs().values())
-    assert {run["machine"]["cores"] for run in runs().values()} == {2}

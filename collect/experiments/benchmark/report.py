@@ -7,6 +7,7 @@ from typing import Any
 
 from handrail.collect.experiments.benchmark.config import BenchmarkConfig
 from handrail.collect.experiments.benchmark.figures import CAPTIONS
+from handrail.collect.experiments.benchmark.results import measures_by_goal
 from handrail.collect.experiments.benchmark.tables import benchmark_tables
 from handrail.collect.flags import command_line
 from handrail.datasets.presentation.drawing import address, svg
@@ -53,7 +54,7 @@ def write_page(
 ) -> None:
     """Put tables and figures into a page, between the marks of this kind of run; other text stays.
 
-    Figures and the summaries as JSON go beside the page, named `<page>_<label>…`.
+    Figures, and summaries and every episode's measures as JSON, go beside the page, named `<page>_<label>…`.
 
     Args:
         results: as summarised.
@@ -64,7 +65,7 @@ def write_page(
     stem = f"{path.stem}_{config.label}"
     for name, data in pictures.items():
         write_whole(path.parent / f"{stem}_{name}.png", data)
-    write_json(path.parent / f"{stem}.json", {k: v for k, v in results.items() if k != "episodes"})
+    write_json(path.parent / f"{stem}.json", {**results, "episodes": measures_by_goal(results)}, indent=None)
     command = command_line("handrail-benchmark", replace(config, json="", report="", page=""))
     parts = [f"`{command}` wrote this. {_how(results)}"]
     for table in benchmark_tables(results):

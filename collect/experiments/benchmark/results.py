@@ -24,6 +24,7 @@ from handrail.datasets.statistics.paired import paired_difference, paired_succes
 
 Row = Mapping[str, Any]
 _COMPARED = (*(name for name in METRICS if name != "success"), "update_ms_median")
+_KEPT = (*(name for name in METRICS if name != "wall_time_s"), *SAFETY_METRICS, *SETTLED_METRICS)
 _PLACES = ("json", "report", "page")  # settings that say where results are written on a machine
 _VERSIONED = ("casadi", "coal", "daqp", "mujoco", "numpy", "pin", "scipy")
 
@@ -60,6 +61,24 @@ def summarise(
         "machine": {"cores": os.cpu_count(), "load": os.getloadavg()[0]},
         "versions": {name: metadata.version(name) for name in _VERSIONED},
         "episodes": [dict(row) for row in rows],
+    }
+
+
+def measures_by_goal(results: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what every episode gave: profile → controller → measure → a value a goal, in their order.
+
+    Times are left out: no other run has the same ones.
+
+    Args:
+        results: as summarised.
+    """
+    rows = results["episodes"]
+    return {
+        profile: {
+            name: {metric: [row[metric] for row in rows_of(rows, profile, name)] for metric in _KEPT}
+            for name in summaries
+        }
+        for profile, summaries in results["profiles"].items()
     }
 
 

@@ -13,7 +13,7 @@ from handrail.collect.execution.config import ExecutionConfig
 from handrail.collect.experiments.scaling.config import ScalingConfig
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.presentation.table import Table
-from handrail.datasets.reading.digest import digest_of_rows
+from handrail.datasets.reading.digest import digest_of_dataset
 from handrail.datasets.reading.reader import read_episodes
 
 _COMMAND = "from handrail.scripts.record import main; main()"
@@ -95,7 +95,7 @@ def _run(config: ScalingConfig, place: ExecutionConfig, root: Path) -> dict[str,
         "seconds": seconds,
         "recording_seconds": last - first,
         "frames": sum(row["length"] for row in rows),
-        "rows": digest_of_rows(root),
+        "rows": digest_of_dataset(root),
     }
 
 

@@ -4,6 +4,7 @@ import hashlib
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from handrail.controllers.errors import HandrailError
 from handrail.datasets.format.data_file import data_files
 from handrail.datasets.format.stats import column_stats
 from handrail.datasets.reading.check import check_whole
+from handrail.datasets.reading.digest import digest_of_pictures
 from handrail.datasets.reading.reader import DatasetInfo, read_episodes, read_info, read_rows_of, with_success
 from handrail.policies.imitation.config import TrainConfig
 from handrail.policies.imitation.interface.checkpoint import PolicyMeta
@@ -68,14 +70,15 @@ class Source:
     features: dict[str, dict[str, Any]]
     columns: Columns
 
-    @property
+    @cached_property
     def digest(self) -> str:
-        """What tells the data apart: of the numbers in all columns."""
+        """What tells the data apart: of the numbers in all columns, then of the pictures, if it sees any."""
         digest = hashlib.sha256()
         for key, values in sorted(self.columns.items()):
             digest.update(f"{key} {values.dtype} {values.shape}".encode())
             digest.update(np.ascontiguousarray(values).data)
-        return digest.hexdigest()[:16]
+        seen = digest_of_pictures(self.info, self.selection.rows) if self.config.images else ""
+        return digest.hexdigest()[:16] + seen
 
     @property
     def trained_on(self) -> dict[str, float]:

@@ -11,12 +11,12 @@ from handrail.datasets.demonstrations.demonstration import DoesNotApply
 from handrail.datasets.demonstrations.load import Recorded, recorded_episodes
 from handrail.datasets.learnability.learnability import learnability
 from handrail.datasets.quality.measure import measure
-from handrail.datasets.reading.digest import digest_of_rows
+from handrail.datasets.reading.digest import digest_of_dataset
 from handrail.policies.imitation.interface.policy_rows import policy_rows
 
 
 def summary(root: Path, seed: int) -> dict[str, Any]:
-    """Return how much was recorded, how it ended, how good it is, and a digest of its rows.
+    """Return how much was recorded, how it ended, how good it is, and a digest of it all.
 
     Args:
         root: of the dataset.
@@ -34,7 +34,7 @@ def summary(root: Path, seed: int) -> dict[str, Any]:
         "minutes": sum(episode.seconds for episode in episodes) / 60.0,
         "frames": sum(episode.count for episode in episodes),
         "reasons": dict(Counter(str(reason or "not recorded") for reason in failed).most_common()),
-        "digest": digest_of_rows(root),
+        "digest": digest_of_dataset(root),
         "quality": {name: each["all"].mean for name, each in measured.items() if each["all"].applies},
         "learnability": _learnability(episodes, seed),
     }

@@ -20,14 +20,14 @@ _NAMES = {"act": "ACT", "diffusion": "Diffusion"}
 
 
 def answer(found: Sequence[Contrast], results: Results) -> list[str]:
-    """Return the answer, a sentence each: what was declared, what stands behind it, and the limits."""
+    """Return the answer, a sentence each: the interaction first, as means over what differs mislead."""
     design = results.progress.design
     declared = {each.name: each for each in found if each.kind == DECLARED}
     if not declared:
         return [_undeclared(design)]
-    names = ("controller", "input", "interaction")
-    sentences = [_effect(declared.get(WORDS[name]), name, results) for name in names]
-    sentences += [_simple(found, results), _clean(found, results), _limits(list(declared.values()), results)]
+    effects = {name: _effect(declared.get(words), name, results) for name, words in WORDS.items()}
+    sentences = [effects["interaction"], _simple(found, results), effects["controller"], effects["input"]]
+    sentences += [_clean(found, results), _limits(list(declared.values()), results)]
     return [_begun(each) for each in sentences if each]
 
 

@@ -105,6 +105,12 @@ def test_the_page_keeps_what_others_wrote(written):
     assert re.search(r"\d+ cores; load at the end \d+\.\d, of which 1 by this run", first)
     assert "not corrected for how many there are" in first
     assert all((folder / link).is_file() for link in re.findall(r"\]\((.+?)\)", first))
+    beside = json.loads((folder / "page_nominal_fast3_ideal_seed_1.json").read_text())
+    for row in results["episodes"]:
+        measured = beside["episodes"][row["profile"]][row["controller"]]
+        assert not measured.keys() & TIMED
+        assert measured.keys() >= set(METRICS) - set(TIMED)
+        assert {name: values[row["goal"]] for name, values in measured.items()}.items() <= row.items()
     page.write_text("# Mine\n\nBefore.\n\n" + first.split("\n\n", 1)[1] + "\nAfter.\n")
     write_page(results, {}, page, config)
     again = page.read_text()

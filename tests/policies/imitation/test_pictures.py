@@ -6,9 +6,14 @@ from typing import Any
 import numpy as np
 import pytest
 import torch
+import training_helpers
 from training_helpers import cut, tiny, weights, write_dataset
 
-from handrail.policies.imitation.interface.checkpoint import load_policy
+from handrail.collect.config import StoredConfig
+from handrail.controllers.errors import HandrailError
+from handrail.policies.imitation.interface.checkpoint import load_policy, read_meta
+from handrail.policies.imitation.training.resume import check_data
+from handrail.policies.imitation.training.source import read_source
 from handrail.policies.imitation.training.training import train
 
 pytestmark = pytest.mark.filterwarnings("ignore:.*(torchcodec|pin_memory|video).*")
@@ -60,6 +65,23 @@ def test_a_training_on_pictures_goes_on_to_the_bit(tmp_path):
     config = tiny(root, tmp_path / "policy", SMALL, images=True)
     whole = train(config, quiet=True)
     assert weights(train(cut(config, tmp_path / "cut"), quiet=True)) == weights(whole)
+
+
+def test_a_training_does_not_go_on_with_other_pictures(tmp_path, monkeypatch):
+    """The numbers are the same. A checkpoint of an earlier version says nothing of pictures, and goes on."""
+    root = write_dataset(tmp_path / "set", lengths=(5, 6), cameras=("wrist",))
+    dark = {"observation.images.wrist": np.zeros((16, 16, 3), np.uint8)}
+    with monkeypatch.context() as other:
+        drawn = training_helpers.frame
+        other.setattr(training_helpers, "frame", lambda rng, cameras: drawn(rng, cameras) | dark)
+        darker = write_dataset(tmp_path / "dark", lengths=(5, 6), cameras=("wrist",))
+    config = tiny(root, tmp_path / "policy", SMALL, images=True)
+    source, moved = read_source(config), read_source(replace(config, dataset=StoredConfig(root=str(darker))))
+    _, began = read_meta(train(config, quiet=True))
+    assert began.data == source.digest
+    check_data(source, replace(began, data=began.data[:16]))
+    with pytest.raises(HandrailError, match="got others"):
+        check_data(moved, began)
 
 
 def test_a_policy_is_told_what_to_do(tmp_path):

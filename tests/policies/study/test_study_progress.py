@@ -17,7 +17,7 @@ from handrail.policies.study.design.load import load_design
 from handrail.policies.study.design.progress import StudyProgress, is_done, read_json, write_json
 from handrail.policies.study.design.settings import evaluations, fingerprint, recording
 from handrail.policies.study.execution import work as work_module
-from handrail.policies.study.execution.work import begin, do
+from handrail.policies.study.execution.work import begin, do, work
 
 
 @pytest.fixture
@@ -192,6 +192,8 @@ def test_recorded_again_another_way_is_told(tmp_path, preset, monkeypatch):
     design, layout, found = everything(tmp_path, preset)
     edit(layout.done(found[0]), "result", {"digest": "d1ce"})
     monkeypatch.setattr(work_module, "collect", lambda cell, design, root: None)
+    monkeypatch.setattr(work_module, "summary", lambda root, seed: dict(COLLECTED, digest="d1ce+pictures"))
+    assert "digest_before" not in work(found[0], design, layout)  # an earlier version left the pictures out
     monkeypatch.setattr(work_module, "summary", lambda root, seed: dict(COLLECTED, digest="0ther"))
     do(found[0], design, layout.root)
     assert run_here(StudyConfig(preset, str(layout.root), report_only=True), Starter()) == 0
