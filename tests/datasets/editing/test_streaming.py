@@ -11,7 +11,7 @@ from handrail.datasets.editing.pack_config import packing_advice
 EPISODES = 3
 
 
-def streamed(root, monkeypatch) -> list[tuple[int, int, list[int]]]:
+def streamed(root, monkeypatch) -> list[tuple[int, int, list[float]]]:
     """Return episode, frame and brightness of what LeRobot streams, in order; PyAV decodes."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
