@@ -8,19 +8,18 @@ from handrail.scripts import cli
 def main(config: BenchmarkConfig) -> int:
     """Run the command."""
     config.check()
-    from rich.console import Console
-
     from handrail.collect.experiments.benchmark.benchmark import benchmark
     from handrail.collect.experiments.benchmark.catalogue import BASELINES
     from handrail.collect.experiments.benchmark.tables import benchmark_tables
+    from handrail.datasets.presentation.terminal import Terminal
 
-    console = Console()
+    console = Terminal()
     baselines = {name: BASELINES.find(name) for name in config.controller_names}
     results = benchmark(config, baselines, console)
     console.print(*benchmark_tables(results), sep="\n")
     for written in (config.json, config.report and f"{config.report}/benchmark.html", config.page):
         if written:
-            console.print(f"Written: {written}", highlight=False, soft_wrap=True)
+            console.print(f"Written: {written}")
     return 0
 
 

@@ -14,6 +14,7 @@ import tyro
 
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.numerics.first_use import tell_when_compiling
+from handrail.datasets.printable import printable
 
 BAD_INPUT = 2
 FAILED = 1
@@ -81,7 +82,7 @@ def run(main: Callable[[], int | None]) -> NoReturn:
 
 def fail(message: str, code: int) -> NoReturn:
     """Print one line on standard error and exit."""
-    print(f"error: {message}", file=sys.stderr)
+    print(f"error: {printable(message)}", file=sys.stderr)
     sys.exit(code)
 
 

@@ -6,16 +6,16 @@ from handrail.datasets.comparison.config import CompareConfig
 from handrail.scripts import cli
 
 if TYPE_CHECKING:
-    from rich.console import Console
+    from handrail.datasets.presentation.terminal import Terminal
 
 
 @cli.command("handrail-compare", CompareConfig)
 def main(config: CompareConfig) -> int:
     """Run the command."""
     config.check()
-    from rich.console import Console
+    from handrail.datasets.presentation.terminal import Terminal
 
-    console = Console(highlight=False, markup=False, soft_wrap=True)
+    console = Terminal()
     if config.study:
         return _people(config, console)
     from handrail.datasets.comparison.compare import compare
@@ -37,7 +37,7 @@ def main(config: CompareConfig) -> int:
     return 0
 
 
-def _people(config: CompareConfig, console: "Console") -> int:
+def _people(config: CompareConfig, console: "Terminal") -> int:
     from handrail.datasets.comparison.people.people import compare_people
     from handrail.datasets.comparison.people.report import write_people_report
     from handrail.datasets.comparison.people.tables import people_tables
@@ -48,7 +48,8 @@ def _people(config: CompareConfig, console: "Console") -> int:
     for text in comparison.cautions:
         console.print(f"! {text}")
     files = write_people_report(comparison)
-    console.print("\nWritten: " + ", ".join(map(str, files)))
+    console.print()
+    console.print("Written: " + ", ".join(map(str, files)))
     return 0
 
 

@@ -9,8 +9,9 @@ def main(config: EditConfig) -> None:
     """Run the command."""
     config.check()
     from handrail.datasets.editing.edit import edit
+    from handrail.datasets.presentation.terminal import Terminal
 
-    print(*edit(config), sep="\n")
+    Terminal().print(*map(str, edit(config)), sep="\n")
 
 
 if __name__ == "__main__":

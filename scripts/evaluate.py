@@ -1,7 +1,5 @@
 """`handrail-evaluate`: run trained policies on declared seeds, protected or not, disturbed or not."""
 
-import sys
-
 from handrail.policies.imitation.evaluation.config import EvaluateConfig
 from handrail.policies.imitation.training.installed import check_installed
 from handrail.scripts import cli
@@ -12,18 +10,17 @@ def main(config: EvaluateConfig) -> int:
     """Run the command."""
     config.check()
     check_installed("handrail-evaluate", ("torch",))
-    from rich.console import Console
-
+    from handrail.datasets.presentation.terminal import Terminal
     from handrail.policies.imitation.evaluation.evaluation import UnevaluatedError, evaluate
     from handrail.policies.imitation.evaluation.table import evaluation_table
     from handrail.policies.imitation.evaluation.video import film
 
     reasons: tuple[str, ...] = ()
     try:
-        content = evaluate(config, Console(stderr=True))
+        content = evaluate(config, Terminal(stderr=True))
     except UnevaluatedError as some:
         content, reasons = some.content, some.reasons
-    console = Console(highlight=False, soft_wrap=True)
+    console = Terminal()
     console.print(evaluation_table(content))
     if config.json:
         console.print(f"Written: {config.json}")
@@ -31,7 +28,7 @@ def main(config: EvaluateConfig) -> int:
         trouble = film(config, content)
         console.print(f"Without a video: {trouble}" if trouble else f"Video: {config.video}")
     for reason in reasons:
-        print(f"error: {reason}", file=sys.stderr)
+        Terminal(stderr=True).print(f"error: {reason}")
     return cli.FAILED if reasons else 0
 
 

@@ -8,11 +8,10 @@ from handrail.scripts import cli
 def main(config: FitOperatorConfig) -> int:
     """Run the command."""
     config.check()
-    from rich.console import Console
-
     from handrail.collect.experiments.operator_fit.run import run_fit
+    from handrail.datasets.presentation.terminal import Terminal
 
-    run_fit(config, Console(highlight=False, markup=False, soft_wrap=True))
+    run_fit(config, Terminal())
     return 0
 
 

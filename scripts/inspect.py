@@ -7,31 +7,30 @@ from handrail.collect.commands.config import InspectConfig
 from handrail.scripts import cli
 
 if TYPE_CHECKING:
-    from rich.console import Console
+    from handrail.datasets.presentation.terminal import Terminal
 
 
 @cli.command("handrail-inspect", InspectConfig)
 def main(config: InspectConfig) -> int:
     """Run the command."""
-    from rich.console import Console
-
     from handrail.collect.commands.tables import quality_table, summary_table, worst_table
+    from handrail.datasets.presentation.terminal import Terminal
     from handrail.datasets.quality.worst import deletion, ranking_metric, worst_episodes
     from handrail.datasets.reading.check import check_report
     from handrail.datasets.reading.reader import read_info
     from handrail.datasets.recording.repair import repair
 
-    console = Console()
+    console = Terminal()
     faults: list[str] = []
     if config.repair:
         report = repair(config.dataset.folder)
         faults += report.damage
-        console.print(str(report), highlight=False, markup=False, soft_wrap=True)
+        console.print(str(report))
     if config.check:
         found = check_report(config.dataset.folder)
         faults += found
         said = found or ["checked: everything is as it was saved"]
-        console.print(*said, sep="\n", highlight=False, markup=False, soft_wrap=True)
+        console.print(*said, sep="\n")
     if faults:
         return cli.FAILED
     if config.worst:
@@ -39,7 +38,7 @@ def main(config: InspectConfig) -> int:
         worst = worst_episodes(config.dataset.folder, metric, config.count)
         console.print(worst_table(config.dataset.folder, metric, worst))
         leave_out = deletion(read_info(config.dataset.folder), [each.episode.number for each in worst])
-        console.print(f"Without them: {leave_out}", highlight=False, markup=False, soft_wrap=True)
+        console.print(f"Without them: {leave_out}")
         return 0
     if config.learnability:
         return _learnability(config.dataset.folder, console)
@@ -49,7 +48,7 @@ def main(config: InspectConfig) -> int:
     return 0
 
 
-def _learnability(folder: Path, console: "Console") -> int:
+def _learnability(folder: Path, console: "Terminal") -> int:
     import numpy as np
 
     from handrail.datasets.demonstrations.demonstration import DoesNotApply
@@ -64,7 +63,7 @@ def _learnability(folder: Path, console: "Console") -> int:
         found = str(error)
     for table in learnability_tables({folder.name: found}):
         console.print(table)
-    console.print(learnability_words({folder.name: found}), highlight=False, markup=False, soft_wrap=True)
+    console.print(learnability_words({folder.name: found}))
     return 0
 
 

@@ -10,10 +10,9 @@ from handrail.scripts import cli
 def main(config: LatencyConfig) -> int:
     """Run the command."""
     config.check()
-    from rich.console import Console
-
     from handrail.collect.experiments.latency.measure import measure
     from handrail.collect.experiments.latency.table import latency_table, write_page
+    from handrail.datasets.presentation.terminal import Terminal
     from handrail.datasets.storage.strict_json import write_json
 
     results = measure(config)
@@ -21,7 +20,7 @@ def main(config: LatencyConfig) -> int:
         write_json(Path(config.json).expanduser(), results)
     if config.page:
         write_page(results, config)
-    Console().print(latency_table(results))
+    Terminal().print(latency_table(results))
     return 0
 
 

@@ -9,8 +9,9 @@ def main(config: MergeConfig) -> None:
     """Run the command."""
     roots, target = config.roots, config.target
     from handrail.datasets.editing.pack import merge_datasets
+    from handrail.datasets.presentation.terminal import Terminal
 
-    print(merge_datasets(roots, target, config.name, config.verify))
+    Terminal().print(str(merge_datasets(roots, target, config.name, config.verify)))
 
 
 if __name__ == "__main__":

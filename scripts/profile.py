@@ -10,16 +10,15 @@ from handrail.scripts import cli
 def main(config: ProfileConfig) -> int:
     """Run the command."""
     config.check()
-    from rich.console import Console
-
     from handrail.collect.experiments.profiling.profiling import profile
     from handrail.collect.experiments.profiling.tables import profile_tables
+    from handrail.datasets.presentation.terminal import Terminal
     from handrail.datasets.storage.strict_json import write_json
 
     results = profile(config)
     if config.json:
         write_json(Path(config.json).expanduser(), results)
-    Console().print(*profile_tables(results), sep="\n")
+    Terminal().print(*profile_tables(results), sep="\n")
     return 0
 
 

@@ -8,19 +8,24 @@ from handrail.scripts import cli
 def main(config: PushConfig) -> None:
     """Run the command."""
     config.check()
+    from handrail.datasets.editing.pack_config import packing_advice
+    from handrail.datasets.presentation.terminal import Terminal
     from handrail.datasets.sharing.push import prepare, upload
     from handrail.datasets.sharing.store import copy
 
     dataset = config.dataset
     settings = config.license, config.private, config.verify, config.to
     push = prepare(dataset.folder, dataset.repo_id, *settings)
-    print(push)
+    say = Terminal().print
+    say(str(push))
+    if advice := packing_advice(dataset.folder):
+        say(advice)
     if config.upload:
         send = copy if config.to else upload
         send(push)
-        print(f"sent to {config.to}" if config.to else f"sent as {push.repo_id}")
+        say(f"sent to {config.to}" if config.to else f"sent as {push.repo_id}")
     else:
-        print("nothing was sent; --upload sends it")
+        say("nothing was sent; --upload sends it")
 
 
 if __name__ == "__main__":

@@ -17,11 +17,10 @@ _HEADINGS = ("episode", "largest deviation", "of", "tool at end [m]", "success",
 def main(config: ReplayConfig) -> int:
     """Run the command."""
     config.check()
-    from rich.console import Console
-
     from handrail.collect.commands.replay import replay_one_of
     from handrail.collect.session.contact_sheet import save_sheet
     from handrail.datasets.presentation.table import Table
+    from handrail.datasets.presentation.terminal import Terminal
     from handrail.datasets.reading.open_dataset import open_dataset
 
     rows, clients = [], set[str]()
@@ -34,7 +33,7 @@ def main(config: ReplayConfig) -> int:
             clients.add(replay.robot_client)
             if pictures:
                 save_sheet(pictures, Path(config.sheet).expanduser())
-    console = Console(highlight=False, soft_wrap=True)
+    console = Terminal()
     console.print(Table(_HEADINGS, rows))
     for client in sorted(filter(None, clients)):
         console.print(

@@ -10,15 +10,14 @@ from handrail.scripts import cli
 def main(config: ScalingConfig) -> int:
     """Run the command."""
     config.check()
-    from rich.console import Console
-
     from handrail.collect.experiments.scaling.scaling import measure, scaling_table
+    from handrail.datasets.presentation.terminal import Terminal
     from handrail.datasets.storage.strict_json import write_json
 
     results = measure(config)
     if config.json:
         write_json(Path(config.json).expanduser(), results)
-    Console(soft_wrap=True).print(scaling_table(results))
+    Terminal().print(scaling_table(results))
     return 0 if len({run["rows"] for run in results["runs"]}) == 1 else cli.FAILED
 
 

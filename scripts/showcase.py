@@ -10,11 +10,10 @@ from handrail.scripts import cli
 def main(config: ShowcaseConfig) -> int:
     """Run the command."""
     config.check()
-    from rich.console import Console
-
     from handrail.collect.experiments.showcase.showcase import showcase
+    from handrail.datasets.presentation.terminal import Terminal
 
-    console = Console(highlight=False, soft_wrap=True)
+    console = Terminal()
     console.print(f"Running case {config.case.upper()} …")
     result = showcase(config)
     for line in _lines(result):

@@ -10,9 +10,10 @@ def main(config: TrainConfig) -> int:
     """Run the command."""
     config.check()
     check_installed("handrail-train", ("torch", "accelerate"), config.policy)
+    from handrail.datasets.presentation.terminal import Terminal
     from handrail.policies.imitation.training.training import train
 
-    print(f"written: {train(config)}")
+    Terminal().print(f"written: {train(config)}")
     return 0
 
 

@@ -10,15 +10,17 @@ def main(config: TrainRlConfig) -> int:
     """Run the command."""
     config.check()
     check_installed("handrail-train-rl", ("stable_baselines3", "tensorboard"), extra="rl")
+    from handrail.datasets.presentation.terminal import Terminal
     from handrail.policies.rl.train import train
 
     record = train(config)
     score = {name: values["mean"] for name, values in record["final"].items()}
-    print(
+    say = Terminal().print
+    say(
         f"{score['success']:.1%} of new goals after {record['curve'][-1]['steps']} steps, "
         f"effort {score['arm_effort']:.1f}, jerkiness {score['jerkiness']:.3f}"
     )
-    print(f"written: {config.folder}/actor.npz, actor.json, curve.png")
+    say(f"written: {config.folder}/actor.npz, actor.json, curve.png")
     return 0
 
 

@@ -8,12 +8,11 @@ from handrail.scripts import cli
 def main(config: TrialsConfig) -> int:
     """Run the command."""
     config.check()
-    from rich.console import Console
-
     from handrail.collect.experiments.trials.table import trials_table, write_page
     from handrail.collect.experiments.trials.trials import run_trials
+    from handrail.datasets.presentation.terminal import Terminal
 
-    console = Console(highlight=False, markup=False, soft_wrap=True)
+    console = Terminal()
     trials = run_trials(
         config,
         lambda done: console.print(

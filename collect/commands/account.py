@@ -3,9 +3,7 @@
 from collections import Counter
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
-from rich.console import Console
 from rich.table import Table
 
 from handrail.collect.commands.target import next_commands
@@ -14,8 +12,8 @@ from handrail.collect.operators.catalogue import OPERATORS
 from handrail.collect.operators.operator import EpisodeEvent
 from handrail.collect.session.outcome import Outcome
 from handrail.datasets.editing.pack_config import packing_advice
+from handrail.datasets.presentation.terminal import Terminal
 
-PLAIN: dict[str, Any] = {"highlight": False, "markup": False, "soft_wrap": True}
 _DROPPED: dict[EpisodeEvent | None, str] = {
     None: "practice",
     EpisodeEvent.DISCARD: "thrown away",
@@ -60,7 +58,7 @@ class RecordingLog:
 
 
 def report(
-    config: RecordConfig, root: Path, episodes: int, frames: int, log: RecordingLog, console: Console
+    config: RecordConfig, root: Path, episodes: int, frames: int, log: RecordingLog, console: Terminal
 ) -> None:
     """Say what came of a recording.
 
@@ -73,21 +71,17 @@ def report(
         console: to say it on.
     """
     if log.trouble:
-        console.print(f"error: {log.trouble}", style="bold red", **PLAIN)
+        console.print(f"error: {log.trouble}", style="bold red")
     if log.outcomes:
         console.print(_summary(config, log))
     for outcome in log.dropped:
         why = _DROPPED[None if outcome.practice else outcome.ended_by]
-        console.print(f"not saved: {why}, seed {outcome.seed}", **PLAIN)
-    console.print(
-        f"{episodes} episodes, {frames} frames in {root}",
-        highlight=False,
-        soft_wrap=True,
-    )
+        console.print(f"not saved: {why}, seed {outcome.seed}")
+    console.print(f"{episodes} episodes, {frames} frames in {root}")
     if advice := packing_advice(root):
-        console.print(advice, **PLAIN)
+        console.print(advice)
     if OPERATORS.find(config.operator).interactive and episodes:
-        console.print(next_commands(root), **PLAIN)
+        console.print(*next_commands(root).splitlines(), sep="\n")
 
 
 def _summary(config: RecordConfig, log: RecordingLog) -> Table:

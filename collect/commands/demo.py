@@ -1,9 +1,7 @@
 """The demo: a few demonstrations, a table, a picture, and what to try next."""
 
-from rich.console import Console
-
 from handrail.collect.commands.config import DemoConfig
-from handrail.collect.commands.record import PLAIN, record
+from handrail.collect.commands.record import record
 from handrail.collect.commands.replay import replay_episode
 from handrail.collect.commands.tables import summary_table
 from handrail.collect.commands.target import command_prefix
@@ -11,6 +9,7 @@ from handrail.collect.config import DatasetConfig, RecordConfig
 from handrail.collect.session.contact_sheet import save_sheet
 from handrail.collect.simulation.gl import graphics_trouble
 from handrail.controllers.errors import HandrailError
+from handrail.datasets.presentation.terminal import Terminal
 
 _REPO = "handrail/demo"
 NEXT = """Next:
@@ -29,12 +28,12 @@ def demo(config: DemoConfig) -> int:
     Raises:
         HandrailError: a setting is wrong, or the folder is taken.
     """
-    console = Console()
+    console = Terminal()
     if config.episodes < 1:
         raise HandrailError(f"--episodes {config.episodes}: expected 1 or more")
     trouble = graphics_trouble()
     if trouble:
-        console.print(f"Without pictures: {trouble}", **PLAIN)
+        console.print(f"Without pictures: {trouble}")
     cameras = "" if trouble else "wrist,scene"
     root = config.folder / "dataset"
     dataset = DatasetConfig(repo_id=_REPO, root=str(root), num_episodes=config.episodes)
@@ -46,11 +45,9 @@ def demo(config: DemoConfig) -> int:
     if not trouble:
         sheet = config.folder / "episode_0.png"
         save_sheet(replay_episode(root, 0, pictures=8)[1], sheet)
-        console.print(f"Picture: {sheet}", **PLAIN)
-    console.print(f"Dataset: {root}", **PLAIN)
+        console.print(f"Picture: {sheet}")
+    console.print(f"Dataset: {root}")
     flags = f" --cameras {cameras}" if cameras else ""
-    console.print(
-        NEXT.format(root=root, folder=config.folder, repo=_REPO, cameras=flags, bin=command_prefix()),
-        **PLAIN,
-    )
+    after = NEXT.format(root=root, folder=config.folder, repo=_REPO, cameras=flags, bin=command_prefix())
+    console.print(*after.splitlines(), sep="\n")
     return 0

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from rich.console import Console, RenderableType
+from rich.console import RenderableType
 from rich.progress import (
     BarColumn,
     MofNCompleteColumn,
@@ -15,11 +15,13 @@ from rich.progress import (
 )
 from rich.protocol import is_renderable
 
+from handrail.datasets.presentation.terminal import Terminal
+
 
 class _Progress(Progress):
     """The bar of a recording, below what the people who steer have to show."""
 
-    def __init__(self, *columns: ProgressColumn, console: Console, shown: Sequence[Any]) -> None:
+    def __init__(self, *columns: ProgressColumn, console: Terminal, shown: Sequence[Any]) -> None:
         self._shown = shown  # the bar draws itself once while it is made
         super().__init__(*columns, console=console)
 
@@ -29,7 +31,7 @@ class _Progress(Progress):
         yield from super().get_renderables()
 
 
-def recording_bar(console: Console, people: Sequence[Any]) -> Progress:
+def recording_bar(console: Terminal, people: Sequence[Any]) -> Progress:
     """Return the bar of a recording, not started.
 
     Args:

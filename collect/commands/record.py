@@ -2,9 +2,7 @@
 
 from typing import Any
 
-from rich.console import Console
-
-from handrail.collect.commands.account import PLAIN, RecordingLog, report
+from handrail.collect.commands.account import RecordingLog, report
 from handrail.collect.commands.progress import recording_bar
 from handrail.collect.commands.recording import Recording, come_first, episode_seed, open_writer
 from handrail.collect.commands.shards import Shards
@@ -20,6 +18,7 @@ from handrail.collect.session.display import Display
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.registry import resolved
 from handrail.datasets.format.layout import Layout
+from handrail.datasets.presentation.terminal import Terminal
 from handrail.datasets.recording.folder import check_target
 from handrail.datasets.recording.writer import EpisodeWriter
 
@@ -36,7 +35,7 @@ def record(config: RecordConfig) -> int:
     Raises:
         HandrailError: a setting is wrong; nothing has been written then.
     """
-    console = Console(stderr=True)
+    console = Terminal(stderr=True)
     if config.is_shared or Shards(config).begun:
         return record_shared(config, console)
     interactive = OPERATORS.find(config.operator).interactive
@@ -56,12 +55,12 @@ def record(config: RecordConfig) -> int:
         people = _people(config, env, console)
         with open_writer(config, env) as writer:
             if writer.repaired and not writer.repaired.clean:
-                console.print(str(writer.repaired), **PLAIN)
+                console.print(str(writer.repaired))
             recording = Recording(config, env, writer, people, displays)
             if interactive or env.real:
-                console.print("Getting ready; the first time on a computer takes about a minute.", **PLAIN)
+                console.print("Getting ready; the first time on a computer takes about a minute.")
                 recording.warm_up(config.seed)
-                console.print("Ready.", **PLAIN)
+                console.print("Ready.")
             log = RecordingLog()
             _record_all(config, recording, writer, log, console)
             report(config, writer.root, writer.num_episodes, writer.num_frames, log, console)
@@ -84,7 +83,7 @@ def _opened(config: RecordConfig, interactive: bool) -> tuple[HandrailEnv, Any]:
 
 
 def _record_all(
-    config: RecordConfig, recording: Recording, writer: EpisodeWriter, log: RecordingLog, console: Console
+    config: RecordConfig, recording: Recording, writer: EpisodeWriter, log: RecordingLog, console: Terminal
 ) -> None:
     """Record until the number is reached, the operator interrupts, or the disk or an encoder fails."""
     with recording_bar(console, recording.people) as progress, Interrupts() as interrupts:
@@ -109,16 +108,16 @@ def _record_all(
             log.trouble, log.exit_code = str(error), FAILED
 
 
-def _displays(config: RecordConfig, console: Console) -> list[Display]:
+def _displays(config: RecordConfig, console: Terminal) -> list[Display]:
     spawn, web, save = config.display_data, config.display_web, config.display_save
     if not (spawn or web or save):
         return []
-    return [Display(spawn, web, save, say=lambda words: console.print(words, **PLAIN))]
+    return [Display(spawn, web, save, say=console.print)]
 
 
-def _people(config: RecordConfig, env: HandrailEnv, console: Console) -> list[Any]:
+def _people(config: RecordConfig, env: HandrailEnv, console: Terminal) -> list[Any]:
     """Return whoever steers now at this computer, if the settings say so."""
     spec = OPERATORS.find(config.operator)
     if not spec.interactive:
         return []
-    return [resolved(spec.build)(config, env, lambda words: console.print(words, **PLAIN))]
+    return [resolved(spec.build)(config, env, console.print)]

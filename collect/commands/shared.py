@@ -9,9 +9,7 @@ from functools import lru_cache
 from pathlib import Path
 from threading import Event
 
-from rich.console import Console
-
-from handrail.collect.commands.account import PLAIN, RecordingLog, report
+from handrail.collect.commands.account import RecordingLog, report
 from handrail.collect.commands.recording import Recording, episode_seed, open_writer
 from handrail.collect.commands.shards import Shard, Shards
 from handrail.collect.config import RecordConfig
@@ -26,6 +24,7 @@ from handrail.controllers.errors import HandrailError
 from handrail.datasets.format.layout import Layout
 from handrail.datasets.format.lines import each_line
 from handrail.datasets.format.metadata import EpisodeRecord
+from handrail.datasets.presentation.terminal import Terminal
 from handrail.datasets.reading.reader import read_info
 from handrail.datasets.recording.writer import EpisodeWriter
 from handrail.datasets.storage.lock import HeldError
@@ -37,7 +36,7 @@ _MOMENT = 0.1  # [s]
 _RECORDINGS: dict[RecordConfig, Recording] = {}
 
 
-def record_shared(config: RecordConfig, console: Console) -> int:
+def record_shared(config: RecordConfig, console: Terminal) -> int:
     """Record as configured, the work shared; return the exit code: 0, 1 after a failure, 130 after Ctrl-C.
 
     What was recorded before a failure is kept: the same flags go on, with any number of workers.
@@ -62,7 +61,7 @@ def record_shared(config: RecordConfig, console: Console) -> int:
         env.reset(seed=config.seed)
         with open_writer(config, env) as writer:  # nobody else writes there meanwhile
             if writer.repaired and not writer.repaired.clean:
-                console.print(str(writer.repaired), **PLAIN)
+                console.print(str(writer.repaired))
             if not going_on:
                 shards.begin(writer.num_episodes)
             merged = shards.are_in(writer.num_episodes)

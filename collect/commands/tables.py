@@ -25,7 +25,7 @@ def summary_table(root: Path) -> Table:
     caption += f"; driven through the client of {', '.join(clients)}" if clients else ""
     tasks = {row.task for row in rows}
     left_out = (*CHATTERING, *(("task",) if len(tasks) == 1 else ()))
-    title = f"{root}\n{tasks.pop()}" if len(tasks) == 1 else str(root)
+    title = f"{root}: {tasks.pop()}" if len(tasks) == 1 else str(root)
     lines = [{name: cell for name, cell in row.cells().items() if name not in left_out} for row in rows]
     headings = list(lines[0]) if lines else ["episode"]
     return Table(headings, [list(line.values()) for line in lines], title, caption)
@@ -38,7 +38,7 @@ def quality_table(root: Path) -> Table:
         HandrailError: there is no dataset, or it cannot be read.
     """
     caption = (
-        "rate of change and high-frequency content of the commanded velocities;\n"
+        "rate of change and high-frequency content of the commanded velocities; "
         "corrections of joints that were commanded one by one, switched on or off"
     )
     lines = [[row.cells()[name] for name in _QUALITY] for row in summarize(root)]

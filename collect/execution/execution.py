@@ -4,9 +4,8 @@ import time
 from collections import OrderedDict
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
-from typing import Any, Self
+from typing import Self
 
-from rich.console import Console
 from rich.progress import (
     BarColumn,
     MofNCompleteColumn,
@@ -20,11 +19,11 @@ from handrail.collect.execution.config import ExecutionConfig
 from handrail.collect.execution.engine import engine_of
 from handrail.collect.execution.interrupts import Interrupts
 from handrail.collect.execution.job import Job, Result
+from handrail.datasets.presentation.terminal import Terminal
 
 _SLOWEST = 3  # jobs that are named at the end
 _WORTH_NAMING = 5.0  # [s]
 _LOOK = 1.0  # how often it is asked how far the running jobs are [s]
-_PLAIN: dict[str, Any] = {"highlight": False, "markup": False, "soft_wrap": True}
 
 
 class Execution:
@@ -45,17 +44,17 @@ class Execution:
         self,
         config: ExecutionConfig,
         title: str,
-        console: Console | None = None,
+        console: Terminal | None = None,
         preload: Sequence[str] = (),
         fresh: bool = False,
     ) -> None:
         self._engine = engine_of(config, preload, fresh)
-        self._console = console or Console(quiet=True)
+        self._console = console or Terminal(quiet=True)
         self._progress = Progress(
-            TextColumn("{task.description}"),
+            TextColumn("{task.description}", markup=False),
             BarColumn(),
             MofNCompleteColumn(),
-            TextColumn("{task.fields[words]}"),
+            TextColumn("{task.fields[words]}", markup=False),
             TimeElapsedColumn(),
             TextColumn("left"),
             TimeRemainingColumn(),
@@ -162,9 +161,9 @@ class Execution:
         slowest = sorted(self._results, key=lambda result: -result.seconds)[:_SLOWEST]
         if len(self._results) > _SLOWEST and slowest[0].seconds > _WORTH_NAMING:
             named = ", ".join(f"{each.job.name} {each.seconds:.1f} s" for each in slowest)
-            self._console.print(f"slowest: {named}", **_PLAIN)
+            self._console.print(f"slowest: {named}")
         for each in self._results:
             if each.error:
                 log = f" ({each.job.log})" if each.job.log and each.job.log.is_file() else ""
                 words = f"failed: {each.job.name}: {each.error}{log}"
-                self._console.print(words, style="bold red", **_PLAIN)
+                self._console.print(words, style="bold red")

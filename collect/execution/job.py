@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from handrail.controllers.errors import HandrailError, message_of
+from handrail.datasets.presentation.terminal import Terminal
 
 
 @dataclass(frozen=True)
@@ -66,7 +67,7 @@ def attempt(job: Job, logged: bool = False) -> Result:
         except (Exception, SystemExit) as raised:
             error = _words(raised)
             if logged and job.log:
-                print(f"error: {error}", file=sys.stderr)
+                Terminal(stderr=True).print(f"error: {error}")
     return Result(job, value, error, time.monotonic() - start)
 
 

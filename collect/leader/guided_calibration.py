@@ -19,6 +19,7 @@ from handrail.collect.teleop_config import CalibrateConfig
 from handrail.controllers.errors import HandrailError, message_of
 from handrail.controllers.robot.description import RobotDescription
 from handrail.controllers.robot.model import load_model
+from handrail.datasets.presentation.terminal import Terminal
 
 SKIP = "-"
 _UNITS = {"degrees": math.pi / 180.0, "radians": 1.0}
@@ -47,7 +48,7 @@ def calibrate(config: CalibrateConfig, ask: Callable[[str], str] = input) -> int
         teleoperator.disconnect()
     path = calibration_file(config.teleop, description.name)
     save_calibration(calibration, path)
-    print(f"saved: {path}")
+    Terminal().print(f"saved: {path}")
     return 0
 
 
@@ -93,7 +94,9 @@ class _Guide:
             if source and abs(change * scale) >= _LEAST * 0.5 * math.pi:
                 self._taken.add(source)
                 return LeaderJoint(source, math.copysign(scale, change))
-            print("That was not one joint alone, or not far enough, or it drives another one. Once more.")
+            Terminal().print(
+                "That was not one joint alone, not far enough, or it drives another one. Once more."
+            )
 
     def _gripper(self) -> LeaderGripper | None:
         """Return the handle; None where the person leaves it out, or nothing moved."""
@@ -104,7 +107,7 @@ class _Guide:
         self._ask("Close the handle, then press Enter: ")
         source, change = self._moved(opened)
         if not source or abs(change) < _LEAST_HANDLE:
-            print("No handle has moved: the gripper is closed and opened by a key.")
+            Terminal().print("No handle has moved: the gripper is closed and opened by a key.")
             return None
         return LeaderGripper(source, closed=opened[source] + change, opened=opened[source])
 

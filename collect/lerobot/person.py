@@ -23,6 +23,7 @@ from handrail.collect.lerobot.teleoperator import SimTeleoperator
 from handrail.collect.local_operators.open_devices import open_gamepad
 from handrail.collect.operators.operator import EpisodeEvent
 from handrail.collect.teleop_config import TeleopConfig
+from handrail.datasets.presentation.terminal import Terminal
 
 _BUTTONS = {
     EpisodeEvent.SUCCESS: NEXT,
@@ -88,13 +89,14 @@ class HandrailCockpit(_PersonTeleoperator):
 
     def _opened(self, session: Stepwise) -> Cockpit:
         check_installed()
-        self._server = ServerProcess(self._settings, print)
-        print(f"Drive at {self.address}")
+        say = Terminal().print
+        self._server = ServerProcess(self._settings, say)
+        say(f"Drive at {self.address}")
         if self._settings.open and self._settings.is_private:
             webbrowser.open(self.address)
         mode = session.mode
         modes = {mode.name: mode}
-        return Cockpit(session.env.model, modes, mode.name, self._server, refuses=_REFUSED, say=print)
+        return Cockpit(session.env.model, modes, mode.name, self._server, refuses=_REFUSED, say=say)
 
 
 class HandrailGamepad(_PersonTeleoperator):

@@ -124,9 +124,11 @@ class WholeBody:
         before = self._gate.velocity
         self.sent = self._gate.limit(command, np.append(base[:b], self.targets))
         way = 0.5 * self._period * (before + self._gate.velocity)[b:]
-        wanted, arm = self.targets + way, self._reading.arm
-        self.targets = np.clip(wanted, arm - _LEAD, arm + _LEAD)
-        self._held[b:] = np.abs(self.targets - wanted) > 1e-9
+        arm = self._reading.arm
+        most = np.where(way > 0.0, arm + _LEAD - self.targets, self.targets - arm + _LEAD)
+        share = np.min(most / np.maximum(np.abs(way), 1e-12), initial=1.0)  # all slow down: the path stays
+        self.targets = np.clip(self.targets + max(share, 0.0) * way, arm - _LEAD, arm + _LEAD)
+        self._held[b:] = share < 1.0
         self._twist = turned(self._gate.velocity[:3], -base[2]) if b else np.zeros(3)
         self._grip += float(np.clip(self._gate.gripper - self._grip, -self._grip_step, self._grip_step))
         return self._units.action(self.targets, self._gate.velocity[b:], self._twist, self._grip)

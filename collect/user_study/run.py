@@ -4,8 +4,6 @@ import time
 import webbrowser
 from collections.abc import Callable
 
-from rich.console import Console
-
 from handrail.collect.cockpit.cards import Cards
 from handrail.collect.cockpit.process import ServerProcess
 from handrail.collect.execution.interrupts import Interrupts
@@ -17,6 +15,7 @@ from handrail.collect.user_study.erase import erase
 from handrail.collect.user_study.exports import export
 from handrail.collect.user_study.folder import StudyFolder
 from handrail.collect.user_study.status import status
+from handrail.datasets.presentation.terminal import Terminal
 
 _FAREWELL = 1.0  # in which the page shows its last card [s]
 Say = Callable[[str], None]
@@ -28,8 +27,7 @@ def study_session(config: StudySessionConfig) -> int:
     Raises:
         HandrailError: a setting or the study's file is wrong, or a file is damaged.
     """
-    folder, console = StudyFolder(config.folder), Console(stderr=True)
-    say: Say = lambda words: console.print(words, highlight=False, markup=False, soft_wrap=True)  # noqa: E731
+    folder, say = StudyFolder(config.folder), Terminal(stderr=True).print
     if config.verb == "new":
         say(f"Written: {folder.write_example()}")
         say(f"Change it, then: handrail-study-session run {folder.root} P001")
@@ -53,7 +51,7 @@ def study_session(config: StudySessionConfig) -> int:
 
 def _status(folder: StudyFolder) -> int:
     study = folder.study()
-    console = Console(highlight=False, markup=False, soft_wrap=True)
+    console = Terminal()
     console.print(f"{study.title} ({study.source})")
     console.print(status(folder, study) if folder.participants() else "nobody has begun")
     return 0

@@ -10,6 +10,7 @@ from handrail.datasets.demonstrations.demonstration import Demonstration
 from handrail.datasets.demonstrations.episode import Episode
 from handrail.datasets.format.data_file import DataFiles, data_files
 from handrail.datasets.reading.reader import DatasetInfo, read_episodes, read_info, read_rows_of, with_success
+from handrail.datasets.reading.simulated import kept_in_state, out_of_state
 
 
 @dataclass(frozen=True)
@@ -33,6 +34,7 @@ class Recorded(Episode):
     def opened(self, files: DataFiles) -> Demonstration:
         """Return it with its rows; see `Episode.opened`."""
         frames = read_rows_of(self.info, self.meta, self.wanted, files)
+        frames = out_of_state(kept_in_state(self.info.robot_type, self.info.features), frames) | frames
         return Demonstration(self.number, self.info, frames, self.meta, self.columns)
 
 

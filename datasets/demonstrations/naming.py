@@ -10,11 +10,12 @@ _POINTS = ("tool", "ee", "eef", "end_effector", "gripper_pose", "hand")
 def point_entries(names: Sequence[str]) -> list[int]:
     """Return the entries that are the tool's position, in order x, y, z; none where no name says so."""
     lower = [name.lower() for name in names]
+    plain = [name.removesuffix(".pos") for name in lower]
     for point in _POINTS:
         for joint in (".", "_"):
             wanted = [f"{point}{joint}{axis}" for axis in "xyz"]
-            if all(name in lower for name in wanted):
-                return [lower.index(name) for name in wanted]
+            if all(name in plain for name in wanted):
+                return [plain.index(name) for name in wanted]
     for wanted in (list("xyz"), list("xy")):
         if all(name in lower for name in wanted):
             return [lower.index(name) for name in wanted]

@@ -78,11 +78,14 @@ class MergeConfig:
 
 
 def packing_advice(root: Path) -> str:
-    """Return how to pack a dataset that has become slow to open for its many files, or ""."""
-    count = sum(1 for _ in root.glob("data/*/*.parquet"))
-    if count <= MANY:
-        return ""
-    return f"{count} files of rows are slow to open: handrail-pack {shlex.quote(str(root))} makes few of them"
+    """Return how to pack a dataset that is slow to open, or that LeRobot cannot stream yet, or ""."""
+    count, cameras, videos = (len(list(root.glob(each))) for each in ("data/*/*", "videos/*", "videos/*/*/*"))
+    command = f"handrail-pack {shlex.quote(str(root))}"
+    if count > MANY:
+        return f"{count} files of rows are slow to open: {command} makes few of them"
+    if videos > cameras:
+        return f"LeRobot's StreamingLeRobotDataset expects one video a camera: {command} before streaming"
+    return ""
 
 
 def _apart(output: str, roots: tuple[Path, ...]) -> Path:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from handrail.controllers.errors import not_installed
+from handrail.datasets.printable import printable
 
 COLOURS = (
     "#0072b2",
@@ -37,11 +38,12 @@ class Panel:
 
 
 def short(label: str, most: int) -> str:
-    """Return a label that fits beside axes: the middle of a long one is left out."""
-    if len(label) <= most:
-        return label
-    head = (most - 1) // 2
-    return f"{label[:head]}…{label[len(label) - (most - 1 - head) :]}"
+    """Return a label that fits beside axes and is no formula: the middle of a long one is left out."""
+    label = printable(label)
+    if len(label) > most:
+        head = (most - 1) // 2
+        label = f"{label[:head]}…{label[len(label) - (most - 1 - head) :]}"
+    return label.replace("$", "\\$")
 
 
 def new_figure(width: float, height: float) -> Any:

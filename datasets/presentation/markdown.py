@@ -1,11 +1,16 @@
 """Markdown: tables, and the part of a page that a command writes: between two marks, other text stays."""
 
 import re
+from html import escape
 from pathlib import Path
 
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.presentation.table import Cell, Table
+from handrail.datasets.printable import printable
 from handrail.datasets.storage.atomic import write_whole
+
+_TAG = re.compile(r"<(?=[a-z/!?])|&(?=#?\w+;)", re.IGNORECASE)
+_LIVE = re.compile(r"[\\`*|~]|(?<![^\W_])_|_(?![^\W_])|](?=[(\[:])|(?<=:)/(?=/)|(?<=www)\.", re.IGNORECASE)
 
 
 def markdown_table(table: Table) -> str:
@@ -14,13 +19,18 @@ def markdown_table(table: Table) -> str:
         [_cell(cell) for cell in row] for row in (table.headings, ["---"] * len(table.headings), *table.rows)
     ]
     lines = "\n".join("| " + " | ".join(row) + " |" for row in rows)
-    return f"**{table.title}**\n\n{lines}" if table.title else lines
+    return f"**{markdown_text(table.title)}**\n\n{lines}" if table.title else lines
 
 
 def _cell(cell: Cell | str) -> str:
     if isinstance(cell, Cell):
         cell = f"{cell.text} ({cell.below})" if cell.below else cell.text
-    return cell.replace("|", "\\|")
+    return markdown_text(cell)
+
+
+def markdown_text(text: str) -> str:
+    """Return a text that is shown as it is in the middle of a line: no tag, link, picture, code or cell."""
+    return _LIVE.sub(r"\\\g<0>", _TAG.sub(lambda found: escape(found[0]), printable(text)))
 
 
 def read_page(page: Path, heading: str = "") -> str:

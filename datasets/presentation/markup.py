@@ -1,9 +1,10 @@
 """The few pieces of HTML that a report is made of; everything that goes in is escaped."""
 
 from collections.abc import Iterable
-from html import escape
+from html import escape as escaped
 
 from handrail.datasets.presentation.table import Cell, Table
+from handrail.datasets.printable import printable
 
 _CSS = """
 :root { --ink: #1d2733; --quiet: #5d6874; --line: #e3e7ec; --paper: #ffffff; --wash: #f6f8fa; }
@@ -60,6 +61,11 @@ details summary { cursor: pointer; color: var(--quiet); }
 """
 
 
+def escape(text: str) -> str:
+    """Return a text that is no markup, wherever it stands in a page."""
+    return escaped(printable(text, "\n"))
+
+
 def page(title: str, *parts: str | Table, what: str = "") -> str:
     """Return a whole page that needs nothing else: its title, what it is about, and its parts."""
     return (
@@ -100,11 +106,6 @@ def _cell(cell: Cell | str) -> str:
 def film(address: str) -> str:
     """Return a video."""
     return f'<video controls muted loop src="{address}"></video>'
-
-
-def link(text: str, address: str) -> str:
-    """Return a paragraph that leads somewhere."""
-    return f'<p><a href="{escape(address)}">{escape(text)}</a></p>'
 
 
 def items(texts: Iterable[tuple[str, str]]) -> str:

@@ -9,6 +9,8 @@ from rich import table as rich_table
 from rich.console import Console, ConsoleOptions
 from rich.text import Text
 
+from handrail.datasets.printable import printable
+
 _NUMBER = re.compile(r"[-+]?\d[\d.]*(e[-+]?\d+)?|[-–]|")
 _WHOLE = 14  # a cell of so many letters is not broken
 _GAP = 2  # between two columns
@@ -31,7 +33,7 @@ class Cell:
     below: str = ""
 
     def __str__(self) -> str:
-        return f"{self.text}\n{self.below}" if self.below else self.text
+        return "\n".join(map(printable, filter(None, (self.text, self.below))))
 
 
 @dataclass(frozen=True)
@@ -58,15 +60,15 @@ class Table:
     ) -> Iterator[rich_table.Table | Text]:
         """Yield the parts that fit."""
         if self.title:
-            yield Text(self.title, "bold")
+            yield Text(printable(self.title), "bold")
         for part in self._parts(options.max_width):
             yield self._table(part, options.max_width)
             yield Text()
         if self.caption:
-            yield Text(f"{self.caption}\n", "dim")
+            yield Text(f"{printable(self.caption)}\n", "dim")
 
     def _cells(self, column: int) -> list[str]:
-        return [str(row[column]) for row in self.rows]
+        return [_text(row[column]) for row in self.rows]
 
     def _least(self, column: int) -> int:
         """Return the width below which a column reads badly."""
@@ -101,7 +103,7 @@ class Table:
             show_edge=False,
         )
         for row in self.rows:
-            table.add_row(*(Text(str(row[column])) for column in part))
+            table.add_row(*(Text(_text(row[column])) for column in part))
         return table
 
     def _widths(self, part: Sequence[int], width: int) -> dict[int, int]:
@@ -119,8 +121,15 @@ class Table:
         cells = self._cells(column)
         numbers = all(map(_NUMBER.fullmatch, cells)) and any(map(str.strip, "".join(cells).strip("–")))
         return rich_table.Column(
-            Text(self.headings[column]), width=width, overflow="fold", justify="right" if numbers else "left"
+            Text(printable(self.headings[column])),
+            width=width,
+            overflow="fold",
+            justify="right" if numbers else "left",
         )
+
+
+def _text(cell: Cell | str) -> str:
+    return str(cell) if isinstance(cell, Cell) else printable(cell)
 
 
 def _total(widths: Sequence[int]) -> int:

@@ -20,9 +20,9 @@ from handrail.datasets.format.layout import VIDEO_PATH, Layout
 from handrail.datasets.format.manifest import read_manifest
 from handrail.datasets.format.path_pattern import check_pattern, fill
 from handrail.datasets.format.schema import NUMBERS, Feature
+from handrail.datasets.reading.simulated import STATE, SUCCESS, kept_in_state, out_of_state
 from handrail.datasets.storage.strict_json import read_json
 
-_SUCCESS = "next.success"
 _DAMAGED = " the dataset is damaged"
 _READABLE = (*NUMBERS, "float16", "string")
 _PLACE = ("episode_index", "length", "data/chunk_index", "data/file_index")
@@ -183,7 +183,7 @@ def with_success(info: DatasetInfo, rows: Sequence[dict[str, Any]]) -> list[dict
     """Return lines of metadata with `success`, as they say it or else as their frames do: any of them.
 
     LeRobot's own `next.success` survives its `delete_episodes` and `split`, which drop every column of an
-    episode that is not LeRobot's.
+    episode that is not LeRobot's. `lerobot-record` keeps what `handrail_sim` says of it in the state.
 
     Args:
         info: What the dataset is.
@@ -192,14 +192,19 @@ def with_success(info: DatasetInfo, rows: Sequence[dict[str, Any]]) -> list[dict
     Raises:
         HandrailError: A file of the dataset cannot be read.
     """
-    feature = info.features.get(_SUCCESS)
-    if feature is None or feature.dtype not in NUMBERS:
+    feature, places = info.features.get(SUCCESS), kept_in_state(info.robot_type, info.features)
+    if feature is not None and feature.dtype in NUMBERS:
+        column, places = SUCCESS, {}
+    elif SUCCESS in places:
+        column = STATE
+    else:
         return list(rows)
     found = [dict(row) for row in rows]
     with data_files() as files:
         for row in found:
             if row.get("success") is None:
-                row["success"] = bool(np.any(read_rows_of(info, row, [_SUCCESS], files)[_SUCCESS] > 0))
+                frames = read_rows_of(info, row, [column], files)
+                row["success"] = bool(np.any((frames | out_of_state(places, frames))[SUCCESS] > 0))
     return found
 
 

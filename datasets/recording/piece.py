@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
+from handrail.controllers.errors import HandrailError
 from handrail.datasets.format.arrow import flat_numbers, numbers, to_numpy
 from handrail.datasets.format.columns import Scalar
 from handrail.datasets.format.data_file import DataFiles
@@ -116,12 +117,17 @@ class Piece:
         return new | ({"frame_index": frames, "timestamp": frames / fps} if self.is_cut else {})
 
     def _tasks(self, whole: pa.Table, table: pa.Table, totals: Totals) -> tuple[tuple[str, ...], np.ndarray]:
-        """Return the task sentences of rows, and which of the dataset's each row has, (N,)."""
+        """Return the task sentences of rows, and which of the dataset's each row has, (N,).
+
+        Raises:
+            HandrailError: the rows have more tasks, or fewer, than the line of metadata.
+        """
         numbers_of = dict.fromkeys(whole.column("task_index").to_pylist())
-        sentences = {
-            number: self.sentences.get(sentence, sentence)
-            for number, sentence in zip(numbers_of, self.record.tasks, strict=True)
-        }
+        known = self.record.tasks
+        if len(known) != len(numbers_of):
+            where = f"{str(self.data)!r}, episode {self.record.episode}"
+            raise HandrailError(f"{where}: expected rows of {len(known)} tasks, got {len(numbers_of)}")
+        sentences = dict(zip(numbers_of, (self.sentences.get(each, each) for each in known), strict=True))
         said = [sentences[number] for number in table.column("task_index").to_pylist()]
         tasks = tuple(dict.fromkeys(said))
         places = {sentence: place for place, sentence in enumerate(totals.with_tasks(tasks))}

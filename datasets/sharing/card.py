@@ -10,7 +10,7 @@ import numpy as np
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.demonstrations.episode import Episode
 from handrail.datasets.demonstrations.load import recorded_episodes
-from handrail.datasets.presentation.markdown import markdown_table
+from handrail.datasets.presentation.markdown import markdown_table, markdown_text
 from handrail.datasets.presentation.table import Table
 from handrail.datasets.presentation.wording import DASH, number, percent
 from handrail.datasets.quality.catalogue import METRICS
@@ -40,7 +40,7 @@ def description(root: Path) -> str:
     frames = sum(episode.count for episode in episodes)
     lines = (
         f"{len(episodes)} episodes, {frames} frames at {info.fps} Hz, {frames / info.fps / 60:.1f} minutes",
-        f"robot `{info.robot_type or DASH}`",
+        f"robot {markdown_text(info.robot_type) or DASH}",
         *(f"{name}: {said}" for name in _COUNTED if (said := _counted(episodes, name))),
         *_outcome(episodes),
     )
@@ -61,13 +61,17 @@ def write_card(root: Path, repo_id: str, license_id: str) -> str:
             f"{str(path)!r}: expected none, or one that handrail-push wrote; found another, which LeRobot's"
             " upload would replace: give it another name"
         )
-    from lerobot.datasets.dataset_metadata import LeRobotDatasetMetadata
+    from lerobot.datasets.io_utils import load_info
     from lerobot.datasets.utils import create_lerobot_dataset_card
 
     said = description(root)
+    try:
+        info = load_info(root)
+    except (AttributeError, TypeError, ValueError) as error:
+        raise HandrailError(f"dataset {str(root)!r}: LeRobot cannot read meta/info.json: {error}") from error
     card = create_lerobot_dataset_card(
         tags=list(TAGS),
-        dataset_info=LeRobotDatasetMetadata(repo_id, root=root).info,
+        dataset_info=info,
         license=license_id,
         repo_id=repo_id,
         dataset_description=said,
@@ -80,7 +84,7 @@ def write_card(root: Path, repo_id: str, license_id: str) -> str:
 def _counted(episodes: Sequence[Episode], name: str) -> str:
     """Return the values of a column of metadata and how many episodes have each."""
     values = Counter(value for episode in episodes for value in _values(episode, name))
-    return ", ".join(f"{value} ({count})" for value, count in values.most_common())
+    return ", ".join(f"{markdown_text(str(value))} ({count})" for value, count in values.most_common())
 
 
 def _values(episode: Episode, name: str) -> Sequence[Any]:

@@ -6,6 +6,8 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from handrail.datasets.printable import printable
+
 _FORMULA = tuple("=+-@\t\r\n＝＋－＠")  # how a formula begins, says OWASP
 
 
@@ -25,7 +27,7 @@ def defused(value: Any) -> Any:
     """Return what to write for a value so that no spreadsheet runs it."""
     if not isinstance(value, str):
         return value
-    text = value.replace("\r", " ")  # else half of the readers begin a new row there
+    text = printable(value.replace("\r", " "), "\n\t")  # else half of the readers begin a new row there
     harmful = value.lstrip(" ").startswith(_FORMULA) and not _is_number(value)
     return f"'{text}" if harmful else text
 

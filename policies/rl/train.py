@@ -19,6 +19,7 @@ from stable_baselines3.common.callbacks import BaseCallback
 
 from handrail.collect.experiments.benchmark.tables import PUBLISHED
 from handrail.datasets.presentation.drawing import COLOURS, GREY, new_figure, png, tidy
+from handrail.datasets.presentation.terminal import Terminal
 from handrail.datasets.storage.atomic import write_whole
 from handrail.datasets.storage.strict_json import write_json
 from handrail.policies.rl.checkpoint import (
@@ -89,7 +90,7 @@ class Watch(BaseCallback):
         self._goals = evaluation_goals(config.goals)
         self._began = time.monotonic() - (curve[-1]["seconds"] if curve else 0.0)
         columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-        self._progress = Progress(*columns)
+        self._progress = Progress(*columns, console=Terminal())
         self._bar = self._progress.add_task("training", total=config.steps)
 
     def _on_training_start(self) -> None:

@@ -4,8 +4,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from rich.console import Console
-
 from handrail.collect.experiments.benchmark.catalogue import Baseline
 from handrail.collect.experiments.benchmark.config import BenchmarkConfig
 from handrail.collect.experiments.benchmark.figures import figures
@@ -15,11 +13,14 @@ from handrail.collect.experiments.benchmark.run import available, goals, run, tr
 from handrail.collect.experiments.benchmark.video import Example
 from handrail.collect.simulation.gl import graphics_trouble
 from handrail.datasets.presentation.drawing import png
+from handrail.datasets.presentation.terminal import Terminal
 from handrail.datasets.storage.atomic import explained
 from handrail.datasets.storage.strict_json import write_json
 
 
-def benchmark(config: BenchmarkConfig, baselines: Mapping[str, Baseline], console: Console) -> dict[str, Any]:
+def benchmark(
+    config: BenchmarkConfig, baselines: Mapping[str, Baseline], console: Terminal
+) -> dict[str, Any]:
     """Run the benchmark, write what is asked for, return the results.
 
     Args:
@@ -37,7 +38,7 @@ def benchmark(config: BenchmarkConfig, baselines: Mapping[str, Baseline], consol
             report.mkdir(parents=True, exist_ok=True)
     present, skipped = available(baselines, config)
     for name, reason in skipped.items():
-        console.print(f"without {name}: {reason}", highlight=False)
+        console.print(f"without {name}: {reason}")
     episodes = run(config, present, console)
     results = summarise([episode.row for episode in episodes], config, present, skipped)
     if config.json:
@@ -58,11 +59,11 @@ def benchmark(config: BenchmarkConfig, baselines: Mapping[str, Baseline], consol
     return results
 
 
-def _example(config: BenchmarkConfig, present: tuple[Baseline, ...], console: Console) -> Example | None:
+def _example(config: BenchmarkConfig, present: tuple[Baseline, ...], console: Terminal) -> Example | None:
     """Return what the first two controllers do on the first goal; None without OpenGL, which is said."""
     trouble = graphics_trouble() if config.video else "not asked for"
     if trouble:
-        console.print(f"without an example to look at: {trouble}", highlight=False)
+        console.print(f"without an example to look at: {trouble}")
         return None
     runs = [(who, *trace_of(config, who, 0)) for who in present[:2]]
     return Example(runs[0][1], [(who.help, trace) for who, _, trace in runs])

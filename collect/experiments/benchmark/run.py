@@ -6,7 +6,6 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from rich.console import Console
 
 from handrail.collect.execution.execution import Execution
 from handrail.collect.execution.job import Job
@@ -23,6 +22,7 @@ from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.controller import Controller
 from handrail.controllers.numerics.threads import single_threaded
 from handrail.controllers.robot.model import Pose, load_model
+from handrail.datasets.presentation.terminal import Terminal
 
 _PRELOAD = ("handrail.collect.experiments.benchmark.run",)
 _PATHS = 12  # goals whose paths are kept, for drawing
@@ -79,7 +79,7 @@ def available(
 
 
 def run(
-    config: BenchmarkConfig, baselines: tuple[Baseline, ...], console: Console | None = None
+    config: BenchmarkConfig, baselines: tuple[Baseline, ...], console: Terminal | None = None
 ) -> list[Episode]:
     """Run everything and return the episodes, by goal.
 

@@ -3,18 +3,18 @@
 from pathlib import Path
 
 import numpy as np
-from rich.console import Console
 from rich.progress import Progress
 
 from handrail.collect.experiments.operator_fit.config import FitOperatorConfig
 from handrail.collect.experiments.operator_fit.episodes import Steered, check_alike, read_steered
 from handrail.collect.experiments.operator_fit.fit import ROUNDS, TRIED_BESIDE, fit_operator
 from handrail.collect.experiments.operator_fit.report import as_json, fit_table, sentences
+from handrail.datasets.presentation.terminal import Terminal
 from handrail.datasets.storage.atomic import explained
 from handrail.datasets.storage.strict_json import write_json
 
 
-def run_fit(config: FitOperatorConfig, console: Console) -> None:
+def run_fit(config: FitOperatorConfig, console: Terminal) -> None:
     """Fit as configured.
 
     Raises:
@@ -22,7 +22,7 @@ def run_fit(config: FitOperatorConfig, console: Console) -> None:
     """
     config.check()
     found, left_out = _episodes(config)
-    with Progress(console=Console(stderr=True), transient=True) as progress:
+    with Progress(console=Terminal(stderr=True), transient=True) as progress:
         bar = progress.add_task("trying operators", total=ROUNDS * config.draws + TRIED_BESIDE)
         rng = np.random.default_rng(config.seed)
         fit = fit_operator(found, config.draws, rng, lambda: progress.advance(bar))

@@ -6,8 +6,6 @@ from functools import lru_cache
 from pathlib import Path
 from typing import cast
 
-from rich.console import Console
-
 from handrail.collect.commands.recording import episode_seed
 from handrail.collect.config import SessionConfig
 from handrail.collect.envs.env import HandrailEnv
@@ -19,6 +17,7 @@ from handrail.collect.operators.scripts.scripted import ScriptedOperator
 from handrail.collect.session.build import build_controller, build_env, build_mode, build_operator
 from handrail.collect.session.session import Session
 from handrail.controllers.errors import HandrailError
+from handrail.datasets.presentation.terminal import Terminal
 from handrail.datasets.recording.frames import Frame
 
 _PRELOAD = ("handrail.collect.experiments.trials.trials",)
@@ -29,7 +28,7 @@ _OF_OUTCOME = (
 
 
 def run_trials(
-    config: TrialsConfig, told: Callable[[Trial], None], console: Console | None = None
+    config: TrialsConfig, told: Callable[[Trial], None], console: Terminal | None = None
 ) -> list[Trial]:
     """Run what is not in the file yet, and return every episode that was asked for, in order.
 

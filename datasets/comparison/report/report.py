@@ -149,7 +149,7 @@ def write_texts(folder: Path, texts: Mapping[str, str]) -> list[Path]:
 
 def json_text(content: Any) -> str:
     """Return content as JSON; what is no finite number is null."""
-    return json.dumps(plain(content), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+    return json.dumps(plain(content), indent=1, allow_nan=False) + "\n"
 
 
 def plain(value: Any) -> Any:

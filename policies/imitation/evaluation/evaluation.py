@@ -5,11 +5,10 @@ from pathlib import Path
 from time import monotonic
 from typing import Any
 
-from rich.console import Console
-
 from handrail.collect.execution.execution import Execution
 from handrail.collect.execution.job import Job
 from handrail.controllers.errors import HandrailError
+from handrail.datasets.presentation.terminal import Terminal
 from handrail.policies.imitation.evaluation.conditions import PolicyCondition, policy_conditions
 from handrail.policies.imitation.evaluation.config import EvaluateConfig
 from handrail.policies.imitation.evaluation.file import EvaluationFile
@@ -36,7 +35,7 @@ class UnevaluatedError(HandrailError):
 
 
 def evaluate(
-    config: EvaluateConfig, console: Console | None = None, load: Load = load_policy
+    config: EvaluateConfig, console: Terminal | None = None, load: Load = load_policy
 ) -> dict[str, Any]:
     """Run what is not in the file yet, write it, and return the content of the file.
 
@@ -73,7 +72,7 @@ def _run_all(
     config: EvaluateConfig,
     load: Load,
     file: EvaluationFile,
-    console: Console | None,
+    console: Terminal | None,
 ) -> list[str]:
     """Run rollouts; return why some policies could not be."""
     conditions = {_name(*rollout): rollout[0] for rollout in rollouts}

@@ -16,10 +16,10 @@ from lerobot.datasets.sampler import EpisodeAwareSampler, compute_sampler_state
 from lerobot.scripts.lerobot_train import update_policy
 from lerobot.utils.logging_utils import AverageMeter, MetricsTracker
 from lerobot.utils.random_utils import set_seed
-from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from torch.utils.data import BatchSampler
 
+from handrail.datasets.presentation.terminal import Terminal
 from handrail.datasets.storage.atomic import publish_folder
 from handrail.policies.imitation.interface.checkpoint import MODEL, point_to
 from handrail.policies.imitation.interface.completion import Completion
@@ -77,7 +77,7 @@ class Run:
         curve = Curve(settings.output_dir, learner.step) if main else None
         columns = TextColumn("training"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
         told, shown = TextColumn("{task.description}"), main and not self.quiet
-        with Progress(*columns, told, console=Console(stderr=True), disable=not shown) as progress:
+        with Progress(*columns, told, console=Terminal(stderr=True), disable=not shown) as progress:
             self._loop(learner, accelerator, curve, progress)
         accelerator.end_training()
 

@@ -4,11 +4,10 @@ import contextlib
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from rich.console import Console
-
 from handrail.collect.execution.execution import Execution
 from handrail.collect.execution.job import Job as Piece
 from handrail.datasets.presentation.markdown import read_page, with_part
+from handrail.datasets.presentation.terminal import Terminal
 from handrail.datasets.storage.atomic import explained
 from handrail.datasets.storage.lock import DatasetLock
 from handrail.policies.imitation.training.installed import check_installed
@@ -41,10 +40,10 @@ def run_study(
     """
     config.check()
     design = load_design(config.preset)
-    progress, console = StudyProgress(design, Layout(config.folder)), Console(stderr=True)
+    progress, console = StudyProgress(design, Layout(config.folder)), Terminal(stderr=True)
     check_cell(config.only, progress.jobs)
     told = f"study {design.name}, design {design.digest}: {len(progress.jobs)} jobs. {plan(design)}"
-    console.print(told, highlight=False, soft_wrap=True)
+    console.print(told)
     if config.plan:
         return 0
     check_installed("handrail-study", ("torch", "accelerate"), design.policy)
@@ -65,7 +64,7 @@ def run_study(
         from handrail.policies.study.report.report import write_study
 
         files = write_study(config, StudyProgress(design, progress.layout))
-    console.print("Written: " + ", ".join(map(str, files)), highlight=False, soft_wrap=True)
+    console.print("Written: " + ", ".join(map(str, files)))
     return FAILED if failed else 0
 
 

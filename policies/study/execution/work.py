@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from handrail.controllers.errors import HandrailError
+from handrail.datasets.presentation.terminal import Terminal
 from handrail.datasets.reading.reader import read_episodes
 from handrail.datasets.storage.atomic import remove
 from handrail.policies.imitation.interface.checkpoint import last_checkpoint, read_meta
@@ -63,7 +64,7 @@ def begin(job: Job, design: StudyDesign, layout: Layout) -> None:
             f"{layout.begun(job)}, found none; remove what is there, or choose another --output"
         )
     for path in stale:
-        print(f"removed, made with other settings: {path}")
+        Terminal().print(f"removed, made with other settings: {path}")
         remove(path)
     write_json(layout.begun(job), settings)
 
@@ -94,7 +95,7 @@ def work(job: Job, design: StudyDesign, layout: Layout) -> dict[str, Any]:
     same = before.get("settings") == fingerprint(job, design)
     expected = before.get("result", {}).get("digest", found["digest"])
     if same and not found["digest"].startswith(expected):  # an earlier version left the pictures out
-        print(f"recorded again, the rows differ: expected the digest {expected}, got {found['digest']}")
+        Terminal().print(f"recorded again, the rows differ: expected {expected}, got {found['digest']}")
         found["digest_before"] = expected
     return found
 
