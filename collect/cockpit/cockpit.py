@@ -20,7 +20,19 @@ from PIL import Image
 
 from handrail.collect.cockpit import stage
 from handrail.collect.cockpit.disk import DiskWatch
-from handrail.collect.cockpit.pipe import ASK, DRIVE, DROPPED, FRAME, LOST, NOTE, OVER, PICTURE, STAGE, STOP
+from handrail.collect.cockpit.pipe import (
+    ASK,
+    DRIVE,
+    DROPPED,
+    FRAME,
+    LOST,
+    NOTE,
+    OVER,
+    PICTURE,
+    STAGE,
+    STILL,
+    STOP,
+)
 from handrail.collect.cockpit.played import EpisodePoses, PlayedFiles
 from handrail.collect.cockpit.process import ServerProcess
 from handrail.collect.cockpit.snapshot import Counts, Snapshots
@@ -30,7 +42,7 @@ from handrail.collect.envs.env import HandrailEnv
 from handrail.collect.operators.modes import TeleopMode
 from handrail.collect.operators.operator import EpisodeEvent, View
 from handrail.collect.operators.person.inputs import Ask, Inputs
-from handrail.collect.operators.person.person import Person
+from handrail.collect.operators.person.person import Person, Phase
 from handrail.collect.session.build import build_modes
 from handrail.collect.session.outcome import Outcome
 from handrail.controllers.errors import HandrailError, not_installed
@@ -85,6 +97,11 @@ class Cockpit:
     def practises(self) -> bool:
         """Whether the episode is not to be saved."""
         return self._person.practises
+
+    @property
+    def is_stopped(self) -> bool:
+        """Whether somebody has pressed STOP, and nobody has released it."""
+        return self._person.phase is Phase.STOPPED
 
     def practise(self, practises: bool) -> None:
         """Say whether the episodes to come are practice, not to be saved."""
@@ -179,7 +196,7 @@ class Cockpit:
                 lists = {name: tuple(said["inputs"][name]) for name in ("axes", "targets")}
                 inputs = Inputs(**(said["inputs"] | lists))
                 self._person.take(inputs, said["received"], said["round_trip"])
-            elif kind == ASK:
+            elif kind in (ASK, STILL):
                 said = json.loads(data)
                 if said["what"] in self._refuses:
                     continue
