@@ -260,7 +260,7 @@ def open_cockpit(config: RecordConfig, env: HandrailEnv, say: Callable[[str], No
     server = ServerProcess(config.cockpit, say)
     say(f"Drive at {server.address}")
     say(f"Episodes go to {config.dataset.folder}. To end: Esc on the page, or Ctrl-C here.")
-    if config.cockpit.open and config.cockpit.is_private:
+    if config.cockpit.opens:
         webbrowser.open(server.address)
     folder, wanted = str(config.dataset.folder), config.dataset.num_episodes
     then = [

@@ -90,7 +90,7 @@ class HandrailCockpit(_PersonTeleoperator):
         check_installed()
         self._server = ServerProcess(self._settings, print)
         print(f"Drive at {self.address}")
-        if self._settings.open and self._settings.is_private:
+        if self._settings.opens:
             webbrowser.open(self.address)
         mode = session.mode
         modes = {mode.name: mode}
