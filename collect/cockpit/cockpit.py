@@ -166,7 +166,8 @@ class Cockpit:
             self._disk.close()
         counts = self._counts
         said = {"saved": counts.saved, "succeeded": counts.succeeded, "folder": self._folder}
-        self._server.send_surely(OVER, json.dumps(said | {"next": list(self._next)}).encode())
+        said["next"] = list(self._next) if counts.saved else []
+        self._server.send_surely(OVER, json.dumps(said).encode())
         self._server.close()
 
     @property

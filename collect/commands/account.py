@@ -79,14 +79,13 @@ def report(
     for outcome in log.dropped:
         why = _DROPPED[None if outcome.practice else outcome.ended_by]
         console.print(f"not saved: {why}, seed {outcome.seed}", **PLAIN)
-    console.print(
-        f"{episodes} episodes, {frames} frames in {root}",
-        highlight=False,
-        soft_wrap=True,
-    )
+    if not episodes:
+        console.print("no episode was saved: nothing is left behind", **PLAIN)
+        return
+    console.print(f"{episodes} episodes, {frames} frames in {root}", **PLAIN)
     if advice := packing_advice(root):
         console.print(advice, **PLAIN)
-    if OPERATORS.find(config.operator).interactive and episodes:
+    if OPERATORS.find(config.operator).interactive and log.outcomes:
         console.print(next_commands(root), **PLAIN)
 
 

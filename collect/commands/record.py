@@ -6,7 +6,7 @@ from rich.console import Console
 
 from handrail.collect.commands.account import PLAIN, RecordingLog, report
 from handrail.collect.commands.progress import recording_bar
-from handrail.collect.commands.recording import Recording, come_first, episode_seed, open_writer
+from handrail.collect.commands.recording import Recording, come_first, episode_seed, session_writer
 from handrail.collect.commands.shards import Shards
 from handrail.collect.commands.shared import record_shared
 from handrail.collect.commands.target import located
@@ -54,9 +54,11 @@ def record(config: RecordConfig) -> int:
         if interactive and not config.resume:  # before a person's page is opened, or their device
             check_target(Layout(config.dataset.folder.absolute()), config.overwrite)
         people = _people(config, env, console)
-        with open_writer(config, env) as writer:
+        with session_writer(config, env) as writer:
             if writer.repaired and not writer.repaired.clean:
                 console.print(str(writer.repaired), **PLAIN)
+            if writer.num_episodes:
+                console.print(f"Adds to {writer.num_episodes} episodes in {writer.root}", **PLAIN)
             recording = Recording(config, env, writer, people, displays)
             if interactive or env.real:
                 console.print("Getting ready; the first time on a computer takes about a minute.", **PLAIN)

@@ -16,11 +16,9 @@ import numpy as np
 import pytest
 
 pytest.importorskip("playwright.sync_api", reason="the extra 'dev' is not installed")
-from cockpit_helpers import heard, server, show
 from cockpit_witness import Relay, Witness, closing, is_moving, is_still
-from page_driver import SLOW, PageDriver
+from page_driver import PageDriver
 
-from handrail.collect.cockpit.pipe import STOP
 from handrail.collect.experiments.latency.machine import family
 from handrail.datasets.reading.reader import read_episodes, read_frames
 
@@ -221,34 +219,6 @@ def test_stop_over_a_connection_that_is_stuck(chromium, recording, witness, most
         made.press()
         made.page.keyboard.up("KeyW")
         made.check_braked(recording, time.time())
-
-
-def test_the_page_says_stop_until_it_is_so(chromium):
-    """Also when the connection breaks meanwhile; it is the same press all the time, and all that is said."""
-    with server() as served, closing(Relay(served.address)) as relay:
-        page, said = chromium.new_page(), []
-        page.on(
-            "websocket", lambda socket: socket.on("framesent", lambda text: said.append(json.loads(text)))
-        )
-        with page.expect_websocket(timeout=SLOW):
-            page.goto(relay.address)
-        page.wait_for_timeout(1000)
-        page.locator("#stop").click()
-        for _ in range(2):
-            before, end = len(said), time.monotonic() + 60.0
-            relay.break_off()
-            while len(said) < before + 3:
-                assert time.monotonic() < end, said
-                page.wait_for_timeout(100)
-        assert heard(served, {STOP}, 2, patience=1.0) == [(STOP, b"")]
-        show(served, phase="stopped")
-        page.wait_for_timeout(1000)
-        before = len(said)
-        page.wait_for_timeout(1000)
-        assert len(said) == before
-        assert {each["what"] for each in said} == {"stop"}
-        assert len({each["press"] for each in said}) == 1
-        page.close()
 
 
 def renderers():

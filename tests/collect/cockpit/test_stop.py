@@ -27,15 +27,15 @@ class QueuedSocket:
     """A page's socket as the web server has it: messages that have come, and then nothing."""
 
     def __init__(self, messages):
-        self._messages, self.said, self.closed = list(messages), [], None
+        self.left, self.said, self.closed = list(messages), [], None
 
     async def accept(self):
         pass
 
     async def receive(self):
-        if not self._messages:
+        if not self.left:
             return {"type": "websocket.disconnect"}
-        return {"type": "websocket.receive", "text": self._messages.pop(0)}
+        return {"type": "websocket.receive", "text": self.left.pop(0)}
 
     async def send_text(self, text):
         self.said.append(json.loads(text))
@@ -190,7 +190,7 @@ def test_a_page_that_is_cut_off_still_stops(hub, ends):
         ["nonsense"] * 60 + ["x" * 5000, ask_for("stop")] + ["nonsense"] * 1200 + [ask_for("stop")]
     )
     serve(hub, page)
-    assert page.closed or not page._messages
+    assert page.closed or not page.left
     assert [kind for kind, _ in ends[0].receive() if kind == STOP] == [STOP, STOP]
 
 
