@@ -58,7 +58,7 @@ def record(config: RecordConfig) -> int:
             if writer.repaired and not writer.repaired.clean:
                 console.print(str(writer.repaired), **PLAIN)
             if writer.num_episodes:
-                console.print(f"Adds to {writer.num_episodes} episodes in {writer.root}", **PLAIN)
+                console.print(f"Adds to {writer.root}; episodes there: {writer.num_episodes}", **PLAIN)
             recording = Recording(config, env, writer, people, displays)
             if interactive or env.real:
                 console.print("Getting ready; the first time on a computer takes about a minute.", **PLAIN)

@@ -78,7 +78,7 @@ def test_a_session_adds_in_the_same_words_and_without_episodes_leaves_nothing(tm
         assert writer.root == root
     assert not list(tmp_path.iterdir())
     assert record(config) == record(config) == 0
-    assert f"Adds to 1 episodes in {root}\n" in capsys.readouterr().err
+    assert f"Adds to {root}; episodes there: 1\n" in capsys.readouterr().err
     before = sorted(root.rglob("*"))
     with session_writer(located(config, ENV), ENV) as writer:
         assert writer.num_episodes == 2
