@@ -13,10 +13,12 @@ class CockpitConfig:
 
     host: str = "127.0.0.1"
     """Address to listen at; any other than 127.0.0.1 asks for a token, by HTTPS."""
+    token: bool = False
+    """Ask for the token on 127.0.0.1 too: without, every account of this computer can drive."""
     port: int = 8765
     """Port to listen at; the next free one where it is taken; 0 for any."""
     open: bool = True
-    """Open the page in this computer's browser."""
+    """Open the page in this computer's browser, unless it asks for a token."""
     certificate: str = ""
     """Folder of a certificate of your own, cert.pem and key.pem; without, one is made on this machine."""
 
@@ -24,6 +26,16 @@ class CockpitConfig:
     def is_private(self) -> bool:
         """Whether only this computer, as itself, can come in."""
         return self.host in ("127.0.0.1", "::1", "localhost")
+
+    @property
+    def asks(self) -> bool:
+        """Whether the page asks for a token."""
+        return self.token or not self.is_private
+
+    @property
+    def opens(self) -> bool:
+        """Whether the page opens by itself; a token on a command line could be read by other accounts."""
+        return self.open and not self.asks
 
     def check(self) -> None:
         """Check the settings.

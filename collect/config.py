@@ -175,7 +175,7 @@ class DatasetConfig(StoredConfig):
 
     @property
     def is_found(self) -> bool:
-        """Whether the folder is to be found: the first of `found_folders` that fits."""
+        """Whether the folder is to be found: the first one that fits."""
         return False
 
 
@@ -184,7 +184,7 @@ class FoundDatasetConfig(DatasetConfig):
     """Where the episodes go, how many, how fast; without a folder, one is found."""
 
     place: Annotated[tyro.conf.Positional[str], tyro.conf.arg(metavar="FOLDER")] = ""
-    """Folder of the dataset; by default outputs/cockpit/TASK: goes on if it fits, else one beside it."""
+    """Folder of the dataset; one that is there is added to. By default outputs/cockpit/TASK, or beside it."""
 
     @property
     def is_found(self) -> bool:

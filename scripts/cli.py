@@ -20,6 +20,7 @@ BAD_INPUT = 2
 FAILED = 1
 INTERRUPTED = 130
 VERSION = "--version"
+STARTING = "Starting; this takes some seconds …"
 COMPILING = "Compiling the controller for this machine, once; this can take a minute …"
 
 
@@ -78,6 +79,11 @@ def run(main: Callable[[], int | None]) -> NoReturn:
         sys.exit(FAILED)
     except KeyboardInterrupt as interrupt:
         fail(str(interrupt) or "interrupted", INTERRUPTED)
+
+
+def say_starting() -> None:
+    """Say that the command runs, before it loads the simulator."""
+    print(STARTING, file=sys.stderr, flush=True)
 
 
 def fail(message: str, code: int) -> NoReturn:

@@ -8,6 +8,8 @@ from handrail.scripts import cli
 def main(config: StudySessionConfig) -> int:
     """Run the command."""
     config.check()
+    if config.verb == "run":
+        cli.say_starting()
     from handrail.collect.user_study.run import (
         study_session,  # loads the simulator: only once the settings are right
     )

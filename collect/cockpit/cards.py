@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from handrail.collect.cockpit.messages import Answer
-from handrail.collect.cockpit.pipe import ANSWER, CARD
+from handrail.collect.cockpit.pipe import ANSWER, CARD, STOP
 from handrail.collect.cockpit.process import ServerProcess
 
 _AGAIN = 0.5  # after which a card is shown again: the web server may have been started anew [s]
@@ -33,10 +33,12 @@ class Cards:
             self._shown, self._at = data, time.monotonic()
 
     def hear(self, patience: float = 0.1) -> list[Answer]:
-        """Return what was answered, waiting a little for it.
+        """Return what was answered, waiting a little for it; a STOP is left for the next episode.
 
         Args:
             patience: how long [s].
         """
         select.select([self._server.pipe], [], [], patience)
-        return [Answer(**json.loads(data)) for kind, data in self._server.receive() if kind == ANSWER]
+        messages = self._server.receive()
+        self._server.unread = [each for each in messages if each[0] == STOP]
+        return [Answer(**json.loads(data)) for kind, data in messages if kind == ANSWER]

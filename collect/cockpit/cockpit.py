@@ -20,7 +20,19 @@ from PIL import Image
 
 from handrail.collect.cockpit import stage
 from handrail.collect.cockpit.disk import DiskWatch
-from handrail.collect.cockpit.pipe import ASK, DRIVE, DROPPED, FRAME, LOST, NOTE, OVER, PICTURE, STAGE, STOP
+from handrail.collect.cockpit.pipe import (
+    ASK,
+    DRIVE,
+    DROPPED,
+    FRAME,
+    LOST,
+    NOTE,
+    OVER,
+    PICTURE,
+    STAGE,
+    STILL,
+    STOP,
+)
 from handrail.collect.cockpit.played import EpisodePoses, PlayedFiles
 from handrail.collect.cockpit.process import ServerProcess
 from handrail.collect.cockpit.snapshot import Counts, Snapshots
@@ -30,7 +42,7 @@ from handrail.collect.envs.env import HandrailEnv
 from handrail.collect.operators.modes import TeleopMode
 from handrail.collect.operators.operator import EpisodeEvent, View
 from handrail.collect.operators.person.inputs import Ask, Inputs
-from handrail.collect.operators.person.person import Person
+from handrail.collect.operators.person.person import Person, Phase
 from handrail.collect.session.build import build_modes
 from handrail.collect.session.outcome import Outcome
 from handrail.controllers.errors import HandrailError, not_installed
@@ -85,6 +97,11 @@ class Cockpit:
     def practises(self) -> bool:
         """Whether the episode is not to be saved."""
         return self._person.practises
+
+    @property
+    def is_stopped(self) -> bool:
+        """Whether somebody has pressed STOP, and nobody has released it."""
+        return self._person.phase is Phase.STOPPED
 
     def practise(self, practises: bool) -> None:
         """Say whether the episodes to come are practice, not to be saved."""
@@ -149,7 +166,8 @@ class Cockpit:
             self._disk.close()
         counts = self._counts
         said = {"saved": counts.saved, "succeeded": counts.succeeded, "folder": self._folder}
-        self._server.send_surely(OVER, json.dumps(said | {"next": list(self._next)}).encode())
+        said["next"] = list(self._next) if counts.saved else []
+        self._server.send_surely(OVER, json.dumps(said).encode())
         self._server.close()
 
     @property
@@ -179,7 +197,7 @@ class Cockpit:
                 lists = {name: tuple(said["inputs"][name]) for name in ("axes", "targets")}
                 inputs = Inputs(**(said["inputs"] | lists))
                 self._person.take(inputs, said["received"], said["round_trip"])
-            elif kind == ASK:
+            elif kind in (ASK, STILL):
                 said = json.loads(data)
                 if said["what"] in self._refuses:
                     continue
@@ -243,7 +261,7 @@ def open_cockpit(config: RecordConfig, env: HandrailEnv, say: Callable[[str], No
     server = ServerProcess(config.cockpit, say)
     say(f"Drive at {server.address}")
     say(f"Episodes go to {config.dataset.folder}. To end: Esc on the page, or Ctrl-C here.")
-    if config.cockpit.open and config.cockpit.is_private:
+    if config.cockpit.opens:
         webbrowser.open(server.address)
     folder, wanted = str(config.dataset.folder), config.dataset.num_episodes
     then = [

@@ -1,4 +1,4 @@
-"""Who may come in: on this computer any page of the cockpit's own, from elsewhere only with the token.
+"""Who may come in: any page of the cockpit's own; from elsewhere, and where it is asked for, with the token.
 
 Every request is checked for the `Host` it asks for, every socket and form for the `Origin` of the page that
 makes it, so that no other page in the same browser, nor a name that was made to point here, gets in.
@@ -24,7 +24,7 @@ class Guard:
     started again; with the secret of another recording it is worth nothing.
 
     Args:
-        private: whether only this computer, as itself, can come in; nobody needs the token then.
+        private: whether nobody needs the token, because only this computer, as itself, can come in.
         scheme: `http` or `https`.
         secret: of this recording.
         clock: [s].

@@ -5,13 +5,13 @@ import contextlib
 import json
 import time
 from collections import Counter, deque
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Any
 
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from handrail.collect.cockpit.lease import Lease
-from handrail.collect.cockpit.messages import LEASE, Answer, Drive, parse
+from handrail.collect.cockpit.messages import LEASE, Answer, Drive, Said, Stop, parse, stills
 from handrail.collect.cockpit.page_socket import REPLACED, PageSocket
 from handrail.collect.cockpit.pipe import (
     ANSWER,
@@ -24,6 +24,7 @@ from handrail.collect.cockpit.pipe import (
     OVER,
     PICTURE,
     STAGE,
+    STILL,
     STOP,
     Pipe,
 )
@@ -33,8 +34,7 @@ from handrail.controllers.errors import HandrailError
 
 MOST_PAGES = 32
 MOST_LATE = 0.3  # for how long there may have been a newer picture than the one that an input answers [s]
-_MOST_MESSAGES = 150.0  # from a page [1/s]
-_MOST_BAD = 50  # messages before a page is cut off
+_LAST_WORDS = 0.5  # for which a page that is cut off may still say STOP [s]
 
 
 class Hub:
@@ -52,6 +52,8 @@ class Hub:
         self._pages: set[PageSocket] = set()
         self._stage = self._card = ""
         self._stamps: deque[float] = deque(maxlen=64)  # of the frames that pages have got
+        self._presses: deque[int] = deque(maxlen=64)  # of STOP that were heard
+        self._stopped = -1.0  # when it was said last [s]
         self._was_free, self._is_over = True, False
         self.counts: Counter[str] = Counter()
 
@@ -69,6 +71,8 @@ class Hub:
         newest: dict[Any, bytes] = {}
         for kind, data in self._pipe.receive():
             newest[kind if kind != PICTURE else (PICTURE, data[:1])] = data
+            if kind == FRAME:  # also one that no page gets: inputs that do not answer it may be late
+                self._stamps.append(json.loads(data)["stamp"])
         now = time.monotonic()
         for kind, data in newest.items():
             if kind == STAGE:
@@ -83,7 +87,6 @@ class Hub:
                 self._card = f'{{"kind":"card","card":{data.decode()}}}'
                 self._deal()
             elif kind == FRAME:
-                self._stamps.append(json.loads(data)["stamp"])
                 self._show(f'{{"kind":"frame","frame":{data.decode()}}}', now)
             else:
                 for page in self._pages:
@@ -136,6 +139,7 @@ class Hub:
             pass  # it is gone, or takes nothing
         finally:
             delivery.cancel()
+            page.end()
             self._part(page)
 
     async def _replace(self, page: PageSocket) -> None:
@@ -156,28 +160,55 @@ class Hub:
         self._tell_all()
 
     async def _listen(self, page: PageSocket, delivery: "asyncio.Task[None]") -> None:
-        """Take a page's messages: a few of them bad, not too many a second."""
-        bad, allowance, before = 0, _MOST_MESSAGES, time.monotonic()
-        while bad < _MOST_BAD and not delivery.done() and page in self._pages:
-            message = await page.socket.receive()
-            if message["type"] == "websocket.disconnect":
-                return
-            now = time.monotonic()
-            allowance = min(_MOST_MESSAGES, allowance + _MOST_MESSAGES * (now - before)) - 1.0
-            before = now
-            if allowance < 0.0:
-                self.counts["messages too fast"] += 1
-                await asyncio.sleep(1.0 / _MOST_MESSAGES)
-                continue
-            try:
-                self._take(page, parse(message.get("text") or message.get("bytes") or ""), now)
-            except HandrailError as error:
-                bad += 1
-                self.counts["messages that make no sense"] += 1
-                if self._lease.drives(page.name):
-                    self._lose()
-                page.say("error", error=str(error))
+        """Take a page's messages; one that is cut off may still say STOP."""
+        while not delivery.done() and page in self._pages and not page.is_cut:
+            self._take_all(page, await page.hear(), time.monotonic())
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(_LAST_WORDS):
+                while page.is_cut:
+                    self._take_all(page, await page.hear(), time.monotonic())
         await page.socket.close(1008)
+
+    def _take_all(self, page: PageSocket, heard: list[str | bytes], now: float) -> None:
+        """Take messages that came together: STOP first, whatever was said before it.
+
+        Before it, and beyond what a page may say, only what takes motion away counts.
+        """
+        said = [_parsed(each) for each in heard]
+        stops = [n for n, each in enumerate(said) if isinstance(each, Stop) and self._is_new(each)]
+        if stops:
+            self._stop(said, now)
+        for number, each in enumerate(said if not page.is_cut else ()):
+            may = page.may_say(now)
+            if isinstance(each, HandrailError):
+                self._refuse(page, each)
+            elif stills(each) or (may and number >= max(stops, default=0)):
+                self._try(page, each, now)
+            else:
+                self.counts["messages before a stop" if may else "messages too fast"] += 1
+
+    def _is_new(self, stop: Stop) -> bool:
+        return stop.press not in self._presses
+
+    def _stop(self, said: list[Said | HandrailError], now: float) -> None:
+        """Stop the robot: anyone who sees danger may; a press that is said again counts once."""
+        self._presses.extend(each.press for each in said if isinstance(each, Stop) and each.press)
+        self._stopped = now
+        self._pipe.send_surely(STOP, b"", (STOP, ASK))
+
+    def _try(self, page: PageSocket, said: Said, now: float) -> None:
+        try:
+            self._take(page, said, now)
+        except HandrailError as error:
+            self._refuse(page, error)
+
+    def _refuse(self, page: PageSocket, error: HandrailError) -> None:
+        """Count a message that makes no sense; whoever drives so drives no more."""
+        page.bad += 1
+        self.counts["messages that make no sense"] += 1
+        if self._lease.drives(page.name):
+            self._lose()
+        page.say("error", error=str(error))
 
     def _deal(self) -> None:
         """Show the card to the page that drives: what a person answers is for nobody else."""
@@ -185,40 +216,47 @@ class Hub:
             if self._card and self._lease.drives(page.name):
                 page.offer(CARD, self._card)
 
-    def _take(self, page: PageSocket, said: Drive | Ask | Answer, now: float) -> None:
+    def _take(self, page: PageSocket, said: Said, now: float) -> None:
+        if isinstance(said, Stop):
+            return  # it was heard first
         if isinstance(said, Ask) and said.what in LEASE:
             drove = self._lease.holder
             (self._lease.take if said.what == "take" else self._lease.give)(page.name)
             if self._lease.holder != drove:
                 self._lose()
             self._tell_all()
-        elif isinstance(said, Ask) and said.what == "stop" and said.value:
-            self._pipe.send_surely(STOP, b"", (STOP, ASK))  # anyone who sees danger may stop it
         elif not self._lease.drives(page.name):
             self.counts["input of who does not drive"] += 1
         elif isinstance(said, Answer):
             self._pipe.send_surely(ANSWER, json.dumps(asdict(said)).encode())
         elif isinstance(said, Drive):
             self._drive(page, said, now)
+        elif said.what == "stop" and page.echo <= self._stopped:  # said before it could be seen
+            page.say("error", error="release: expected of a page that saw the robot stopped; press it again")
+        elif stills(said):
+            self._pipe.send_surely(STILL, json.dumps(asdict(said)).encode())
         elif self._stage:
             self._pipe.send_surely(ASK, json.dumps(asdict(said)).encode())
 
     def _drive(self, page: PageSocket, said: Drive, now: float) -> None:
-        """Pass an input on, unless it comes too late: who answers an old picture cannot steer."""
+        """Pass an input on; who answers an old picture cannot steer, only let go."""
         if said.echo > now or said.sequence <= page.sequence:
             raise HandrailError("drive: expected a time that this server has said, and seq to count up")
         page.sequence = said.sequence
         page.answered(said.echo, now)
+        self.hear()  # which pictures there have been meanwhile, also while this server stood still
         newer = next((stamp for stamp in self._stamps if stamp > said.echo), now)
         is_late = now - newer > MOST_LATE
         if is_late != page.is_late:
             page.is_late = is_late
             self._tell(page)
-        if is_late:
-            self.counts["input that came too late"] += 1
-            return
-        forward = {"inputs": asdict(said.inputs), "received": now, "round_trip": page.round_trip}
-        self._pipe.send(DRIVE, json.dumps(forward).encode())
+        self.counts["input that came too late"] += is_late
+        inputs = asdict(replace(said.inputs, on=said.inputs.on and not is_late))
+        forward = json.dumps({"inputs": inputs, "received": now, "round_trip": page.round_trip}).encode()
+        if stills(said):
+            self._pipe.send_surely(DRIVE, forward, (DRIVE,))
+        elif not is_late:
+            self._pipe.send(DRIVE, forward)
 
     def _lose(self) -> None:
         """Tell the recording that nobody drives now: who does next has to begin anew."""
@@ -247,3 +285,10 @@ class Hub:
             asking=self._lease.asking == page.name,
             late=driving and page.is_late,
         )
+
+
+def _parsed(message: str | bytes) -> Said | HandrailError:
+    try:
+        return parse(message)
+    except HandrailError as error:
+        return error

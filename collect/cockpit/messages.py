@@ -1,9 +1,10 @@
-"""What a page may say, checked where it comes in: three kinds of messages, a few numbers and words each.
+"""What a page may say, checked where it comes in: a few kinds of messages, a few numbers and words each.
 
 ```
 drive    seq, echo, on, device, grip, axes (one deflection a channel), view, targets (of the arm's joints)
                                  latest wins, many a second
 ask      what, value            each counts, once
+         stop, true, press      STOP; comes again, with the same number, until a frame says that it is so
 answer   card, item, value      to a question on a card; comes again until the card says that it is kept
 ```
 """
@@ -13,7 +14,7 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from handrail.collect.operators.person.inputs import ASKS, Ask, Inputs
+from handrail.collect.operators.person.inputs import ASKS, STILLS, Ask, Inputs
 from handrail.controllers.errors import HandrailError, shown
 
 LARGEST = 4096  # message [bytes]
@@ -43,6 +44,17 @@ class Answer:
 
 
 @dataclass(frozen=True)
+class Stop:
+    """The e-stop.
+
+    Attributes:
+        press: which one: a repeated message says the same number; 0 where the page counts none.
+    """
+
+    press: int = 0
+
+
+@dataclass(frozen=True)
 class Drive:
     """What a page says many times a second.
 
@@ -57,7 +69,17 @@ class Drive:
     inputs: Inputs
 
 
-def parse(text: str | bytes) -> Drive | Ask | Answer:
+Said = Drive | Ask | Answer | Stop
+
+
+def stills(said: Said) -> bool:
+    """Whether a message takes motion away: all is let go, or the robot is left at rest."""
+    if isinstance(said, Drive):
+        return not said.inputs.on or said.inputs.is_let_go
+    return isinstance(said, Stop) or (isinstance(said, Ask) and (said.what in STILLS or said.what == "give"))
+
+
+def parse(text: str | bytes) -> Said:
     """Return what a page said.
 
     Raises:
@@ -120,7 +142,10 @@ def _numbers(name: str, value: object, largest: float) -> tuple[float, ...]:
     return tuple(_number(name, each, -largest, largest) for each in value)
 
 
-def _ask(said: dict[str, Any]) -> Ask:
+def _ask(said: dict[str, Any]) -> Ask | Stop:
+    if said.get("what") == "stop" and said.get("value") is True:
+        press = said.get("press")
+        return Stop(press if type(press) is int else 0)  # whatever else it says, it is a stop
     _check_keys(said, ("what", "value"))
     what, value = said["what"], said["value"]
     if not isinstance(what, str) or what not in _KINDS:

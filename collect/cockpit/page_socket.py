@@ -1,13 +1,16 @@
-"""A connected page: gets what is newest of each kind, when it takes it."""
+"""A connected page: gets what is newest of each kind, when it takes it; says a few messages at a time."""
 
 import asyncio
 import json
 from typing import Any
 
-from starlette.websockets import WebSocket
+from starlette.websockets import WebSocket, WebSocketDisconnect
 
 SLOW = 10.0  # time in which a page must take what it is sent [s]
 REPLACED = 4001  # code of closing: the same page is open elsewhere
+_MOST_MESSAGES = 150.0  # [1/s]
+_MOST_AT_ONCE = 1000  # messages
+_MOST_BAD, _MOST_TOO_FAST = 50, 3000  # messages before it is cut off
 
 
 class PageSocket:
@@ -22,6 +25,8 @@ class PageSocket:
         echo: the newest time of the server that it has answered [s].
         round_trip: how long that answer took [s].
         is_late: whether what it says comes too late to steer.
+        bad: messages that made no sense.
+        too_fast: messages beyond what it may say, since it was quiet.
     """
 
     def __init__(self, socket: WebSocket, name: str) -> None:
@@ -30,6 +35,45 @@ class PageSocket:
         self._newest: dict[Any, str | bytes] = {}
         self._waiting = asyncio.Event()
         self._next: dict[Any, float] = {}
+        self.bad = self.too_fast = 0
+        self._allowance, self._before = _MOST_MESSAGES, 0.0
+        self._coming = asyncio.ensure_future(socket.receive())
+
+    @property
+    def is_cut(self) -> bool:
+        """Whether it has said too much that makes no sense, or far too much."""
+        return self.bad >= _MOST_BAD or self.too_fast >= _MOST_TOO_FAST
+
+    def may_say(self, now: float) -> bool:
+        """Count a message; return whether it has said no more than so many a second [s]."""
+        self._allowance = min(_MOST_MESSAGES, self._allowance + _MOST_MESSAGES * (now - self._before))
+        self._before = now
+        may = self._allowance >= 1.0
+        self.too_fast = 0 if self._allowance == _MOST_MESSAGES else self.too_fast + (not may)
+        self._allowance -= may
+        return may
+
+    async def hear(self) -> list[str | bytes]:
+        """Return all that has come and was not heard yet, the oldest first; wait for it.
+
+        Raises:
+            WebSocketDisconnect: it is gone.
+        """
+        heard: list[str | bytes] = []
+        while len(heard) < _MOST_AT_ONCE and (not heard or self._coming.done()):
+            message = await self._coming
+            if message["type"] == "websocket.disconnect":
+                if heard:
+                    break  # the next time
+                raise WebSocketDisconnect
+            heard.append(message.get("text") or message.get("bytes") or "")
+            self._coming = asyncio.ensure_future(self.socket.receive())
+            await asyncio.sleep(0)  # what is here already comes now
+        return heard
+
+    def end(self) -> None:
+        """Hear no more."""
+        self._coming.cancel()
 
     def offer(self, kind: Any, data: str | bytes) -> None:
         """Let it have a message; an older one of its kind that still waits is dropped."""

@@ -1,7 +1,8 @@
 """The pipe between the recording and the web server: whole messages, never a wait.
 
 The recording must not wait for a page, nor the server for the robot. What comes many times a second (frames,
-pictures, inputs) is dropped where there is no room; what is said once (a scene, a stop) waits until there is.
+pictures, inputs) is dropped where there is no room; what is said once (a scene, a mode) waits until there is.
+What takes motion away is never dropped, and goes first.
 """
 
 import socket
@@ -24,15 +25,17 @@ SETTINGS, FRAME, PICTURE, STAGE, CARD, OVER = (
     b"Q",
     b"O",
 )  # what the recording sends
-NOTE, DRIVE, ASK, STOP, LOST, DROPPED, ANSWER = (
+NOTE, DRIVE, ASK, STILL, STOP, LOST, DROPPED, ANSWER = (
     b"N",
     b"D",
     b"A",
+    b"a",
     b"!",
     b"L",
     b"-",
     b"R",
 )  # what the server sends
+_STILL = (STOP, LOST, STILL, DRIVE)  # what takes motion away: inputs only wait where all is let go
 
 
 class Pipe:
@@ -75,7 +78,9 @@ class Pipe:
         return went
 
     def send_surely(self, kind: bytes, data: bytes, instead_of: Collection[bytes] = ()) -> None:
-        """Send a message, later if there is no room now; of too many that wait the last ones are dropped.
+        """Send a message, later if there is no room now.
+
+        Of too many that wait the last ones are dropped, but none that takes motion away: it waits once.
 
         Args:
             kind: of the message.
@@ -85,13 +90,14 @@ class Pipe:
         Raises:
             HandrailError: the other end is gone.
         """
-        stale = [each for each in self._waiting if each[0] in instead_of]
+        stale = [each for each in self._waiting if each[0] in instead_of or each == (kind, data)]
         for each in stale:
             self._waiting.remove(each)
-        if len(self._waiting) >= _MOST_WAITING or len(data) > LARGEST:
+        is_full = len(self._waiting) >= _MOST_WAITING and kind not in _STILL
+        if is_full or len(data) > LARGEST:
             self.dropped[kind] += 1
             return
-        self._waiting.append((kind, data))
+        (self._waiting.appendleft if kind == STOP else self._waiting.append)((kind, data))
         self.flush()
 
     def flush(self) -> bool:

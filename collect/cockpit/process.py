@@ -34,6 +34,7 @@ class ServerProcess:
     Attributes:
         process: it.
         pipe: to it.
+        unread: what it has passed on, and nobody has obeyed yet.
         address: of the page; with the token after `#` where one is asked for.
 
     Raises:
@@ -45,6 +46,7 @@ class ServerProcess:
         self._folder = tempfile.TemporaryDirectory(prefix="handrail-cockpit-", ignore_cleanup_errors=True)
         self._settings = asdict(config) | {"folder": self._folder.name, "secret": secrets.token_urlsafe(32)}
         self._say, self._deaths = say, deque[float](maxlen=MOST_DEATHS)
+        self.unread: list[tuple[bytes, bytes]] = []
         self._start()
         try:
             self.address = self._wait()
@@ -79,7 +81,8 @@ class ServerProcess:
             HandrailError: it has died too often.
         """
         try:
-            messages = self.pipe.receive()
+            messages = self.unread + self.pipe.receive()
+            self.unread = []
             self.pipe.flush()
         except HandrailError:
             self._start_again()

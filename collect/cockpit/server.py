@@ -185,10 +185,10 @@ async def serve(pipe: Pipe, settings: dict[str, Any]) -> None:
     config = CockpitConfig(**settings)
     listener = _listening(config.host, config.port)
     scheme = "http" if config.is_private else "https"
-    guard, hub = Guard(config.is_private, scheme, secret), Hub(pipe)
+    guard, hub = Guard(not config.asks, scheme, secret), Hub(pipe)
     server = uvicorn.Server(_uvicorn(Site(hub, guard, folder), config))
     host, port = listener.getsockname()[:2]
-    door = "" if config.is_private else f"#{guard.token}"
+    door = f"#{guard.token}" if config.asks else ""
     shown = f"[{host}]" if ":" in host else host
     pipe.send_surely(
         NOTE, json.dumps({"address": f"{scheme}://{shown}:{port}/{door}", "port": port}).encode()

@@ -77,10 +77,13 @@ def report(
     for outcome in log.dropped:
         why = _DROPPED[None if outcome.practice else outcome.ended_by]
         console.print(f"not saved: {why}, seed {outcome.seed}")
+    if not episodes:
+        console.print("no episode was saved: nothing is left behind")
+        return
     console.print(f"{episodes} episodes, {frames} frames in {root}")
     if advice := packing_advice(root):
         console.print(advice)
-    if OPERATORS.find(config.operator).interactive and episodes:
+    if OPERATORS.find(config.operator).interactive and log.outcomes:
         console.print(*next_commands(root).splitlines(), sep="\n")
 
 

@@ -4,7 +4,7 @@ from typing import Any
 
 from handrail.collect.commands.account import RecordingLog, report
 from handrail.collect.commands.progress import recording_bar
-from handrail.collect.commands.recording import Recording, come_first, episode_seed, open_writer
+from handrail.collect.commands.recording import Recording, come_first, episode_seed, session_writer
 from handrail.collect.commands.shards import Shards
 from handrail.collect.commands.shared import record_shared
 from handrail.collect.commands.target import located
@@ -53,9 +53,11 @@ def record(config: RecordConfig) -> int:
         if interactive and not config.resume:  # before a person's page is opened, or their device
             check_target(Layout(config.dataset.folder.absolute()), config.overwrite)
         people = _people(config, env, console)
-        with open_writer(config, env) as writer:
+        with session_writer(config, env) as writer:
             if writer.repaired and not writer.repaired.clean:
                 console.print(str(writer.repaired))
+            if writer.num_episodes:
+                console.print(f"Adds to {writer.root}; episodes there: {writer.num_episodes}")
             recording = Recording(config, env, writer, people, displays)
             if interactive or env.real:
                 console.print("Getting ready; the first time on a computer takes about a minute.")

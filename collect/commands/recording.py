@@ -1,8 +1,8 @@
 """A session whose episodes become a dataset: what `handrail-record` and a user study share."""
 
 import os
-from collections.abc import Callable, Sequence
-from contextlib import closing, suppress
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import closing, contextmanager, suppress
 from dataclasses import replace
 from typing import Any, Protocol
 
@@ -157,6 +157,27 @@ def open_writer(config: RecordConfig, env: HandrailEnv) -> EpisodeWriter:
     if config.resume:
         return EpisodeWriter.resume(dataset.folder, manifest, config.verify)
     return EpisodeWriter.create(dataset.folder, manifest, config.overwrite)
+
+
+@contextmanager
+def session_writer(config: RecordConfig, env: HandrailEnv) -> Iterator[EpisodeWriter]:
+    """Open the writer of a recording's dataset; a session without episodes leaves nothing behind.
+
+    Raises:
+        HandrailError: the folder is taken, cannot be written, or holds another recording.
+    """
+    root = config.dataset.folder.absolute()
+    made = [folder for folder in (root, *root.parents) if not folder.exists()]
+    try:
+        with open_writer(config, env) as writer:
+            try:
+                yield writer
+            finally:
+                writer.erase_if_empty()
+    finally:
+        for folder in made:
+            with suppress(OSError):  # something is in it
+                folder.rmdir()
 
 
 def manifest_of(config: RecordConfig, env: HandrailEnv) -> Manifest:

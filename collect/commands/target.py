@@ -7,9 +7,11 @@ from dataclasses import replace
 from pathlib import Path
 
 from handrail.collect.commands.recording import open_writer
-from handrail.collect.config import RecordConfig
+from handrail.collect.config import FoundDatasetConfig, RecordConfig
 from handrail.collect.envs.env import HandrailEnv
 from handrail.controllers.errors import HandrailError
+from handrail.datasets.format.layout import Layout
+from handrail.datasets.recording.folder import is_dataset
 
 _TRIES = 100  # folders
 _NEXT = """Next:
@@ -19,7 +21,32 @@ _NEXT = """Next:
 
 
 def located(config: RecordConfig, env: HandrailEnv) -> RecordConfig:
-    """Return the settings of a recording with its folder: where nobody said one, the first that fits.
+    """Return the settings of a recording with its folder, and whether it adds to a dataset that is there.
+
+    Raises:
+        HandrailError: these episodes cannot be added to it.
+    """
+    if config.dataset.is_found:
+        return _found(config, env)
+    goes_on = isinstance(config.dataset, FoundDatasetConfig) and not (config.resume or config.overwrite)
+    if goes_on and is_dataset(Layout(config.dataset.folder.absolute())):
+        return _resumed(config, env)
+    return config
+
+
+def _resumed(config: RecordConfig, env: HandrailEnv) -> RecordConfig:
+    """Return the settings that add to the dataset that is there.
+
+    Raises:
+        HandrailError: these episodes cannot be added to it.
+    """
+    resumed = replace(config, resume=True)
+    open_writer(resumed, env).close()
+    return resumed
+
+
+def _found(config: RecordConfig, env: HandrailEnv) -> RecordConfig:
+    """Return the settings with the first folder that fits, where nobody said one.
 
     That is `outputs/cockpit/TASK` or the next one with a number: one that is free, or to which these episodes
     can be added.
@@ -27,15 +54,13 @@ def located(config: RecordConfig, env: HandrailEnv) -> RecordConfig:
     Raises:
         HandrailError: there is none.
     """
-    if not config.dataset.is_found:
-        return config
     first = config.dataset.folder / config.task.replace(":", "_")
     for folder in (first, *(first.with_name(f"{first.name}-{number}") for number in range(2, _TRIES))):
         there = replace(config, dataset=replace(config.dataset, place=str(folder)))
         if config.overwrite or not folder.exists():
             return there
-        with contextlib.suppress(HandrailError), open_writer(replace(there, resume=True), env):
-            return replace(there, resume=True)
+        with contextlib.suppress(HandrailError):
+            return _resumed(there, env)
     raise HandrailError(f"no folder for the dataset beside {str(first)!r}: say one")
 
 

@@ -14,12 +14,14 @@ class HandrailCockpitConfig(TeleoperatorConfig):
 
     Attributes:
         host: address to listen at; any other than 127.0.0.1 asks for a token, by HTTPS.
+        token: whether to ask for the token on 127.0.0.1 too; without, every account here can drive.
         port: to listen at; the next free one where it is taken; 0 for any.
-        open: whether to open the page in this computer's browser.
+        open: whether to open the page in this computer's browser, unless it asks for a token.
         certificate: folder of a certificate of your own, cert.pem and key.pem.
     """
 
     host: str = CockpitConfig.host
+    token: bool = False
     port: int = CockpitConfig.port
     open: bool = True
     certificate: str = ""
@@ -30,6 +32,6 @@ class HandrailCockpitConfig(TeleoperatorConfig):
         Raises:
             HandrailError: a setting is wrong.
         """
-        config = CockpitConfig(self.host, self.port, self.open, self.certificate)
+        config = CockpitConfig(self.host, self.token, self.port, self.open, self.certificate)
         config.check()
         return config

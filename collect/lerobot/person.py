@@ -92,7 +92,7 @@ class HandrailCockpit(_PersonTeleoperator):
         say = Terminal().print
         self._server = ServerProcess(self._settings, say)
         say(f"Drive at {self.address}")
-        if self._settings.open and self._settings.is_private:
+        if self._settings.opens:
             webbrowser.open(self.address)
         mode = session.mode
         modes = {mode.name: mode}

@@ -3,6 +3,7 @@
 from typing import Self
 
 from handrail.collect.cockpit.cockpit import Cockpit
+from handrail.collect.cockpit.pipe import STOP
 from handrail.collect.cockpit.process import ServerProcess
 from handrail.collect.commands.recording import Recording, come_first, open_writer
 from handrail.collect.envs.env import HandrailEnv
@@ -61,6 +62,9 @@ class Driving:
         self._mode, self.task = modes[mode], env.task_description
         offered = self._study.modes if "mode" in self._study.allow else (mode,)
         modes = {name: modes[name] for name in offered}
+        before: Cockpit | None = getattr(self, "_cockpit", None)
+        if before and before.is_stopped:
+            self._server.unread.append((STOP, b""))  # a STOP holds until somebody releases it
         self._cockpit = Cockpit(env.model, modes, mode, self._server, self._refuses)
         self._recording = Recording(config, env, self._writer, [self._cockpit])
         self._recording.warm_up(seed)

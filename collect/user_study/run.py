@@ -65,7 +65,7 @@ def _run(config: StudySessionConfig, folder: StudyFolder, study: UserStudy, say:
     server = ServerProcess(config.cockpit)
     try:
         say(f"Drive at {server.address}")
-        if config.cockpit.open and config.cockpit.is_private:
+        if config.cockpit.opens:
             webbrowser.open(server.address)
         with Interrupts() as interrupts, Driving(folder, study, who.name, server, interrupts) as driving:
             ending = Conductor(folder, study, who, Cards(server), driving, say).run()

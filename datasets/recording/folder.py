@@ -1,5 +1,6 @@
 """Whether a folder may become a dataset, and emptying one that the user gave up."""
 
+import contextlib
 import os
 from pathlib import Path
 
@@ -86,6 +87,18 @@ def clear_dataset(layout: Layout) -> None:
     if episodes.exists():
         os.replace(episodes, layout.staging / _GIVEN_UP)
     _clear_given_up(layout)
+
+
+def remove_dataset(layout: Layout) -> None:
+    """Remove a dataset as `clear_dataset` does, and that there was one; its folder and the lock stay.
+
+    Raises:
+        OSError: Something cannot be removed.
+    """
+    clear_dataset(layout)
+    remove(layout.manifest)
+    with contextlib.suppress(OSError):  # something else is in it
+        layout.manifest.parent.rmdir()
 
 
 def finish_clearing(layout: Layout) -> None:

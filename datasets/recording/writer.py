@@ -33,7 +33,13 @@ from handrail.datasets.format.schema import Feature, video_keys
 from handrail.datasets.format.tables import data_bytes, tasks_bytes
 from handrail.datasets.recording.checksums import Checksums
 from handrail.datasets.recording.episode import OpenEpisode, numeric_stats
-from handrail.datasets.recording.folder import check_folders, check_target, clear_dataset, clear_staging
+from handrail.datasets.recording.folder import (
+    check_folders,
+    check_target,
+    clear_dataset,
+    clear_staging,
+    remove_dataset,
+)
 from handrail.datasets.recording.repair import RepairReport, tidy_locked
 from handrail.datasets.storage.atomic import (
     explained,
@@ -195,6 +201,18 @@ class EpisodeWriter:
         """Forget the open episode; nothing of it stays on the disk."""
         self._check_usable()
         self._discard()
+
+    def erase_if_empty(self) -> None:
+        """Remove the dataset if it has no episode; one whose saving was interrupted is left for `resume`.
+
+        Raises:
+            HandrailError: Something cannot be removed.
+        """
+        if self.num_episodes or self._unusable:
+            return
+        with explained(f"cannot remove the empty dataset {str(self.root)!r}"):
+            self._discard()
+            remove_dataset(self._layout)
 
     def close(self) -> None:
         """Forget the open episode, remove the temporary files, give the dataset free. Safe to call twice."""

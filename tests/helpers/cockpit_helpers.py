@@ -111,3 +111,8 @@ def told(socket, kind, patience=60.0):
         if said["kind"] == kind:
             return said
     raise TimeoutError(kind)
+
+
+def ask_for(what, value=True, **more):
+    """Return a message of a page that asks for something once."""
+    return json.dumps({"kind": "ask", "what": what, "value": value, **more})

@@ -9,6 +9,7 @@ from contextlib import contextmanager, suppress
 from urllib.parse import urlsplit
 
 import numpy as np
+from cockpit_helpers import drive
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 from websockets.typing import Origin
@@ -70,6 +71,7 @@ class Witness:
         while self.frame["saved"] == saved:
             assert time.monotonic() < end, self.you
             driving = self.you.get("driving")
+            self.say(json.loads(drive(time.monotonic_ns() // 1_000_000, self.frame["stamp"], on=False)))
             if driving and self.frame["phase"] == "stopped":
                 self.say({"kind": "ask", "what": "stop", "value": False})
             self.say({"kind": "ask", "what": "failure" if driving else "take", "value": True})
@@ -105,7 +107,7 @@ class Relay:
         self._there = urlsplit(address).port
         self._listener = socket.create_server(("127.0.0.1", 0))
         self.address = f"http://127.0.0.1:{self._listener.getsockname()[1]}/"
-        self._pairs, self.is_cut = [], False
+        self._pairs, self.is_cut, self.most = [], False, 1e9  # bytes a second from the page
         threading.Thread(target=self._accept, daemon=True).start()
 
     def _accept(self):
@@ -114,15 +116,16 @@ class Relay:
                 here, _ = self._listener.accept()
                 there = socket.create_connection(("127.0.0.1", self._there))
                 self._pairs.append((here, there))
-                for ends in ((here, there), (there, here)):
+                for ends in ((here, there, lambda: self.most), (there, here, lambda: 1e9)):
                     threading.Thread(target=self._pass, args=ends, daemon=True).start()
 
-    def _pass(self, source, target):
+    def _pass(self, source, target, most):
         with suppress(OSError):
-            while data := source.recv(65536):
+            while data := source.recv(65536 if most() > 65536 else 256):
                 while self.is_cut:  # nothing passes, and nobody is told
                     time.sleep(0.05)
                 target.sendall(data)
+                time.sleep(len(data) / most())
             target.shutdown(socket.SHUT_WR)
 
     def break_off(self):

@@ -4,6 +4,8 @@ import dataclasses
 import io
 import re
 import shlex
+import subprocess
+import sys
 from collections import Counter
 from pathlib import Path
 from typing import Any, get_args, get_type_hints
@@ -213,3 +215,19 @@ def test_a_table_keeps_units_and_words_whole():
     row = ("0", "direct_filtered", "no", "timeout", "30.0", "0.088", "-2.20", "0")
     words = shown(Table(headings, [row])).split()
     assert {*" ".join(headings).split(), *row} <= set(words)
+
+
+@pytest.mark.parametrize(
+    "words", [["cockpit"], ["record", "x", "--operator=gamepad"], ["study_session", "run", "x", "P"]]
+)
+def test_who_waits_is_told_so_before_anything_heavy_is_loaded(words):
+    code = (
+        "import importlib, sys\n"
+        "heavy = ('mujoco', 'casadi', 'pinocchio', 'scipy', 'numba', 'lerobot')\n"
+        "sys.modules.update(dict.fromkeys(heavy))  # to load one of them fails\n"
+        "sys.argv = ['handrail', *sys.argv[2:]]\n"
+        f"importlib.import_module('handrail.scripts.{words[0]}').main()\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code, *words], capture_output=True, text=True, timeout=60)
+    assert done.stderr.startswith(f"{cli.STARTING}\n"), done.stderr
+    assert "ModuleNotFoundError" in done.stderr

@@ -1,5 +1,6 @@
 // The connection to the server: says where the inputs are, hears what happens; comes back by itself.
 const RETRY = 700; // [ms]
+const AGAIN = 200; // between two times that STOP is said [ms]
 const REPLACED = 4001; // this page is open elsewhere too, a copy of the tab: that one drives
 
 function pageName() {
@@ -17,6 +18,8 @@ export class Link {
     this.handlers = handlers;
     this.sequence = 0;
     this.stamp = 0;
+    this.press = 0; // which press of STOP the robot has not answered yet; 0 for none
+    setInterval(() => { if (!this.isClogged) this.sayStop(); }, AGAIN);
     this.open();
   }
 
@@ -44,6 +47,7 @@ export class Link {
     const said = JSON.parse(data);
     if (said.kind === "over") this.leave();
     if (said.kind === "frame") this.stamp = said.frame.stamp;
+    if (said.frame?.phase === "stopped") this.press = 0;
     this.handlers[said.kind](said[said.kind] ?? said);
   }
 
@@ -57,18 +61,30 @@ export class Link {
     return this.socket.readyState === WebSocket.OPEN;
   }
 
+  get isClogged() {
+    return this.isOpen && this.socket.bufferedAmount > 4096;
+  }
+
   say(message) {
     if (this.isOpen) this.socket.send(JSON.stringify(message));
   }
 
   // Where the inputs are; left out while what was said before is not gone yet: only the newest counts.
+  // After STOP nobody steers until the robot has stopped.
   drive(input) {
-    if (this.isOpen && this.socket.bufferedAmount > 4096) return;
+    if (this.isClogged) return;
     this.sequence += 1;
-    this.say({ kind: "drive", seq: this.sequence, echo: this.stamp, ...input });
+    this.say({ kind: "drive", seq: this.sequence, echo: this.stamp, ...input, on: input.on && !this.press });
   }
 
   ask(what, value = true) {
-    this.say({ kind: "ask", what, value });
+    if (what !== "stop" || !value) return this.say({ kind: "ask", what, value });
+    this.press = 1 + crypto.getRandomValues(new Uint32Array(1))[0];
+    return this.sayStop();
+  }
+
+  // Said again until a frame says that the robot is stopped; the number says that it is the same press.
+  sayStop() {
+    if (this.press) this.say({ kind: "ask", what: "stop", value: true, press: this.press });
   }
 }

@@ -123,7 +123,7 @@ export class Panels {
     for (const id of NEEDS.begun) byId(id).disabled = !isDriver || frame.phase === "ready";
     for (const id of [...NEEDS.driver, ...NEEDS.choices]) byId(id).disabled = !isDriver;
     for (const each of document.querySelectorAll("#owned button, #channels button, #locks input, [data-focus]")) each.disabled = !isDriver;
-    byId("stop").disabled = !isConnected || Boolean(over);
+    byId("stop").disabled = Boolean(over); // without a connection, too: it is said when there is one
   }
 
   frame(frame) {

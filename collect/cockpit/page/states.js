@@ -20,6 +20,7 @@ function nameOf({ isConnected, isDriver, frame }) {
 }
 
 function overWords({ saved, folder, next }) {
+  if (!saved) return "Recording is over: no episode was saved.";
   const what = `Recording is over: ${saved} ${saved === 1 ? "episode" : "episodes"}${folder ? ` in ${folder}` : ""}.`;
   return next.length ? `${what}\nNext:\n${next.join("\n")}` : what;
 }

@@ -53,6 +53,7 @@ ASKS: Mapping[str, type] = {
     "speed": float,
     "lock": list,
 }
+STILLS = frozenset(("pause", "success", "failure", "discard", "restart", "quit", "undo"))  # leave it at rest
 
 
 @dataclass(frozen=True)

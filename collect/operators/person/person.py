@@ -20,20 +20,13 @@ import numpy as np
 
 from handrail.collect.operators.modes import TeleopMode, mode_of_mask
 from handrail.collect.operators.operator import EpisodeEvent, View
-from handrail.collect.operators.person.inputs import Ask, Inputs
+from handrail.collect.operators.person.inputs import STILLS, Ask, Inputs
 from handrail.collect.operators.person.meaning import HAND_FRAMES, InputMeaning, Setting
 from handrail.controllers.interface.intent import Intent
 from handrail.controllers.robot.model import RobotModel
 
 MOST_AGE = 0.25  # of an input that steers [s]
-_EVENTS = {
-    "success": EpisodeEvent.SUCCESS,
-    "failure": EpisodeEvent.FAILURE,
-    "discard": EpisodeEvent.DISCARD,
-    "restart": EpisodeEvent.RESTART,
-    "quit": EpisodeEvent.QUIT,
-    "undo": EpisodeEvent.UNDO,
-}
+_EVENTS = {what: EpisodeEvent(what) for what in STILLS - {"pause"}}
 
 
 class Phase(StrEnum):

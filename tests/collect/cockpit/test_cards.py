@@ -4,11 +4,11 @@ import json
 import time
 
 import pytest
-from cockpit_helpers import drive, heard, page, server, stage, told
+from cockpit_helpers import drive, heard, heard_by, page, server, stage, told
 
 from handrail.collect.cockpit.cards import Cards
 from handrail.collect.cockpit.messages import Answer, parse
-from handrail.collect.cockpit.pipe import ANSWER
+from handrail.collect.cockpit.pipe import ANSWER, STOP
 from handrail.controllers.errors import HandrailError
 
 CARD = {"id": "ee/tlx", "title": "How was it?", "answers": {"mental": 40}}
@@ -83,6 +83,19 @@ def test_cards_hear_answers_and_leave_out_what_devices_say(served):
         while not found and time.monotonic() < until:
             found += cards.hear()
         assert found == [Answer("ee/tlx", "mental", 45)]
+
+
+def test_a_stop_between_episodes_is_left_for_the_next_one(served):
+    cards = Cards(served)
+    with page(served, "page-number-one") as socket:
+        told(socket, "you")
+        socket.send(json.dumps({"kind": "ask", "what": "stop", "value": True}))
+        socket.send(said())
+        while not cards.hear():
+            pass
+        cards.hear(0.0)
+        assert heard_by(served, {STOP}) == [STOP]
+        assert not heard_by(served, {STOP}, patience=0.1)
 
 
 def test_a_card_that_nobody_acknowledges_is_shown_again(served):

@@ -195,6 +195,32 @@ def test_a_cable_that_is_pulled(chromium, recording, witness):
         made.check_braked(recording, happened)
 
 
+@pytest.mark.parametrize("most", [0, 4000])
+def test_stop_over_a_connection_that_is_stuck(chromium, recording, witness, most):
+    """What was held before it arrives at once, or slowly; it is released once, and stays so."""
+    with pulled(chromium, recording, witness) as (made, relay):
+        relay.is_cut, relay.most = not most, most or relay.most
+        witness.until(is_still)
+        time.sleep(4.5)
+        made.page.keyboard.press("Space")
+        time.sleep(0.5)
+        relay.is_cut, relay.most = False, 1e9
+        witness.until(lambda frame: frame["phase"] == "stopped")
+        made.page.keyboard.up("KeyW")
+        time.sleep(0.3)
+        made.page.keyboard.down("KeyW")
+        time.sleep(1.0)
+        assert is_still(witness.frame)
+        made.page.keyboard.up("KeyW")
+        made.driver.expect_phase("STOPPED")
+        made.page.keyboard.press("Enter")
+        made.driver.expect_phase("paused")
+        made.page.keyboard.press("Enter")
+        made.press()
+        made.page.keyboard.up("KeyW")
+        made.check_braked(recording, time.time())
+
+
 def renderers():
     """Return the processes of pages of this test's browsers."""
     return {pid for pid, words in family(os.getpid()).items() if "--type=renderer" in words}

@@ -1,12 +1,19 @@
 """Laws of the real page: who comes back goes on; who comes second watches, until they are given the wheel."""
 
+import json
+import time
+
 import numpy as np
 import pytest
 
 pytest.importorskip("playwright.sync_api", reason="the extra 'dev' is not installed")
-from page_driver import PageDriver
+from cockpit_helpers import heard, server, show
+from cockpit_witness import Relay, closing
+from page_driver import SLOW, PageDriver
 from page_recording import is_smooth, is_whole, recording, saved
 from playwright.sync_api import expect
+
+from handrail.collect.cockpit.pipe import STOP
 
 pytestmark = pytest.mark.slow
 
@@ -77,3 +84,30 @@ def test_anyone_who_sees_danger_may_stop_it(new_page, tmp_path):
         first.expect_phase("paused")
         first.press("Escape")
         assert process.wait(60) == 0
+
+
+def test_the_page_says_stop_until_it_is_so(new_page):
+    """Also when the connection breaks meanwhile; it is the same press all the time, and all that is said."""
+    with server() as served, closing(Relay(served.address)) as relay:
+        page, said = new_page(), []
+        page.on(
+            "websocket", lambda socket: socket.on("framesent", lambda text: said.append(json.loads(text)))
+        )
+        with page.expect_websocket(timeout=SLOW):
+            page.goto(relay.address)
+        page.wait_for_timeout(1000)
+        page.locator("#stop").click()
+        for _ in range(2):
+            before, end = len(said), time.monotonic() + 60.0
+            relay.break_off()
+            while len(said) < before + 3:
+                assert time.monotonic() < end, said
+                page.wait_for_timeout(100)
+        assert heard(served, {STOP}, 2, patience=1.0) == [(STOP, b"")]
+        show(served, phase="stopped")
+        page.wait_for_timeout(1000)
+        before = len(said)
+        page.wait_for_timeout(1000)
+        assert len(said) == before
+        assert {each["what"] for each in said} == {"stop"}
+        assert len({each["press"] for each in said}) == 1

@@ -4,7 +4,19 @@ from contextlib import suppress
 
 import pytest
 
-from handrail.collect.cockpit.pipe import ASK, DRIVE, FRAME, LARGEST, LOST, PICTURE, STAGE, STOP, Pipe
+from handrail.collect.cockpit.pipe import (
+    ANSWER,
+    ASK,
+    DRIVE,
+    FRAME,
+    LARGEST,
+    LOST,
+    PICTURE,
+    STAGE,
+    STILL,
+    STOP,
+    Pipe,
+)
 from handrail.controllers.errors import HandrailError
 
 
@@ -65,7 +77,24 @@ def test_a_stop_takes_the_place_of_what_waits(ends):
         ours.send_surely(STOP, b"", (STOP, ASK))
     theirs.receive()
     assert ours.flush()
-    assert theirs.receive() == [(LOST, b""), (STOP, b"")]
+    assert theirs.receive() == [(STOP, b""), (LOST, b"")]
+
+
+def test_what_takes_motion_away_is_never_dropped(ends):
+    ours, theirs = ends
+    fill(ours)
+    for number in range(500):
+        ours.send_surely(ANSWER, b"%d" % number)
+    taking = [(STOP, b""), (LOST, b""), (STILL, b"success"), (STILL, b"quit"), (DRIVE, b"let go")]
+    for _ in range(2):
+        for kind, data in reversed(taking):
+            ours.send_surely(kind, data)
+    theirs.receive()
+    while not ours.flush():
+        pass
+    found = [each for each in theirs.receive() if each[0] != ANSWER]
+    assert found[0] == (STOP, b"")
+    assert sorted(found) == sorted(taking)
 
 
 def test_frames_that_clog_one_way_leave_the_other_free(ends):

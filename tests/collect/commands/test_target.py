@@ -1,16 +1,18 @@
-"""Laws of a folder that nobody said: a dataset that fits goes on, another one is left alone."""
+"""Laws of a cockpit's folder, said or not: a dataset that fits goes on, another one is left alone."""
 
 from dataclasses import replace
 
 import pytest
 
-from handrail.collect.commands.recording import open_writer
+from handrail.collect.commands.record import record
+from handrail.collect.commands.recording import open_writer, session_writer
 from handrail.collect.commands.target import located, next_commands
-from handrail.collect.config import DriveConfig, FoundDatasetConfig
+from handrail.collect.config import DatasetConfig, DriveConfig, FoundDatasetConfig, RecordConfig
 from handrail.collect.session.build import build_env
 from handrail.controllers.errors import HandrailError
 
 PLAIN = DriveConfig(physics=False)
+ENV = build_env(PLAIN, PLAIN.dataset.fps)
 
 
 def opened(config=PLAIN):
@@ -56,11 +58,39 @@ def test_what_is_no_dataset_is_left_alone(tmp_path):
     assert opened()[0].name == "reach-2"
 
 
-def test_a_folder_that_is_said_is_never_another(tmp_path):
+def test_a_folder_that_is_said_goes_on_and_is_never_another(tmp_path):
     said = replace(PLAIN, dataset=FoundDatasetConfig(place=str(tmp_path / "mine")))
-    assert opened(said)[0] == tmp_path / "mine"
-    with pytest.raises(HandrailError, match="exists already"):
-        opened(said)
+    for resume in (False, True):
+        root, config = opened(said)
+        assert root == tmp_path / "mine"
+        assert config.resume is resume
+    with pytest.raises(HandrailError, match="fps"):
+        opened(replace(said, dataset=replace(said.dataset, fps=30)))
+    with pytest.raises(HandrailError, match="exists already"):  # `handrail-record` is asked to
+        opened(RecordConfig(task="reach", physics=False, dataset=DatasetConfig(place=str(root))))
+
+
+@pytest.mark.parametrize("place", ["", "mine"])
+def test_a_session_adds_in_the_same_words_and_without_episodes_leaves_nothing(tmp_path, place, capsys):
+    config = replace(PLAIN, operator="scripted", dataset=FoundDatasetConfig(place=place, num_episodes=1))
+    root = tmp_path / (place or "outputs/cockpit/reach")
+    with session_writer(located(config, ENV), ENV) as writer:
+        assert writer.root == root
+    assert not list(tmp_path.iterdir())
+    assert record(config) == record(config) == 0
+    assert f"Adds to {root}; episodes there: 1\n" in capsys.readouterr().err
+    before = sorted(root.rglob("*"))
+    with session_writer(located(config, ENV), ENV) as writer:
+        assert writer.num_episodes == 2
+    assert sorted(root.rglob("*")) == before
+
+
+def test_what_lies_beside_a_dataset_without_episodes_stays(tmp_path):
+    config = replace(PLAIN, dataset=FoundDatasetConfig(place="mine"))
+    (tmp_path / "mine").mkdir()
+    with session_writer(located(config, ENV), ENV) as writer:
+        (writer.root / "notes.txt").write_text("mine")
+    assert list(tmp_path.rglob("*")) == [tmp_path / "mine", tmp_path / "mine" / "notes.txt"]
 
 
 def test_where_nothing_can_be_written_it_says_so(tmp_path):
