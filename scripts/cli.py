@@ -14,10 +14,11 @@ import tyro
 
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.numerics.first_use import tell_when_compiling
+from handrail.datasets.storage.interrupts import Interrupts
+from handrail.scripts import INTERRUPTED
 
 BAD_INPUT = 2
 FAILED = 1
-INTERRUPTED = 130
 VERSION = "--version"
 COMPILING = "Compiling the controller for this machine, once; this can take a minute …"
 
@@ -65,12 +66,14 @@ def command[Config](
 
 
 def run(main: Callable[[], int | None]) -> NoReturn:
-    """Run a command's body; an expected error becomes one line and exit code 2."""
+    """Run a command's body; an expected error becomes one line and exit code 2, an interrupt one and 130."""
     if isinstance(sys.stdout, io.TextIOWrapper):  # one that is not Unicode gets a "?" for what it lacks
         sys.stdout.reconfigure(errors="replace")
     tell_when_compiling(lambda: print(COMPILING, file=sys.stderr, flush=True))
     try:
-        sys.exit(main())
+        with Interrupts():
+            code = main()
+        sys.exit(code)
     except HandrailError as error:
         fail(str(error), BAD_INPUT)
     except BrokenPipeError:

@@ -27,6 +27,11 @@ class Interrupts:
         for number, handler in self._previous.items():
             signal.signal(number, handler)
 
+    @property
+    def asked(self) -> bool:
+        """Whether an interrupt has come."""
+        return self._asked
+
     @contextlib.contextmanager
     def deferred(self) -> Iterator[None]:
         """Let the block finish before an interrupt takes effect."""
