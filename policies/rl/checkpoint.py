@@ -34,7 +34,8 @@ SHOWN = {
 """What the figure of a curve shows."""
 _NETWORKS, _TRANSITIONS, _CURVE = "model.zip", "replay_buffer.npz", "curve.json"
 _ARRAYS = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
-_ROW = {"steps", "updates", "seconds", *SHOWN}  # what every row of the curve has
+_UNTIL = {"steps", "updates", "seconds"}  # what the last row of the curve has, of an interrupted run
+_ROW = {*_UNTIL, *SHOWN}  # and every other one
 _STEPS = re.compile(r"\d{8}", re.ASCII)  # name of a checkpoint
 _ENTROPY = "log_ent_coef"
 _WRITTEN = ("config.json", "actor.json", "actor.npz", "curve.png")
@@ -78,8 +79,8 @@ def check_resumes(config: TrainRlConfig) -> Path:
     return last
 
 
-def resume_run(last: Path, model: SAC) -> Curve:
-    """Give a model all that a checkpoint has, transitions too; return the curve until then.
+def resume_run(last: Path, model: SAC) -> tuple[Curve, float]:
+    """Give a model all that a checkpoint has, transitions too; return the curve and the time [s] until then.
 
     Args:
         last: checkpoint of the run.
@@ -99,7 +100,8 @@ def resume_run(last: Path, model: SAC) -> Curve:
     assert model.replay_buffer is not None
     _read_transitions(last / _TRANSITIONS, model.replay_buffer)
     model.num_timesteps, model._n_updates = int(last.name), int(curve[-1]["updates"])
-    return curve
+    evaluated = [row for row in curve if row.keys() >= _ROW]
+    return evaluated, curve[-1]["seconds"]
 
 
 def last_networks(folder: Path) -> Mapping[str, Any]:
@@ -115,11 +117,19 @@ def last_networks(folder: Path) -> Mapping[str, Any]:
     return parameters["policy"]
 
 
-def write_checkpoint(folder: Path, model: SAC, actor: Actor, curve: Curve) -> None:
-    """Write a checkpoint under another name, rename it, and remove the one before."""
+def write_checkpoint(folder: Path, model: SAC, actor: Actor | None, curve: Curve) -> None:
+    """Write a checkpoint under another name, rename it, and remove the one before.
+
+    Args:
+        folder: of the run.
+        model: in training.
+        actor: of the model, if it was evaluated.
+        curve: until now; the last row says how far the training is.
+    """
     name = f"{model.num_timesteps:08d}"
-    (folder / "actors").mkdir(exist_ok=True)
-    actor.save(folder / "actors" / f"{name}.npz")
+    if actor is not None:
+        (folder / "actors").mkdir(exist_ok=True)
+        actor.save(folder / "actors" / f"{name}.npz")
     last, final = _last(folder), folder / "checkpoints" / name
     partial = final.with_suffix(".partial")
     shutil.rmtree(partial, ignore_errors=True)
@@ -193,7 +203,8 @@ def _curve(path: Path, steps: int) -> Curve:
     """Return the curve of a checkpoint after so many steps."""
     curve = load_json(path, "the curve of a training run")
     rows = curve if isinstance(curve, list) and all(map(is_amounts, curve)) else []
-    if not rows or not all(row.keys() >= _ROW for row in rows) or rows[-1]["steps"] != steps:
+    whole = all(row.keys() >= _ROW for row in rows[:-1]) and all(row.keys() >= _UNTIL for row in rows[-1:])
+    if not rows or not whole or rows[-1]["steps"] != steps:
         raise HandrailError(
             f"{str(path)!r}: expected the curve of a training run until step {steps}, got {curve!r:.80}"
         )

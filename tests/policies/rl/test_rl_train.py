@@ -1,12 +1,15 @@
 """Training: a run can be stopped and resumed, its settings stay, and what it writes can be used."""
 
 import json
+import os
+import signal
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from handrail.controllers.errors import HandrailError
+from handrail.policies.rl import evaluation
 from handrail.policies.rl.config import TrainRlConfig
 from handrail.policies.rl.evaluation import FINAL_SEED, evaluate, evaluation_goals, means
 from handrail.policies.rl.policy import Actor
@@ -15,7 +18,7 @@ pytest.importorskip("stable_baselines3")
 pytest.importorskip("tensorboard")
 from stable_baselines3 import SAC
 
-from handrail.policies.rl.train import train
+from handrail.policies.rl.train import Watch, train
 
 TINY = TrainRlConfig(
     steps=60,
@@ -155,3 +158,26 @@ def test_only_a_training_run_is_overwritten(tmp_path):
 def test_settings_that_make_no_sense_are_refused(change):
     with pytest.raises(HandrailError, match="expected"):
         replace(TINY, **change).check()
+
+
+@pytest.mark.parametrize(("at", "steps"), [("step", 31), ("evaluation", 40)])
+def test_an_interrupted_run_saves_a_checkpoint_and_goes_on(at, steps, tmp_path, monkeypatch):
+    """SIGTERM comes before the first evaluation, or during it; no evaluation is waited for."""
+    config, told = replace(TINY, output_dir=str(tmp_path / "rl"), goals=2, steps=50), []
+
+    def terminate(*arguments):
+        told.append(1) or os.kill(os.getpid(), signal.SIGTERM)
+        return arguments and scored(*arguments)
+
+    scored = evaluation._score
+    with monkeypatch.context() as patch:
+        if at == "step":
+            patch.setattr(Watch, "_on_rollout_end", lambda self: self.num_timesteps == 30 and terminate())
+        patch.setattr(evaluation, "_score", terminate)
+        with pytest.raises(KeyboardInterrupt, match=f"interrupted; --resume goes on after step {steps}$"):
+            train(config)
+    assert len(told) == 1
+    assert [path.name for path in (config.folder / "checkpoints").iterdir()] == [f"{steps:08d}"]
+    record = train(replace(config, resume=True))
+    assert [row["steps"] for row in record["curve"]] == ([40, 50] if at == "step" else [50])
+    assert record["updates"] == 29  # the interrupted step makes none

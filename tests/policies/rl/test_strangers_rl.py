@@ -156,7 +156,7 @@ def test_malformed_settings_are_one_line(content, run):
 def test_a_run_goes_on_with_all_that_it_had(honest):
     """Law: networks, optimisers, temperature, transitions and counters are those of the checkpoint."""
     model = new_model(honest)
-    curve = resume_run(checkpoint(honest), model)
+    curve, _ = resume_run(checkpoint(honest), model)
     place = checkpoint(honest)
     from stable_baselines3 import SAC
 
