@@ -6,7 +6,7 @@ are read here: networks and optimisers from `model.zip`, transitions from `repla
 
 import re
 import shutil
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any, cast
@@ -19,6 +19,7 @@ from stable_baselines3.common.save_util import load_from_zip_file
 
 from handrail.controllers.entries import is_amounts
 from handrail.controllers.errors import HandrailError, message_of
+from handrail.controllers.regular_file import open_regular, regular
 from handrail.datasets.storage.atomic import publish_folder
 from handrail.datasets.storage.strict_json import load_json, write_json
 from handrail.policies.imitation.interface.trust import check_links
@@ -104,17 +105,18 @@ def resume_run(last: Path, model: SAC) -> tuple[Curve, float]:
     return evaluated, curve[-1]["seconds"]
 
 
-def last_networks(folder: Path) -> Mapping[str, Any]:
-    """Return actor, critics and target critics of a run's last checkpoint, without the optimisers' memory.
+def start_from(folder: Path, model: SAC) -> None:
+    """Give a model actor, critics and target critics of a run's last checkpoint, not the optimisers' memory.
 
     Raises:
         HandrailError: there is no checkpoint, or it is broken.
     """
     last = _there(folder, "--start_from")
     parameters, _ = _tensors(last / _NETWORKS)
-    if "policy" not in parameters:
-        raise _broken(last / _NETWORKS, "no policy")
-    return parameters["policy"]
+    try:
+        model.policy.load_state_dict(parameters["policy"])
+    except Exception as error:  # of PyTorch: whatever the tensors are, they do not fit
+        raise _broken(last / _NETWORKS, error) from error
 
 
 def write_checkpoint(folder: Path, model: SAC, actor: Actor | None, curve: Curve) -> None:
@@ -171,10 +173,21 @@ def _there(folder: Path, flag: str) -> Path:
 def _tensors(path: Path) -> tuple[Mapping[str, Any], Mapping[str, torch.Tensor]]:
     """Return state dictionaries and single tensors of a model; what is pickled beside them is not read."""
     try:
-        _, parameters, variables = load_from_zip_file(path, load_data=False, device="cpu")
+        _, parameters, variables = load_from_zip_file(regular(path), load_data=False, device="cpu")
     except Exception as error:  # of zipfile, pickle and PyTorch: whatever the file holds, it is refused
         raise _broken(path, error) from error
+    if not all(values.isfinite().all() for values in _leaves([parameters, variables])):
+        raise _broken(path, "NaN or infinity")
     return parameters, variables or {}
+
+
+def _leaves(content: Any) -> Iterator[torch.Tensor]:
+    """Yield every tensor in nested state dictionaries."""
+    if isinstance(content, torch.Tensor):
+        yield content
+    elif isinstance(content, Mapping | list):
+        for each in content.values() if isinstance(content, Mapping) else content:
+            yield from _leaves(each)
 
 
 def _read_transitions(path: Path, buffer: ReplayBuffer) -> None:
@@ -184,7 +197,7 @@ def _read_transitions(path: Path, buffer: ReplayBuffer) -> None:
             " --start_from begins a new run with the networks of this one"
         )
     try:
-        with open(path, "rb") as file, np.load(file, allow_pickle=False) as arrays:
+        with open_regular(path) as file, np.load(file, allow_pickle=False) as arrays:
             place, full = map(int, arrays["place"])
             found = {name: arrays[name] for name in _ARRAYS}
     except Exception as error:  # of NumPy and zipfile: whatever the file holds, it is refused

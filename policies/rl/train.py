@@ -29,8 +29,8 @@ from handrail.policies.rl.checkpoint import (
     begin_run,
     check_resumes,
     evaluated_actors,
-    last_networks,
     resume_run,
+    start_from,
     write_checkpoint,
 )
 from handrail.policies.rl.config import TrainRlConfig
@@ -157,7 +157,7 @@ def _new(config: TrainRlConfig) -> tuple[SAC, Curve, float]:
     begin_run(config)
     model = new_model(config)
     if config.start_from:
-        model.policy.load_state_dict(last_networks(Path(config.start_from).expanduser()))
+        start_from(Path(config.start_from).expanduser(), model)
     return model, [], 0.0
 
 

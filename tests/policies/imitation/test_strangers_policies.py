@@ -5,11 +5,12 @@ import os
 import pickle
 import shutil
 
+import numpy as np
 import pytest
 from command_helpers import command
 from policy_helpers import untrained_act
-from safetensors.numpy import save_file
-from training_helpers import tiny, write_dataset
+from safetensors.numpy import load_file, save_file
+from training_helpers import cut, tiny, write_dataset
 
 from handrail.controllers.errors import HandrailError
 from handrail.policies.imitation.evaluation.config import EvaluateConfig
@@ -164,6 +165,39 @@ def test_weights_are_safetensors(name, policy, tmp_path):
     assert "\n" not in str(raised.value)
     assert command("--policy", policy, "--episodes", 1, name="evaluate").returncode == 2
     assert not (tmp_path / "marker").exists()
+
+
+def spoil(file, how):
+    """Give one array of a safetensors file another name or a NaN, or leave it out."""
+    arrays = {name: values.copy() for name, values in load_file(file).items()}
+    name = "model.action_head.weight" if "model.action_head.weight" in arrays else "observation.state.mean"
+    values = arrays[name]
+    if how in ("foreign", "missing"):
+        gone = {key for key in arrays if key.startswith(name.removesuffix("mean"))}
+        arrays = {key: each for key, each in arrays.items() if key not in gone}
+    if how == "foreign":
+        arrays["stranger.mean"] = values
+    if how == "nan":
+        values.flat[0] = np.nan
+    if how == "endless":
+        values.flat[0] = np.inf
+    save_file(arrays, file)
+
+
+@pytest.mark.parametrize("how", ["foreign", "missing", "nan", "endless"])
+@pytest.mark.parametrize("file", ["model", "policy_preprocessor_*_normalizer_processor"])
+def test_weights_and_statistics_are_the_policy_s_and_finite(file, how, trained, tmp_path):
+    """Law: a policy that would drive at random is refused, to be evaluated and to learn on."""
+    config = cut(trained[1], tmp_path / "training")
+    place = model_folder(config.folder)
+    (spoilt,) = place.glob(f"{file}.safetensors")
+    assert load_policy(place).meta
+    spoil(spoilt, how)
+    once = EvaluateConfig(policy=(str(place),), episodes=1, workers=1)
+    for use in (lambda: load_policy(place), lambda: evaluate(once), lambda: train(config, quiet=True)):
+        with pytest.raises(HandrailError, match=r"policy '.*training") as raised:
+            use()
+        assert "\n" not in str(raised.value)
 
 
 @pytest.mark.parametrize("place", ["repository", "folder", "absolute"])
