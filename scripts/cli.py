@@ -5,6 +5,7 @@ import functools
 import importlib.metadata
 import inspect
 import io
+import os
 import re
 import sys
 from collections.abc import Callable, Sequence
@@ -12,7 +13,7 @@ from typing import NoReturn
 
 import tyro
 
-from handrail.controllers.errors import HandrailError
+from handrail.controllers.errors import HandrailError, message_of
 from handrail.controllers.numerics.first_use import tell_when_compiling
 from handrail.datasets.storage.interrupts import Interrupts
 from handrail.scripts import INTERRUPTED
@@ -28,7 +29,7 @@ def parse[Config](config: Callable[..., Config], prog: str, arguments: Sequence[
 
     Exits with 0 after `--help` and `--version`, and with 2 and one line on standard error after bad input.
     """
-    arguments = [_boolean(argument) for argument in (sys.argv[1:] if arguments is None else arguments)]
+    arguments = [_checked(argument) for argument in (sys.argv[1:] if arguments is None else arguments)]
     if VERSION in arguments:
         print(f"{prog} {importlib.metadata.version('handrail')}")
         sys.exit(0)
@@ -78,6 +79,8 @@ def run(main: Callable[[], int | None]) -> NoReturn:
         fail(str(error), BAD_INPUT)
     except BrokenPipeError:
         sys.exit(FAILED)
+    except OSError as error:  # a name that is too long, a folder that may not be read
+        fail(message_of(error), BAD_INPUT)
     except KeyboardInterrupt as interrupt:
         fail(str(interrupt) or "interrupted", INTERRUPTED)
 
@@ -86,6 +89,16 @@ def fail(message: str, code: int) -> NoReturn:
     """Print one line on standard error and exit."""
     print(f"error: {message}", file=sys.stderr)
     sys.exit(code)
+
+
+def _checked(argument: str) -> str:
+    """Return an argument as `tyro` knows it; one that is no text, or has no home, ends the command."""
+    value = argument.rpartition("=")[2]
+    if any("\udc80" <= letter <= "\udcff" for letter in argument):
+        fail(f"argument {os.fsencode(argument)!r}: expected text in UTF-8, got other bytes", BAD_INPUT)
+    if value.startswith("~") and os.path.expanduser(value) == value:
+        fail(f"argument {argument!r}: expected the home of a person on this computer", BAD_INPUT)
+    return _boolean(argument)
 
 
 def _boolean(argument: str) -> str:

@@ -12,18 +12,18 @@ from typing import Any
 
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.format.columns import ColumnTypes
-from handrail.datasets.format.layout import DAMAGED, STAGING, Layout
+from handrail.datasets.format.layout import DAMAGED, FOLDERS, STAGING, Layout
 from handrail.datasets.format.manifest import Manifest
 from handrail.datasets.format.metadata import Totals, info_bytes, stats_bytes
 from handrail.datasets.format.tables import tasks_bytes
 from handrail.datasets.recording.append import copy_file
 from handrail.datasets.recording.piece import Piece
 from handrail.datasets.recording.volume import write_volumes
-from handrail.datasets.storage.atomic import publish_folder, remove, replace, sync_folder
+from handrail.datasets.storage.atomic import beside, publish_folder, remove, replace, sync_folder
 from handrail.datasets.storage.lock import LOCK_NAME, DatasetLock
 
 Encodings = Mapping[str, Mapping[str, Any]]
-_OURS = ("data", "videos", "meta", STAGING, DAMAGED)
+_OURS = (*FOLDERS, STAGING, DAMAGED)
 
 
 def write_anew(
@@ -137,8 +137,8 @@ def _carry_over(root: Path, draft: Path) -> None:
 
 
 def _draft(root: Path) -> Path:
-    return root.with_name(f".{root.name}.partial")
+    return beside(root, "partial")
 
 
 def _old(root: Path) -> Path:
-    return root.with_name(f".{root.name}.old")  # as `publish_folder` calls it
+    return beside(root, "old")  # as `publish_folder` calls it
