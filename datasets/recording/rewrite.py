@@ -6,7 +6,8 @@ short before that, nothing has changed; after it, `settle` finishes what is left
 
 import os
 import shutil
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -52,10 +53,7 @@ def write_anew(
             changed then.
         OSError: The disk does not take it.
     """
-    draft = Layout(_draft(root))
-    lock = DatasetLock(draft.staging)
-    try:
-        _clear(draft)
+    with drafted(root) as draft:
         totals = write_volumes(draft, manifest, pieces, types)
         if not totals.episodes:
             raise HandrailError(
@@ -67,13 +65,28 @@ def write_anew(
         replace(draft.info, info_bytes(manifest, totals, encodings), draft.staging)
         if in_place:
             _carry_over(root, draft.root)
+    return totals
+
+
+@contextmanager
+def drafted(root: Path) -> Iterator[Layout]:
+    """Provide an empty folder that takes the place of another, once it is finished and on the disk.
+
+    Raises:
+        HandrailError: Another process writes there.
+        OSError: The disk does not take it.
+    """
+    draft = Layout(_draft(root))
+    lock = DatasetLock(draft.staging)
+    try:
+        _clear(draft)
+        yield draft
     except BaseException:
         remove(draft.root)
         raise
     finally:
         lock.release()
     publish_folder(draft.root, root)
-    return totals
 
 
 def remove_whole(root: Path) -> None:
