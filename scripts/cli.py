@@ -71,18 +71,21 @@ def run(main: Callable[[], int | None]) -> NoReturn:
     if isinstance(sys.stdout, io.TextIOWrapper):  # one that is not Unicode gets a "?" for what it lacks
         sys.stdout.reconfigure(errors="replace")
     tell_when_compiling(lambda: print(COMPILING, file=sys.stderr, flush=True))
+    interrupts = Interrupts()
     try:
-        with Interrupts():
+        with interrupts:
             code = main()
         sys.exit(code)
-    except HandrailError as error:
-        fail(str(error), BAD_INPUT)
-    except BrokenPipeError:
-        sys.exit(FAILED)
-    except OSError as error:  # a name that is too long, a folder that may not be read
-        fail(message_of(error), BAD_INPUT)
     except KeyboardInterrupt as interrupt:
         fail(str(interrupt) or "interrupted", INTERRUPTED)
+    except Exception as error:
+        if interrupts.asked:  # a library that was imported just then made another error of it
+            fail("interrupted", INTERRUPTED)
+        if isinstance(error, BrokenPipeError):
+            sys.exit(FAILED)
+        if isinstance(error, HandrailError | OSError):  # such as a name that is too long
+            fail(str(error) if isinstance(error, HandrailError) else message_of(error), BAD_INPUT)
+        raise
 
 
 def fail(message: str, code: int) -> NoReturn:

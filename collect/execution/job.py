@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from handrail.controllers.errors import HandrailError, message_of
+from handrail.datasets.storage.interrupts import interrupted
 
 
 @dataclass(frozen=True)
@@ -64,6 +65,8 @@ def attempt(job: Job, logged: bool = False) -> Result:
         try:
             value = job.call(*job.arguments)
         except (Exception, SystemExit) as raised:
+            if interrupted():
+                raise KeyboardInterrupt from raised
             error = _words(raised)
             if logged and job.log:
                 print(f"error: {error}", file=sys.stderr)

@@ -42,7 +42,8 @@ def check_links(folder: Path) -> None:
                 f"{str(path)!r}: expected a file in the folder, found a link out of it; copy it with cp -rL"
             )
         try:
-            path.is_dir() or regular(path)
+            if not path.is_dir():
+                regular(path)
         except OSError as error:
             raise HandrailError(f"{str(path)!r}: {reason(error)}") from error
 

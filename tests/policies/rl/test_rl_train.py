@@ -3,14 +3,15 @@
 import json
 import os
 import signal
+from collections import Counter
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from handrail.controllers.errors import HandrailError
-from handrail.policies.rl import evaluation
 from handrail.policies.rl.config import TrainRlConfig
+from handrail.policies.rl.env import GoalReachingEnv
 from handrail.policies.rl.evaluation import FINAL_SEED, evaluate, evaluation_goals, means
 from handrail.policies.rl.policy import Actor
 
@@ -18,7 +19,7 @@ pytest.importorskip("stable_baselines3")
 pytest.importorskip("tensorboard")
 from stable_baselines3 import SAC
 
-from handrail.policies.rl.train import Watch, train
+from handrail.policies.rl.train import train
 
 TINY = TrainRlConfig(
     steps=60,
@@ -160,23 +161,27 @@ def test_settings_that_make_no_sense_are_refused(change):
         replace(TINY, **change).check()
 
 
-@pytest.mark.parametrize(("at", "steps"), [("step", 31), ("evaluation", 40)])
+@pytest.mark.parametrize(("at", "steps"), [("step", 30), ("evaluation", 40)])
 def test_an_interrupted_run_saves_a_checkpoint_and_goes_on(at, steps, tmp_path, monkeypatch):
     """SIGTERM comes before the first evaluation, or during it; no evaluation is waited for."""
-    config, told = replace(TINY, output_dir=str(tmp_path / "rl"), goals=2, steps=50), []
+    config, calls = replace(TINY, output_dir=str(tmp_path / "rl"), goals=2, steps=50), Counter[str]()
+    reset, step = GoalReachingEnv.reset, GoalReachingEnv.step
 
-    def terminate(*arguments):
-        told.append(1) or os.kill(os.getpid(), signal.SIGTERM)
-        return arguments and scored(*arguments)
+    def counted(name, call):
+        def called(*arguments, **options):
+            calls[name] += name == "step" or bool(options.get("options"))
+            if name.endswith(at) and calls[name] == {"step": 30, "evaluation": 1}[at]:
+                os.kill(os.getpid(), signal.SIGTERM)
+            return call(*arguments, **options)
 
-    scored = evaluation._score
+        return called
+
     with monkeypatch.context() as patch:
-        if at == "step":
-            patch.setattr(Watch, "_on_rollout_end", lambda self: self.num_timesteps == 30 and terminate())
-        patch.setattr(evaluation, "_score", terminate)
+        patch.setattr(GoalReachingEnv, "step", counted("step", step))
+        patch.setattr(GoalReachingEnv, "reset", counted("evaluation", reset))
         with pytest.raises(KeyboardInterrupt, match=f"interrupted; --resume goes on after step {steps}$"):
             train(config)
-    assert len(told) == 1
+    assert calls["evaluation"] == (at == "evaluation"), "it evaluates on"
     assert [path.name for path in (config.folder / "checkpoints").iterdir()] == [f"{steps:08d}"]
     record = train(replace(config, resume=True))
     assert [row["steps"] for row in record["curve"]] == ([40, 50] if at == "step" else [50])
