@@ -9,6 +9,7 @@ from typing import Any, TypeGuard
 from handrail.controllers.errors import HandrailError, shown
 
 _LARGEST = 1e6  # of a number in a file [SI units]; what is larger is a slip, or meant ill
+_SMALLEST = 1e-6  # of one above 0: a limit of 5e-324 has no inverse
 _LONGEST = 200  # characters of a text
 
 
@@ -61,8 +62,8 @@ def is_number(value: Any) -> bool:
 
 
 def is_positive(value: Any) -> bool:
-    """Return whether a value is such a number above 0."""
-    return is_number(value) and value > 0
+    """Return whether a value is such a number above 0, and not next to it."""
+    return is_number(value) and value >= _SMALLEST
 
 
 def is_count(value: Any) -> TypeGuard[int]:

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from handrail.controllers.errors import HandrailError, message_of
+from handrail.controllers.regular_file import open_regular
 
 MOST_BYTES = 2**20
 
@@ -20,9 +21,11 @@ def read_toml(path: Path, what: str) -> dict[str, Any]:
         HandrailError: it cannot be read, is too large or too deep, or no TOML.
     """
     try:
-        if path.stat().st_size > MOST_BYTES:
+        with open_regular(path) as file:
+            data = file.read(MOST_BYTES + 1)
+        if len(data) > MOST_BYTES:
             raise HandrailError(f"{what} {path}: expected at most {MOST_BYTES >> 10} kB")
-        return tomllib.loads(path.read_text(encoding="utf-8"))
+        return tomllib.loads(data.decode())
     except RecursionError as error:
         raise HandrailError(f"{what} {path}: not valid TOML: nested too deeply") from error
     except (OSError, ValueError) as error:

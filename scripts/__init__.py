@@ -1,1 +1,27 @@
-"""One thin command a file."""
+"""One thin command a file; Ctrl-C and SIGTERM end it with one line and 130 while it loads, too."""
+
+import os
+import signal
+import sys
+from types import FrameType
+from typing import NoReturn
+
+INTERRUPTED = 130
+
+
+def _leave(number: int, frame: FrameType | None) -> NoReturn:
+    """End at once: a command that loads, or has done its work, holds nothing."""
+    os.write(2, b"error: interrupted\n")
+    os._exit(INTERRUPTED)
+
+
+def _is_command() -> bool:
+    """Return whether this process is a command, and no worker of one, nor a program that imports this."""
+    name, processes = os.path.basename(sys.argv[0]), sys.modules.get("multiprocessing.process")
+    is_worker = processes is not None and processes.parent_process() is not None
+    return not is_worker and (name == "-m" or name.startswith("handrail-"))
+
+
+if _is_command():  # here, for all that a command needs is imported after this
+    for _number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(_number, _leave)

@@ -5,6 +5,7 @@ import functools
 import importlib.metadata
 import inspect
 import io
+import os
 import re
 import sys
 from collections.abc import Callable, Sequence
@@ -12,13 +13,14 @@ from typing import NoReturn
 
 import tyro
 
-from handrail.controllers.errors import HandrailError
+from handrail.controllers.errors import HandrailError, message_of
 from handrail.controllers.numerics.first_use import tell_when_compiling
 from handrail.datasets.printable import printable
+from handrail.datasets.storage.interrupts import Interrupts
+from handrail.scripts import INTERRUPTED
 
 BAD_INPUT = 2
 FAILED = 1
-INTERRUPTED = 130
 VERSION = "--version"
 STARTING = "Starting; this takes some seconds …"
 COMPILING = "Compiling the controller for this machine, once; this can take a minute …"
@@ -29,7 +31,7 @@ def parse[Config](config: Callable[..., Config], prog: str, arguments: Sequence[
 
     Exits with 0 after `--help` and `--version`, and with 2 and one line on standard error after bad input.
     """
-    arguments = [_boolean(argument) for argument in (sys.argv[1:] if arguments is None else arguments)]
+    arguments = [_checked(argument) for argument in (sys.argv[1:] if arguments is None else arguments)]
     if VERSION in arguments:
         print(f"{prog} {importlib.metadata.version('handrail')}")
         sys.exit(0)
@@ -67,18 +69,25 @@ def command[Config](
 
 
 def run(main: Callable[[], int | None]) -> NoReturn:
-    """Run a command's body; an expected error becomes one line and exit code 2."""
+    """Run a command's body; an expected error becomes one line and exit code 2, an interrupt one and 130."""
     if isinstance(sys.stdout, io.TextIOWrapper):  # one that is not Unicode gets a "?" for what it lacks
         sys.stdout.reconfigure(errors="replace")
     tell_when_compiling(lambda: print(COMPILING, file=sys.stderr, flush=True))
+    interrupts = Interrupts()
     try:
-        sys.exit(main())
-    except HandrailError as error:
-        fail(str(error), BAD_INPUT)
-    except BrokenPipeError:
-        sys.exit(FAILED)
+        with interrupts:
+            code = main()
+        sys.exit(code)
     except KeyboardInterrupt as interrupt:
         fail(str(interrupt) or "interrupted", INTERRUPTED)
+    except Exception as error:
+        if interrupts.asked:  # a library that was imported just then made another error of it
+            fail("interrupted", INTERRUPTED)
+        if isinstance(error, BrokenPipeError):
+            sys.exit(FAILED)
+        if isinstance(error, HandrailError | OSError):  # such as a name that is too long
+            fail(str(error) if isinstance(error, HandrailError) else message_of(error), BAD_INPUT)
+        raise
 
 
 def say_starting() -> None:
@@ -90,6 +99,16 @@ def fail(message: str, code: int) -> NoReturn:
     """Print one line on standard error and exit."""
     print(f"error: {printable(message)}", file=sys.stderr)
     sys.exit(code)
+
+
+def _checked(argument: str) -> str:
+    """Return an argument as `tyro` knows it; one that is no text, or has no home, ends the command."""
+    value = argument.rpartition("=")[2]
+    if any("\udc80" <= letter <= "\udcff" for letter in argument):
+        fail(f"argument {os.fsencode(argument)!r}: expected text in UTF-8, got other bytes", BAD_INPUT)
+    if value.startswith("~") and os.path.expanduser(value) == value:
+        fail(f"argument {argument!r}: expected the home of a person on this computer", BAD_INPUT)
+    return _boolean(argument)
 
 
 def _boolean(argument: str) -> str:

@@ -10,7 +10,6 @@ from handrail.collect.commands.shared import record_shared
 from handrail.collect.commands.target import located
 from handrail.collect.config import RecordConfig
 from handrail.collect.envs.env import HandrailEnv
-from handrail.collect.execution.interrupts import Interrupts
 from handrail.collect.operators.catalogue import OPERATORS
 from handrail.collect.operators.operator import EpisodeEvent
 from handrail.collect.session.build import build_env, build_modes, build_session
@@ -21,6 +20,7 @@ from handrail.datasets.format.layout import Layout
 from handrail.datasets.presentation.terminal import Terminal
 from handrail.datasets.recording.folder import check_target
 from handrail.datasets.recording.writer import EpisodeWriter
+from handrail.datasets.storage.interrupts import Interrupts
 
 INTERRUPTED = 130
 FAILED = 1

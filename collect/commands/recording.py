@@ -10,7 +10,6 @@ import numpy as np
 
 from handrail.collect.config import RecordConfig
 from handrail.collect.envs.env import HandrailEnv
-from handrail.collect.execution.interrupts import Interrupts
 from handrail.collect.session.build import (
     build_env,
     build_modes,
@@ -27,6 +26,7 @@ from handrail.collect.session.session import Observer
 from handrail.datasets.format.columns import CLIENT, Scalar
 from handrail.datasets.format.manifest import Manifest
 from handrail.datasets.recording.writer import EpisodeWriter
+from handrail.datasets.storage.interrupts import Interrupts
 
 _NICE = -10  # of a loop that a person steers, where the system allows that
 

@@ -25,7 +25,7 @@ from handrail.datasets.format.manifest import Manifest
 from handrail.datasets.format.metadata import EpisodeRecord
 from handrail.datasets.recording.piece import Piece
 from handrail.datasets.recording.rewrite import settle, write_anew
-from handrail.datasets.storage.atomic import explained, remove, write_whole
+from handrail.datasets.storage.atomic import beside, explained, remove, write_whole
 from handrail.datasets.storage.strict_json import read_json
 
 FORMAT = "handrail.shards/1"
@@ -69,7 +69,7 @@ class Shards:
 
     def __init__(self, config: RecordConfig) -> None:
         self.root = config.dataset.folder.absolute()
-        self.folder = self.root.with_name(f".{self.root.name}.shards")
+        self.folder = beside(self.root, "shards")
         self._episodes = config.dataset.num_episodes
         dataset = {name: getattr(config.dataset, name) for name in ("name", "fps", "single_task")}
         self._settings = json.loads(settings_json(config)) | dataset | {"num_episodes": self._episodes}

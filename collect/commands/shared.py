@@ -16,7 +16,6 @@ from handrail.collect.config import RecordConfig
 from handrail.collect.envs.env import HandrailEnv
 from handrail.collect.execution.execution import Execution
 from handrail.collect.execution.forking import RECORDING
-from handrail.collect.execution.interrupts import Interrupts
 from handrail.collect.execution.job import Job
 from handrail.collect.session.build import build_env, build_session
 from handrail.collect.session.outcome import Outcome
@@ -27,6 +26,7 @@ from handrail.datasets.format.metadata import EpisodeRecord
 from handrail.datasets.presentation.terminal import Terminal
 from handrail.datasets.reading.reader import read_info
 from handrail.datasets.recording.writer import EpisodeWriter
+from handrail.datasets.storage.interrupts import Interrupts
 from handrail.datasets.storage.lock import HeldError
 
 INTERRUPTED = 130

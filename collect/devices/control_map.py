@@ -13,6 +13,7 @@ from typing import Any
 
 from handrail.controllers.errors import HandrailError, shown
 from handrail.controllers.interface.channels import TOOL
+from handrail.controllers.regular_file import open_regular
 
 SECTIONS: Mapping[str, tuple[str, ...]] = {
     "hand": TOOL,
@@ -139,7 +140,8 @@ def load_map(device: str, controls: Iterable[str], changes: str = "") -> Control
 
 def _read(path: Path) -> dict[str, Any]:
     try:
-        return tomllib.loads(path.read_text())
+        with open_regular(path) as file:
+            return tomllib.load(file)
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise HandrailError(f"--teleop.map {path}: expected a .toml file: {error}") from error
 

@@ -12,6 +12,7 @@ from typing import Any
 
 from handrail.controllers.errors import HandrailError, message_of
 from handrail.datasets.presentation.terminal import Terminal
+from handrail.datasets.storage.interrupts import interrupted
 
 
 @dataclass(frozen=True)
@@ -65,6 +66,8 @@ def attempt(job: Job, logged: bool = False) -> Result:
         try:
             value = job.call(*job.arguments)
         except (Exception, SystemExit) as raised:
+            if interrupted():
+                raise KeyboardInterrupt from raised
             error = _words(raised)
             if logged and job.log:
                 Terminal(stderr=True).print(f"error: {error}")

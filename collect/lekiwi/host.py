@@ -5,7 +5,6 @@ parts: a JSON header with `_cams`, then one JPEG a camera (`lerobot/robots/lekiw
 """
 
 import json
-import signal
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -91,13 +90,9 @@ def serve(config: HostConfig, say: Callable[[str], None] = print) -> int:
         f"LeKiwi (simulated): commands {config.address}:{config.port_zmq_cmd}, "
         f"observations :{config.port_zmq_observations}; Ctrl-C ends it"
     )
-    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         _run(loop, sockets, config)
-    except KeyboardInterrupt:
-        pass
     finally:
-        signal.signal(signal.SIGTERM, before)
         sockets.close()
         body.close()
         env.close()

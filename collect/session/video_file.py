@@ -10,7 +10,7 @@ import av
 import numpy as np
 from numpy.typing import NDArray
 
-from handrail.datasets.storage.atomic import explained, sync_file, sync_folder
+from handrail.datasets.storage.atomic import beside, explained, sync_file, sync_folder
 
 
 class VideoFile:
@@ -26,7 +26,7 @@ class VideoFile:
     """
 
     def __init__(self, path: Path, size: tuple[int, int], fps: int | Fraction) -> None:
-        self._path, self._partial = path, path.with_name(f".{path.name}.partial")
+        self._path, self._partial = path, beside(path, "partial")
         self._container = av.open(str(self._partial), "w", format="mp4")
         rate = Fraction(fps)
         self._stream = self._container.add_stream(

@@ -11,11 +11,14 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from handrail.controllers.arrays import FloatArray
-from handrail.controllers.errors import HandrailError
+from handrail.controllers.errors import HandrailError, message_of
+from handrail.controllers.regular_file import open_regular
 from handrail.controllers.robot.model import RobotModel
+from handrail.controllers.robot.urdf import mesh_files
 
 _TUBE, _JOINT, _CAP = (0.80, 0.81, 0.83, 1.0), (0.42, 0.44, 0.47, 1.0), (0.32, 0.56, 0.76, 1.0)
 _GRID, _FINE = 1e-3, 10_000  # a mesh of more triangles is drawn with its vertices on a grid [m]
+_LARGEST = 1e6  # of a coordinate, before it is scaled
 _TRIANGLE = np.dtype([("normal", "<3f4"), ("vertices", "<9f4"), ("attribute", "<u2")])
 
 
@@ -40,13 +43,23 @@ class PlacedMesh:
 
 
 def placed_meshes(model: RobotModel) -> Iterator[PlacedMesh]:
-    """Yield the collision meshes that the URDF names, in the colour of a visual one of the same file."""
+    """Yield the collision meshes that the URDF names, in the colour of a visual one of the same file.
+
+    Raises:
+        HandrailError: one lies outside the robot's folder, or is no mesh.
+    """
     description = model.description
+    for path in mesh_files(description.urdf, description.mesh_root):
+        if path.suffix.lower() == ".stl":
+            _corners(path)
     arm = pin.buildModelFromUrdf(str(description.urdf))
-    geometry, seen = (
-        pin.buildGeomFromUrdf(arm, str(description.urdf), kind, package_dirs=[str(description.mesh_root)])
-        for kind in (pin.COLLISION, pin.VISUAL)
-    )
+    try:
+        geometry, seen = (
+            pin.buildGeomFromUrdf(arm, str(description.urdf), kind, package_dirs=[str(description.mesh_root)])
+            for kind in (pin.COLLISION, pin.VISUAL)
+        )
+    except (ValueError, RuntimeError) as error:
+        raise HandrailError(f"URDF {description.urdf}: {message_of(error)}") from error
     colours = {item.meshPath: tuple(map(float, item.meshColor)) for item in seen.geometryObjects}
     for item in geometry.geometryObjects:
         path = Path(item.meshPath)
@@ -89,13 +102,24 @@ def _pieces(path: Path, scale: FloatArray) -> tuple[Piece, ...]:
 
 
 def _read_stl(path: Path) -> tuple[FloatArray, NDArray[np.int64]]:
-    data = path.read_bytes()
-    count = int.from_bytes(data[80:84], "little")
-    if len(data) < 84 + count * _TRIANGLE.itemsize:
+    corners = _corners(path)
+    if corners is None:
         raise HandrailError(f"mesh {path}: expected a binary STL file")
-    corners = np.frombuffer(data, _TRIANGLE, count, 84)["vertices"].reshape(-1, 3).astype(float)
     vertices, index = np.unique(corners.round(7), axis=0, return_inverse=True)
     return vertices, index.reshape(-1, 3)
+
+
+def _corners(path: Path) -> FloatArray | None:
+    """Return the corners of the triangles of a binary STL file, (3 f, 3); None of another file."""
+    with open_regular(path) as file:
+        data = file.read()
+    count = int.from_bytes(data[80:84], "little")
+    if len(data) < 84 + count * _TRIANGLE.itemsize:
+        return None
+    corners = np.frombuffer(data, _TRIANGLE, count, 84)["vertices"].reshape(-1, 3).astype(float)
+    if not np.abs(corners).max(initial=0.0) < _LARGEST:
+        raise HandrailError(f"mesh {path}: expected finite coordinates of sane size, got others")
+    return corners
 
 
 def _part(

@@ -7,7 +7,6 @@ from handrail.collect.cockpit.pipe import STOP
 from handrail.collect.cockpit.process import ServerProcess
 from handrail.collect.commands.recording import Recording, come_first, open_writer
 from handrail.collect.envs.env import HandrailEnv
-from handrail.collect.execution.interrupts import Interrupts
 from handrail.collect.operators.modes import TeleopMode
 from handrail.collect.session.build import build_env, build_modes
 from handrail.collect.session.outcome import Outcome
@@ -16,6 +15,7 @@ from handrail.collect.user_study.folder import StudyFolder
 from handrail.collect.user_study.plan import Step, trial_seed
 from handrail.controllers.interface.channels import Channels
 from handrail.datasets.recording.writer import EpisodeWriter
+from handrail.datasets.storage.interrupts import Interrupts
 
 
 class Driving:

@@ -6,7 +6,6 @@ from collections.abc import Callable
 
 from handrail.collect.cockpit.cards import Cards
 from handrail.collect.cockpit.process import ServerProcess
-from handrail.collect.execution.interrupts import Interrupts
 from handrail.collect.user_study.conduct import Conductor, Ending
 from handrail.collect.user_study.config import StudySessionConfig
 from handrail.collect.user_study.design import UserStudy
@@ -16,6 +15,7 @@ from handrail.collect.user_study.exports import export
 from handrail.collect.user_study.folder import StudyFolder
 from handrail.collect.user_study.status import status
 from handrail.datasets.presentation.terminal import Terminal
+from handrail.datasets.storage.interrupts import Interrupts
 
 _FAREWELL = 1.0  # in which the page shows its last card [s]
 Say = Callable[[str], None]

@@ -10,6 +10,7 @@ import numpy as np
 from handrail.controllers.arrays import FloatArray, frozen
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.numerics.rotation import matrix_from_rpy, matrix_to_axis
+from handrail.controllers.regular_file import is_inside
 from handrail.controllers.robot.catalogue import ROBOTS
 from handrail.controllers.robot.description_check import check_description
 from handrail.controllers.robot.shape import Shape, ShapeKind
@@ -268,8 +269,7 @@ def _find_urdf(urdf: str, folder: Path) -> tuple[Path, Path]:
     """
     name = PurePosixPath(urdf)
     beside = folder / name
-    inside = beside.resolve().is_relative_to(folder.resolve())
-    if not name.parts or name.is_absolute() or ".." in name.parts or not inside:
+    if not name.parts or name.is_absolute() or ".." in name.parts or not is_inside(beside, folder):
         raise HandrailError(f"URDF {urdf}: expected a path inside a package, or beside the description")
     if beside.is_file():
         return beside, folder

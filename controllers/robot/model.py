@@ -13,6 +13,7 @@ import pinocchio as pin
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import HandrailError, message_of
 from handrail.controllers.robot.description import PlacedShape, Placement, RobotDescription, load_description
+from handrail.controllers.robot.urdf import check_urdf
 
 _BASE_JOINTS = {"x": pin.JointModelPX, "y": pin.JointModelPY, "theta": pin.JointModelRZ}
 
@@ -97,6 +98,7 @@ def _build(description: RobotDescription) -> pin.Model:
 
 def _arm(description: RobotDescription) -> pin.Model:
     """Return the arm with every joint that the description does not list locked at zero."""
+    check_urdf(description.urdf)
     try:
         with _without_words():
             model = pin.buildModelFromUrdf(str(description.urdf))

@@ -4,6 +4,7 @@ A new dataset is written from episodes of old ones, in one pass; it has its name
 """
 
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import pyarrow as pa
@@ -18,7 +19,7 @@ from handrail.datasets.editing.source import Source
 from handrail.datasets.format.columns import ColumnTypes
 from handrail.datasets.reading.reader import read_rows_of
 from handrail.datasets.recording.piece import TRIMMED, Piece
-from handrail.datasets.recording.rewrite import write_anew
+from handrail.datasets.recording.rewrite import drafted, write_anew
 from handrail.datasets.storage.atomic import explained
 
 _LABELS = {"success": pa.bool_(), "failure_reason": pa.string()}
@@ -47,12 +48,18 @@ def _anew(config: EditConfig) -> list[Edited]:
     check_free(config.target)
     source = Source.open(config.roots[0], config.verify)
     if config.verb == "split":
-        parts = split_parts(config.parts, source.successes)
-        return [
-            _write(config, config.target / name, source, source.pieces(numbers), f"_{name}")
-            for name, numbers in parts.items()
-        ]
+        return _split(config, source)
     return [_write(config, config.target, source, _pieces(config, source))]
+
+
+def _split(config: EditConfig, source: Source) -> list[Edited]:
+    """Write the parts, which are there all together or none of them."""
+    with drafted(config.target) as draft:
+        edited = [
+            _write(config, draft.root / name, source, source.pieces(numbers), f"_{name}")
+            for name, numbers in split_parts(config.parts, source.successes).items()
+        ]
+    return [replace(each, root=config.target / each.root.name) for each in edited]
 
 
 def _write(

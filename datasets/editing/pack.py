@@ -1,5 +1,6 @@
 """Packing and merging: whole datasets become one, in files of many episodes, in one pass."""
 
+import os
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -52,11 +53,14 @@ def merge_datasets(
         verify: Read every file of the datasets anew, also those that have not changed since the last check.
 
     Raises:
-        HandrailError: Robot, rate or columns differ, a dataset is not Handrail's, is damaged or in use, or
-            the disk does not take it. Nothing has been changed then.
+        HandrailError: A folder is given twice, robot, rate or columns differ, a dataset is not Handrail's, is
+            damaged or in use, or the disk does not take it. Nothing has been changed then.
     """
     target = Path(output).expanduser().absolute()
     given = [Path(root).expanduser().absolute() for root in roots]
+    real = [os.path.realpath(root) for root in given]
+    if twice := [str(root) for root, place in zip(given, real, strict=True) if real.count(place) > 1]:
+        raise HandrailError(f"merge: expected each folder once, got {twice[0]!r} twice")
     places = [root for root in given if root == target or not _is_empty(root)] or given
     with explained(f"cannot write {str(target)!r}"):
         if target not in places:

@@ -1,5 +1,6 @@
 """Settings of `handrail-pack` and `handrail-merge`; light to import."""
 
+import os
 import shlex
 from dataclasses import dataclass
 from pathlib import Path
@@ -48,7 +49,9 @@ class MergeConfig:
     folders: Annotated[tyro.conf.Positional[Words], tyro.conf.arg(metavar="FOLDER FOLDER [FOLDER …]")]
     """Folders of the datasets."""
     output: str = ""
-    """Folder of the new dataset; or one of the folders, which the new dataset replaces."""
+    """Folder of the new dataset; with --in_place one of the folders, which the new dataset replaces."""
+    in_place: bool = False
+    """Let the new dataset replace one of the folders, the one that --output names."""
     name: str = ""
     """Name of the new dataset, owner/name; that of the first folder when empty."""
     verify: bool = False
@@ -70,11 +73,17 @@ class MergeConfig:
         """The folder of what is written.
 
         Raises:
-            HandrailError: There is none, or it lies in a dataset's folder, or around it.
+            HandrailError: There is none, it lies in a dataset's folder, or around it, or nobody said whether
+                it may replace one.
         """
         if not self.output:
             raise HandrailError("merge: expected --output FOLDER for the new dataset, got none")
-        return _apart(self.output, self.roots)
+        target = _apart(self.output, self.roots)
+        replaces = any(os.path.realpath(target) == os.path.realpath(root) for root in self.roots)
+        if self.in_place != replaces:
+            which = "one of the folders" if self.in_place else "another folder, or --in_place to replace it"
+            raise HandrailError(f"--output {self.output}: expected {which}")
+        return target
 
 
 def packing_advice(root: Path) -> str:

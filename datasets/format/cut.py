@@ -6,6 +6,7 @@ import av
 import av.error
 
 from handrail.controllers.errors import HandrailError
+from handrail.controllers.regular_file import regular
 from handrail.datasets.format.join import VideoJoin, place_of, videos
 from handrail.datasets.format.schema import Feature
 from handrail.datasets.format.video import VideoEncoder
@@ -40,7 +41,7 @@ def encode_stretch(source: Path, first: int, count: int, target: Path, fps: int,
     """Write a stretch of a video as one of its own whose pictures are encoded anew; see `cut_video`."""
     encoder = VideoEncoder(target, fps, feature)
     try:
-        with av.open(str(source)) as container:
+        with av.open(str(regular(source))) as container:
             stream = container.streams.video[0]
             container.seek(round(first / (fps * (stream.time_base or 1))), stream=stream)
             for frame in container.decode(stream):

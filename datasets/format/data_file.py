@@ -13,6 +13,7 @@ from pathlib import Path
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from handrail.controllers.regular_file import regular
 from handrail.datasets.format.arrow import numbers, to_numpy
 
 _EPISODE = "episode_index"
@@ -80,7 +81,7 @@ class DataFile:
             OSError, pyarrow.ArrowException, ValueError: It is not there, not whole, or has no episodes.
         """
         self.path = path
-        self._file = pq.ParquetFile(path, page_checksum_verification=True)
+        self._file = pq.ParquetFile(regular(path), page_checksum_verification=True)
         self._groups = self._file.num_row_groups
         self._column = _leaves(self._file.metadata).index(_EPISODE) if self._groups else 0
         self._last: tuple[range, list[str] | None, pa.Table] | None = None  # what was read last

@@ -15,6 +15,7 @@ import av
 import av.error
 
 from handrail.controllers.errors import HandrailError
+from handrail.controllers.regular_file import regular
 
 
 @dataclass(frozen=True)
@@ -88,7 +89,7 @@ class Videos:
     def _opened(self, path: Path, camera: str) -> Any:
         if camera not in self._open or self._open[camera][0] != path:
             self.forget(camera)
-            self._open[camera] = path, av.open(str(path))
+            self._open[camera] = path, av.open(str(regular(path)))
         return self._open[camera][1]
 
     def _short(self, path: Path, first: int, count: int) -> NoReturn:

@@ -16,6 +16,7 @@ VIDEO_PATH = "videos/{video_key}/chunk-{chunk_index:03d}/file-{file_index:03d}.m
 EPISODES_PATH = "meta/episodes/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
 STAGING = ".handrail"
 DAMAGED = ".damaged"
+FOLDERS = ("data", "videos", "meta")  # of a dataset; what else lies beside them is not touched
 
 _NUMBERED = re.compile(r"chunk-(\d{3,})/file-(\d{3,})\.(?:parquet|mp4)")
 

@@ -17,6 +17,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from handrail.controllers.errors import HandrailError
+from handrail.controllers.regular_file import regular
 from handrail.datasets.format.arrow import (
     equal_lists,
     flat_numbers,
@@ -77,7 +78,7 @@ class Lines:
             ForeignLineError: The file is whole, but another tool wrote it.
             OSError, pyarrow.ArrowException, ValueError, KeyError: The file is not whole, or has no line.
         """
-        with pq.ParquetFile(path) as file:
+        with pq.ParquetFile(regular(path)) as file:
             marks = file.schema_arrow.metadata or {}
             if _SEALS not in marks:
                 raise ForeignLineError(
@@ -146,7 +147,7 @@ class Lines:
         found: dict[str, dict[str, np.ndarray]] = {}
         table = self.table
         if table is None:
-            with pq.ParquetFile(self.path) as file:
+            with pq.ParquetFile(regular(self.path)) as file:
                 table = file.read(use_threads=False)
         for name, column in zip(table.column_names, table.columns, strict=True):
             if name.startswith(_STATS):
@@ -174,7 +175,7 @@ def each_line(layout: Layout, with_stats: bool = False) -> Iterator[EpisodeRecor
 def count_lines(path: Path) -> int:
     """Return how many lines a file has; one if it cannot be read, since it was made for one at least."""
     try:
-        return max(1, pq.read_metadata(path).num_rows)
+        return max(1, pq.read_metadata(regular(path)).num_rows)
     except (OSError, pa.ArrowException):
         return 1
 
@@ -208,14 +209,14 @@ def lines_bytes(
 
 def resealed_bytes(path: Path, files: Mapping[str, FileSeal]) -> bytes:
     """Return a file of lines as it is, but with other seals."""
-    with pq.ParquetFile(path) as file:
+    with pq.ParquetFile(regular(path)) as file:
         table = file.read(use_threads=False)
     return _bytes(table, dict(table.schema.metadata or {}) | {_SEALS: _seals_json(files)})
 
 
 def read_column_types(path: Path) -> ColumnTypes:
     """Return the types of the extra columns in a file of lines."""
-    return {field.name: field.type for field in pq.read_schema(path) if is_extra(field.name)}
+    return {field.name: field.type for field in pq.read_schema(regular(path)) if is_extra(field.name)}
 
 
 def _bytes(table: pa.Table, marks: Mapping[bytes, str | bytes]) -> bytes:

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from handrail.controllers.regular_file import open_regular
 from handrail.datasets.format.columns import Scalar
 from handrail.datasets.format.layout import DATA_PATH, FILES_IN_A_CHUNK, VIDEO_PATH
 from handrail.datasets.format.manifest import Manifest, json_bytes
@@ -35,7 +36,7 @@ class FileSeal:
         Raises:
             OSError: The file cannot be read.
         """
-        with open(path, "rb") as file:
+        with open_regular(path) as file:
             digest = hashlib.file_digest(file, "sha256").hexdigest()
         return cls(path.stat().st_size, digest)
 

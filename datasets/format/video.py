@@ -15,6 +15,7 @@ import av.error
 import numpy as np
 
 from handrail.controllers.errors import HandrailError
+from handrail.controllers.regular_file import regular
 from handrail.datasets.format.schema import Feature
 from handrail.datasets.format.stats import image_levels, image_stats
 from handrail.datasets.storage.atomic import sync_file
@@ -50,7 +51,7 @@ def count_frames(path: Path) -> int:
         HandrailError: The file is not there or not a whole mp4.
     """
     try:
-        with av.open(str(path)) as container:
+        with av.open(str(regular(path))) as container:
             sizes = [packet.size for packet in container.demux(video=0)]
         return sum(size > 0 for size in sizes)
     except (av.error.FFmpegError, IndexError, ValueError) as error:  # ValueError: text that is none
@@ -76,7 +77,7 @@ def decoded_stats(
     """
     levels: list[np.ndarray] = []
     try:
-        with av.open(str(path)) as container:
+        with av.open(str(regular(path))) as container:
             stream = container.streams.video[0]
             if stream.codec_context is None:
                 raise ValueError("a codec that nobody knows")

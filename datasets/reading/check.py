@@ -1,11 +1,14 @@
 """Checking a dataset before it is used: is everything there that was saved, and is it what was saved?"""
 
+import itertools
+import os
 from collections.abc import Iterator
 from pathlib import Path
 
 from handrail.controllers.errors import HandrailError
+from handrail.controllers.regular_file import regular
 from handrail.datasets.format.data_file import data_files
-from handrail.datasets.format.layout import Layout
+from handrail.datasets.format.layout import FOLDERS, Layout
 from handrail.datasets.format.lines import ForeignLineError
 from handrail.datasets.format.manifest import read_manifest
 from handrail.datasets.format.path_pattern import fill
@@ -14,6 +17,7 @@ from handrail.datasets.reading.reader import DatasetInfo, read_episodes, read_in
 from handrail.datasets.recording.checksums import Checksums
 from handrail.datasets.recording.repair import require_whole, shortened
 from handrail.datasets.recording.survey import Survey, survey
+from handrail.datasets.storage.atomic import explained
 from handrail.datasets.storage.strict_json import read_json
 
 
@@ -28,6 +32,7 @@ def check_whole(root: str | Path, verify: bool = False) -> None:
         HandrailError: It was copied in part, is damaged, or is of a newer format.
     """
     info = read_info(root)
+    _check_kinds(info.root)
     found = _surveyed(info, verify)
     if found is not None:
         require_whole(Layout(info.root), found)
@@ -40,6 +45,15 @@ def check_whole(root: str | Path, verify: bool = False) -> None:
         )
 
 
+def _check_kinds(root: Path) -> None:
+    """Check that no file of a dataset is a named pipe, a socket or a device, before LeRobot opens any."""
+    for top, _, names in itertools.chain.from_iterable(os.walk(root / name) for name in FOLDERS):
+        for path in (Path(top, name) for name in names):
+            with explained(f"dataset {str(root)!r}: {path.relative_to(root)}"):
+                if path.exists():  # a link to nowhere is a file that is missing
+                    regular(path)
+
+
 def check_report(root: str | Path) -> list[str]:
     """Return everything that is wrong with a dataset, a line each; every byte is read.
 
@@ -47,6 +61,7 @@ def check_report(root: str | Path) -> list[str]:
         HandrailError: It cannot be read at all.
     """
     info = read_info(root)
+    _check_kinds(info.root)
     found = _surveyed(info, verify=True)
     if found is None:
         return [*_unread(info), *_statistics(info)]

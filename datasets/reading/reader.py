@@ -13,6 +13,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from handrail.controllers.errors import HandrailError, unknown_name
+from handrail.controllers.regular_file import regular
 from handrail.datasets.format.arrow import flat_numbers, plain_values
 from handrail.datasets.format.data_file import DataFiles, data_files
 from handrail.datasets.format.info_fields import MOST_EPISODES, MOST_FRAMES, features, rate, whole_number
@@ -227,7 +228,7 @@ def _to_numpy(column: pa.ChunkedArray, feature: Feature) -> np.ndarray:
 
 def _read_rows(path: Path) -> list[dict[str, Any]]:
     try:
-        with pq.ParquetFile(path) as file:
+        with pq.ParquetFile(regular(path)) as file:
             names = [name for name in file.schema_arrow.names if not name.startswith("stats/")]
             table = file.read(columns=names, use_threads=False)
         columns = [plain_values(table.column(place)) for place in range(len(names))]

@@ -5,6 +5,7 @@ import shutil
 from dataclasses import replace as changed
 from pathlib import Path
 
+from handrail.controllers.regular_file import regular
 from handrail.datasets.format.columns import ColumnTypes, Scalar, fit_columns
 from handrail.datasets.format.cut import cut_video
 from handrail.datasets.format.data_file import data_files
@@ -90,7 +91,7 @@ def copy_file(source: Path, target: Path) -> None:
     make_folder(target.parent)
     remove(target)
     try:
-        os.link(source, target)
+        os.link(regular(source), target)
     except OSError:
-        shutil.copyfile(source, target)
+        shutil.copyfile(regular(source), target)
     sync_file(target)

@@ -28,7 +28,7 @@ class Checksums:
         """See the class."""
         self._root = root
         self._memory = (
-            memory_folder() / f"{hashlib.sha256(str(root.resolve()).encode()).hexdigest()[:24]}.json"
+            memory_folder() / f"{hashlib.sha256(os.path.realpath(root).encode()).hexdigest()[:24]}.json"
         )
         self._known: dict[str, Any] = {} if anew else self._remembered()
         self._used: dict[str, Any] = {}

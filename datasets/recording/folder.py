@@ -5,12 +5,11 @@ import os
 from pathlib import Path
 
 from handrail.controllers.errors import HandrailError
-from handrail.datasets.format.layout import DAMAGED, STAGING, Layout, episode_of
+from handrail.datasets.format.layout import DAMAGED, FOLDERS, STAGING, Layout, episode_of
 from handrail.datasets.storage.atomic import make_folder, move, remove
 from handrail.datasets.storage.lock import LOCK_NAME
 
 _GIVEN_UP = "episodes"  # the lines of a dataset that is being cleared, in the staging folder
-_FOLDERS = ("data", "videos", "meta")  # of a dataset; what else lies beside them is not touched
 
 
 def check_target(layout: Layout, overwrite: bool) -> None:
@@ -57,7 +56,7 @@ def check_folders(layout: Layout) -> None:
     Raises:
         HandrailError: One is a link to another place.
     """
-    for name in (STAGING, DAMAGED, *_FOLDERS):
+    for name in (STAGING, DAMAGED, *FOLDERS):
         top = layout.root / name
         within = [Path(folder) / each for folder, folders, _ in os.walk(top) for each in folders]
         linked = next((path for path in (top, *within) if path.is_symlink()), None)
@@ -151,7 +150,7 @@ def set_aside(layout: Layout, paths: list[Path]) -> list[str]:
 def _foreign(layout: Layout) -> list[str]:
     """Return what lies among a dataset's files, or among those that were set aside, and is none of them."""
     summaries = {layout.info, layout.stats, layout.tasks, layout.manifest}
-    places = {path: layout for name in _FOLDERS for path in _all_below(layout.root / name)}
+    places = {path: layout for name in FOLDERS for path in _all_below(layout.root / name)}
     for path in _all_below(layout.damaged):
         parts = path.relative_to(layout.damaged).parts
         places[path] = Layout(layout.damaged / parts[0]) if len(parts) > 1 else layout

@@ -4,7 +4,6 @@ An episode that is put back gets the next number, and a mark of the line that it
 this is done again without an episode coming twice. What was set aside is removed only after it is back.
 """
 
-import hashlib
 from pathlib import Path
 
 from handrail.controllers.errors import HandrailError
@@ -70,7 +69,7 @@ def put_back(layout: Layout, manifest: Manifest, totals: Totals) -> tuple[Totals
     types = read_column_types(layout.row(0)) if before else None
     for folder in folders(layout):
         for row in rows_of_lines(folder):
-            origin = hashlib.sha256(row.read_bytes()).hexdigest()
+            origin = FileSeal.of(row).sha256
             lines, places = _whole_ones(folder, manifest, row)
             left = len(lines) if lines else 0
             for record in [lines.record(place, with_stats=True) for place in places] if lines else []:

@@ -6,24 +6,25 @@ short before that, nothing has changed; after it, `settle` finishes what is left
 
 import os
 import shutil
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.format.columns import ColumnTypes
-from handrail.datasets.format.layout import DAMAGED, STAGING, Layout
+from handrail.datasets.format.layout import DAMAGED, FOLDERS, STAGING, Layout
 from handrail.datasets.format.manifest import Manifest
 from handrail.datasets.format.metadata import Totals, info_bytes, stats_bytes
 from handrail.datasets.format.tables import tasks_bytes
 from handrail.datasets.recording.append import copy_file
 from handrail.datasets.recording.piece import Piece
 from handrail.datasets.recording.volume import write_volumes
-from handrail.datasets.storage.atomic import publish_folder, remove, replace, sync_folder
+from handrail.datasets.storage.atomic import beside, publish_folder, remove, replace, sync_folder
 from handrail.datasets.storage.lock import LOCK_NAME, DatasetLock
 
 Encodings = Mapping[str, Mapping[str, Any]]
-_OURS = ("data", "videos", "meta", STAGING, DAMAGED)
+_OURS = (*FOLDERS, STAGING, DAMAGED)
 
 
 def write_anew(
@@ -52,10 +53,7 @@ def write_anew(
             changed then.
         OSError: The disk does not take it.
     """
-    draft = Layout(_draft(root))
-    lock = DatasetLock(draft.staging)
-    try:
-        _clear(draft)
+    with drafted(root) as draft:
         totals = write_volumes(draft, manifest, pieces, types)
         if not totals.episodes:
             raise HandrailError(
@@ -67,13 +65,28 @@ def write_anew(
         replace(draft.info, info_bytes(manifest, totals, encodings), draft.staging)
         if in_place:
             _carry_over(root, draft.root)
+    return totals
+
+
+@contextmanager
+def drafted(root: Path) -> Iterator[Layout]:
+    """Provide an empty folder that takes the place of another, once it is finished and on the disk.
+
+    Raises:
+        HandrailError: Another process writes there.
+        OSError: The disk does not take it.
+    """
+    draft = Layout(_draft(root))
+    lock = DatasetLock(draft.staging)
+    try:
+        _clear(draft)
+        yield draft
     except BaseException:
         remove(draft.root)
         raise
     finally:
         lock.release()
     publish_folder(draft.root, root)
-    return totals
 
 
 def remove_whole(root: Path) -> None:
@@ -137,8 +150,8 @@ def _carry_over(root: Path, draft: Path) -> None:
 
 
 def _draft(root: Path) -> Path:
-    return root.with_name(f".{root.name}.partial")
+    return beside(root, "partial")
 
 
 def _old(root: Path) -> Path:
-    return root.with_name(f".{root.name}.old")  # as `publish_folder` calls it
+    return beside(root, "old")  # as `publish_folder` calls it

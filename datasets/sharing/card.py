@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from handrail.controllers.errors import HandrailError
+from handrail.controllers.regular_file import regular
 from handrail.datasets.demonstrations.episode import Episode
 from handrail.datasets.demonstrations.load import recorded_episodes
 from handrail.datasets.presentation.markdown import markdown_table, markdown_text
@@ -56,7 +57,7 @@ def write_card(root: Path, repo_id: str, license_id: str) -> str:
         HandrailError: There is a card that somebody else wrote, no dataset, or the disk does not take it.
     """
     path = root / CARD
-    if path.exists() and _MARK not in path.read_text(encoding="utf-8", errors="replace"):
+    if path.exists() and _MARK not in regular(path).read_text(encoding="utf-8", errors="replace"):
         raise HandrailError(
             f"{str(path)!r}: expected none, or one that handrail-push wrote; found another, which LeRobot's"
             " upload would replace: give it another name"

@@ -4,6 +4,7 @@ What goes is LeRobot's dataset and the card. `.damaged/`, `.handrail/` and whate
 stay, and episodes of a user study's participants are not sent at all.
 """
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatch
@@ -83,9 +84,12 @@ def prepare(
     said = write_card(root, repo_id, license_id)
     found = [path for path in sorted(root.rglob("*")) if path.is_file()]
     files = [path for path in found if is_sent(path.relative_to(root).as_posix())]
-    linked = next((path for path in files if path.resolve() != root.resolve() / path.relative_to(root)), None)
-    if linked is not None:
-        raise HandrailError(f"{str(linked)!r}: expected a file of the dataset, found a link; nothing is sent")
+    home = Path(os.path.realpath(root))
+    linked = [each for each in files if Path(os.path.realpath(each)) != home / each.relative_to(root)]
+    if linked:
+        raise HandrailError(
+            f"{str(linked[0])!r}: expected a file of the dataset, found a link; nothing is sent"
+        )
     tops, sent = ({path.relative_to(root).parts[0] for path in some} for some in (found, files))
     names = tuple(path.relative_to(root).as_posix() for path in files)
     size = sum(path.stat().st_size for path in files)

@@ -30,6 +30,17 @@ def reason(error: Exception) -> str:
     return getattr(error, "strerror", None) or str(error)
 
 
+def beside(path: Path, ending: str) -> Path:
+    """Return the hidden name of what is not finished, beside a file or a folder.
+
+    Raises:
+        HandrailError: There is nothing beside it.
+    """
+    if not path.name:
+        raise HandrailError(f"{str(path)!r}: expected a folder with a name, got the top of all folders")
+    return path.with_name(f".{path.name}.{ending}")
+
+
 def write_synced(path: Path, data: bytes) -> None:
     """Write a file and wait until the disk has it.
 
@@ -78,7 +89,7 @@ def write_whole(path: Path, data: bytes) -> None:
         OSError: The disk is full, or the folder cannot be made or written.
     """
     make_folder(path.parent)
-    partial = path.with_name(f".{path.name}.partial")
+    partial = beside(path, "partial")
     try:
         write_synced(partial, data)
         os.replace(partial, path)
@@ -98,7 +109,7 @@ def publish_folder(draft: Path, final: Path) -> None:
     """
     for path in (draft, *draft.rglob("*")):
         _sync(path, os.O_RDONLY)
-    old = final.with_name(f".{final.name}.old")
+    old = beside(final, "old")
     remove(old)
     if final.exists():
         os.replace(final, old)
@@ -123,7 +134,7 @@ def remove(path: Path) -> None:
 
 
 def _sync(path: Path, flags: int) -> None:
-    descriptor = os.open(path, flags)
+    descriptor = os.open(path, flags | os.O_NONBLOCK)  # a named pipe would wait
     try:
         os.fsync(descriptor)
     finally:

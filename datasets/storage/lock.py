@@ -60,7 +60,7 @@ class DatasetLock:
     def _acquire(self) -> BinaryIO:
         while True:
             make_folder(self._path.parent)
-            file = open(self._path, "ab")  # noqa: SIM115 - held open for as long as the lock is
+            file = open(self._path, "ab", opener=_opened)  # noqa: SIM115 - held for as long as the lock is
             try:
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except OSError as error:
@@ -79,3 +79,7 @@ class DatasetLock:
             return os.path.samestat(os.fstat(file.fileno()), self._path.stat())
         except FileNotFoundError:
             return False
+
+
+def _opened(path: str, flags: int) -> int:
+    return os.open(path, flags | os.O_NONBLOCK, 0o666)  # a named pipe would wait

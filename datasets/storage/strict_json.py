@@ -2,12 +2,11 @@
 
 import json
 import math
-import os
-import stat
 from pathlib import Path
 from typing import Any, NoReturn
 
 from handrail.controllers.errors import HandrailError, message_of
+from handrail.controllers.regular_file import open_regular
 from handrail.datasets.storage.atomic import write_whole
 
 MOST_BYTES = 16 * 1024 * 1024
@@ -19,13 +18,10 @@ def read_json(path: Path) -> Any:
     """Return what a file says; see `parse_json`.
 
     Raises:
-        OSError: It is not there or cannot be read.
-        ValueError: It is no plain file, or `parse_json` refuses it; one line.
+        OSError: It is not there, cannot be read, or is no regular file.
+        ValueError: `parse_json` refuses it; one line.
     """
-    found = os.stat(path)
-    if not stat.S_ISREG(found.st_mode):
-        raise ValueError("no plain file")
-    with open(path, "rb") as file:
+    with open_regular(path) as file:
         return parse_json(file.read(MOST_BYTES + 1))
 
 

@@ -6,7 +6,7 @@ are read here: networks and optimisers from `model.zip`, transitions from `repla
 
 import re
 import shutil
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any, cast
@@ -19,6 +19,7 @@ from stable_baselines3.common.save_util import load_from_zip_file
 
 from handrail.controllers.entries import is_amounts
 from handrail.controllers.errors import HandrailError, message_of
+from handrail.controllers.regular_file import open_regular, regular
 from handrail.datasets.storage.atomic import publish_folder
 from handrail.datasets.storage.strict_json import load_json, write_json
 from handrail.policies.imitation.interface.trust import check_links
@@ -34,7 +35,8 @@ SHOWN = {
 """What the figure of a curve shows."""
 _NETWORKS, _TRANSITIONS, _CURVE = "model.zip", "replay_buffer.npz", "curve.json"
 _ARRAYS = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
-_ROW = {"steps", "updates", "seconds", *SHOWN}  # what every row of the curve has
+_UNTIL = {"steps", "updates", "seconds"}  # what the last row of the curve has, of an interrupted run
+_ROW = {*_UNTIL, *SHOWN}  # and every other one
 _STEPS = re.compile(r"\d{8}", re.ASCII)  # name of a checkpoint
 _ENTROPY = "log_ent_coef"
 _WRITTEN = ("config.json", "actor.json", "actor.npz", "curve.png")
@@ -78,8 +80,8 @@ def check_resumes(config: TrainRlConfig) -> Path:
     return last
 
 
-def resume_run(last: Path, model: SAC) -> Curve:
-    """Give a model all that a checkpoint has, transitions too; return the curve until then.
+def resume_run(last: Path, model: SAC) -> tuple[Curve, float]:
+    """Give a model all that a checkpoint has, transitions too; return the curve and the time [s] until then.
 
     Args:
         last: checkpoint of the run.
@@ -99,27 +101,37 @@ def resume_run(last: Path, model: SAC) -> Curve:
     assert model.replay_buffer is not None
     _read_transitions(last / _TRANSITIONS, model.replay_buffer)
     model.num_timesteps, model._n_updates = int(last.name), int(curve[-1]["updates"])
-    return curve
+    evaluated = [row for row in curve if row.keys() >= _ROW]
+    return evaluated, curve[-1]["seconds"]
 
 
-def last_networks(folder: Path) -> Mapping[str, Any]:
-    """Return actor, critics and target critics of a run's last checkpoint, without the optimisers' memory.
+def start_from(folder: Path, model: SAC) -> None:
+    """Give a model actor, critics and target critics of a run's last checkpoint, not the optimisers' memory.
 
     Raises:
         HandrailError: there is no checkpoint, or it is broken.
     """
     last = _there(folder, "--start_from")
     parameters, _ = _tensors(last / _NETWORKS)
-    if "policy" not in parameters:
-        raise _broken(last / _NETWORKS, "no policy")
-    return parameters["policy"]
+    try:
+        model.policy.load_state_dict(parameters["policy"])
+    except Exception as error:  # of PyTorch: whatever the tensors are, they do not fit
+        raise _broken(last / _NETWORKS, error) from error
 
 
-def write_checkpoint(folder: Path, model: SAC, actor: Actor, curve: Curve) -> None:
-    """Write a checkpoint under another name, rename it, and remove the one before."""
+def write_checkpoint(folder: Path, model: SAC, actor: Actor | None, curve: Curve) -> None:
+    """Write a checkpoint under another name, rename it, and remove the one before.
+
+    Args:
+        folder: of the run.
+        model: in training.
+        actor: of the model, if it was evaluated.
+        curve: until now; the last row says how far the training is.
+    """
     name = f"{model.num_timesteps:08d}"
-    (folder / "actors").mkdir(exist_ok=True)
-    actor.save(folder / "actors" / f"{name}.npz")
+    if actor is not None:
+        (folder / "actors").mkdir(exist_ok=True)
+        actor.save(folder / "actors" / f"{name}.npz")
     last, final = _last(folder), folder / "checkpoints" / name
     partial = final.with_suffix(".partial")
     shutil.rmtree(partial, ignore_errors=True)
@@ -161,10 +173,21 @@ def _there(folder: Path, flag: str) -> Path:
 def _tensors(path: Path) -> tuple[Mapping[str, Any], Mapping[str, torch.Tensor]]:
     """Return state dictionaries and single tensors of a model; what is pickled beside them is not read."""
     try:
-        _, parameters, variables = load_from_zip_file(path, load_data=False, device="cpu")
+        _, parameters, variables = load_from_zip_file(regular(path), load_data=False, device="cpu")
     except Exception as error:  # of zipfile, pickle and PyTorch: whatever the file holds, it is refused
         raise _broken(path, error) from error
+    if not all(values.isfinite().all() for values in _leaves([parameters, variables])):
+        raise _broken(path, "NaN or infinity")
     return parameters, variables or {}
+
+
+def _leaves(content: Any) -> Iterator[torch.Tensor]:
+    """Yield every tensor in nested state dictionaries."""
+    if isinstance(content, torch.Tensor):
+        yield content
+    elif isinstance(content, Mapping | list):
+        for each in content.values() if isinstance(content, Mapping) else content:
+            yield from _leaves(each)
 
 
 def _read_transitions(path: Path, buffer: ReplayBuffer) -> None:
@@ -174,7 +197,7 @@ def _read_transitions(path: Path, buffer: ReplayBuffer) -> None:
             " --start_from begins a new run with the networks of this one"
         )
     try:
-        with open(path, "rb") as file, np.load(file, allow_pickle=False) as arrays:
+        with open_regular(path) as file, np.load(file, allow_pickle=False) as arrays:
             place, full = map(int, arrays["place"])
             found = {name: arrays[name] for name in _ARRAYS}
     except Exception as error:  # of NumPy and zipfile: whatever the file holds, it is refused
@@ -193,7 +216,8 @@ def _curve(path: Path, steps: int) -> Curve:
     """Return the curve of a checkpoint after so many steps."""
     curve = load_json(path, "the curve of a training run")
     rows = curve if isinstance(curve, list) and all(map(is_amounts, curve)) else []
-    if not rows or not all(row.keys() >= _ROW for row in rows) or rows[-1]["steps"] != steps:
+    whole = all(row.keys() >= _ROW for row in rows[:-1]) and all(row.keys() >= _UNTIL for row in rows[-1:])
+    if not rows or not whole or rows[-1]["steps"] != steps:
         raise HandrailError(
             f"{str(path)!r}: expected the curve of a training run until step {steps}, got {curve!r:.80}"
         )

@@ -1,6 +1,6 @@
 """How good a policy of the reinforcement-learning baseline is, on goals that never change."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
@@ -26,7 +26,7 @@ def evaluation_goals(count: int, seed: int = EVALUATION_SEED) -> tuple[Pose, ...
     return tuple(sample_goal(rng) for _ in range(count))
 
 
-def evaluate(policy: Policy, goals: Sequence[Pose], physics: bool = True) -> list[Score]:
+def evaluate(policy: Policy, goals: Iterable[Pose], physics: bool = True) -> list[Score]:
     """Return the score of every goal, early failure off."""
     env = GoalReachingEnv(early_failure=False, physics=physics)
     return [_score(env, policy, goal) for goal in goals]

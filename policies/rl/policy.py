@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray, frozen
-from handrail.controllers.errors import HandrailError
+from handrail.controllers.errors import HandrailError, message_of
+from handrail.controllers.regular_file import open_regular
 from handrail.datasets.storage.atomic import write_whole
 from handrail.policies.rl.observation import ACTION_SIZE, OBSERVATION_SIZE
 
@@ -98,10 +99,12 @@ class Actor:
         """
         path = path or SHIPPED / "actor.npz"
         try:
-            with np.load(path, allow_pickle=False) as arrays:
+            with open_regular(path) as file, np.load(file, allow_pickle=False) as arrays:
                 layers = range(len(arrays.files) // 2)
                 weights = tuple(arrays[f"weight_{i}"] for i in layers)
                 biases = tuple(arrays[f"bias_{i}"] for i in layers)
-        except (OSError, KeyError, ValueError) as error:
-            raise HandrailError(f"actor {path}: expected an .npz file of one, got {error}") from error
+        except Exception as error:  # of NumPy and zipfile: whatever the file holds, it is refused
+            raise HandrailError(
+                f"actor {path}: expected an .npz file of one, got {message_of(error)}"
+            ) from error
         return cls(weights, biases)

@@ -1,6 +1,7 @@
 """Training of the reinforcement-learning baseline with soft actor-critic from Stable-Baselines3."""
 
 import importlib.metadata
+import itertools
 import os
 import platform
 import time
@@ -21,6 +22,7 @@ from handrail.collect.experiments.benchmark.tables import PUBLISHED
 from handrail.datasets.presentation.drawing import COLOURS, GREY, new_figure, png, tidy
 from handrail.datasets.presentation.terminal import Terminal
 from handrail.datasets.storage.atomic import write_whole
+from handrail.datasets.storage.interrupts import Interrupts
 from handrail.datasets.storage.strict_json import write_json
 from handrail.policies.rl.checkpoint import (
     SHOWN,
@@ -28,8 +30,8 @@ from handrail.policies.rl.checkpoint import (
     begin_run,
     check_resumes,
     evaluated_actors,
-    last_networks,
     resume_run,
+    start_from,
     write_checkpoint,
 )
 from handrail.policies.rl.config import TrainRlConfig
@@ -51,14 +53,12 @@ def train(config: TrainRlConfig) -> dict[str, Any]:
 
     Raises:
         HandrailError: a setting is wrong, there is a run already, or there is none to resume.
+        KeyboardInterrupt: it was interrupted; a checkpoint is written, and it can be resumed.
     """
     config.check()
     torch.set_num_threads(config.threads)
-    model, curve = _resumed(config) if config.resume else _new(config)
-    remaining = config.steps - model.num_timesteps
-    if remaining > 0:
-        callback = Watch(config, curve)
-        model.learn(remaining, callback, log_interval=20, reset_num_timesteps=not config.resume)
+    model, curve, seconds = _resumed(config) if config.resume else _new(config)
+    _learn(config, model, curve, seconds)
     actor = Actor.mean(evaluated_actors(config.folder, config.average))
     actor.save(config.folder / "actor.npz")
     final = spreads(evaluate(actor, evaluation_goals(config.final_goals, FINAL_SEED), config.physics))
@@ -66,6 +66,25 @@ def train(config: TrainRlConfig) -> dict[str, Any]:
     write_json(config.folder / "actor.json", record)
     write_whole(config.folder / "curve.png", png(_figure(curve)))
     return record
+
+
+def _learn(config: TrainRlConfig, model: SAC, curve: Curve, seconds: float) -> None:
+    """Make the steps that remain, until an interrupt."""
+    remaining = max(config.steps - model.num_timesteps, 0)
+    if not remaining and _is_evaluated(model, curve):
+        return
+    with Interrupts() as interrupts:
+        callback = Watch(config, curve, seconds, interrupts)
+        try:
+            with interrupts.deferred():
+                model.learn(remaining, callback, log_interval=20, reset_num_timesteps=not config.resume)
+        except KeyboardInterrupt:
+            goes_on = f"--resume goes on after step {model.num_timesteps}"
+            raise KeyboardInterrupt(f"training: interrupted; {goes_on}") from None
+
+
+def _is_evaluated(model: SAC, curve: Curve) -> bool:
+    return bool(curve) and curve[-1]["steps"] == model.num_timesteps
 
 
 def actor_of(model: SAC) -> Actor:
@@ -80,15 +99,17 @@ class Watch(BaseCallback):
     Args:
         config: of the training.
         curve: evaluations so far; more are appended.
+        seconds: of training so far.
+        interrupts: one of them ends the training, and an evaluation too.
     """
 
     model: SAC
 
-    def __init__(self, config: TrainRlConfig, curve: Curve) -> None:
+    def __init__(self, config: TrainRlConfig, curve: Curve, seconds: float, interrupts: Interrupts) -> None:
         super().__init__()
-        self._config, self._curve = config, curve
+        self._config, self._curve, self._interrupts = config, curve, interrupts
         self._goals = evaluation_goals(config.goals)
-        self._began = time.monotonic() - (curve[-1]["seconds"] if curve else 0.0)
+        self._began = time.monotonic() - seconds
         columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
         self._progress = Progress(*columns, console=Terminal())
         self._bar = self._progress.add_task("training", total=config.steps)
@@ -100,36 +121,45 @@ class Watch(BaseCallback):
         self._progress.update(self._bar, completed=self.num_timesteps)
         if self.num_timesteps % self._config.save_every == 0:
             self._evaluate_and_save()
-        return True
+        return not self._interrupts.asked
 
     def _on_training_end(self) -> None:
-        if not self._curve or self._curve[-1]["steps"] != self.num_timesteps:
+        if not _is_evaluated(self.model, self._curve):
             self._evaluate_and_save()
+        if not _is_evaluated(self.model, self._curve):  # an interrupt does not wait for that
+            write_checkpoint(self._config.folder, self.model, None, [*self._curve, self._row()])
         self._progress.stop()
+
+    def _row(self) -> dict[str, float]:
+        """Return how far the training is."""
+        seconds, updates = time.monotonic() - self._began, float(self.model._n_updates)
+        return {"steps": self.num_timesteps, "updates": updates, "seconds": seconds}
 
     def _evaluate_and_save(self) -> None:
         actor = actor_of(self.model)
-        score = means(evaluate(actor, self._goals, self._config.physics))
-        seconds = time.monotonic() - self._began
-        updates = float(self.model._n_updates)
-        row = {"steps": self.num_timesteps, "updates": updates, "seconds": seconds}
+        goals = itertools.takewhile(lambda _: not self._interrupts.asked, self._goals)
+        scores = evaluate(actor, goals, self._config.physics)
+        if self._interrupts.asked:
+            return
+        row = self._row()
+        score = means(scores)
         self._curve.append({**row, "learning_rate": self._config.learning_rate, **score})
         for name, value in score.items():
             self.logger.record(f"evaluation/{name}", value)
         self.logger.dump(self.num_timesteps)
         self._progress.console.print(
-            f"{self.num_timesteps} steps, {seconds:.0f} s: {score['success']:.0%} of the goals, "
+            f"{self.num_timesteps} steps, {row['seconds']:.0f} s: {score['success']:.0%} of the goals, "
             f"effort {score['arm_effort']:.1f}, jerkiness {score['jerkiness']:.3f}"
         )
         write_checkpoint(self._config.folder, self.model, actor, self._curve)
 
 
-def _new(config: TrainRlConfig) -> tuple[SAC, Curve]:
+def _new(config: TrainRlConfig) -> tuple[SAC, Curve, float]:
     begin_run(config)
     model = new_model(config)
     if config.start_from:
-        model.policy.load_state_dict(last_networks(Path(config.start_from).expanduser()))
-    return model, []
+        start_from(Path(config.start_from).expanduser(), model)
+    return model, [], 0.0
 
 
 def new_model(config: TrainRlConfig) -> SAC:
@@ -154,12 +184,12 @@ def new_model(config: TrainRlConfig) -> SAC:
     )
 
 
-def _resumed(config: TrainRlConfig) -> tuple[SAC, Curve]:
+def _resumed(config: TrainRlConfig) -> tuple[SAC, Curve, float]:
     last = check_resumes(config)
     model = new_model(config)
-    curve = resume_run(last, model)
+    curve, seconds = resume_run(last, model)
     model.set_random_seed(config.seed + model.num_timesteps)  # else the same goals would come again
-    return model, curve
+    return model, curve, seconds
 
 
 def _environment(config: TrainRlConfig) -> gymnasium.Env:

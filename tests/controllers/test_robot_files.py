@@ -1,5 +1,7 @@
 """A robot's file from whoever it is: a robot, or one line; whatever is put into it, deep down or between."""
 
+import os
+import re
 import shutil
 from pathlib import Path
 
@@ -14,6 +16,7 @@ from handrail.controllers.errors import HandrailError
 from handrail.controllers.robot.catalogue import ROBOTS
 from handrail.controllers.robot.description import load_description, robot_names
 from handrail.controllers.robot.model import RobotModel
+from handrail.controllers.strict_toml import read_toml
 
 TEXTS = {name: spec.file.read_text() for name, spec in ROBOTS.items()}
 QUICK = settings(max_examples=50, suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -119,3 +122,50 @@ def test_a_malformed_urdf_is_one_line(content, tmp_path):
     with pytest.raises(HandrailError) as raised:
         RobotModel(load_description(beside(tmp_path, "arm.urdf")))
     assert "\n" not in str(raised.value)
+
+
+def chain(links: int) -> str:
+    """Return a URDF of links in a row."""
+    joints = (
+        f"<joint name='j{i}' type='fixed'><parent link='l{i}'/><child link='l{i + 1}'/></joint>"
+        for i in range(links - 1)
+    )
+    return f"<robot name='x'>{''.join(f"<link name='l{i}'/>" for i in range(links))}{''.join(joints)}</robot>"
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (chain(20_000), "expected at most 1000 elements 'link', got 20000"),
+        ("<!DOCTYPE robot [<!ENTITY a 'b'>]><robot name='&a;'/>", "no DOCTYPE"),
+        (b" " * (16 * 2**20 + 1), "expected at most 16 MB"),
+        *(
+            (f"<robot name='x'><link name='a'/><limit velocity='{word}'/></robot>", f"got '{word}'")
+            for word in ("5e-324", "nan", "inf", "-1e300")
+        ),
+    ],
+    ids=["chain", "entity", "large", "tiny", "nan", "inf", "huge"],
+)
+def test_a_urdf_that_pinocchio_cannot_stand_is_one_line(content, said, tmp_path):
+    """Twenty thousand links overflow its stack, and end the process."""
+    (tmp_path / "arm.urdf").write_bytes(content if isinstance(content, bytes) else content.encode())
+    with pytest.raises(HandrailError, match=said) as raised:
+        RobotModel(load_description(beside(tmp_path, "arm.urdf")))
+    assert "\n" not in str(raised.value)
+
+
+def test_a_named_pipe_is_one_line(tmp_path):
+    os.mkfifo(tmp_path / "robot.toml")
+    with pytest.raises(HandrailError, match=r"robot description .*found a named pipe"):
+        read_toml(tmp_path / "robot.toml", "robot description")
+    (home := tmp_path / "home").mkdir()
+    os.mkfifo(home / "arm.urdf")
+    with pytest.raises(HandrailError, match=r"URDF arm\.urdf: expected it beside"):
+        load_description(beside(home, "arm.urdf"))
+
+
+def test_a_limit_next_to_zero_is_one_line(tmp_path):
+    path = tmp_path / "robot.toml"
+    path.write_text(re.sub(r"(?m)^velocity = \[[^,]*", "velocity = [5e-324", TEXTS["ridgeback_ur10"]))
+    with pytest.raises(HandrailError, match="velocity: expected numbers above 0"):
+        load_description(path)

@@ -61,7 +61,7 @@ def test_plain_json_is_read():
 
 def test_a_pipe_is_not_waited_for(tmp_path):
     os.mkfifo(tmp_path / "info.json")
-    with pytest.raises(ValueError, match="plain file"):
+    with pytest.raises(OSError, match="found a named pipe"):
         read_json(tmp_path / "info.json")
 
 

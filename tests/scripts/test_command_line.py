@@ -2,6 +2,7 @@
 
 import dataclasses
 import io
+import os
 import re
 import shlex
 import subprocess
@@ -64,6 +65,19 @@ def test_a_terminal_without_unicode_gets_the_words_it_can_show(monkeypatch):
     with pytest.raises(SystemExit) as stopped:
         cli.run(lambda: print("pick × place", flush=True))
     assert (stopped.value.code, written.getvalue()) == (None, b"pick ? place\n")
+
+
+@pytest.mark.parametrize(
+    "word", [os.fsdecode(b"caf\xe9"), "~nobody-here/x", "--output=~nobody-here", "a" * 300, "/"]
+)
+@pytest.mark.parametrize("name", ["inspect", "repair", "replay", "pack", "compare", "train", "evaluate"])
+def test_a_name_that_none_can_have_is_one_line(name, word, tmp_path, monkeypatch):
+    """Bytes that are no text, a person who has no home here, a name too long, the top of all folders."""
+    monkeypatch.chdir(tmp_path)
+    done = command(word, *(["--output", "new"] if name == "train" else []), name=name)
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1), done.stderr
+    assert len(done.stderr) < 500
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize("name", STORED)

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from child import Child, members, wait_until
 
-KILLED, HUNG_UP, ASKED = {-signal.SIGKILL}, {-signal.SIGHUP}, {130, -signal.SIGTERM}
+KILLED, HUNG_UP, ASKED = {-signal.SIGKILL}, {-signal.SIGHUP}, {130}
 FINE, FAILED = {0}, {0, 1, 2}  # a failure that comes too late for the command to notice is none
 CLUSTER = "cluster.json"  # in the folder of work that is done on a cluster
 _DAY = 86_400.0  # [s]

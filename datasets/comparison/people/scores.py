@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from handrail.controllers.errors import HandrailError, message_of, shown
+from handrail.controllers.regular_file import open_regular
 from handrail.datasets.quality.metric import Metric
 
 COLUMNS = ("participant", "condition", "score", "value")
@@ -68,7 +69,7 @@ def read_scores(path: Path) -> tuple[Score, ...]:
 
 
 def _text(path: Path) -> str:
-    with open(path, "rb") as file:
+    with open_regular(path) as file:
         data = file.read(MOST_BYTES + 1)
     if len(data) > MOST_BYTES:
         raise ValueError(f"expected at most {MOST_BYTES >> 20} MB, got more")

@@ -3,6 +3,7 @@
 import io
 from typing import Any
 
+from handrail.controllers.regular_file import regular
 from handrail.datasets.comparison.groups import Group
 from handrail.datasets.demonstrations.episode import Episode
 from handrail.datasets.format.path_pattern import fill
@@ -36,7 +37,7 @@ def _first_frame(info: DatasetInfo, key: str, episode: Episode) -> str:
         return ""
     try:
         begin = float(episode.meta.get(f"videos/{key}/from_timestamp") or 0.0)
-        with av.open(str(info.root / fill(info.video_path, chunk, file, key))) as container:
+        with av.open(str(regular(info.root / fill(info.video_path, chunk, file, key)))) as container:
             stream = container.streams.video[0]
             container.seek(int(begin * 1_000_000))
             for frame in container.decode(stream):

@@ -14,6 +14,7 @@ from handrail.collect.tasks.catalogue import TASKS
 from handrail.controllers.baselines.catalogue import CONTROLLERS
 from handrail.controllers.entries import is_count
 from handrail.controllers.errors import HandrailError
+from handrail.controllers.regular_file import open_regular
 from handrail.controllers.robot.catalogue import ROBOTS
 from handrail.datasets.storage.strict_json import load_json, read_json
 from handrail.policies.imitation.evaluation.config import EvaluateConfig
@@ -223,7 +224,7 @@ def _digest(folder: Path) -> str:
             if path.name == NAME:
                 digest.update(_without_training(path))
                 continue
-            with open(path, "rb") as file:
+            with open_regular(path) as file:
                 hashlib.file_digest(file, lambda: digest)  # adds the file to it
     return digest.hexdigest()[:16]
 

@@ -22,6 +22,7 @@ from handrail.controllers.arrays import FloatArray
 from handrail.controllers.entries import Entry, is_count, is_name, is_number, is_table
 from handrail.controllers.errors import HandrailError, message_of
 from handrail.controllers.fields import check_fields
+from handrail.controllers.regular_file import is_inside
 from handrail.datasets.storage.atomic import sync_folder, write_whole
 from handrail.datasets.storage.strict_json import load_json
 from handrail.policies.imitation.config import ACTION_SPACES
@@ -161,15 +162,19 @@ def load_policy(folder: str | Path, device: str = "cpu") -> TrainedPolicy:
     import draccus
     from lerobot.policies.factory import get_policy_class, make_pre_post_processors
 
+    from handrail.policies.imitation.interface.numbers import check_statistics, check_weights
     from handrail.policies.imitation.interface.steps import without_steps
 
     kind, override = settings.pop("type"), {"device_processor": {"device": device}}
     try:
         config = draccus.decode(registered_policies()[kind], settings | {"device": device})
-        policy = get_policy_class(kind).from_pretrained(place, config=config)
+        policy = get_policy_class(kind).from_pretrained(place, config=config, strict=True)
         around = make_pre_post_processors(config, str(place), preprocessor_overrides=override)
     except Exception as error:  # of LeRobot and all below it: whatever the files hold, they are refused
         raise HandrailError(f"policy {str(place)!r}: {message_of(error)}") from error
+    check_weights(policy, place)
+    for pipeline in around:
+        check_statistics(pipeline, place)
     interface = _interface_of(around[0], interface, place)
     before, after = map(without_steps, around)  # an operator sees and acts through the interface itself
     policy.eval()
@@ -243,7 +248,7 @@ def model_folder(folder: Path) -> Path:
     places = (folder, folder / MODEL, *([last / MODEL] if last else []))
     for name, place in itertools.product((NAME, CONFIG), places):
         if (place / name).is_file():
-            if not place.resolve().is_relative_to(folder.resolve()):
+            if not is_inside(place, folder):
                 raise HandrailError(f"{str(place)!r}: expected it in {str(folder)!r}, found a link out of it")
             return place
     raise HandrailError(f"policy {str(folder)!r}: expected a checkpoint with a {CONFIG}, found none")

@@ -17,6 +17,8 @@ from pathlib import Path, PurePath
 from typing import Any
 
 from handrail.controllers.errors import HandrailError, unknown_name
+from handrail.controllers.regular_file import is_inside, regular
+from handrail.datasets.storage.atomic import reason
 from handrail.datasets.storage.strict_json import load_json
 
 CONFIG, WEIGHTS = "config.json", "model.safetensors"
@@ -29,17 +31,21 @@ _NO_PLACE = ("type", "device", "registry_name", "state_file", "action_names", "a
 
 
 def check_links(folder: Path) -> None:
-    """Check that every file in a folder lies in it.
+    """Check that everything in a folder lies in it, and is a file or a folder.
 
     Raises:
-        HandrailError: one is a link to somewhere else.
+        HandrailError: one is a link to somewhere else, a named pipe, a socket or a device.
     """
-    home = folder.resolve()
     for path in sorted(folder.glob("*")):
-        if not path.resolve().is_relative_to(home):
+        if not is_inside(path, folder):
             raise HandrailError(
                 f"{str(path)!r}: expected a file in the folder, found a link out of it; copy it with cp -rL"
             )
+        try:
+            if not path.is_dir():
+                regular(path)
+        except OSError as error:
+            raise HandrailError(f"{str(path)!r}: {reason(error)}") from error
 
 
 def _settings(folder: Path) -> dict[str, Any]:

@@ -1,14 +1,19 @@
 """How a training goes: the curve of its loss in `curve.csv`."""
 
+import math
 import os
 from collections.abc import Mapping
 from pathlib import Path
 
+from handrail.controllers.entries import Entry, check_entries, lists
 from handrail.datasets.storage.atomic import write_whole
+from handrail.datasets.storage.strict_json import load_json, write_json
 
 NAME = "curve.csv"
 COLUMNS = ("step", "loss", "grad_norm", "lr", "update_s", "dataloading_s")
 Row = Mapping[str, float]
+_SUMS = "training_state/curve.json"  # in a checkpoint: of the row that is not whole yet
+_SUM = Entry("a sum and a count", lists(lambda value: isinstance(value, int | float), 2), needed=False)
 
 
 class Curve:
@@ -32,6 +37,24 @@ class Curve:
             file.write(f"{_line(row)}\r\n".encode())
             file.flush()
             os.fsync(file.fileno())
+
+
+def write_sums(checkpoint: Path, sums: Mapping[str, tuple[float, float]]) -> None:
+    """Write sum and count of columns since the last row, so that a training goes on to the same rows."""
+    write_json(checkpoint / _SUMS, {name: each for name, each in sums.items() if math.isfinite(each[0])})
+
+
+def read_sums(checkpoint: Path | None) -> dict[str, tuple[float, float]]:
+    """Return sum and count of columns as a checkpoint has them; an older one has none.
+
+    Raises:
+        HandrailError: the file is something else.
+    """
+    if checkpoint is None or not (path := checkpoint / _SUMS).exists():
+        return {}
+    content = load_json(path, "sums of a training's curve")
+    check_entries(content, dict.fromkeys(COLUMNS, _SUM), repr(str(path)))
+    return {name: (total, count) for name, (total, count) in content.items()}
 
 
 def _line(row: Row) -> str:

@@ -15,6 +15,7 @@ from torch.optim.lr_scheduler import LambdaLR
 
 from handrail.controllers.errors import HandrailError
 from handrail.policies.imitation.interface.checkpoint import MODEL
+from handrail.policies.imitation.interface.numbers import check_statistics, load_weights
 from handrail.policies.imitation.interface.steps import without_steps
 from handrail.policies.imitation.training.memory import MemoryMeta
 from handrail.policies.imitation.training.plateau import Plateau
@@ -55,6 +56,9 @@ def build_learner(
         checkpoint: to go on from; None to begin.
         accelerator: of its processes.
         plateau: says how the learning rate goes; None for the settings' schedule.
+
+    Raises:
+        HandrailError: the checkpoint's weights or statistics are not the policy's, or not finite.
     """
     described = settings.policy
     assert described is not None
@@ -67,6 +71,9 @@ def build_learner(
     else:
         device = {"device_processor": {"device": accelerator.device.type}}
         loaded = make_pre_post_processors(described, str(checkpoint / MODEL), preprocessor_overrides=device)
+        load_weights(policy, checkpoint / MODEL)  # LeRobot leaves out what does not fit
+        for pipeline in loaded:
+            check_statistics(pipeline, checkpoint / MODEL)
         around = without_steps(loaded[0]), without_steps(loaded[1])  # the data in memory are seen so already
     step: int = 0
     optimizer, schedule = make_optimizer_and_scheduler(settings, policy)

@@ -21,11 +21,12 @@ from torch.utils.data import BatchSampler
 
 from handrail.datasets.presentation.terminal import Terminal
 from handrail.datasets.storage.atomic import publish_folder
+from handrail.datasets.storage.interrupts import Interrupts
 from handrail.policies.imitation.interface.checkpoint import MODEL, point_to
 from handrail.policies.imitation.interface.completion import Completion
 from handrail.policies.imitation.interface.interface import PolicyInterface
 from handrail.policies.imitation.interface.steps import with_steps
-from handrail.policies.imitation.training.curve import Curve
+from handrail.policies.imitation.training.curve import COLUMNS, Curve, read_sums, write_sums
 from handrail.policies.imitation.training.learner import Learner, build_accelerator, build_learner
 from handrail.policies.imitation.training.memory import MemoryDataset
 from handrail.policies.imitation.training.plateau import Plateau
@@ -68,6 +69,7 @@ class Run:
 
         Raises:
             HandrailError: accelerate would split the model between processes, or the loss is not finite.
+            KeyboardInterrupt: it was interrupted; the update is finished, and its checkpoint written.
         """
         settings, accelerator = self.settings, build_accelerator(self.settings.policy)
         assert settings.output_dir is not None
@@ -77,20 +79,29 @@ class Run:
         curve = Curve(settings.output_dir, learner.step) if main else None
         columns = TextColumn("training"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
         told, shown = TextColumn("{task.description}"), main and not self.quiet
-        with Progress(*columns, told, console=Terminal(stderr=True), disable=not shown) as progress:
-            self._loop(learner, accelerator, curve, progress)
+        with (
+            Progress(*columns, told, console=Terminal(stderr=True), disable=not shown) as progress,
+            Interrupts() as interrupts,
+            interrupts.deferred(),
+        ):
+            self._loop(learner, accelerator, curve, progress, interrupts)
         accelerator.end_training()
 
     def _loop(
-        self, learner: Learner, accelerator: Accelerator, curve: Curve | None, progress: Progress
+        self,
+        learner: Learner,
+        accelerator: Accelerator,
+        curve: Curve | None,
+        progress: Progress,
+        interrupts: Interrupts,
     ) -> None:
         settings, means = self.settings, self._means(learner.step, accelerator)
         assert settings.optimizer is not None
         around = settings.optimizer.grad_clip_norm, accelerator, learner.schedule
         batches = self._batches(learner.step, accelerator)
         bar = progress.add_task("", total=self._end, completed=learner.step)
-        step = learner.step
-        while step < self._end:
+        step, ends = learner.step, False
+        while step < self._end and not ends:
             step += 1
             began = time.perf_counter()
             batch = learner.before(next(batches))
@@ -107,10 +118,12 @@ class Run:
             if self.validation and (step % self.validation.every == 0 or step == self._end):
                 self.validation.measure(step, learner, accelerator, settings.batch_size)
                 progress.update(bar, total=self._end)
-            if should_save_checkpoint(step, settings.save_freq, self._end):
+            ends = interrupts.asked
+            if ends or should_save_checkpoint(step, settings.save_freq, self._end):
                 if accelerator.is_main_process:
-                    self._save(learner, step, accelerator)
-                accelerator.wait_for_everyone()
+                    self._save(learner, step, accelerator, means)
+                if not ends:  # of other processes' interrupts this one does not know
+                    accelerator.wait_for_everyone()
 
     @property
     def _end(self) -> int:
@@ -119,6 +132,8 @@ class Run:
 
     def _means(self, step: int, accelerator: Accelerator) -> MetricsTracker:
         meters = {name: AverageMeter(name, reduction=how) for name, how in _OVER_PROCESSES.items()}
+        for name, (total, count) in read_sums(self.checkpoint).items():
+            meters[name].sum, meters[name].count = total, count
         sizes = self.settings.batch_size, len(self.dataset), len(self.dataset.meta.lengths)
         return MetricsTracker(*sizes, meters, step, accelerator)  # pyright: ignore[reportArgumentType]
 
@@ -140,7 +155,7 @@ class Run:
             for indices in order:
                 yield send_to_device(self.dataset.batch(indices), accelerator.device)
 
-    def _save(self, learner: Learner, step: int, accelerator: Accelerator) -> None:
+    def _save(self, learner: Learner, step: int, accelerator: Accelerator, means: MetricsTracker) -> None:
         assert self.settings.output_dir is not None
         folder = get_step_checkpoint_dir(self.settings.output_dir, self.settings.steps, step)
         draft = folder.with_name(f".{folder.name}")
@@ -149,6 +164,8 @@ class Run:
         around = with_steps(learner.before, learner.after, self.interface, self.completion)
         parts = (policy, learner.optimizer, learner.schedule, *around)
         save_checkpoint(draft, step, self.settings, *parts, processes, self.settings.batch_size)
+        meters = {name: means.metrics[name] for name in COLUMNS if name in means.metrics}
+        write_sums(draft, {name: (meter.sum, meter.count) for name, meter in meters.items()})
         self.finish(draft / MODEL, step)
         publish_folder(draft, folder)
         point_to(folder)

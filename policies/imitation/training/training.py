@@ -60,7 +60,7 @@ def train(config: TrainConfig, quiet: bool = False) -> Path:
     plateau = _plateau(config, steps, losses)
     if checkpoint is not None and int(checkpoint.name) >= (plateau.end if plateau else steps):
         return checkpoint / MODEL
-    with threads(config.threads), _no_pages_of_logs(), in_one_line(config):
+    with threads(config.threads), _no_pages_of_logs(), in_one_line(config), _going_on(config):
         _run(config, source, steps, checkpoint, quiet, losses, plateau)
     last = last_checkpoint(config.folder)
     assert last is not None
@@ -222,6 +222,17 @@ def _robot(source: Source) -> str:
 
 def _common(values: list[str]) -> str:
     return values[0] if len(set(values)) == 1 else "mixed"
+
+
+@contextmanager
+def _going_on(config: TrainConfig) -> Iterator[None]:
+    """Say what an interrupted training comes to."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        last = last_checkpoint(config.folder)
+        goes_on = f"--resume goes on after update {int(last.name)}" if last else "no update was made"
+        raise KeyboardInterrupt(f"training: interrupted; {goes_on}") from None
 
 
 def _is_main_process() -> bool:

@@ -4,15 +4,19 @@ import os
 import shutil
 
 import pytest
+from command_helpers import command
 from datasets_guillotine import Guillotine
 from datasets_helpers import TINY_FEATURES, record, tree
 from editing_helpers import content, part
 
 from handrail.controllers.errors import HandrailError
+from handrail.datasets.editing.config import EditConfig
+from handrail.datasets.editing.edit import edit
 from handrail.datasets.editing.pack import merge_datasets
 from handrail.datasets.format.layout import Layout
 from handrail.datasets.recording.repair import repair
 from handrail.datasets.recording.rewrite import settle
+from handrail.scripts import cli
 
 GUILLOTINE = Guillotine()
 
@@ -53,3 +57,41 @@ def test_a_merge_killed_at_changes_to_the_disk(tmp_path, in_place, step):
         assert content(target) == wanted
         assert repair(target).clean
     assert k > 8
+
+
+@pytest.mark.parametrize("step", [8, pytest.param(1, marks=pytest.mark.slow)])
+def test_a_split_killed_at_changes_to_the_disk_is_run_again(tmp_path, step):
+    """The parts are there all together, or none of them is, and the same line does it."""
+    root = record(tmp_path / "set", 4, features=TINY_FEATURES)
+    line = ["split", root, "--parts", "train=0-2", "test=3", "--output"]
+    lived, k = False, 1 - step
+    while not lived:
+        k += step
+        out = tmp_path / str(k) / "parts"
+        out.parent.mkdir()
+        config = cli.parse(EditConfig, "handrail-edit", [*map(str, line), str(out)])
+        lived = GUILLOTINE.run(out.parent, k, lambda config=config: edit(config))
+        if not out.exists():
+            assert command(*line, out, name="edit").returncode == 0
+        assert [path.name for path in out.parent.iterdir()] == ["parts"]
+        assert [len(content(out / name)) for name in ("train", "test")] == [3, 1]
+    assert k > 8
+
+
+def test_a_merge_of_a_folder_with_itself_or_into_one_of_its_own_asks(tmp_path):
+    root, other = part(tmp_path / "one", 0, 2), part(tmp_path / "two", 2, 4)
+    (tmp_path / "link").symlink_to(root)
+    before = tree(tmp_path)
+    for line, said in (
+        (("merge", root, root, "--output", tmp_path / "new"), "expected each folder once"),
+        (("merge", root, tmp_path / "link", "--output", tmp_path / "new"), "expected each folder once"),
+        (("merge", root, other, "--output", root), "another folder, or --in_place to replace it"),
+        (("merge", root, other, "--output", tmp_path / "new", "--in_place"), "one of the folders"),
+        (("edit", "merge", root, root, "--output", tmp_path / "new"), "expected each folder once"),
+    ):
+        done = command(*line[1:], name=line[0])
+        assert (done.returncode, done.stderr.count("\n")) == (2, 1), done.stderr
+        assert said in done.stderr
+        assert tree(tmp_path) == before
+    assert command(root, other, "--output", root, "--in_place", name="merge").returncode == 0
+    assert len(content(root)) == 4

@@ -215,10 +215,10 @@ def test_a_file_named_after_an_episode_of_a_packed_file_is_no_episode(tmp_path):
 
 
 def test_datasets_without_an_episode_add_none(whole, tmp_path):
-    empty = part(tmp_path / "empty", 0, 0)
-    merge_datasets([empty, whole, empty], tmp_path / "both")
+    empty, other = (part(tmp_path / name, 0, 0) for name in ("empty", "other"))
+    merge_datasets([empty, whole, other], tmp_path / "both")
     assert content(tmp_path / "both") == content(whole)
-    for roots, said in (([empty, empty], "an episode or more"), ([whole, tmp_path / "none"], "none")):
+    for roots, said in (([empty, other], "an episode or more"), ([whole, tmp_path / "none"], "none")):
         with pytest.raises(HandrailError, match=said):
             merge_datasets(roots, tmp_path / "new")
         assert not (tmp_path / "new").exists()

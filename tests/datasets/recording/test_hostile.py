@@ -1,16 +1,28 @@
 """A dataset made to do harm does none: nothing outside its folder is touched, nothing hangs."""
 
+import contextlib
 import json
+import os
 import shutil
+import signal
+import socket
 
 import pyarrow.parquet as pq
 import pytest
+from command_helpers import command
 from datasets_helpers import create, record, resume, tree
 
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.format.layout import Layout
 from handrail.datasets.format.metadata import FileSeal
 from handrail.datasets.recording.repair import repair
+
+COMMANDS = (
+    ("inspect",),
+    ("inspect", "--check"),
+    ("pack", "--output", "/nowhere/new"),
+    ("repair",),
+)
 
 
 @pytest.fixture
@@ -65,3 +77,42 @@ def test_a_line_with_other_columns_is_damage_not_a_traceback(root, column):
     table = pq.read_table(path)
     pq.write_table(table.drop_columns([column]), path)
     assert "episode 2" in repair(root).damage[0]
+
+
+def named_pipe(path):
+    os.mkfifo(path)
+
+
+def listening(path):
+    with socket.socket(socket.AF_UNIX) as line, contextlib.chdir(path.parent):
+        line.bind(path.name)
+
+
+def endless(path):
+    path.symlink_to("/dev/zero")
+
+
+def itself(path):
+    path.symlink_to(path.name)
+
+
+@pytest.mark.parametrize("put", [named_pipe, listening, endless, itself])
+def test_what_is_no_regular_file_is_one_line_wherever_it_lies(root, put, tmp_path):
+    """Law: whatever file of a dataset it stands for, no command waits for it or reads without end."""
+    before = signal.signal(signal.SIGALRM, lambda *_: pytest.fail("it hangs"))
+    signal.alarm(240)
+    try:
+        for number, name in enumerate([*tree(root), "README.md", ".handrail/lock"]):
+            copy = shutil.copytree(root, tmp_path / str(number))
+            (copy / name).unlink(missing_ok=True)
+            (copy / name).parent.mkdir(exist_ok=True)
+            put(copy / name)
+            said = [command(copy, *words, name=verb) for verb, *words in COMMANDS]
+            assert all(done.returncode in (0, 1, 2) for done in said)
+            assert all(done.stderr.count("\n") <= 1 for done in said), said
+            if name.startswith(("data", "videos", "meta/episodes")):
+                assert {done.returncode for done in said[1:]} <= {1, 2}, (name, said)
+            shutil.rmtree(copy)
+    finally:
+        signal.alarm(0)
+        signal.signal(signal.SIGALRM, before)

@@ -1,6 +1,7 @@
 """Training of imitation policies that was cut off, killed or resumed: the same to the bit, or refused."""
 
 import dataclasses
+import itertools
 import json
 import os
 import shutil
@@ -8,15 +9,17 @@ import signal
 import subprocess
 import sys
 import time
+from unittest import mock
 
 import numpy as np
 import pytest
+from lerobot.scripts.lerobot_train import update_policy
 from training_helpers import TINY, cut, tiny, weights, write_dataset
 
 from handrail.collect.config import StoredConfig
 from handrail.controllers.errors import HandrailError
 from handrail.policies.imitation.interface.checkpoint import NAME, last_checkpoint, read_meta, write_meta
-from handrail.policies.imitation.training import presets
+from handrail.policies.imitation.training import presets, run
 from handrail.policies.imitation.training.curve import read_curve
 from handrail.policies.imitation.training.source import read_source
 from handrail.policies.imitation.training.training import train
@@ -134,3 +137,34 @@ def test_the_curve_has_a_row_every_fifty_updates_also_after_a_cut(recorded, tmp_
     train(dataclasses.replace(config, resume=True), quiet=True)
     again = read_curve(config.folder)
     assert [(row["step"], row["loss"]) for row in again] == [(row["step"], row["loss"]) for row in first]
+
+
+def test_a_training_that_is_interrupted_saves_a_checkpoint_and_goes_on_to_the_same_losses(tmp_path):
+    """SIGTERM comes while an update is made, between two rows of the curve and two measurements."""
+    root = write_dataset(tmp_path / "set", lengths=(9, 7, 8, 5, 6, 7, 8))
+    whole = tiny(root, tmp_path / "whole", steps=100, save_freq=1000, eval_split=0.3, eval_steps=40)
+    cut_off = dataclasses.replace(whole, output=str(tmp_path / "cut"))
+    with (
+        mock.patch.object(run, "update_policy", interrupted(at=63)),
+        pytest.raises(KeyboardInterrupt) as said,
+    ):
+        train(cut_off, quiet=True)
+    assert str(said.value) == "training: interrupted; --resume goes on after update 63"
+    policies = train(dataclasses.replace(cut_off, resume=True), quiet=True), train(whole, quiet=True)
+    assert weights(policies[0]) == weights(policies[1])
+    metas = [read_meta(each)[1].validation for each in policies]
+    assert metas[0] == metas[1]
+    curves = [[(row["step"], row["loss"]) for row in read_curve(each.folder)] for each in (cut_off, whole)]
+    assert curves[0] == curves[1]
+
+
+def interrupted(at):
+    """Return LeRobot's update, during one of which this process is told to end."""
+    updates = itertools.count(1)
+
+    def update(*arguments):
+        if next(updates) == at:
+            os.kill(os.getpid(), signal.SIGTERM)
+        return update_policy(*arguments)
+
+    return update

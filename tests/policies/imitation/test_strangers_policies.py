@@ -146,6 +146,16 @@ def test_no_file_is_a_link_out_of_the_folder(name, policy, tmp_path):
     refused(policy, f"{name}.*expected a file in the folder, found a link out of it")
 
 
+@pytest.mark.parametrize("name", ["model.safetensors", "config.json", "handrail.json", "new", *PROCESSORS])
+def test_a_file_of_a_checkpoint_is_no_named_pipe(name, policy):
+    (policy / name).unlink(missing_ok=True)
+    os.mkfifo(policy / name)
+    refused(policy, "expected .* found")
+    (policy / name).unlink()
+    (policy / name).symlink_to(name)
+    refused(policy, "expected|Too many levels")
+
+
 def test_a_checkpoint_does_not_lead_out_of_the_training_s_folder(policy, tmp_path):
     step = tmp_path / "training" / "checkpoints" / "000001"
     step.mkdir(parents=True)

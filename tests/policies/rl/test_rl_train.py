@@ -1,6 +1,9 @@
 """Training: a run can be stopped and resumed, its settings stay, and what it writes can be used."""
 
 import json
+import os
+import signal
+from collections import Counter
 from dataclasses import replace
 
 import numpy as np
@@ -8,6 +11,7 @@ import pytest
 
 from handrail.controllers.errors import HandrailError
 from handrail.policies.rl.config import TrainRlConfig
+from handrail.policies.rl.env import GoalReachingEnv
 from handrail.policies.rl.evaluation import FINAL_SEED, evaluate, evaluation_goals, means
 from handrail.policies.rl.policy import Actor
 
@@ -155,3 +159,30 @@ def test_only_a_training_run_is_overwritten(tmp_path):
 def test_settings_that_make_no_sense_are_refused(change):
     with pytest.raises(HandrailError, match="expected"):
         replace(TINY, **change).check()
+
+
+@pytest.mark.parametrize(("at", "steps"), [("step", 30), ("evaluation", 40)])
+def test_an_interrupted_run_saves_a_checkpoint_and_goes_on(at, steps, tmp_path, monkeypatch):
+    """SIGTERM comes before the first evaluation, or during it; no evaluation is waited for."""
+    config, calls = replace(TINY, output_dir=str(tmp_path / "rl"), goals=2, steps=50), Counter[str]()
+    reset, step = GoalReachingEnv.reset, GoalReachingEnv.step
+
+    def counted(name, call):
+        def called(*arguments, **options):
+            calls[name] += name == "step" or bool(options.get("options"))
+            if name.endswith(at) and calls[name] == {"step": 30, "evaluation": 1}[at]:
+                os.kill(os.getpid(), signal.SIGTERM)
+            return call(*arguments, **options)
+
+        return called
+
+    with monkeypatch.context() as patch:
+        patch.setattr(GoalReachingEnv, "step", counted("step", step))
+        patch.setattr(GoalReachingEnv, "reset", counted("evaluation", reset))
+        with pytest.raises(KeyboardInterrupt, match=f"interrupted; --resume goes on after step {steps}$"):
+            train(config)
+    assert calls["evaluation"] == (at == "evaluation"), "it evaluates on"
+    assert [path.name for path in (config.folder / "checkpoints").iterdir()] == [f"{steps:08d}"]
+    record = train(replace(config, resume=True))
+    assert [row["steps"] for row in record["curve"]] == ([40, 50] if at == "step" else [50])
+    assert record["updates"] == 29  # the interrupted step makes none

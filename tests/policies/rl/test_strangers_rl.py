@@ -102,6 +102,22 @@ def test_pickled_weights_are_refused(name, run, tmp_path):
     assert not (tmp_path / "marker").exists()
 
 
+@pytest.mark.parametrize("spoil", ["nan", "foreign"])
+def test_networks_are_the_run_s_and_finite(spoil, run, tmp_path):
+    archive = checkpoint(run) / "model.zip"
+    with zipfile.ZipFile(archive) as old:
+        weights = torch.load(io.BytesIO(old.read("policy.pth")), weights_only=True)
+    name = next(iter(weights))
+    if spoil == "nan":
+        weights[name].flatten()[0] = torch.nan
+    else:
+        weights["stranger"] = weights.pop(name)
+    torch.save(weights, stream := io.BytesIO())
+    rewrite(archive, **{"policy.pth": stream.getvalue()})
+    refused(run, "model.zip.*expected a checkpoint of this run")
+    refused(other(run, tmp_path), "model.zip.*expected a checkpoint of this run")
+
+
 def test_pickled_transitions_are_refused(run, tmp_path):
     marker, place = MakesFolder(tmp_path / "marker"), checkpoint(run)
     with np.load(place / "replay_buffer.npz") as arrays:
@@ -156,7 +172,7 @@ def test_malformed_settings_are_one_line(content, run):
 def test_a_run_goes_on_with_all_that_it_had(honest):
     """Law: networks, optimisers, temperature, transitions and counters are those of the checkpoint."""
     model = new_model(honest)
-    curve = resume_run(checkpoint(honest), model)
+    curve, _ = resume_run(checkpoint(honest), model)
     place = checkpoint(honest)
     from stable_baselines3 import SAC
 

@@ -26,6 +26,13 @@ class Interrupts:
     def __exit__(self, *_: object) -> None:
         for number, handler in self._previous.items():
             signal.signal(number, handler)
+        if self._asked and (outer := _current()):
+            outer._asked = True
+
+    @property
+    def asked(self) -> bool:
+        """Whether an interrupt has come."""
+        return self._asked
 
     @contextlib.contextmanager
     def deferred(self) -> Iterator[None]:
@@ -42,3 +49,15 @@ class Interrupts:
         self._asked = True
         if not self._deferring:
             raise KeyboardInterrupt
+
+
+def interrupted() -> bool:
+    """Return whether an interrupt has come: a library that is imported just then makes other errors of it."""
+    current = _current()
+    return current is not None and current.asked
+
+
+def _current() -> Interrupts | None:
+    """Return what hears the signals now."""
+    owner = getattr(signal.getsignal(signal.SIGTERM), "__self__", None)
+    return owner if isinstance(owner, Interrupts) else None

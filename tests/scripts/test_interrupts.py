@@ -1,0 +1,121 @@
+"""Ctrl-C and SIGTERM end every command with one line and 130, whenever they come, and leave no process."""
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+from places import ROOT
+
+COMMANDS = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["scripts"]
+LIGHT = "import sys; sys.argv = ['handrail-x']; import handrail.scripts; print(*sys.modules)"
+SET = ("--task", "reach", "--dataset.num_episodes")
+WORK = {
+    "record": ("OUT", *SET, "50"),
+    "record with workers": ("OUT", *SET, "50", "--workers", "2"),
+    "replay": ("SET",),
+    "compare": ("SET", "SET", "--output", "OUT"),
+    "train": ("SET", "--output", "OUT", "--steps", "100000", "--batch_size", "8"),
+    "evaluate": ("OUT/none",),
+    "pack": ("SET", "--output", "OUT"),
+    "lekiwi_host": (),
+    "benchmark": (),
+    "profile": (),
+}
+
+
+def begun(module: str, *words: str, **options) -> subprocess.Popen:
+    """Begin a command in a session of its own; return when it hears SIGTERM."""
+    process = subprocess.Popen(
+        [sys.executable, "-m", module, *words],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        **options,
+    )
+    while process.poll() is None and not hears(process.pid):
+        time.sleep(0.001)
+    return process
+
+
+def hears(pid: int) -> bool:
+    caught = re.search(r"SigCgt:\s*(\w+)", Path(f"/proc/{pid}/status").read_text())
+    return caught is not None and bool(int(caught[1], 16) >> (signal.SIGTERM - 1) & 1)
+
+
+def session(pid: int) -> list[int]:
+    """Return the processes of a session that live."""
+    found = []
+    for place in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            state, *fields = place.read_text().rpartition(")")[2].split()
+        except OSError:
+            continue
+        if int(fields[2]) == pid and state != "Z":
+            found.append(int(place.parent.name))
+    return found
+
+
+def ended(process: subprocess.Popen, number: int) -> str:
+    """Send a signal; return what the command said, which left no process behind."""
+    process.send_signal(number)
+    _, said = process.communicate(timeout=120)
+    assert process.returncode == 130, said
+    assert said.endswith("interrupted\n") or "interrupted; " in said
+    assert "Traceback" not in said
+    deadline = time.monotonic() + 60
+    while left := session(process.pid):
+        assert time.monotonic() < deadline, left
+        time.sleep(0.02)
+    return said
+
+
+def test_a_command_hears_before_it_imports_anything_heavy():
+    done = subprocess.run([sys.executable, "-c", LIGHT], capture_output=True, text=True, check=True)
+    loaded = {name.partition(".")[0] for name in done.stdout.split()}
+    assert not loaded & {"numpy", "tyro", "rich", "gymnasium", "torch", "mujoco", "multiprocessing"}
+
+
+def test_what_imports_a_command_keeps_its_own_signals():
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+@pytest.mark.parametrize("name", COMMANDS)
+def test_a_command_that_loads_is_ended_by_one_line(name, number):
+    """At some moment of the first 0.05 s, long before it has imported what it needs."""
+    process = begun(COMMANDS[name].partition(":")[0], "--help")
+    time.sleep(np.random.default_rng(list(name.encode())).uniform(0.0, 0.05))
+    assert ended(process, number) == "error: interrupted\n"
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory):
+    root = tmp_path_factory.mktemp("recorded") / "set"
+    words = ["-m", "handrail.scripts.record", str(root), *SET, "4"]
+    subprocess.run([sys.executable, *words], check=True, capture_output=True)
+    return root
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seconds", [0.5, 1.0, 2.0, 4.0, 8.0])
+@pytest.mark.parametrize("name", WORK)
+def test_a_command_that_works_is_ended_by_one_line(name, seconds, recorded, tmp_path):
+    places = {"SET": str(recorded), "OUT": str(tmp_path / "out"), "OUT/none": str(tmp_path / "none")}
+    words = [places.get(word, word) for word in WORK[name]]
+    module = f"handrail.scripts.{name.partition(' ')[0]}"
+    process = begun(module, *words, cwd=tmp_path, env=os.environ | {"HF_HUB_OFFLINE": "1"})
+    time.sleep(seconds)
+    if process.poll() is None:
+        ended(process, signal.SIGTERM)
+    else:
+        _, said = process.communicate()
+        assert process.returncode in (0, 2), said
