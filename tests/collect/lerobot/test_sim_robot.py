@@ -30,13 +30,13 @@ def test_what_is_no_command_brakes_and_is_counted(tmp_path):
     with steered(tmp_path) as (robot, teleop):
         actions = loop(robot, teleop, 20)
         for value in (np.nan, np.inf):
-            robot.send_action(actions[-1] | {"ee.vx": value})
+            robot.send_action(actions[-1] | {"ee.x.vel": value})
         observed = robot.get_observation()
         assert observed["brakes"] == 2
         assert list(Status)[int(observed["status"])] is Status.INVALID_INTENT
         assert all(np.isfinite(list(observed.values())))
-        with pytest.raises(HandrailError, match=r"expected ee\.vx.*missing: ee\.vz"):
-            robot.send_action({name: value for name, value in actions[-1].items() if name != "ee.vz"})
+        with pytest.raises(HandrailError, match=r"expected ee\.x\.vel.*missing: ee\.z\.vel"):
+            robot.send_action({name: value for name, value in actions[-1].items() if name != "ee.z.vel"})
 
 
 def test_a_held_robot_comes_to_rest_and_time_stands_still(tmp_path):
@@ -56,7 +56,7 @@ def test_scenes_are_those_of_the_recording_with_this_seed(tmp_path):
         robot.send_action(still | {NEXT: 1.0})
         second = robot.get_observation()
         assert (start["scene"], second["scene"]) == (0, 1)
-        assert second["goal.x"] != start["goal.x"]
+        assert second["goal.x.pos"] != start["goal.x.pos"]
     with steered(tmp_path, seed=3, episode=1) as (robot, _):
         assert robot.get_observation() == second
 
