@@ -64,6 +64,18 @@ def test_actions_of_a_mode_are_completed():
     env.close()
 
 
+@pytest.mark.parametrize("mode", ["", "ee"])
+def test_a_gripper_that_is_no_number_brakes(mode):
+    config, env = made(task="reach", mode=mode)
+    before, _ = env.reset(seed=[5])
+    action = np.zeros((1, *config.features["action"].shape), np.float32)
+    action[0, 0], action[0, -1] = 0.3, np.nan
+    for _ in range(5):
+        after, *_ = env.step(action)
+    np.testing.assert_allclose(after["agent_pos"], before["agent_pos"], atol=1e-3)
+    env.close()
+
+
 def test_an_action_of_another_size_is_said():
     _, env = made(task="reach", mode="ee")
     env.reset(seed=[5])
