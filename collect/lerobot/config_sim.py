@@ -22,6 +22,7 @@ class HandrailSimConfig(RobotConfig):
         image_size: height and width of the pictures [px].
         moving_obstacles: obstacles that cross the robot's way; task reach only.
         seed: of the scenes: those of `handrail-record` with this seed.
+        evaluation: whether they are those of `handrail-evaluate` with this seed: none is in a recording.
         episode: number of the first scene; to replay an episode, the number of its scene.
         fps: actions a second [Hz]; say the same to LeRobot (`--dataset.fps`, `--fps`).
         realtime: never be faster than real time, however often LeRobot asks.
@@ -36,6 +37,7 @@ class HandrailSimConfig(RobotConfig):
     image_size: int = 128
     moving_obstacles: int = 0
     seed: int = 0
+    evaluation: bool = False
     episode: int = 0
     fps: int = 20
     realtime: bool = True

@@ -19,9 +19,8 @@ from handrail.controllers.baselines.direct import DirectController
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import Controller
-from handrail.controllers.interface.intent import Intent
+from handrail.controllers.interface.intent import Intent, decided_gripper
 
-_HALF = 0.5  # a gripper command beyond it closes
 _MOST = 10.0  # of any channel [m/s, rad/s]
 
 
@@ -121,7 +120,7 @@ class EvaluatedEnv(gymnasium.Wrapper[Observation, NDArray[np.float32], Observati
         return ", ".join(names)
 
     def _intent(self, numbers: NDArray[np.float64], channels: bool) -> Intent:
-        time, gripper = self._env.state().time, float(numbers[-1] > _HALF)
+        time, gripper = self._env.state().time, decided_gripper(numbers[-1])
         if self._action and channels:
             return self._action.decided(numbers, time)
         values = np.zeros(self._channels.size)

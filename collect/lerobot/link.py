@@ -15,6 +15,11 @@ class Steered(Protocol):
 
     stepwise: Stepwise
 
+    @property
+    def is_connected(self) -> bool:
+        """Whether it can be steered."""
+        ...
+
 
 _newest: list[weakref.ref[Steered]] = []
 
@@ -22,6 +27,12 @@ _newest: list[weakref.ref[Steered]] = []
 def announce(robot: Steered) -> None:
     """Take note of the robot that was made last."""
     _newest[:] = [weakref.ref(robot)]
+
+
+def connected_robot() -> Steered | None:
+    """Return the robot that was made last, if it is connected."""
+    robot = _newest[0]() if _newest else None
+    return robot if robot is not None and robot.is_connected else None
 
 
 def simulated_robot(wanted_by: str) -> Steered:

@@ -4,17 +4,18 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from handrail.collect.lerobot.names import lerobot_name, named
 from handrail.collect.operators.modes import TeleopMode
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.channels import Channels
-from handrail.controllers.interface.intent import Intent
+from handrail.controllers.interface.intent import Intent, decided_gripper
 
 FOCUS, GRIPPER = "focus", "gripper"
 # what a teleoperator presses: in its action beside the channels, and in no dataset
 NEXT, AGAIN, HOLD = "handrail.next", "handrail.again", "handrail.hold"
 BUTTONS = (NEXT, AGAIN, HOLD)
-_HALF = 0.5  # a focus beyond it is the base's, a gripper beyond it closes
+_HALF = 0.5  # a focus beyond it is the base's, a button beyond it is pressed
 
 
 class ModeAction:
@@ -25,7 +26,7 @@ class ModeAction:
         channels: of the robot.
 
     Attributes:
-        names: of the numbers; `focus` (0 hand, 1 base) only where the mode makes a difference.
+        names: LeRobot's, of the numbers; `focus` (0 hand, 1 base) only where the mode makes a difference.
     """
 
     def __init__(self, mode: TeleopMode, channels: Channels) -> None:
@@ -33,13 +34,16 @@ class ModeAction:
         self._hand, self._base = (channels.mask(*mode.groups(focus)) for focus in ("hand", "base"))
         self._owned = np.flatnonzero(self._hand | self._base)
         focus = (FOCUS,) if mode.by_focus else ()
-        self.names: tuple[str, ...] = (*(channels.names[i] for i in self._owned), *focus, GRIPPER)
+        self._own = (*(channels.names[i] for i in self._owned), *focus, GRIPPER)
+        self.names = tuple(map(lerobot_name, self._own))
 
     def intent(self, action: Mapping[str, float], time: float) -> Intent:
         """Return what an action asks for; a number that is not finite becomes an intent that brakes.
 
+        A gripper beyond a half closes.
+
         Args:
-            action: by name.
+            action: by name, LeRobot's or Handrail's own.
             time: on the robot's clock [s].
 
         Raises:
@@ -49,12 +53,15 @@ class ModeAction:
         values = np.zeros(self._channels.size)
         values[self._owned] = numbers[: len(self._owned)]
         mask = self._base if self._mode.by_focus and not numbers[-2] <= _HALF else self._hand
-        return Intent(values, mask, float(numbers[-1]), self._mode.name, time)
+        return Intent(values, mask, decided_gripper(numbers[-1]), self._mode.name, time)
 
     def decided(self, numbers: Sequence[float] | FloatArray, time: float) -> Intent:
-        """Return what the numbers of a policy ask for: a gripper beyond a half closes."""
-        named = dict(zip(self.names, [*numbers[:-1], float(numbers[-1] > _HALF)], strict=True))
-        return self.intent(named, time)
+        """Return what the numbers of a policy ask for."""
+        return self.intent(dict(zip(self.names, numbers, strict=True)), time)
+
+    def is_in(self, action: Mapping[str, float]) -> bool:
+        """Whether an action has a channel of the mode."""
+        return any(named(name, action) is not None for name in self._own[:-1])
 
     def numbers(self, action: Mapping[str, float]) -> FloatArray:
         """Return the numbers of an action in the order of `names`.
@@ -62,13 +69,14 @@ class ModeAction:
         Raises:
             HandrailError: one is missing.
         """
-        missing = [name for name in self.names if name not in action]
+        found = [named(name, action) for name in self._own]
+        missing = [name for name, number in zip(self.names, found, strict=True) if number is None]
         if missing:
             raise HandrailError(
                 f"action of handrail_sim: expected {', '.join(self.names)} for mode {self._mode.name};"
                 f" missing: {', '.join(missing)}; a teleoperator of Handrail says them all"
             )
-        return np.array([float(action[name]) for name in self.names])
+        return np.array(found, float)
 
     def action(self, intent: Intent, rotation: FloatArray) -> dict[str, float]:
         """Return an intent as an action, the hand's twist in the world's axes.
@@ -88,7 +96,7 @@ class ModeAction:
 
     def still(self, gripper: float = 0.0) -> dict[str, float]:
         """Return the action of who touches nothing, with the gripper as it is."""
-        return dict.fromkeys(self.names, 0.0) | {GRIPPER: gripper}
+        return dict.fromkeys(self.names, 0.0) | {lerobot_name(GRIPPER): gripper}
 
 
 def pressed(action: Mapping[str, float], buttons: Sequence[str] = BUTTONS) -> str:

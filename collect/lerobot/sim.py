@@ -1,5 +1,7 @@
 """The simulated robot as LeRobot's `Robot`: an action is a part of the motion, a controller completes it."""
 
+import logging
+from collections.abc import Mapping
 from contextlib import ExitStack
 from functools import cached_property
 from typing import Any
@@ -10,8 +12,10 @@ from lerobot.robots import Robot
 from handrail.collect.lerobot.config_sim import HandrailSimConfig
 from handrail.collect.lerobot.link import announce
 from handrail.collect.lerobot.mode_action import AGAIN, HOLD, NEXT, pressed
+from handrail.collect.lerobot.names import POSITION
 from handrail.collect.lerobot.pace import Pace
 from handrail.collect.lerobot.stepwise import Stepwise
+from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.numerics.threads import single_threaded
 
@@ -21,7 +25,8 @@ _REHEARSED = 3  # periods before the first, in which what is compiled at first u
 class HandrailSim(Robot):
     """A robot in MuJoCo with a task; `handrail_sim` in LeRobot's commands.
 
-    Every `send_action` moves it for one period. An action that is not finite brakes, and is counted.
+    Every `send_action` moves it for one period. An action that is not finite brakes, and is counted. When
+    `lerobot-rollout` has led the joints back to where they were at connect(), the next scene begins.
 
     Args:
         config: its settings.
@@ -40,7 +45,7 @@ class HandrailSim(Robot):
         self._connected = False
         super().__init__(config)
         self._config = config
-        self.stepwise = Stepwise(config.session(), config.fps, config.diagnostics)
+        self.stepwise = Stepwise(config.session(), config.fps, config.diagnostics, config.evaluation)
         self.cameras = dict.fromkeys(self.stepwise.env.cameras)  # LeRobot counts them
         self._pace = Pace(1.0 / config.fps)
         self._open = ExitStack()
@@ -88,41 +93,67 @@ class HandrailSim(Robot):
         for _ in range(_REHEARSED):
             session.step(session.action.intent(session.action.still(), session.view.state.time))
         session.begin(self._config.episode)
+        self._first = self._positions(session.numbers())
         self._connected = True
 
     def get_observation(self) -> dict[str, Any]:
         """Return the robot, the scene, what was sent and how the controller fared; and the pictures."""
         self._check_connected()
-        return {**self.stepwise.numbers(), **self.stepwise.pictures}
+        session = self.stepwise
+        if session.led is not None and np.array_equal(session.led, self._first):
+            self._begin(session.scene + session.driven)
+        return {**session.numbers(), **session.pictures}
 
     def send_action(self, action: dict[str, Any]) -> dict[str, Any]:
         """Do what an action asks for, for one period; return it as it was understood.
 
         A button beside the channels begins another episode (`handrail.next`), the same one again
-        (`handrail.again`), or brakes and lets time stand still (`handrail.hold`).
+        (`handrail.again`), or brakes and lets time stand still (`handrail.hold`). Positions of all joints
+        (`x.pos`, …) without any channel lead the joints there.
 
         Raises:
             HandrailError: it is not connected, or the action lacks a channel.
         """
         self._check_connected()
-        session = self.stepwise
-        numbers = session.action.numbers(action).astype(np.float32)  # as exact as a dataset keeps them
-        understood = dict(zip(session.action.names, map(float, numbers), strict=True))
+        session, steered = self.stepwise, self.stepwise.action.is_in(action)
         if self._config.realtime:
             self._pace.wait()
+        if not steered and all(name in action for name in self._joints):
+            session.lead(self._positions(action))
+            return action
+        numbers = session.action.numbers(action).astype(np.float32)  # as exact as a dataset keeps them
         button = pressed(action)
         if button in (NEXT, AGAIN):
-            session.begin(session.scene + (button == NEXT))
+            self._begin(session.scene + (button == NEXT))
         elif button == HOLD:
             session.hold()
         else:
-            session.step(session.action.intent(understood, session.view.state.time))
-        return understood
+            session.step(session.action.decided(numbers, session.view.state.time))
+        return dict(zip(session.action.names, map(float, numbers), strict=True))
+
+    @cached_property
+    def _joints(self) -> tuple[str, ...]:
+        return tuple(name + POSITION for name in self.stepwise.env.model.joints)
+
+    def _positions(self, numbers: Mapping[str, float]) -> FloatArray:
+        return np.array([numbers[name] for name in self._joints], float)
+
+    def _begin(self, scene: int) -> None:
+        self._report()
+        self.stepwise.begin(scene)
+
+    def _report(self) -> None:
+        """Log how a scene went in which something was done."""
+        session = self.stepwise
+        if session.driven:
+            result = "success" if session.success else "no success"
+            logging.info("handrail_sim: scene %d: %s, %d brakes", session.scene, result, session.brakes)
 
     def disconnect(self) -> None:
         """Stop the robot and close its world."""
         self._check_connected()
         self._connected = False
+        self._report()
         self.stepwise.env.robot.stop()
         self._open.close()
 

@@ -11,6 +11,7 @@ from handrail.controllers.interface.frames import Frames
 from handrail.controllers.numerics.jit import are_finite
 
 _USUAL = Frames()
+_HALF = 0.5  # a gripper command beyond it closes
 
 
 @dataclass(frozen=True)
@@ -84,3 +85,8 @@ class Intent:
         scalars = math.isfinite(self.gripper) and math.isfinite(self.time)
         scalars = scalars and self.values.ndim == 1 and self.values.shape == self.mask.shape
         return scalars and (are_finite(self.values) or bool(np.all(np.isfinite(self.values) | ~self.mask)))
+
+
+def decided_gripper(number: float) -> float:
+    """Return 1 (close) for a number beyond a half, else 0 (open); NaN stays, and brakes the robot."""
+    return float(number > _HALF) if math.isfinite(number) else float(number)

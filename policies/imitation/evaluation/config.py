@@ -6,7 +6,7 @@ from typing import Annotated
 
 import tyro
 
-from handrail.collect.config import FIRST_SEED, FPS_RANGE, MOST_TIME
+from handrail.collect.config import FPS_RANGE, MOST_ROLLOUTS, MOST_TIME, evaluation_seed
 from handrail.collect.execution.config import ExecutionConfig
 from handrail.collect.flags import one_of, only_one
 from handrail.collect.perturbations.perturbations import Perturbation
@@ -15,7 +15,6 @@ from handrail.controllers.errors import HandrailError, unknown_name
 from handrail.datasets.lists import Names, Words
 
 PROTECTIONS = ("own", "none", "mpc", "filter")
-MOST_EPISODES = 1_000_000
 
 
 @dataclass(frozen=True)
@@ -86,8 +85,7 @@ class EvaluateConfig(ExecutionConfig):
     @property
     def seeds(self) -> tuple[int, ...]:
         """The seeds of the episodes: `2³² + 10⁶ seed + i`, i from 0; those of recordings are below 2³²."""
-        first = FIRST_SEED + MOST_EPISODES * self.seed
-        return tuple(range(first, first + self.episodes))
+        return tuple(evaluation_seed(self.seed, episode) for episode in range(self.episodes))
 
     def check(self) -> None:
         """Check what can be checked without loading anything heavy.
@@ -96,7 +94,7 @@ class EvaluateConfig(ExecutionConfig):
             HandrailError: one setting is wrong; the message says what may be chosen.
         """
         for name, least, most in (
-            ("episodes", 1, MOST_EPISODES),
+            ("episodes", 1, MOST_ROLLOUTS),
             ("seed", 0, 10**9),
             ("fps", *FPS_RANGE),
         ):

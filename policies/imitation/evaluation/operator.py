@@ -8,14 +8,12 @@ import numpy as np
 from handrail.collect.operators.operator import View
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.interface.channels import Channels
-from handrail.controllers.interface.intent import Intent
+from handrail.controllers.interface.intent import Intent, decided_gripper
 from handrail.policies.imitation.interface.checkpoint import TrainedPolicy
 from handrail.policies.imitation.interface.interface import PolicyInterface
 
 if TYPE_CHECKING:
     from handrail.collect.lerobot.mode_action import ModeAction
-
-_CLOSED = 0.5  # a gripper command beyond it closes
 
 
 class AsRecorded:
@@ -41,7 +39,7 @@ class AsRecorded:
         """Return an intent on every joint."""
         values = np.zeros(self._channels.size)
         values[self._channels.joint_slice] = action[:-1]
-        return Intent(values, self._channels.mask("joint"), gripper=float(action[-1] > _CLOSED))
+        return Intent(values, self._channels.mask("joint"), gripper=decided_gripper(action[-1]))
 
 
 class AsSteered:

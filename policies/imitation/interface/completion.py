@@ -29,7 +29,7 @@ from handrail.controllers.interface.controller import State
 from handrail.controllers.interface.intent import Intent
 from handrail.controllers.robot.catalogue import ROBOTS
 from handrail.policies.imitation.interface.interface import ACTION, PolicyInterface
-from handrail.policies.imitation.interface.view_step import Features, policy_rows, seen_by
+from handrail.policies.imitation.interface.view_step import Features, asked, policy_rows, seen_by
 
 COMPLETE = "handrail_policy_mpc"
 TIME, SENT, OBSTACLES = (f"observation.{name}" for name in ("time", "sent", "obstacles"))
@@ -69,7 +69,8 @@ class Completion:
 class PolicyCompletionStep(ProcessorStep):
     """Turns the intents that a policy writes into joint velocities and gripper of the whole robot.
 
-    It avoids what the environment `handrail` says stands around; an action that is not finite brakes.
+    It avoids what the environment `handrail` says stands around; an action that is not finite brakes. Where
+    nothing is said of that, as by the robot `handrail_sim`, the robot completes the intents itself.
 
     Attributes:
         interface: a `PolicyInterface`, as JSON.
@@ -96,6 +97,8 @@ class PolicyCompletionStep(ProcessorStep):
         Raises:
             HandrailError: nothing was seen before, or not what the environment `handrail` shows.
         """
+        if self.view is not None and not {TIME, SENT, OBSTACLES} & self.view.raw.keys():
+            return asked(COMPLETE, transition, self.view, self.seen)
         rows, states = policy_rows(COMPLETE, transition, self.view, self.seen)
         assert self.view is not None
         around = [_shown(self.view.raw, key, len(rows)) for key in (TIME, SENT, OBSTACLES)]

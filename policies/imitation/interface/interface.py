@@ -19,7 +19,7 @@ from handrail.controllers.entries import Entry, is_text, lists
 from handrail.controllers.errors import HandrailError, unknown_name
 from handrail.controllers.fields import check_fields
 from handrail.controllers.interface.channels import Channels
-from handrail.controllers.interface.intent import Intent
+from handrail.controllers.interface.intent import Intent, decided_gripper
 from handrail.datasets.format.schema import Feature
 from handrail.policies.imitation.interface.relative import RelativeView
 
@@ -30,7 +30,6 @@ STATE, ENVIRONMENT, ACTION = "observation.state", "observation.environment_state
 MASK = "teleop.mask"
 COLUMNS = (STATE, ENVIRONMENT, ACTION, "teleop.values", MASK)
 _GRIPPER = "gripper"
-_HALF = 0.5  # a gripper command beyond it closes
 _CHANNELS = Entry("names of channels", lists(is_text))
 _MASKS = Entry("lists of true and false", lambda value: value == [] or lists(lists(_is_bool))(value))
 
@@ -136,7 +135,16 @@ class PolicyInterface:
             values[0, self._known.joint_slice] = self._toward(action[:count], self._view.positions(state)[0])
         flags = action[count:-1]
         mask = np.array(self._sets[int(np.argmax(flags)) if len(flags) else 0], dtype=bool)
-        return Intent(values[0], mask, gripper=float(action[-1] > _HALF))
+        return Intent(values[0], mask, gripper=decided_gripper(action[-1]))
+
+    def asked(self, action: FloatArray, state: FloatArray) -> FloatArray:
+        """Return the values of the channels that an action (a,) asks for, the focus (1 base), the gripper.
+
+        The focus is there where the operator owned several sets of channels; NaN stays, and brakes the robot.
+        """
+        intent = self.decode(action, state)
+        focus = [float(intent.mask[0])] if len(self.masks) > 1 else []
+        return np.array([*intent.values[self.commanded], *focus, intent.gripper])
 
     @classmethod
     def from_dict(cls, content: Mapping[str, Any]) -> "PolicyInterface":

@@ -11,21 +11,18 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
-import numpy as np
-import torch
 from lerobot.configs import FeatureType, PipelineFeatureType, PolicyFeature
-from lerobot.lerobot_types import EnvTransition, TransitionKey
+from lerobot.lerobot_types import EnvTransition
 from lerobot.processor import ProcessorStep, ProcessorStepRegistry
 from lerobot.processor.normalize_processor import NormalizerProcessorStep
 
-from handrail.controllers.arrays import FloatArray
 from handrail.policies.imitation.interface.completion import COMPLETE, Completion, PolicyCompletionStep
 from handrail.policies.imitation.interface.interface import ACTION, PolicyInterface
 from handrail.policies.imitation.interface.view_step import (
     VIEW,
     Features,
     PolicyViewStep,
-    policy_rows,
+    asked,
     seen_by,
 )
 
@@ -61,19 +58,7 @@ class PolicyActionStep(ProcessorStep):
         Raises:
             HandrailError: nothing was seen before, or the action is not the policy's.
         """
-        rows, states = policy_rows(ACT, transition, self.view, self.seen)
-        meant = np.stack([self._meant(row, state) for row, state in zip(rows, states, strict=True)])
-        changed: Any = transition.copy()
-        shape = changed[TransitionKey.ACTION].shape[:-1]
-        changed[TransitionKey.ACTION] = torch.as_tensor(meant).reshape(*shape, meant.shape[1])
-        return changed
-
-    def _meant(self, row: FloatArray, state: FloatArray) -> FloatArray:
-        """Return the numbers of an action, float64: nothing is lost; NaN stays, and brakes the robot."""
-        intent = self.seen.decode(row, state)
-        values = intent.values[self.seen.commanded]
-        focus = [float(intent.mask[0])] if len(self.seen.masks) > 1 else []
-        return np.array([*values, *focus, intent.gripper])
+        return asked(ACT, transition, self.view, self.seen)
 
     def get_config(self) -> dict[str, Any]:
         """Return what makes this step again."""

@@ -26,6 +26,8 @@ _made: "weakref.WeakValueDictionary[str, PolicyViewStep]" = weakref.WeakValueDic
 class PolicyViewStep(ProcessorStep):
     """Shows a policy what is recorded as it learnt to see it: relative poses, no velocities of its own.
 
+    A robot of LeRobot's, such as `handrail_sim`, shows robot and scene as one vector, `observation.state`.
+
     Attributes:
         interface: a `PolicyInterface`, as JSON.
         raw: the observation that was seen last, before it was changed.
@@ -52,6 +54,11 @@ class PolicyViewStep(ProcessorStep):
         """
         observation = dict(transition.get(TransitionKey.OBSERVATION) or {})
         sizes = len(self.seen.state_names), len(self.seen.environment_names)
+        if ENVIRONMENT not in observation and _size(observation.get(STATE)) == sum(sizes):
+            observation |= {
+                STATE: observation[STATE][..., : sizes[0]],
+                ENVIRONMENT: observation[STATE][..., sizes[0] :],
+            }
         state = _numbers(observation, STATE, sizes[0])
         environment = _numbers(observation, ENVIRONMENT, sizes[1]) if sizes[1] else np.zeros((len(state), 0))
         seen = self.seen.observe(state, environment)
@@ -114,6 +121,40 @@ def policy_rows(
     return rows, np.broadcast_to(view.state, (len(rows), view.state.shape[1]))
 
 
+def asked(step: str, transition: EnvTransition, view: Any, seen: PolicyInterface) -> EnvTransition:
+    """Return a transition in which the action is what a policy asks for, on channels, float64.
+
+    Args:
+        step: the name of who asks, for the error.
+        transition: with the policy's action.
+        view: the step that sees.
+        seen: what the policy reads and writes.
+
+    Raises:
+        HandrailError: as `policy_rows`, or the simulated robot of this process takes other numbers.
+    """
+    rows, states = policy_rows(step, transition, view, seen)
+    numbers = np.stack([seen.asked(row, state) for row, state in zip(rows, states, strict=True)])
+    _check_taken(step, numbers.shape[1])
+    changed: Any = transition.copy()
+    shape = changed[TransitionKey.ACTION].shape[:-1]
+    changed[TransitionKey.ACTION] = torch.as_tensor(numbers).reshape(*shape, numbers.shape[1])
+    return changed
+
+
+def _check_taken(step: str, size: int) -> None:
+    """Refuse what `lerobot-rollout` would not: of too many numbers it takes the first, whatever they mean."""
+    from handrail.collect.lerobot.link import connected_robot
+
+    robot = connected_robot()
+    if robot is not None and len(names := robot.stepwise.action.names) != size:
+        raise HandrailError(
+            f"step {step}: the policy writes {size} numbers; --robot.mode={robot.stepwise.mode.name} takes"
+            f" {len(names)}: {', '.join(names)}; expected direct for joint velocities, for intents the mode"
+            " of their demonstrations"
+        )
+
+
 def _key(interface: Mapping[str, Any]) -> str:
     return json.dumps(interface, sort_keys=True)
 
@@ -121,9 +162,13 @@ def _key(interface: Mapping[str, Any]) -> str:
 def _numbers(observation: Mapping[str, Any], key: str, size: int) -> FloatArray:
     """Return the numbers under a key, (B, size)."""
     values = observation.get(key)
-    if not isinstance(values, torch.Tensor) or values.shape[-1] != size:
+    if not isinstance(values, torch.Tensor) or _size(values) != size:
         raise HandrailError(
             f"step {VIEW}: expected {key} with {size} numbers, as handrail-record writes it,"
             f" got {'none' if values is None else list(getattr(values, 'shape', ()))}"
         )
     return values.detach().cpu().numpy().reshape(-1, size)
+
+
+def _size(values: Any) -> int:
+    return values.shape[-1] if isinstance(values, torch.Tensor) and values.ndim else 0

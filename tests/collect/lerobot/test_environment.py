@@ -11,6 +11,7 @@ from places import ROOT
 
 from handrail.collect.config import FIRST_SEED, SessionConfig
 from handrail.collect.lerobot import HandrailSim, HandrailSimConfig
+from handrail.collect.lerobot.names import lerobot_name
 from handrail.collect.session.build import build_env
 from handrail.collect.tasks.catalogue import TASKS
 from handrail.controllers.errors import HandrailError
@@ -63,11 +64,23 @@ def test_actions_of_a_mode_are_completed():
     env.close()
 
 
+@pytest.mark.parametrize("mode", ["", "ee"])
+def test_a_gripper_that_is_no_number_brakes(mode):
+    config, env = made(task="reach", mode=mode)
+    before, _ = env.reset(seed=[5])
+    action = np.zeros((1, *config.features["action"].shape), np.float32)
+    action[0, 0], action[0, -1] = 0.3, np.nan
+    for _ in range(5):
+        after, *_ = env.step(action)
+    np.testing.assert_allclose(after["agent_pos"], before["agent_pos"], atol=1e-3)
+    env.close()
+
+
 def test_an_action_of_another_size_is_said():
     _, env = made(task="reach", mode="ee")
     env.reset(seed=[5])
     env.step(np.zeros((1, 10), np.float32))  # the whole robot's
-    with pytest.raises(HandrailError, match=r"expected ee\.vx, .*, gripper, got 3 numbers"):
+    with pytest.raises(HandrailError, match=r"expected ee\.x\.vel, .*, gripper\.pos, got 3 numbers"):
         env.step(np.zeros((1, 3), np.float32))
     env.close()
 
@@ -87,7 +100,7 @@ def test_what_lerobot_records_of_our_robot_is_what_a_policy_reads_and_writes(mod
     expected, _ = alone.reset(seed=FIRST_SEED + 5)
     said = dict(zip(robot.observation_features, observation["agent_pos"][0], strict=True))
     for names, part in ((alone.agent_names, "agent_pos"), (alone.state_names, "environment_state")):
-        np.testing.assert_array_equal([said[name] for name in names], expected[part])
+        np.testing.assert_array_equal([said[lerobot_name(name)] for name in names], expected[part])
     env.close()
 
 

@@ -66,7 +66,7 @@ def test_a_person_at_a_page_drives_and_takes_the_next_scene(robot, tmp_path):
             ask("mode")  # of no use here
             ask("start")
             until(robot, teleop, lambda action: HOLD not in action, lambda: say((0.0,) * 18))
-            until(robot, teleop, lambda action: action["ee.vx"] > 0.1, lambda: say(FORWARD))
+            until(robot, teleop, lambda action: action["ee.x.vel"] > 0.1, lambda: say(FORWARD))
             until(robot, teleop, lambda action: HOLD in action)  # nothing more comes from the page
             ask("success")
             until(robot, teleop, lambda action: NEXT in action)
@@ -95,7 +95,7 @@ def test_a_person_with_a_gamepad_drives(robot, pad, tmp_path):
             pad.move(control, 1)
         until(robot, teleop, lambda action: HOLD not in action)
         pad.move("left_y", -1.0)
-        until(robot, teleop, lambda action: abs(action["ee.vx"]) > 0.1)
+        until(robot, teleop, lambda action: abs(action["ee.x.vel"]) > 0.1)
         pad.move("left_shoulder", 0)
         until(robot, teleop, lambda action: HOLD in action)
         pad.move("y", 1)

@@ -2,10 +2,17 @@
 
 import numpy as np
 import pytest
+from lerobot.rollout.context import HardwareContext
+from lerobot.rollout.robot_wrapper import ThreadSafeRobot
+from lerobot.rollout.strategies.core import RolloutStrategy
 from lerobot_helpers import loop, steered
 
+from handrail.collect.config import SessionConfig, evaluation_seed
 from handrail.collect.lerobot import HandrailScripted, HandrailScriptedConfig, HandrailSim, HandrailSimConfig
 from handrail.collect.lerobot.mode_action import AGAIN, BUTTONS, HOLD, NEXT
+from handrail.collect.operators.modes import MODES
+from handrail.collect.session.build import build_env
+from handrail.collect.tasks.catalogue import TASKS
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.command import Status
 
@@ -26,17 +33,69 @@ def test_actions_as_a_dataset_keeps_them_replay_exactly(task, mode, tmp_path):
         assert any(abs(first[f"sent.{name}"]) > 0.01 for name in robot.stepwise.env.model.joints)
 
 
+@pytest.mark.parametrize("task", TASKS)
+def test_lerobot_s_rollout_takes_every_number_of_robot_scene_and_action(task):
+    for mode in MODES:
+        robot = HandrailSim(HandrailSimConfig(task=task, mode=mode, diagnostics=False))
+        for names in (robot.observation_features, robot.action_features):
+            assert all(name.endswith((".pos", ".vel")) for name in names)
+        stepwise = robot.stepwise
+        assert len(robot.observation_features) == len(stepwise.env.agent_names + stepwise.env.state_names)
+
+
+def test_an_action_with_the_names_of_older_datasets_moves_the_robot_alike(tmp_path):
+    with steered(tmp_path) as (robot, teleop):
+        actions = loop(robot, teleop, 20)
+        first = robot.get_observation()
+        robot.send_action(actions[0] | {AGAIN: 1.0})
+        names = ("ee.vx", "ee.vy", "ee.vz", "ee.wx", "ee.wy", "ee.wz", "gripper")
+        for action in actions:
+            robot.send_action(dict(zip(names, action.values(), strict=True)))
+        assert robot.get_observation() == first
+
+
+@pytest.mark.parametrize("mode", ["ee", "direct"])
+def test_lerobot_leads_the_robot_back_and_the_next_scene_begins(mode, tmp_path, monkeypatch):
+    monkeypatch.setattr("lerobot.rollout.strategies.core.precise_sleep", lambda seconds: None)
+    with steered(tmp_path, mode=mode, evaluation=True) as (robot, teleop):
+        start = robot.get_observation()
+        first = {name: value for name, value in start.items() if name.endswith(".pos")}
+        hardware = HardwareContext(ThreadSafeRobot(robot), None, first)
+        loop(robot, teleop, 30)
+        away = robot.get_observation()
+        robot.send_action({name: away[name] for name in first})  # LeRobot's handover to an operator
+        assert robot.get_observation()["scene"] == 0
+        RolloutStrategy._return_to_initial_position(hardware)
+        now, joints = robot.stepwise.view.state.q, robot.stepwise.env.model.joints
+        assert max(abs(away[f"{name}.pos"] - start[f"{name}.pos"]) for name in joints) > 0.1
+        np.testing.assert_allclose(now, [start[f"{name}.pos"] for name in joints], atol=0.02)
+        assert not robot.stepwise.success
+        following = robot.get_observation()
+        assert (following["scene"], robot.get_observation()) == (1, following)
+        RolloutStrategy._return_to_initial_position(hardware)  # as before an episode that is recorded again
+        assert robot.get_observation()["scene"] == 1
+
+
+def test_scenes_of_an_evaluation_are_those_of_handrail_evaluate(tmp_path):
+    with steered(tmp_path, evaluation=True, seed=2, episode=7) as (robot, _):
+        expected, _ = build_env(SessionConfig(task="reach"), 20).reset(seed=evaluation_seed(2, 7))
+        shown = list(robot.get_observation().values())
+        size = len(expected["agent_pos"])
+        np.testing.assert_array_equal(shown[:size], expected["agent_pos"])
+        np.testing.assert_array_equal(shown[size:][:7], expected["environment_state"])
+
+
 def test_what_is_no_command_brakes_and_is_counted(tmp_path):
     with steered(tmp_path) as (robot, teleop):
         actions = loop(robot, teleop, 20)
-        for value in (np.nan, np.inf):
-            robot.send_action(actions[-1] | {"ee.vx": value})
+        for name, value in (("ee.x.vel", np.nan), ("ee.x.vel", np.inf), ("gripper.pos", np.nan)):
+            robot.send_action(actions[-1] | {name: value})
         observed = robot.get_observation()
-        assert observed["brakes"] == 2
+        assert observed["brakes"] == 3
         assert list(Status)[int(observed["status"])] is Status.INVALID_INTENT
         assert all(np.isfinite(list(observed.values())))
-        with pytest.raises(HandrailError, match=r"expected ee\.vx.*missing: ee\.vz"):
-            robot.send_action({name: value for name, value in actions[-1].items() if name != "ee.vz"})
+        with pytest.raises(HandrailError, match=r"expected ee\.x\.vel.*missing: ee\.z\.vel"):
+            robot.send_action({name: value for name, value in actions[-1].items() if name != "ee.z.vel"})
 
 
 def test_a_held_robot_comes_to_rest_and_time_stands_still(tmp_path):
@@ -56,7 +115,7 @@ def test_scenes_are_those_of_the_recording_with_this_seed(tmp_path):
         robot.send_action(still | {NEXT: 1.0})
         second = robot.get_observation()
         assert (start["scene"], second["scene"]) == (0, 1)
-        assert second["goal.x"] != start["goal.x"]
+        assert second["goal.x.pos"] != start["goal.x.pos"]
     with steered(tmp_path, seed=3, episode=1) as (robot, _):
         assert robot.get_observation() == second
 

@@ -135,13 +135,32 @@ def test_what_cannot_be_completed_is_said(interface):
     sizes = len(interface.state_names), len(interface.environment_names)
     names = ("observation.state", "observation.environment_state")
     seen = {name: torch.ones(1, size) for name, size in zip(names, sizes, strict=True)}
-    view({"observation": seen})
+    view({"observation": seen | {"observation.sent": torch.zeros(1, 9)}})
     with pytest.raises(
         HandrailError, match=r"expected observation\.time of 1 robots, as --env.type=handrail"
     ):
         completion({"action": torch.zeros(1, 7)})
     with pytest.raises(HandrailError, match="fps"):
         steps(interface, dataclasses.replace(BY, fps=0))
+
+
+def test_a_robot_that_says_nothing_of_what_stands_around_gets_the_intent(interface):
+    """`handrail_sim` shows robot and scene as one vector, and completes what it is asked for itself."""
+    view, acts, completion = steps(interface)
+    env = build_env(SessionConfig(task=BY.task), BY.fps)
+    seen, _ = env.reset(seed=5)
+    state, environment = (torch.from_numpy(seen[name])[None] for name in ("agent_pos", "environment_state"))
+    apart = {"observation.state": state, "observation.environment_state": environment}
+    shown = [
+        view({"observation": each})["observation"]
+        for each in (apart, {"observation.state": torch.cat([state, environment], dim=1)})
+    ]
+    torch.testing.assert_close(*shown, rtol=0, atol=0)
+    action = torch.tensor([[0.2, 0.1, -0.1, 0.0, 0.0, 0.2, torch.nan]])
+    asked = [step({"action": action})["action"] for step in (acts, completion)]
+    torch.testing.assert_close(*asked, rtol=0, atol=0, equal_nan=True)
+    assert asked[0].shape == (1, 7)
+    assert asked[0][0, -1].isnan()
 
 
 @pytest.mark.parametrize("field", ["robot", "task", "mode"])

@@ -9,10 +9,11 @@ import pytest
 from command_helpers import command
 from policy_helpers import StandIn, checkpoint, load
 
+from handrail.collect.config import FIRST_SEED
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.comparison.evaluations import read_evaluations
 from handrail.policies.imitation.evaluation.conditions import policy_conditions
-from handrail.policies.imitation.evaluation.config import FIRST_SEED, EvaluateConfig
+from handrail.policies.imitation.evaluation.config import EvaluateConfig
 from handrail.policies.imitation.evaluation.evaluation import UnevaluatedError, evaluate
 from handrail.policies.imitation.evaluation.table import evaluation_table
 
