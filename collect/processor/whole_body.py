@@ -25,7 +25,7 @@ class WholeBody:
 
     A joint that takes positions is sent the path of its velocity, `r⁺ = r + ½ h (v + v⁺)`: on from the target
     before, not from where it is, so that a joint that sags under its weight sags no further. It goes no
-    farther ahead of the joint than 0.2 rad; where it would, the joint counts as standing still.
+    farther ahead of the joint than 0.2 rad; where it would, the whole arm slows down and stays on its path.
 
     A robot without odometry is where its base's velocities have led. An observation that makes no sense, or
     the very same object again, is none: the base goes on as it was sent, until the next one.

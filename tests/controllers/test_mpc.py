@@ -126,7 +126,7 @@ def test_a_failed_solve_brakes(monkeypatch):
     positions, velocities, _ = roll(MPC, [asked] * 10)
 
     infeasible = Answer(False, np.zeros(SLACKS), 0.0, 3, np.arange(SLACKS))
-    monkeypatch.setattr(MPC.solver.qp, "solve", lambda program, active: infeasible)
+    monkeypatch.setattr(MPC.solver.qp, "solve", lambda *_: infeasible)
     beyond = asking(np.full(18, -2.0), "ee")
     command = MPC.update(State(positions[-1], velocities[-1], 0.5), beyond(0.5))
     assert command.diagnostics.status is Status.SOLVER_FAILED
