@@ -251,7 +251,9 @@ def test_a_longer_horizon_is_a_setting():
     mpc = MaskedMpc(MODEL, MpcSettings(horizon=15, dt=0.08))
     command = mpc.update(still(), asking(np.full(18, 0.2), "ee")(0.0))
     assert mpc.plan.v.shape == (16, 9)
-    np.testing.assert_array_equal(command.velocities[:16], mpc.plan.v)
+    np.testing.assert_array_equal(command.plan.velocities, mpc.plan.v)
+    np.testing.assert_array_equal(command.velocities[:2], mpc.plan.v[:2])  # what was certified, then the stop
+    np.testing.assert_array_less(np.diff(np.abs(command.velocities[1:]), axis=0), 1e-12)
     np.testing.assert_array_equal(command.velocities[-1], 0.0)  # a command ends at rest
     assert command.dt == 0.08
 

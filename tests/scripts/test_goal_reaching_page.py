@@ -130,7 +130,7 @@ def test_a_reader_can_repeat_every_table_and_test_from_the_episodes(label):
             success = paired_success(*(np.array(each["success"], float) for each in (one, other)))
             assert asdict(success) == published["success"]
             for metric in METRICS[1:-1]:
-                pair = (np.array(each[metric], float) for each in (one, other))
+                pair = np.array(one[metric], float), np.array(other[metric], float)
                 found, told = paired_difference(*pair, np.random.default_rng(0)), published[metric]
                 assert [found.pairs, found.mean, found.p_wilcoxon, *found.t_interval] == pytest.approx(
                     [told["pairs"], told["mean"], told["p_wilcoxon"], *told["t_interval"]], rel=1e-6
