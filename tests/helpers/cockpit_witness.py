@@ -139,8 +139,9 @@ class Relay:
     def close(self):
         """End."""
         self.is_cut = False
-        self.break_off()
+        self._listener.shutdown(socket.SHUT_RDWR)
         self._listener.close()
+        self.break_off()
 
 
 @contextmanager

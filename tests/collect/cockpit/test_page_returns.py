@@ -111,3 +111,4 @@ def test_the_page_says_stop_until_it_is_so(new_page):
         assert len(said) == before
         assert {each["what"] for each in said} == {"stop"}
         assert len({each["press"] for each in said}) == 1
+        page.close()

@@ -1,0 +1,38 @@
+"""A law of a study's trials: a STOP holds until somebody releases it, in the next mode too."""
+
+import json
+from collections import Counter
+from types import SimpleNamespace
+
+from user_study_helpers import study_folder
+
+from handrail.collect.cockpit.pipe import STILL, STOP
+from handrail.collect.user_study.driving import Driving
+from handrail.collect.user_study.plan import Step
+from handrail.datasets.storage.interrupts import Interrupts
+
+
+class StoppingServer:
+    """Passes on a STOP, and then that the trial has failed."""
+
+    def __init__(self):
+        self.pipe, self.unread = SimpleNamespace(dropped=Counter()), [(STOP, b"")]
+
+    def receive(self):
+        messages, self.unread = self.unread, []
+        return messages or [(STILL, json.dumps({"what": "failure", "value": True}).encode())]
+
+    def send(self, *message):
+        pass
+
+    send_surely = keep = drop = send
+
+
+def test_a_stop_holds_in_the_next_mode(tmp_path):
+    server, folder = StoppingServer(), study_folder(tmp_path)
+    with Interrupts() as interrupts, Driving(folder, folder.study(), "P001", server, interrupts) as driving:
+        driving.prepare("ee", "reach")
+        driving.run(Step("practice", "ee", "reach"), 3)
+        assert not server.unread
+        driving.prepare("direct", "reach")
+        assert server.unread == [(STOP, b"")]
