@@ -26,8 +26,6 @@ FOUND = Path("outputs/cockpit")  # of datasets whose folders nobody says
 CAMERAS = ("wrist", "scene")
 FPS_RANGE = (10, 100)
 WORTH_SHARING = 100  # episodes from which on several processes are quicker than one
-FIRST_SEED = 2**32  # of evaluations; recordings use the numbers below it
-MOST_ROLLOUTS = 1_000_000  # of an evaluation, of each policy
 MOST_MOVING = 4
 MOST_TIME = 3600.0  # [s]
 _ONE_PROCESS = ("robot_client", "realtime", "display_data", "display_web", "display_save")
@@ -299,8 +297,3 @@ def check_fps(fps: int) -> None:
     low, high = FPS_RANGE
     if not low <= fps <= high:
         raise HandrailError(f"--dataset.fps {fps}: expected {low} to {high}")
-
-
-def evaluation_seed(seed: int, episode: int) -> int:
-    """Return the seed of an episode of an evaluation, `2³² + 10⁶ seed + episode`: of no recording."""
-    return FIRST_SEED + MOST_ROLLOUTS * seed + episode

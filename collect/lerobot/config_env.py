@@ -7,10 +7,11 @@ from lerobot.configs import FeatureType, PolicyFeature
 from lerobot.envs.configs import EnvConfig
 from lerobot.utils.constants import ACTION, OBS_ENV_STATE, OBS_IMAGES, OBS_STATE
 
-from handrail.collect.config import FIRST_SEED, SessionConfig, check_fps
+from handrail.collect.config import SessionConfig, check_fps
 from handrail.collect.envs.observation import AgentObservation
 from handrail.collect.lerobot.mode_action import ModeAction
 from handrail.collect.operators.modes import MASK
+from handrail.collect.seeds import FIRST_SEED
 from handrail.collect.session.build import build_mode, build_task
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.channels import Channels

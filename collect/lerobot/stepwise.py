@@ -8,12 +8,13 @@ from typing import Any
 import numpy as np
 
 from handrail.collect.commands.recording import episode_seed
-from handrail.collect.config import SessionConfig, evaluation_seed
+from handrail.collect.config import SessionConfig
 from handrail.collect.lerobot.mode_action import ModeAction
 from handrail.collect.lerobot.names import lerobot_name
 from handrail.collect.operators.human.steering import FOLLOW
 from handrail.collect.operators.modes import MODES
 from handrail.collect.operators.operator import View
+from handrail.collect.seeds import evaluation_seed
 from handrail.collect.session.build import build_controller, build_env, build_mode
 from handrail.collect.session.driver import Driver
 from handrail.collect.session.mode_controller import ModeController

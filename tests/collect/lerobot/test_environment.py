@@ -9,9 +9,10 @@ from lerobot.envs.factory import make_env, make_env_config
 from lerobot.envs.utils import env_to_policy_features, preprocess_observation
 from places import ROOT
 
-from handrail.collect.config import FIRST_SEED, SessionConfig
+from handrail.collect.config import SessionConfig
 from handrail.collect.lerobot import HandrailSim, HandrailSimConfig
 from handrail.collect.lerobot.names import lerobot_name
+from handrail.collect.seeds import FIRST_SEED
 from handrail.collect.session.build import build_env
 from handrail.collect.tasks.catalogue import TASKS
 from handrail.controllers.errors import HandrailError

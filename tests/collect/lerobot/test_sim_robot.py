@@ -7,10 +7,11 @@ from lerobot.rollout.robot_wrapper import ThreadSafeRobot
 from lerobot.rollout.strategies.core import RolloutStrategy
 from lerobot_helpers import loop, steered
 
-from handrail.collect.config import SessionConfig, evaluation_seed
+from handrail.collect.config import SessionConfig
 from handrail.collect.lerobot import HandrailScripted, HandrailScriptedConfig, HandrailSim, HandrailSimConfig
 from handrail.collect.lerobot.mode_action import AGAIN, BUTTONS, HOLD, NEXT
 from handrail.collect.operators.modes import MODES
+from handrail.collect.seeds import evaluation_seed
 from handrail.collect.session.build import build_env
 from handrail.collect.tasks.catalogue import TASKS
 from handrail.controllers.errors import HandrailError

@@ -9,7 +9,7 @@ import pytest
 from command_helpers import command
 from policy_helpers import StandIn, checkpoint, load
 
-from handrail.collect.config import FIRST_SEED
+from handrail.collect.seeds import FIRST_SEED
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.comparison.evaluations import read_evaluations
 from handrail.policies.imitation.evaluation.conditions import policy_conditions

@@ -20,8 +20,9 @@ from places import ROOT
 from training_helpers import tiny
 
 import handrail.policies.lerobot  # noqa: F401  (as LeRobot's command line has it)
-from handrail.collect.config import FIRST_SEED, StoredConfig
+from handrail.collect.config import StoredConfig
 from handrail.collect.lerobot import HandrailSim
+from handrail.collect.seeds import FIRST_SEED
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.reading.reader import read_episodes, read_frames, read_info
 from handrail.policies.imitation.evaluation.conditions import policy_conditions
