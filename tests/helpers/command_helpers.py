@@ -23,13 +23,14 @@ class Done:
 
 
 def command(*arguments: Any, name: str = "record") -> Done:
-    """Run `handrail-<name>` with its command line, in this process; of cold caches it says no word."""
+    """Run `handrail-<name>` with its command line, in this process, without its words about starting."""
     main = importlib.import_module(f"handrail.scripts.{name}").main
     words = [f"handrail-{name}", *map(str, arguments)]
     out, error = io.StringIO(), io.StringIO()
     with (
         mock.patch.object(sys, "argv", words),
         mock.patch.object(cli, "tell_when_compiling"),
+        mock.patch.object(cli, "say_starting"),
         contextlib.redirect_stdout(out),
         contextlib.redirect_stderr(error),
         pytest.raises(SystemExit) as stop,

@@ -5,6 +5,7 @@ import json
 import os
 import signal
 import time
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -68,7 +69,13 @@ def serve(hub, *pages):
     async def all_of_them():
         await asyncio.gather(*(hub.serve(each, name) for each, name in zip(pages, names, strict=True)))
 
-    asyncio.run(all_of_them())
+    run(all_of_them())
+
+
+def run(coroutine):
+    """Run it in a thread of its own: a browser that is open has a loop in this one."""
+    with ThreadPoolExecutor(1) as pool:
+        pool.submit(asyncio.run, coroutine).result()
 
 
 class Robot:
@@ -174,9 +181,7 @@ def test_giving_back_the_lease_is_never_too_much(hub, ends):
     burst = [drive(n, now, HELD) for n in range(BURST)]
     serve(hub, QueuedSocket([*burst, ask_for("give")]))
     assert ends[0].receive()[-1] == (LOST, b"")
-    asyncio.run(
-        hub.serve(QueuedSocket([drive(1, now)]), "another-page")
-    )  # else it would be kept for the first
+    run(hub.serve(QueuedSocket([drive(1, now)]), "another-page"))  # else it would be kept for the first
     assert DRIVE in [kind for kind, _ in ends[0].receive()]
 
 
