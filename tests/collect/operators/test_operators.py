@@ -18,8 +18,8 @@ from handrail.collect.operators.scripts.base_placement import (
     standing_pose,
     standing_within_reach,
 )
-from handrail.collect.operators.scripts.drawer import handle_rotation
-from handrail.collect.operators.scripts.pick_place import grasp_rotation
+from handrail.collect.tasks.drawer import handle_rotation
+from handrail.collect.tasks.pick_place import grasp_rotation
 from handrail.collect.operators.scripts.scripted import gains_of
 from handrail.collect.tasks.cabinet import HANDLE, inward
 from handrail.collect.tasks.drawer import Drawer

@@ -78,12 +78,23 @@ def run(env, says, controller=None, **options):
 
 
 @pytest.mark.parametrize(
-    ("event", "success", "reason"), [(SUCCESS, True, ""), (FAILURE, False, "operator: failure")]
+    ("event", "real", "success", "reason"),
+    [
+        (SUCCESS, False, False, "judge: not done"),
+        (FAILURE, False, False, "operator: failure"),
+        (SUCCESS, True, True, ""),
+        (FAILURE, True, False, "operator: failure"),
+    ],
 )
-def test_the_operator_ends_an_episode(env, event, success, reason):
-    """The frame in which they say so is the last one; the robot brakes in it, and rests in the end."""
+def test_the_operator_ends_an_episode(env, monkeypatch, event, real, success, reason):
+    """The frame in which they say so is the last one; the robot brakes in it, and rests in the end.
+
+    The task's judge has the word about success; of a real robot nobody knows the truth, and the operator has it.
+    """
+    monkeypatch.setattr(env, "real", real)
     outcome, frames, _ = run(env, {15: event})
     assert (outcome.success, outcome.failure_reason, outcome.ended_by) == (success, reason, event)
+    assert outcome.operator_says == event
     assert outcome.kept
     assert [frame.done for frame in frames] == 14 * [False] + [True]
     assert [frame.success for frame in frames] == 14 * [False] + [success]
@@ -154,13 +165,14 @@ def test_a_recording_counts_and_names_what_it_does_not_keep(tmp_path, monkeypatc
     assert record(config) == 0
     rows = read_episodes(root)
     assert [row["length"] for row in rows] == [8, 9]
-    assert [row["success"] for row in rows] == [False, True]
-    assert [row["failure_reason"] for row in rows] == ["operator: failure", ""]
+    assert [row["success"] for row in rows] == [False, False]
+    assert [row["operator_says"] for row in rows] == ["failure", "success"]
+    assert [row["failure_reason"] for row in rows] == ["operator: failure", "judge: not done"]
     first, other = (episode_seed(0, 0, attempt) for attempt in (0, 1))
     assert [row["seed"] for row in rows] == [other, episode_seed(0, 1)]
     said = capsys.readouterr().err
     assert f"not saved: thrown away, seed {first}\nnot saved: begun again, seed {other}\n" in said
-    assert "1/2 succeeded, 1 thrown away, 1 begun again" in said
+    assert "0/2 succeeded, 1 thrown away, 1 begun again" in said
     done = read_frames(root, 0, ["next.done", "next.success"])
     assert done["next.done"].tolist() == 7 * [False] + [True]
 
