@@ -41,6 +41,7 @@ class Counts:
         self.saved += outcome.kept
         self.succeeded += outcome.kept and outcome.success
         words = "success" if outcome.success else outcome.failure_reason or str(outcome.ended_by)
+        words += "; you said done" if outcome.operator_says == "success" and not outcome.success else ""
         words = f"practice: {words}" if outcome.practice else words
         said = {"kept": outcome.kept, "success": outcome.success, "said": words, "seconds": outcome.seconds}
         self.episodes.append(said | {"played": played})

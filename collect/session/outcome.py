@@ -141,9 +141,7 @@ class Tally:
         if -ahead > self._period:
             self._deadline = self.elapsed
 
-    def outcome(
-        self, info: Mapping[str, Any], ended_by: EpisodeEvent | None, judged: bool = True
-    ) -> Outcome:
+    def outcome(self, info: Mapping[str, Any], ended_by: EpisodeEvent | None, judged: bool = True) -> Outcome:
         """Return how it went.
 
         Args:

@@ -15,7 +15,9 @@ def over(driver):
 
 def follow_words(driver, patience=200.0):
     """Hold the keys of the hand for what the page says is left, until the episode is over."""
-    driver.wait(lambda: driver.hold(set() if over(driver) else keys(way(driver.text("way"))[1])) or over(driver), patience)
+    end = time.monotonic() + patience
+    while not over(driver) and time.monotonic() < end:
+        driver.hold(keys(way(driver.text("way"))[1]))
     driver.hold(set())
 
 

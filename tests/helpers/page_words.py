@@ -12,13 +12,13 @@ _AXES = (
     ("tip up", "tip down"),
     ("turn right", "turn left"),
 )
-_KEYS = (("KeyS", "KeyW"), ("KeyD", "KeyA"), ("KeyF", "KeyR"), ("KeyZ", "KeyX"), ("KeyT", "KeyG"), ("KeyE", "KeyQ"))
-_WORDS = re.compile(r"(\w+): [\d.]+ cm away(?: ✓)?(?:: ([^·]*))?(?:· turned (\d+)°(?: ✓)?(?:: (.*))?)?")
+_KEYS = ("SW", "DA", "FR", "ZX", "TG", "EQ")
+_WORDS = re.compile(r"(\w+): [\d.]+ cm away(?: ✓)?(?:: ([^·]*))?(?: ?· turned (\d+)°(?: ✓)?(?:: (.*))?)?")
 _UNITS = np.array([0.01] * 3 + [np.pi / 180.0] * 3)  # of a centimetre and a degree [m, rad]
 
 
 def way(words):
-    """Return what the hand is to be brought to, and way and turn that are left, (6,) [m, rad]; "" where nothing is."""
+    """Return where the hand is to be brought, by name, and what is left of way and turn, (6,) [m, rad]."""
     found = _WORDS.fullmatch(words.strip())
     if not found:
         return "", np.zeros(6)
@@ -31,12 +31,7 @@ def way(words):
     return found[1], _UNITS * error
 
 
-def is_turned(words):
-    """Whether it matters how the hand is turned."""
-    return "turned" in words
-
-
 def keys(error, near=0.04, angle=0.15):
     """Return the keys of the hand to hold: for what is farther than a distance [m], or an angle [rad]."""
     far = np.abs(error) > [near] * 3 + [angle] * 3
-    return {both[int(x > 0)] for both, x, is_far in zip(_KEYS, error, far, strict=True) if is_far}
+    return {f"Key{both[int(x > 0)]}" for both, x, is_far in zip(_KEYS, error, far, strict=True) if is_far}

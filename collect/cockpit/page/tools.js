@@ -50,7 +50,7 @@ function playbackBar(parent) {
 }
 
 // What is left of the picture between the panels, and above and below what lies on it, {x, y, width, height} [px].
-function free(box) {
+export function free(box) {
   const area = box.getBoundingClientRect(), over = [...box.children, ...OVER.map((id) => document.getElementById(id))];
   const edges = over.map((each) => each.getBoundingClientRect()).filter(({ height, right }) => height && right > area.left);
   const middle = area.top + area.height / 2;

@@ -152,7 +152,7 @@ class Person:
             self.setting = changed(self.setting, axis=axis)
 
     def _judge(self, event: EpisodeEvent) -> None:
-        """End the episode; one that has not begun cannot be judged, and one that runs is not quit but paused."""
+        """End the episode, once it has begun; one that runs is paused before it is quit."""
         if event is EpisodeEvent.QUIT and self._event is not None and self._event.judges:
             self._quits = True
         elif event is EpisodeEvent.QUIT and self.phase in (Phase.DRIVING, Phase.LOST):

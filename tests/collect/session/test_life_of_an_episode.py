@@ -89,7 +89,7 @@ def run(env, says, controller=None, **options):
 def test_the_operator_ends_an_episode(env, monkeypatch, event, real, success, reason):
     """The frame in which they say so is the last one; the robot brakes in it, and rests in the end.
 
-    The task's judge has the word about success; of a real robot nobody knows the truth, and the operator has it.
+    The task's judge says what a success is; of a real robot nobody knows the truth, and the operator does.
     """
     monkeypatch.setattr(env, "real", real)
     outcome, frames, _ = run(env, {15: event})
@@ -152,6 +152,21 @@ def test_what_is_not_kept_is_over_at_once(env, event, tmp_path):
         assert (writer.num_episodes, writer.open_frames) == (0, 0)
         recorder.end(session.run(3))
     assert [row["length"] for row in read_episodes(tmp_path / "d")] == [5]
+
+
+def test_a_dataset_of_before_goes_on_with_the_columns_that_it_has(env, tmp_path):
+    """Its episodes do not say what the operator said; that is why it failed, in words."""
+    old = {"success": True, "failure_reason": "", "seed": 3, "started": 0.0, "wall_time": 1.0}
+    old |= dict.fromkeys(("brakes", "late", "undos", "contact_onsets", "contact_periods"), 0)
+    with EpisodeWriter.create(tmp_path / "d", Manifest("x/d", 20, "robot", session_features(env))) as writer:
+        recorder, person = Recorder(writer, "reach", {}), Person(env.model, *2 * [{5: SUCCESS}])
+        session = Session(env, DirectController(env.model, env.period), person, [recorder])
+        session.run(3)
+        writer.save_episode(old)
+        recorder.end(session.run(3))
+    rows = read_episodes(tmp_path / "d")
+    assert [row["failure_reason"] for row in rows] == ["", "judge: not done"]
+    assert "operator_says" not in rows[-1]
 
 
 def test_a_recording_counts_and_names_what_it_does_not_keep(tmp_path, monkeypatch, capsys):
