@@ -60,7 +60,8 @@ def test_hand_and_goal_are_in_the_area_that_panels_leave_free(new_page, width, h
             seen = np.array(driver.page.evaluate(_FRAMED, [width, height, area, points]))
             inside = (seen - [area["x"], area["y"]]) / [area["width"], area["height"]]
             assert np.all((inside > 0.0) & (inside < 1.0))
-            driver.at("hint-close").click()
+            if driver.at("hint").is_visible():
+                driver.at("hint-close").click()
             for name in ("choices-open", "episodes-open"):  # away; on a phone they are away already
                 if driver.at(name).get_attribute("aria-expanded") == "true":
                     driver.at(name).click()
@@ -71,15 +72,15 @@ def test_the_page_says_how_far_the_hand_is_and_how_much_turned(new_page):
         driver = PageDriver(new_page(), made.address)
         driver.choose("frame", "world")
         state = made.view().task
-        driver.wait(lambda: way(driver.text("way"))[0] == "goal")
+        left = state.goal.position - state.tool.position
+        assert driver.wait(lambda: np.abs(way(driver.text("way"))[1][:3] - left).max() < 0.006)
         said = driver.text("way")
         _, error = way(said)
         turn = state.goal.rotation @ state.tool.rotation.T
         angle = np.degrees(np.arccos((np.trace(turn) - 1.0) / 2.0))
-        np.testing.assert_allclose(error[:3], state.goal.position - state.tool.position, atol=0.006)
         assert np.degrees(np.linalg.norm(error[3:])) == pytest.approx(angle, abs=1.5)
         distance, degrees = re.search(r"([\d.]+) cm away.* turned (\d+)°", said).groups()
-        assert float(distance) == pytest.approx(100 * np.linalg.norm(error[:3]), abs=1.0)
+        assert float(distance) == pytest.approx(100 * np.linalg.norm(left), abs=0.6)
         assert float(degrees) == pytest.approx(angle, abs=1.0)
         words = driver.page.inner_text("body")
         assert not re.search(r"[-−]0(\.0)? cm|NaN|undefined|null", words)
@@ -164,7 +165,8 @@ def test_esc_closes_what_is_open_and_never_becomes_a_key(new_page):
             name,
         )
         page.reload()  # an older page's keys: the person's own stay, Esc goes
-        expect(driver.at("quit")).to_contain_text("End recordingEnd")
+        driver = PageDriver(page)
+        expect(driver.at("quit")).to_contain_text("End recording End")
         driver.press("KeyH")
         expect(page.get_by_role("button", name="hand forward: Y")).to_be_visible()
         driver.press("KeyH")
