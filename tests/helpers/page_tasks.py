@@ -3,6 +3,7 @@
 import time
 
 import numpy as np
+from page_driver import LOST
 from page_words import keys, way
 
 _TIPS, _UP = 0.01, np.array([0.0, 0.0, 1.0])
@@ -17,7 +18,7 @@ def follow_words(driver, patience=200.0):
     """Hold the keys of the hand for what the page says is left, until the episode is over."""
     end = time.monotonic() + patience
     while not over(driver) and time.monotonic() < end:
-        driver.hold(keys(way(driver.text("way"))[1]))
+        driver.hold(set() if driver.phase == LOST else keys(way(driver.text("way"))[1]))
     driver.hold(set())
 
 
