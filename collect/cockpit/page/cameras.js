@@ -8,7 +8,8 @@ const FILLED = 0.94; // of the free area, at most
 const NEAREST = 1.7; // that the camera comes by itself, at scale 1 [m]
 const EASE = 0.5; // in which it does most of its way [s]
 const LOW = 320; // a free area of less height has no room for the base [px]
-const ROOM = { tool: 0.2, base: 0.42, aim: 0.2 }; // around each, at scale 1 [m]
+const ROOM = 0.2, BASE = 0.42; // around hand and aim, and around the base, at scale 1 [m]
+const CLOSE = 0.25, FAR = 1; // between these distances of hand and aim the base comes into view, at scale 1 [m]
 
 export class Cameras {
   constructor(canvas) {
@@ -57,8 +58,7 @@ export class Cameras {
     if (this.choice === "hand") return this.ride(tool);
     if (this.choice === "free" && this.placed) return undefined;
     if (!this.placed) this.begin(base);
-    const spheres = Object.entries({ base: this.isLow && aim ? null : base.position, tool: tool.position, aim }).filter(([, at]) => at)
-      .map(([name, at]) => ({ at, room: ROOM[name] * this.scale }));
+    const spheres = this.spheres(base.position, tool.position, aim);
     const { position } = this.camera, { target } = this.controls, now = performance.now();
     this.zoom *= position.distanceTo(target) / this.placed.distance;
     this.pan.add(target).sub(this.placed.target);
@@ -77,11 +77,18 @@ export class Cameras {
     const forward = new THREE.Vector3(1, 0, 0).applyQuaternion(base.quaternion).setZ(0).normalize();
     const side = new THREE.Vector3(-forward.y, forward.x, 0), back = new THREE.Vector3(0, 0, 1);
     if (this.choice === "above") back.addScaledVector(forward, -0.04);
-    else back.addScaledVector(forward, -1.1).addScaledVector(side, 0.5);
+    else back.addScaledVector(forward, -0.9).addScaledVector(side, 0.8);
     this.controls.target.copy(base.position);
     this.camera.position.copy(base.position).addScaledVector(back.normalize(), 1);
     this.placed = { target: this.controls.target.clone(), distance: 1 };
     Object.assign(this, { zoom: 1, pan: new THREE.Vector3(), isNew: true });
+  }
+
+  // What is to be in view, {at, room}: hand and aim; the base too, as long as these are apart.
+  spheres(base, tool, aim) {
+    const share = !aim ? 1 : this.isLow ? 0 : THREE.MathUtils.clamp((tool.distanceTo(aim) / this.scale - CLOSE) / (FAR - CLOSE), 0, 1);
+    const body = { at: tool.clone().lerp(base, share), room: (ROOM + share * (BASE - ROOM)) * this.scale };
+    return [body, ...[tool, aim].filter(Boolean).map((at) => ({ at, room: ROOM * this.scale }))];
   }
 
   // Where to look, and from how far, so that all spheres are in the free area: {target, distance}.

@@ -44,7 +44,9 @@ def check(folder, episodes, device, mode="ee", fewest=None):
     """The dataset has the episodes, of whoever has that in hand; all are successes, or some."""
     found = saved(folder)
     assert len(found) == episodes
-    assert sum(each["next.success"][-1] for each in found) >= (fewest or episodes)
+    done = [bool(each["next.success"][-1]) for each in found]
+    print("done:", done, "frames:", [len(each["action"]) for each in found])
+    assert sum(done) >= (fewest or episodes)
     for each in found:
         assert {"", device} >= set(each["teleop.device"]) >= {device}
         assert set(each["teleop.mode"]) == {mode}
