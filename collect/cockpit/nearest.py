@@ -20,7 +20,7 @@ class Nearest:
 
 
 class NearestPair:
-    """Measures the robot against itself and what stands around; things that it may carry or pull are left out.
+    """Measures the robot against itself and what stands around; what it may carry or pull is left out.
 
     Args:
         model: the compiled model.
