@@ -233,6 +233,7 @@ class Cockpit:
             "refuses": sorted(self._refuses),
             "cameras": self._env.cameras,
             "gripper": self._model.description.gripper is not None,
+            "grips": bool(self._env.start.scene.movables),
             "episodes": [each | {"played": self._there(each["played"])} for each in self._counts.episodes],
             "folder": self._folder,
             "wanted": self._wanted,
@@ -260,7 +261,7 @@ def open_cockpit(config: RecordConfig, env: HandrailEnv, say: Callable[[str], No
     modes = build_modes(config, env)
     server = ServerProcess(config.cockpit, say)
     say(f"Drive at {server.address}")
-    say(f"Episodes go to {config.dataset.folder}. To end: Esc on the page, or Ctrl-C here.")
+    say(f"Episodes go to {config.dataset.folder}. To end: End recording on the page, or Ctrl-C here.")
     if config.cockpit.opens:
         webbrowser.open(server.address)
     folder, wanted = str(config.dataset.folder), config.dataset.num_episodes

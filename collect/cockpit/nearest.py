@@ -20,7 +20,7 @@ class Nearest:
 
 
 class NearestPair:
-    """Measures the robot against the scene and itself.
+    """Measures the robot against itself and what stands around; what it may carry or pull is left out.
 
     Args:
         model: the compiled model.
@@ -37,7 +37,9 @@ class NearestPair:
         self._radii = model.geom_rbound[self._first] + model.geom_rbound[self._second]
 
     def _is_apart(self, geom: int, robot: list[int]) -> bool:
-        """Whether a geom is no part of the robot: not a finger."""
+        """Whether a geom is no part of the robot, as a finger is, and nothing that can be moved."""
+        if self._model.body_dofnum[self._model.geom_bodyid[geom]]:
+            return False
         bodies = {int(self._model.body_rootid[self._model.geom_bodyid[each]]) for each in robot}
         return int(self._model.body_rootid[self._model.geom_bodyid[geom]]) not in bodies
 

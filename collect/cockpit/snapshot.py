@@ -13,6 +13,7 @@ from handrail.collect.envs.env import HandrailEnv
 from handrail.collect.operators.operator import View
 from handrail.collect.operators.person.person import Person, Phase
 from handrail.collect.session.outcome import Outcome
+from handrail.collect.tasks.task import Aimed, TaskState
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.interface.trajectory import Trajectory
 from handrail.controllers.numerics.rotation import quaternion_from_matrix
@@ -40,6 +41,7 @@ class Counts:
         self.saved += outcome.kept
         self.succeeded += outcome.kept and outcome.success
         words = "success" if outcome.success else outcome.failure_reason or str(outcome.ended_by)
+        words += "; you said done" if outcome.operator_says == "success" and not outcome.success else ""
         words = f"practice: {words}" if outcome.practice else words
         said = {"kept": outcome.kept, "success": outcome.success, "said": words, "seconds": outcome.seconds}
         self.episodes.append(said | {"played": played})
@@ -80,6 +82,8 @@ class Snapshots:
             "time": round(view.state.time, 3),
             "practice": person.practises,
             "undos": frame.undos if frame else 0,
+            "aim": self._aim(view.task),
+            "judge": None if self._env.real else self._env.task.outcome(view.task).success,
             "undo_takes": round(view.state.time - self._undo_to, 1),
             "left": round(self._env.task.horizon - view.state.time, 1),
             "phase": person.phase.value,
@@ -102,6 +106,15 @@ class Snapshots:
             "age": round(min(person.age, 99.0), 3),
             "round_trip": round(person.round_trip, 4),
         }
+
+    def _aim(self, state: TaskState) -> dict[str, Any] | None:
+        """Return where the hand is to be brought, if the task says that."""
+        if not isinstance(self._env.task, Aimed):
+            return None
+        aim = self._env.task.aim(state)
+        turn = [] if aim.rotation is None else quaternion_from_matrix(aim.rotation)
+        pose = np.round(np.concatenate([aim.position, turn]), 4).tolist()
+        return {"name": aim.name, "pose": pose, "distance": aim.distance, "angle": round(aim.angle, 4)}
 
     def _reason(self, frame: Frame | None, q: FloatArray) -> str:
         if frame is None:

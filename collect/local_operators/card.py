@@ -101,9 +101,11 @@ class Card:
         """Return what to do next."""
         start = control_of(self._tables, "start", "start_or_pause")
         hold = control_of(self._tables, "hold") or control_of(self._tables, "clutch")
+        ends, saves = control_of(self._tables, "quit"), control_of(self._tables, "success")
+        lost = f"; {ends} ends the recording without this episode, {saves} saves it first" if ends else ""
         return {
             Phase.READY: f"press {start} to begin",
-            Phase.PAUSED: f"paused; press {start} to go on",
+            Phase.PAUSED: f"paused; press {start} to go on{lost}",
             Phase.LOST: "stands still: let go of everything" + (f", then hold {hold}" if hold else ""),
             Phase.STOPPED: f"emergency stop; {start} releases it",
             Phase.DRIVING: f"hold {hold} to move" if hold else "drive",

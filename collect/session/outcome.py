@@ -13,6 +13,8 @@ from handrail.collect.operators.operator import EpisodeEvent
 from handrail.controllers.interface.command import Command, Status
 from handrail.datasets.quality.safety import contacts_begun
 
+_NOT_DONE = "judge: not done"  # why an episode failed that the operator calls a success
+
 
 @dataclass(frozen=True)
 class Outcome:
@@ -20,7 +22,7 @@ class Outcome:
 
     Attributes:
         seed: of the environment.
-        success: whether the task was done.
+        success: whether the task was done, as its judge says; on a real robot, as the operator says.
         failure_reason: why not; empty after a success.
         frames: periods of the robot.
         seconds: simulated time [s].
@@ -55,6 +57,11 @@ class Outcome:
     paused: float = 0.0
     undos: int = 0
     practice: bool = False
+
+    @property
+    def operator_says(self) -> str:
+        """What the operator said of it: success, failure, or nothing."""
+        return str(self.ended_by) if self.ended_by and self.ended_by.judges else ""
 
     @property
     def kept(self) -> bool:
@@ -134,12 +141,19 @@ class Tally:
         if -ahead > self._period:
             self._deadline = self.elapsed
 
-    def outcome(self, info: Mapping[str, Any], ended_by: EpisodeEvent | None) -> Outcome:
-        """Return how it went, as the task judges, or else as the operator says."""
+    def outcome(self, info: Mapping[str, Any], ended_by: EpisodeEvent | None, judged: bool = True) -> Outcome:
+        """Return how it went.
+
+        Args:
+            info: of the last step.
+            ended_by: what the operator said to end it.
+            judged: whether the task's judge knows the truth; else the operator's word counts.
+        """
         success, reason = bool(info["is_success"]), str(info["failure_reason"])
         if ended_by is not None:
-            success = ended_by is EpisodeEvent.SUCCESS
-            reason = "" if success else f"operator: {ended_by}"
+            says = ended_by is EpisodeEvent.SUCCESS
+            success = success if judged else says
+            reason = "" if success else (reason or _NOT_DONE) if says else f"operator: {ended_by}"
         return Outcome(
             seed=self._seed,
             success=success,

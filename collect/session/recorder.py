@@ -50,8 +50,10 @@ class Recorder:
             self.writer.discard_episode()
             return
         self._add(outcome.frames)
+        says = {"operator_says": outcome.operator_says}  # datasets of old have no such column
         self.writer.save_episode(
             dict(self._columns)
+            | (says if self.writer.has_column("operator_says") else {})
             | {
                 "success": outcome.success,
                 "failure_reason": outcome.failure_reason,

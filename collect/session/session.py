@@ -146,7 +146,7 @@ class Session:
                 self.env.robot.stop()
                 self._warn_if_slow()
             paused = self._event is EpisodeEvent.PAUSE
-            return self._tally.outcome(self._info, None if paused else self._event)
+            return self._tally.outcome(self._info, None if paused else self._event, not self.env.real)
 
     def _warn_if_slow(self) -> None:
         """Warn when more than one update in a hundred took longer than the period, in real time."""
@@ -233,7 +233,9 @@ class Session:
             command=action.astype(np.float32),
             diagnostics=self._driver.command.diagnostics,
             contacts=self._info["contacts"],
-            success=self._event is EpisodeEvent.SUCCESS if judged else bool(self._info["is_success"]),
+            success=self._event is EpisodeEvent.SUCCESS
+            if judged and env.real
+            else bool(self._info["is_success"]),
             done=self._done,
             wall_clock=self._wall_clock,
             number=self._number,

@@ -7,7 +7,7 @@ import numpy as np
 from handrail.collect.simulation.scene import Scene, Viewpoint
 from handrail.collect.tasks.cabinet import HANDLE, cabinet, drawer, inward
 from handrail.collect.tasks.starts import check_large, near_home
-from handrail.collect.tasks.task import Start, TaskState, Verdict
+from handrail.collect.tasks.task import Aim, Start, TaskState, Verdict
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.robot.model import RobotModel
 
@@ -53,6 +53,11 @@ class Drawer:
         direction = inward(body.rotation)[:2]
         return np.array([*handle(state), *direction, opened(state), *body.position[:2], body.top])
 
+    def aim(self, state: TaskState) -> Aim:
+        """Return the handle, from before the cabinet."""
+        into = inward(state.object("cabinet").rotation)
+        return Aim("handle", handle(state), handle_rotation(state.tool.rotation, into))
+
     def outcome(self, state: TaskState) -> Verdict:
         """Judge how far the drawer is open, and whether the hand has let go."""
         return Verdict(success=opened(state) >= _OPENING and state.let_go(handle(state)))
@@ -62,6 +67,14 @@ def handle(state: TaskState) -> FloatArray:
     """Return where the middle of the handle is now, (3,) [m]."""
     pose = state.pose("drawer")
     return pose.position + pose.rotation @ HANDLE
+
+
+def handle_rotation(tool: FloatArray, into: FloatArray) -> FloatArray:
+    """Return the rotation nearest to the tool's that points it into the cabinet, fingers above and below."""
+    candidates = [
+        np.column_stack([up, np.cross(into, up), into]) for up in ([0.0, 0.0, 1.0], [0.0, 0.0, -1.0])
+    ]
+    return max(candidates, key=lambda rotation: float(np.trace(rotation.T @ tool)))
 
 
 def opened(state: TaskState) -> float:

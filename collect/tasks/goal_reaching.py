@@ -1,7 +1,7 @@
 """The goal-reaching protocol of the paper's Table I: goals, the planner of the tool's motion, thresholds."""
 
 from dataclasses import dataclass
-from math import ceil, sqrt
+from math import asin, ceil, sqrt
 
 import numpy as np
 import pinocchio as pin
@@ -16,6 +16,7 @@ STEP = 0.03  # of the simulation [s]
 T_MAX = 1000  # longest episode [steps]
 POSITION_TOLERANCE = 0.1  # largest d_p of a success [m]
 ORIENTATION_TOLERANCE = 0.05  # largest d_r of a success
+ANGLE_TOLERANCE = 2.0 * asin(sqrt(ORIENTATION_TOLERANCE))  # the same as an angle, d_r = sin²(θ/2) [rad]
 
 _SHORTEST = 300  # shortest motion of the planner [steps]
 _SPEED = 0.08  # of the planner over long distances [m/s]

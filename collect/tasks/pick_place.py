@@ -8,7 +8,7 @@ from handrail.collect.simulation.scene import Scene, SceneObject, Viewpoint
 from handrail.collect.tasks.clutter import obstacle_features, obstacle_names, sample_obstacles
 from handrail.collect.tasks.furniture import cube, open_bin, table
 from handrail.collect.tasks.starts import near_home
-from handrail.collect.tasks.task import Start, TaskState, Verdict
+from handrail.collect.tasks.task import Aim, Start, TaskState, Verdict
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.numerics.rotation import quaternion_from_matrix
 from handrail.controllers.robot.description import World
@@ -23,6 +23,7 @@ _AT, _AROUND, _LIFTED = (
     1.0,
     0.5,
 )  # of the cube's width: the hand is there, around it; it is off the table
+_ABOVE = 0.05  # the rim is let go, at scale 1 [m]
 _OPEN = 0.8  # share of the stroke from which the gripper is open
 _VIEW = Viewpoint(position=(3.0, 0.0, 3.5), target=(0.05, 0.0, 0.2), fovy=56.0)
 
@@ -92,6 +93,15 @@ class PickPlace:
             return "approach"
         return "lift" if away < _AROUND * width and state.opening < _OPEN else "grasp"
 
+    def aim(self, state: TaskState) -> Aim:
+        """Return the cube, from above; once it is in hand, the place above the bin to let it go."""
+        if self.stage(state) in _STAGES[:2]:
+            cube = state.pose("cube")
+            return Aim("cube", cube.position, grasp_rotation(state.tool.rotation, cube.rotation))
+        position = np.array(state.pose("bin").position)
+        position[2] = state.object("bin").top + _ABOVE * state.scale
+        return Aim("bin", position)
+
     def outcome(self, state: TaskState) -> Verdict:
         """Judge where the cube is, whether it rests, and where the gripper is."""
         position = state.pose("cube").position
@@ -99,6 +109,14 @@ class PickPlace:
             return Verdict(failure="dropped")
         rests = _inside_bin(state, position) and "cube" in state.still
         return Verdict(success=rests and state.let_go(position))
+
+
+def grasp_rotation(tool: FloatArray, cube: FloatArray) -> FloatArray:
+    """Return the rotation nearest to the tool's that points it down, fingers square to the cube, (3, 3)."""
+    yaw, down = np.arctan2(cube[1, 0], cube[0, 0]), np.array([0.0, 0.0, -1.0])
+    ahead = [np.array([np.cos(angle), np.sin(angle), 0.0]) for angle in yaw + np.pi / 2 * np.arange(4)]
+    candidates = [np.column_stack([x, np.cross(down, x), down]) for x in ahead]
+    return max(candidates, key=lambda rotation: float(np.trace(rotation.T @ tool)))
 
 
 def _sample_table(name: str, side: float, world: World, rng: np.random.Generator) -> SceneObject:

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from handrail.collect.simulation.scene import Part, Scene, SceneObject, Viewpoint
-from handrail.collect.tasks.goal_reaching import POSITION_TOLERANCE, pose_error, reached
+from handrail.collect.tasks.goal_reaching import ANGLE_TOLERANCE, POSITION_TOLERANCE, pose_error, reached
 from handrail.collect.tasks.goals import sample_goal_for
 from handrail.collect.tasks.moving import mover_features, mover_names, sample_movers
-from handrail.collect.tasks.task import Start, TaskState, Verdict
+from handrail.collect.tasks.task import Aim, Start, TaskState, Verdict
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.numerics.rotation import matrix_to_axis, quaternion_from_matrix
 from handrail.controllers.robot.model import Pose, RobotModel
@@ -54,6 +54,11 @@ class Reach:
         goal = _goal(state)
         movers = mover_features(state.start.scene, state.time, self.moving_obstacles)
         return np.concatenate([goal.position, quaternion_from_matrix(goal.rotation), movers])
+
+    def aim(self, state: TaskState) -> Aim:
+        """Return the goal."""
+        goal = _goal(state)
+        return Aim("goal", goal.position, goal.rotation, POSITION_TOLERANCE * state.scale, ANGLE_TOLERANCE)
 
     @property
     def stages(self) -> tuple[str, ...]:

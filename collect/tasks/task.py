@@ -107,6 +107,25 @@ class Verdict:
         return self.success or bool(self.failure)
 
 
+@dataclass(frozen=True)
+class Aim:
+    """A place that the hand is to be brought to now; a person is shown how far that is.
+
+    Attributes:
+        name: of what is there.
+        position: of the tool point [m], (3,).
+        rotation: world from tool, (3, 3); None where any will do.
+        distance: tolerance of the task's judge [m]; 0 where it has none.
+        angle: likewise [rad].
+    """
+
+    name: str
+    position: FloatArray
+    rotation: FloatArray | None = None
+    distance: float = 0.0
+    angle: float = 0.0
+
+
 class Task(Protocol):
     """A task; a frozen dataclass in its own file, with one entry in `handrail.collect.tasks.catalogue`."""
 
@@ -135,6 +154,15 @@ class Task(Protocol):
 
     def outcome(self, state: TaskState) -> Verdict:
         """Judge a moment."""
+        ...
+
+
+@runtime_checkable
+class Aimed(Protocol):
+    """A task that says where the hand is to be brought."""
+
+    def aim(self, state: TaskState) -> Aim:
+        """Return where to at a moment."""
         ...
 
 

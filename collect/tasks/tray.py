@@ -8,7 +8,7 @@ from handrail.collect.simulation.scene import Scene, SceneObject, Viewpoint
 from handrail.collect.tasks.clutter import obstacle_features, obstacle_names, sample_obstacles
 from handrail.collect.tasks.furniture import TRAY_BAR, can, table, tray
 from handrail.collect.tasks.starts import check_large, reach_share
-from handrail.collect.tasks.task import Start, TaskState, Verdict
+from handrail.collect.tasks.task import Aim, Start, TaskState, Verdict
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.channels import Channels
@@ -76,6 +76,11 @@ class Tray:
         goal = state.object("table")
         numbers += [*goal.position[:2], goal.top]
         return np.concatenate([numbers, obstacle_features(state.start.scene)])
+
+    def aim(self, state: TaskState) -> Aim:
+        """Return where the hand is when the tray stands in the middle of the table."""
+        goal = state.object("table")
+        return Aim("table", np.array([*goal.position[:2], goal.top]) + HANDLE)
 
     def outcome(self, state: TaskState) -> Verdict:
         """Judge the tray, then the can on it, then whether the tray was left on the table."""

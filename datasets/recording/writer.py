@@ -167,6 +167,10 @@ class EpisodeWriter:
         self._check_usable()
         self._episode.add(frame, task)
 
+    def has_column(self, name: str) -> bool:
+        """Whether an episode may have an extra column: the first one fixes which there are."""
+        return self._types is None or name in self._types
+
     def save_episode(self, columns: Mapping[str, Scalar | None] | None = None) -> int:
         """Save the open episode and return its number; it survives a crash and a power failure from then on.
 

@@ -46,7 +46,7 @@ class TrainConfig:
     mode: str = ""
     """Only episodes of this teleop mode."""
     success_only: bool = False
-    """Only episodes that succeeded."""
+    """Only episodes that succeeded, as the task's judge says; where there is none, as the operator says."""
     episodes: int = 0
     """Only so many of them, drawn at random; 0 for all."""
     minutes: float = 0.0

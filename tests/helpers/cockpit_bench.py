@@ -104,9 +104,9 @@ class Bench:
 
 
 @contextmanager
-def bench(mode="ee"):
+def bench(mode="ee", task="Reach"):
     """Run a cockpit on a bench."""
-    with environment("Reach", render_mode="rgb_array") as env:
+    with environment(task, render_mode="rgb_array") as env:
         made = Bench(env, mode)
         made.start()
         try:

@@ -5,6 +5,7 @@ import time
 from contextlib import contextmanager
 
 import numpy as np
+from page_words import way
 from playwright.sync_api import expect, sync_playwright
 from scipy.spatial.transform import Rotation
 
@@ -35,7 +36,7 @@ class PageDriver:
     """
 
     def __init__(self, page, address=""):
-        self.page = page
+        self.page, self._held = page, set()
         if address:
             page.goto(address)
         expect(self.at("numbers")).not_to_be_empty(timeout=SLOW)
@@ -71,8 +72,30 @@ class PageDriver:
         time.sleep(seconds)
         self.page.keyboard.up(key)
 
+    def hold(self, keys):
+        """Hold these keys, and no others."""
+        for key in self._held - keys:
+            self.page.keyboard.up(key)
+        for key in keys - self._held:
+            self.page.keyboard.down(key)
+        self._held = set(keys)
+
+    def end(self, save=""):
+        """End the recording; save what is open by pressing a key, where there is something."""
+        self.press("End")
+        if save:
+            expect(self.at("decision")).to_be_visible()
+            self.press(save)
+
+    def done(self, phase="ready"):
+        """Say that the task is done, whatever its judge says."""
+        self.press("ArrowRight")
+        expect(self.at("decision")).to_contain_text("not done")
+        self.press("ArrowRight")
+        assert self.wait(lambda: self.phase.startswith((phase, "no connection")))
+
     def place(self, name="hand"):
-        return self.things()[name][0]
+        return self.things()[name]
 
     @property
     def speed(self):
@@ -103,24 +126,25 @@ class PageDriver:
         return int(percent) / 100.0
 
     def things(self):
-        """Return where everything is, (3,), and how far the hand would have to turn to be like it."""
-        found = re.findall(rf"\b(\w+) {_NUMBERS}(?: turn {_NUMBERS})?", self.text("numbers"))
-        numbers = {name: [float(each or 0.0) for each in values] for name, *values in found}
-        return {name: (np.array(x[:3]), Rotation.from_rotvec(x[3:])) for name, x in numbers.items()}
+        """Return where everything is, (3,) [m]."""
+        found = re.findall(rf"^(\w+) {_NUMBERS}$", self.text("numbers"), re.MULTILINE)
+        return {name: np.array(values, float) for name, *values in found}
 
-    def hand(self, mark):
-        """Return where the hand is, and how it is turned against something that stands still."""
-        things = self.things()
-        return things["hand"][0], things[mark][1].inv()
+    def hand(self):
+        """Return where the hand is, and the turn from it to what the page says that it is to be like."""
+        return self.place(), Rotation.from_rotvec(way(self.text("way"))[1][3:])
 
-    def settled(self, mark, patience=2.0):
-        """Return the same once the hand rests, as far as one sees."""
-        before, end = self.hand(mark), time.monotonic() + patience
+    def settled(self, patience=2.0):
+        """Return where the hand is once it rests, as far as one sees."""
+        return self.at_rest(patience)[0]
+
+    def at_rest(self, patience=2.0):
+        """Return the hand once it rests."""
+        before, end = self.hand(), time.monotonic() + patience
         while time.monotonic() < end:
             time.sleep(0.12)
-            now = self.hand(mark)
-            still = np.abs(now[0] - before[0]).max() < 0.002 and (now[1] * before[1].inv()).magnitude() < 0.01
-            if still:
+            now = self.hand()
+            if np.abs(now[0] - before[0]).max() < 0.002 and (now[1] * before[1].inv()).magnitude() < 0.01:
                 return now
             before = now
         return before

@@ -13,6 +13,7 @@ _FAR = 0.7  # with more than so long to go, levers are held and watched [s]
 _AHEAD = 0.25  # so early they are let go again [s]
 _SHOWN = 0.25  # until what was pushed is seen on the page [s]
 _SHORT = 0.03  # no push is shorter [s]
+_MOST = 2.0  # that a second of a lever turns; more, and the page means another side of the thing by now [rad]
 
 
 class Learner:
@@ -21,21 +22,21 @@ class Learner:
     Args:
         driver: who looks at the page.
         levers: what there is to push.
-        mark: something that stands still, to see how the hand turns.
         bends: whether what a lever does depends on where the arm is; then it is learned on the way.
     """
 
-    def __init__(self, driver, levers, mark, bends=False):
-        self.driver, self.levers, self.mark, self._bends = driver, levers, mark, bends
+    def __init__(self, driver, levers, bends=False):
+        self.driver, self.levers, self._bends = driver, levers, bends
+        driver.choose("frame", "world")
         self.twists = np.zeros((6, len(levers)))
 
     def learn(self):
         """Try every lever twice; a computer that stumbles makes a try too small, never too large."""
-        before = self.driver.settled(self.mark)
+        before = self.driver.at_rest()
         for index in 2 * list(range(len(self.levers))):
             before, moved, pushed = self._push(_TRY * np.eye(len(self.levers))[index], before)
             seen = moved / pushed[index]
-            if _size(seen) > _size(self.twists[:, index]):
+            if _size(seen) > _size(self.twists[:, index]) and np.linalg.norm(seen[3:]) < _MOST:
                 self.twists[:, index] = seen
         self._learned = self.twists.copy()
 
@@ -43,12 +44,11 @@ class Learner:
         """Think of what was learned first: the arm is again as it was then."""
         self.twists = self._learned.copy()
 
-    def steer(self, place, turned, near=0.02, angle=0.12, patience=25.0, until=lambda: False, rest=True):
-        """Bring the hand to a place, (3,), turned so; return whether it came near enough in time.
+    def steer(self, place, near=0.02, angle=0.12, patience=25.0, until=lambda: False, rest=True):
+        """Bring the hand to a place, turned as the page says; return whether it came near enough in time.
 
         Args:
-            place: where to, or says where that is now, (3,).
-            turned: how it shall be turned against the mark, or says that.
+            place: where to, (3,).
             near: good enough [m].
             angle: good enough [rad].
             patience: [s].
@@ -60,7 +60,7 @@ class Learner:
             if self.driver.phase == LOST:
                 self.let_go()
                 self.driver.wait(lambda: self.driver.phase != LOST, 5.0)
-            error = self._error(self.driver.hand(self.mark), place, turned)
+            error = _error(self.driver.hand(), place)
             if not rest and _is_there(error, near, angle):
                 return True
             seconds = self._seconds(error)
@@ -68,8 +68,8 @@ class Learner:
                 self._hold(seconds)
                 continue
             self.let_go()
-            before = self.driver.settled(self.mark)
-            error = self._error(before, place, turned)
+            before = self.driver.at_rest()
+            error = _error(before, place)
             if _is_there(error, near, angle):
                 return True
             seconds = self._seconds(error)
@@ -81,10 +81,6 @@ class Learner:
 
     def let_go(self):
         self.levers.hold(np.zeros(len(self.levers)))
-
-    def _error(self, hand, place, turned):
-        place, turned = (each() if callable(each) else each for each in (place, turned))
-        return np.concatenate([place - hand[0], (turned * hand[1].inv()).as_rotvec()])
 
     def _seconds(self, error):
         """Return for how long to push each lever: `min ‖W (J s − e)‖² + λ² ‖s‖²`, (k,) [s]."""
@@ -108,14 +104,18 @@ class Learner:
         seconds = np.where(np.abs(seconds) < _SHORT, 0.0, seconds)
         pushed = push(self.levers, seconds) * self.driver.speed
         time.sleep(_SHOWN)
-        after = self.driver.settled(self.mark)
-        moved = np.concatenate([after[0] - before[0], (after[1] * before[1].inv()).as_rotvec()])
+        after = self.driver.at_rest()
+        moved = np.concatenate([after[0] - before[0], (after[1].inv() * before[1]).as_rotvec()])
         return after, moved, pushed
 
     def _correct(self, moved, pushed):
         """Believe what was seen: the smallest change of what is known that explains it (Broyden)."""
         if np.linalg.norm(pushed) > _SHORT:
             self.twists += np.outer(moved - self.twists @ pushed, pushed) / (pushed @ pushed)
+
+
+def _error(hand, place):
+    return np.concatenate([place - hand[0], hand[1].as_rotvec()])
 
 
 def _size(twist):

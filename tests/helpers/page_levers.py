@@ -23,7 +23,7 @@ class Keys:
     SCRIPT = ""
 
     def __init__(self, driver):
-        self._driver, self._held = driver, set()
+        self._driver = driver
         driver.press("KeyH")
         expect(driver.at("help-table").locator("button").first).to_be_visible()
         names = [_code(name) for name in driver.at("help-table").locator("button").all_inner_texts()]
@@ -39,11 +39,7 @@ class Keys:
         keys = {
             pair[0] if sign > 0 else pair[1] for pair, sign in zip(self.pairs, signs, strict=True) if sign
         }
-        for key in self._held - keys:
-            self._driver.page.keyboard.up(key)
-        for key in keys - self._held:
-            self._driver.page.keyboard.down(key)
-        self._held = keys
+        self._driver.hold(keys)
 
     def grip(self):
         self._driver.press("ShiftLeft")

@@ -5,21 +5,13 @@ import re
 import time
 
 import numpy as np
+from page_words import keys, way
 from playwright.sync_api import expect
 
 DECLINED = "I prefer not to answer"
 DRIVING = re.compile("^(recording|practice: not recorded)$")
 READY = "ready: press Start"
 REMARK = "=1+1; synthetic"  # what a spreadsheet would run
-_KEYS = (
-    ("W", "S"),
-    ("A", "D"),
-    ("R", "F"),
-    ("X", "Z"),
-    ("G", "T"),
-    ("Q", "E"),
-)  # of the hand, along and about
-_NUMBERS = " ".join([r"(-?\d+\.\d+)"] * 3)
 _SLOW = 180_000  # patience: the controller may be compiled first [ms]
 
 
@@ -119,7 +111,7 @@ class ParticipantDriver:
         expect(self.page.locator("#phase")).to_have_text(DRIVING, timeout=_SLOW)
         self.trials += 1
         by_hand = self.page.input_value("#mode") in ("ee", "base+ee")
-        if by_hand and re.search(r"\bgoal -?\d", self.text("numbers")):
+        if by_hand and way(self.text("way"))[0] == "goal":
             self._reach()
         else:
             self._hold({"KeyI"})
@@ -134,20 +126,10 @@ class ParticipantDriver:
         return bool(DRIVING.match(self.text("phase"))) and not self.title
 
     def _reach(self, patience=25.0):
-        """Steer the hand to the goal's frame."""
-        self.page.locator("#frame").select_option("world")
+        """Steer the hand as the page says."""
         end = time.monotonic() + patience
         while time.monotonic() < end and self._drives:
-            numbers = self.text("numbers")
-            hand = re.search(rf"\bhand {_NUMBERS}", numbers).groups()
-            goal = re.search(rf"\bgoal {_NUMBERS} turn {_NUMBERS}", numbers).groups()
-            way = np.array(goal, float) - np.array([*hand, 0, 0, 0], float)
-            far = np.abs(way) > [0.02, 0.02, 0.02, 0.08, 0.08, 0.08]
-            self._hold(
-                f"Key{pair[int(value < 0)]}"
-                for pair, value, is_far in zip(_KEYS, way, far, strict=True)
-                if is_far
-            )
+            self._hold(keys(way(self.text("way"))[1], 0.02, 0.08))
             time.sleep(0.02)
         self._hold(())
 

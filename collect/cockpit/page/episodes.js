@@ -9,17 +9,17 @@ function set(id, words) {
   if (byId(id).textContent !== words) byId(id).textContent = words;
 }
 
-const share = (part, whole) => (whole ? `${Math.round(100 * part / whole)} %` : "–");
+const MANY = 1000; // episodes that there is room for: more are not counted
 
 // disk: free [bytes], and about how many episodes that is; -1 for what nobody knows
 function room([bytes, episodes] = [-1, -1]) {
   if (bytes < 0) return "";
-  return `disk: ${(bytes / 1e9).toFixed(bytes < 1e10 ? 1 : 0)} GB free${episodes < 0 ? "" : `, about ${episodes} episodes`}`;
+  return `disk: ${(bytes / 1e9).toFixed(bytes < 1e10 ? 1 : 0)} GB free${episodes < 0 || episodes > MANY ? "" : `, about ${episodes} episodes`}`;
 }
 
 function checkpoint({ undo_takes: ago, undos }) {
   const count = undos === 1 ? "1 undo" : undos ? `${undos} undos` : "";
-  return [ago === undefined ? "" : `checkpoint ${ago.toFixed(1)} s ago`, count].filter(Boolean).join(", ");
+  return [ago >= 1 ? `Undo goes back ${ago.toFixed(0)} s` : "", count].filter(Boolean).join(", ");
 }
 
 export class Episodes {
@@ -80,11 +80,10 @@ export class Episodes {
     const left = frame.phase === "ready" ? this.horizon : Math.max(0, frame.left);
     set("clock", frame.phase === "ready" ? `${this.horizon} s` : `${left.toFixed(0)} s left`);
     byId("bar").style.transform = `scaleX(${Math.min(1, 1 - left / this.horizon)})`;
-    set("saved", `${frame.saved} saved, ${frame.succeeded} succeeded`);
+    set("saved", `${frame.saved} saved${frame.saved ? `, ${frame.succeeded} succeeded` : ""}`);
     set("progress", this.wanted ? `${frame.saved} of ${this.wanted}` : "");
     byId("progress-bar").hidden = !this.wanted;
     if (this.wanted) Object.assign(byId("progress-bar"), { max: this.wanted, value: frame.saved });
-    set("rate", `success ${share(frame.succeeded, frame.saved)}`);
     set("disk", room(frame.disk));
     set("checkpoint", frame.phase === "ready" ? "" : checkpoint(frame));
   }

@@ -1,26 +1,31 @@
-// What can be put away: panels on a small screen, sticks where there is a mouse.
+// What can be put away: panels, which are away at first on a small screen, and sticks, where there is a mouse.
 import { keep, recall } from "./store.js";
 
 const byId = (id) => document.getElementById(id);
+const SMALL = matchMedia("(max-height: 480px), (max-width: 760px)"); // as in style.css
+const isFlag = (value) => typeof value === "boolean";
 
-function shows(button, isShown) {
+function show(button, isShown) {
+  byId(button.dataset.opens).hidden = !isShown;
   button.setAttribute("aria-expanded", String(isShown));
 }
 
 export function foldPanels() {
-  const panels = [...document.querySelectorAll("[data-opens]")];
+  const panels = [...document.querySelectorAll(".fold")], sticks = byId("sticks-open");
+  const begin = () => { for (const each of panels) show(each, !SMALL.matches && recall(each.dataset.opens, isFlag, true)); };
   for (const button of panels) {
     button.addEventListener("click", () => {
-      const isOpen = byId(button.dataset.opens).classList.toggle("open");
-      for (const other of panels) if (other !== button) { byId(other.dataset.opens).classList.remove("open"); shows(other, false); }
-      shows(button, isOpen);
+      const isShown = byId(button.dataset.opens).hidden;
+      if (SMALL.matches) for (const other of panels) show(other, false); // one at a time
+      else keep(button.dataset.opens, isShown);
+      show(button, isShown);
     });
   }
-  const sticks = byId("sticks-open");
-  const show = (isShown) => { byId("sticks").hidden = !isShown; shows(sticks, isShown); };
-  show(recall("sticks", (value) => typeof value === "boolean", matchMedia("(pointer: coarse)").matches));
+  SMALL.addEventListener("change", begin);
+  begin();
+  show(sticks, recall("sticks", isFlag, matchMedia("(pointer: coarse)").matches));
   sticks.addEventListener("click", () => {
-    show(byId("sticks").hidden);
+    show(sticks, byId("sticks").hidden);
     keep("sticks", !byId("sticks").hidden);
   });
 }

@@ -33,8 +33,21 @@ export class Help {
 
   toggle() {
     byId("help").hidden = this.isOpen;
+    this.cancel();
+  }
+
+  // Whatever was to be changed stays as it is; returns whether something was.
+  cancel() {
+    const wasAsked = Boolean(this.inputs.capture || this.gamepad.capture);
     this.inputs.capture = this.gamepad.capture = null;
-    if (this.isOpen) this.draw();
+    this.draw();
+    return wasAsked;
+  }
+
+  close() {
+    const wasOpen = this.isOpen;
+    if (wasOpen) this.toggle();
+    return wasOpen;
   }
 
   draw() {

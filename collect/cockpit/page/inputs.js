@@ -1,7 +1,7 @@
 // All inputs together: deflections of every device are added up and clipped to a full stick.
 // Sliders say where the arm's joints shall go; that wins over the joints' deflections.
 import { inForce, sticksInForce } from "./keymap.js";
-import { STOP } from "./mapping.js";
+import { BACK, STOP } from "./mapping.js";
 
 const DEAD = 0.12; // of a stick
 const CURVE = 1.7; // exponent: fine near the middle
@@ -59,6 +59,10 @@ export class Inputs {
 
   press(event) {
     if (!this.mapping || isTyping(event.target) || event.ctrlKey || event.metaKey || event.altKey) return;
+    if (event.code === BACK) {
+      if (this.act("back")) event.preventDefault();
+      return;
+    }
     if (this.capture && event.code !== STOP) {
       event.preventDefault();
       event.stopPropagation();

@@ -10,6 +10,11 @@ export const AXES = {
   "ee.wy": ["hand tips up", "hand tips down"],
   "ee.wz": ["hand turns right", "hand turns left"],
 };
+// The same in a word, both ways.
+export const SHORT = {
+  "ee.vx": "forward", "ee.vy": "sideways", "ee.vz": "up", "ee.wx": "roll", "ee.wy": "tip", "ee.wz": "turn",
+  "base.vx": "drive", "base.vy": "sideways", "base.wz": "turn",
+};
 const HAND = [
   ["KeyW", "ee.vx", 1], ["KeyS", "ee.vx", -1], ["KeyA", "ee.vy", 1], ["KeyD", "ee.vy", -1],
   ["KeyR", "ee.vz", 1], ["KeyF", "ee.vz", -1], ["KeyQ", "ee.wz", 1], ["KeyE", "ee.wz", -1],
@@ -32,7 +37,7 @@ export const ACTIONS = {
   restart: { says: "again from the start", key: "ArrowLeft", button: 2 },
   discard: { says: "throw away", key: "Backspace", button: 16 },
   undo: { says: "undo to the checkpoint", key: "Backquote", button: 12 },
-  quit: { says: "end the recording", key: "Escape", button: -1 },
+  quit: { says: "end the recording", key: "End", button: -1 },
   focus: { says: "base or hand", key: "KeyB", button: 11 },
   mode: { says: "next mode", key: "BracketRight", button: 8 },
   joint: { says: "one joint alone, the next", key: "Semicolon", button: -1 },

@@ -1,4 +1,5 @@
 // Puts the page together: inputs up many times a second, the newest picture down.
+import { Decision } from "./decision.js";
 import { Episodes } from "./episodes.js";
 import { Gamepad } from "./gamepad.js";
 import { Help } from "./help.js";
@@ -13,6 +14,7 @@ import { Sliders } from "./sliders.js";
 import { TouchSticks } from "./sticks.js";
 import { Study } from "./study.js";
 import { View } from "./view.js";
+import { wayOf } from "./way.js";
 import { XrHand } from "./xr.js";
 import { foldPanels } from "./folds.js";
 
@@ -23,22 +25,24 @@ let stage = null, frame = null, told = null, drawn = null;
 
 const ask = (what, value) => { episodes.cancel(); link.ask(what, value); };
 const DO = {
-  start: () => (frame?.phase === "driving" ? ask("pause") : episodes.start(frame?.phase)), stop: () => ask("stop"), grip: () => { inputs.grip = !inputs.grip; },
-  pause: () => ask("pause"), success: () => ask("success"), failure: () => ask("failure"), restart: () => ask("restart"),
-  discard: () => ask("discard"), undo: () => ask("undo"), quit: () => ask("quit"), help: () => help.toggle(),
+  start: () => { decision.close(); return frame?.phase === "driving" ? ask("pause") : episodes.start(frame?.phase); },
+  stop: () => ask("stop"), grip: () => { inputs.grip = !inputs.grip; }, pause: () => ask("pause"), success: () => decision.success(),
+  failure: () => decision.failure(), restart: () => ask("restart"), discard: () => ask("discard"), undo: () => ask("undo"),
+  quit: () => decision.quit(), help: () => help.toggle(), back: () => help.cancel() || decision.close() || help.close() || view.playback.close(),
   focus: () => otherFocus(), slower: () => faster(-0.2), faster: () => faster(0.2), mode: () => next("mode"), frame: () => next("frame"),
   joint: () => masks.nextJoint(), camera: () => view.nextCamera(),
 };
 const act = (name) => DO[name]();
 
 const notices = new Notices();
+const decision = new Decision(ask, way);
 const inputs = new Inputs(act);
 const gamepad = inputs.gamepad = new Gamepad(inputs, act, (words) => notices.say(words));
 const touch = new TouchSticks(byId("sticks"), inputs, act);
 const sliders = new Sliders(byId("sliders"));
 const link = new Link({
   connected: (isConnected) => { if (!isConnected) episodes.cancel(); panels.connected(isConnected); },
-  you: (you) => { panels.told(you); study.told(you); },
+  you: (you) => { if (!you.driving) decision.close(); panels.told(you); study.told(you); },
   card: (card) => study.show(card),
   error: (said) => notices.say(`The robot's side says: ${said}`),
   over: (said) => panels.ended(said),
@@ -46,8 +50,8 @@ const link = new Link({
   stage: async (said) => {
     stage = said;
     inputs.mapping = new Mapping(stage);
-    for (const each of [panels, masks, sliders, episodes, study]) each.stage(stage);
-    notices.hint(inputs.entriesInForce(), inputs.mapping.actions, matchMedia("(pointer: coarse)").matches);
+    for (const each of [panels, masks, sliders, episodes, study, decision]) each.stage(stage);
+    hint();
     label();
     await view.stage(stage);
   },
@@ -76,6 +80,14 @@ function otherFocus() {
 function next(id) {
   const values = [...byId(id).options].filter((option) => !option.hidden).map((option) => option.value);
   link.ask(id, values[(values.indexOf(byId(id).value) + 1) % values.length]);
+}
+
+function hint() {
+  notices.hint(inputs.entriesInForce(), inputs.mapping.actions, stage.grips);
+}
+
+function way() {
+  return wayOf(frame, view.azimuth, stage.base);
 }
 
 // Each button says its key, as it is now.
@@ -112,7 +124,7 @@ function own(owned) {
   inputs.turns = false;
   view.light_up(ownedBodies());
   help.draw();
-  notices.hint(inputs.entriesInForce(), inputs.mapping.actions, matchMedia("(pointer: coarse)").matches);
+  hint();
 }
 
 function step() {
@@ -128,7 +140,8 @@ function step() {
 function tell() {
   told = frame;
   own(owned());
-  for (const each of [masks, panels, episodes, xr]) each.frame(frame);
+  for (const each of [masks, panels, episodes, decision, xr]) each.frame(frame);
+  panels.way(way());
   sliders.frame(frame, inputs.owned);
   touch.label();
 }

@@ -3,6 +3,7 @@ import { ACTIONS, HELD, defaultKeys, inForce } from "./keymap.js";
 import { forget, keep, recall } from "./store.js";
 
 export const STOP = "Space"; // is always the stop, whatever else changes
+export const BACK = "Escape"; // always closes or cancels, and does nothing else
 export const STICK_AXES = ["left stick, sideways", "left stick, up and down", "right stick, sideways", "right stick, up and down"];
 const BUTTONS = Object.fromEntries(Object.entries({ ...ACTIONS, ...HELD }).map(([name, { button }]) => [name, button]));
 // Where a browser does not know a gamepad, it numbers sticks and buttons as the driver does.
@@ -18,10 +19,15 @@ function defaults(stage) {
   };
 }
 
-const isCode = (value) => typeof value === "string" && /^[A-Za-z0-9]{1,24}$/.test(value);
+const isCode = (value) => typeof value === "string" && value !== BACK && /^[A-Za-z0-9]{1,24}$/.test(value);
 const isIndex = (value) => Number.isInteger(value) && value >= -1 && value < 64;
 const sameNames = (value, wanted) => value !== null && typeof value === "object" && Object.keys(wanted).every((name) => name in value)
   && Object.keys(value).length === Object.keys(wanted).length;
+
+// An older page ended the recording with that key.
+function renewed(kept, first) {
+  return kept.actions?.quit === BACK ? { ...kept, actions: { ...kept.actions, quit: first.actions.quit } } : kept;
+}
 
 // What was kept fits this robot and this page, piece by piece.
 function isFine(kept, first) {
@@ -38,7 +44,7 @@ export class Mapping {
   constructor(stage) {
     this.name = `map:${stage.robot}`;
     this.first = defaults(stage);
-    Object.assign(this, recall(this.name, (kept) => isFine(kept, this.first), this.first));
+    Object.assign(this, renewed(recall(this.name, (kept) => isFine(renewed(kept, this.first), this.first), this.first), this.first));
   }
 
   // The action of a key, or undefined.
@@ -54,7 +60,7 @@ export class Mapping {
 
   // Give an axis another key; whatever has that key now gets the old one.
   setKey(entry, code, owned) {
-    if (code === STOP) return false;
+    if (code === STOP || code === BACK) return false;
     const old = entry[0], rival = inForce(this.keys, owned).find((each) => each[0] === code), action = this.action(code);
     this.keys = this.keys.map((each) => (each === entry ? [code, each[1], each[2]] : each === rival ? [old, each[1], each[2]] : each));
     if (action) this.actions = { ...this.actions, [action]: old };
@@ -62,7 +68,7 @@ export class Mapping {
   }
 
   setAction(name, code) {
-    if (code === STOP || name === "stop") return false;
+    if (code === STOP || code === BACK || name === "stop") return false;
     const old = this.actions[name], action = this.action(code);
     this.keys = this.keys.map((each) => (each[0] === code ? [old, each[1], each[2]] : each));
     this.actions = { ...this.actions, ...(action ? { [action]: old } : {}), [name]: code };

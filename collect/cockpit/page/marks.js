@@ -2,6 +2,7 @@
 // its own kind, so that nobody needs the colours: the ghosts are hollow, the plan is solid, the nearest pair is dotted.
 import { THREE } from "/lib/three.js";
 import { place } from "./scene.js";
+import { centimetres } from "./way.js";
 
 export const ASKED = 0xffa000, PLAN = 0x2f7df6, NEAR = 0xe5484d;
 const ON_FLOOR = 0.006; // [m]
@@ -108,7 +109,7 @@ export class Marks {
     const ends = points.length ? [new THREE.Vector3(...points.slice(0, 3)), new THREE.Vector3(...points.slice(3))] : [];
     draw(this.near, ends);
     this.ends.forEach((end, index) => { end.visible = ends.length > 0; if (end.visible) end.position.copy(ends[index]); });
-    this.said = frame.nearest ? `${(100 * frame.nearest.distance).toFixed(this.scale < 1 ? 1 : 0)} cm` : "";
+    this.said = frame.nearest ? `${centimetres(frame.nearest.distance)} cm` : "";
   }
 
   // Every part of the hand stands to the ghost as it stands to the hand now.

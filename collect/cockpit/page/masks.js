@@ -1,9 +1,8 @@
 // Any mask: which parts the person owns, by group, joint or single channel; choosing a mode goes back.
-import { AXES, jointName } from "./keymap.js";
+import { AXES, SHORT, jointName } from "./keymap.js";
 
 const GROUPS = { base: "base.", hand: "ee.", joints: "joint." };
 const byId = (id) => document.getElementById(id);
-const SHORT = { "base.vx": "drive", "base.vy": "sideways", "base.wz": "turn", "ee.vx": "forward", "ee.vy": "sideways", "ee.vz": "up", "ee.wx": "roll", "ee.wy": "tip", "ee.wz": "turn" };
 
 function toggle(words, label, act) {
   const made = document.createElement("button");

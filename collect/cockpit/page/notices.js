@@ -1,9 +1,15 @@
 // What is said for a while: what went wrong, and three sentences for who is here for the first time.
-import { keyName } from "./keymap.js";
+import { SHORT, jointName, keyName } from "./keymap.js";
 import { keep, recall } from "./store.js";
 
 const SHOWN = 7000; // [ms]
 const byId = (id) => document.getElementById(id);
+
+// "W S forward, A D sideways": both keys of each axis.
+function pairs(keys) {
+  const axes = [...new Set(keys.map(([, axis]) => axis))];
+  return axes.map((axis) => [...keys.filter((each) => each[1] === axis).map(([code]) => keyName(code)), SHORT[axis] ?? jointName(axis)].join(" ")).join(", ");
+}
 
 export class Notices {
   constructor() {
@@ -17,12 +23,13 @@ export class Notices {
     this.timer = setTimeout(() => { byId("notice").hidden = true; }, SHOWN);
   }
 
-  // keys: the mapping in force, [[code, axis, sign], …]
-  hint(keys, actions, isTouch) {
-    const first = keys.slice(0, 4).map(([code]) => keyName(code)).join(" ");
-    const how = isTouch ? "put a thumb on a stick" : `hold ${first || "a key"}`;
-    const [start, stop] = [keyName(actions.start), keyName(actions.stop)];
-    byId("hint-words").textContent = `Press Start (${start}), then ${how} to move. Let go, and the robot stands still. ${isTouch ? "STOP" : stop} stops everything at once.`;
+  // keys: the mapping in force, [[code, axis, sign], …]; grips: whether the task needs the gripper
+  hint(keys, actions, grips) {
+    const isTouch = matchMedia("(pointer: coarse)").matches;
+    const [start, stop, grip] = [actions.start, actions.stop, actions.grip].map(keyName);
+    const begin = isTouch ? "Press Start, then put a thumb on a stick to move." : `Press Start (${start}). Hold to move: ${pairs(keys)}.`;
+    const gripper = grips ? ` ${isTouch ? "grip" : grip} closes and opens the gripper.` : "";
+    byId("hint-words").textContent = `${begin}${gripper} Let go, and the robot stands still. ${isTouch ? "STOP" : stop} stops it at once.`;
     byId("hint").hidden = recall("hint", (value) => value === "seen", "") === "seen";
   }
 

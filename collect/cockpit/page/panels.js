@@ -1,7 +1,7 @@
 // Words and buttons: what the page says besides the picture. Everything comes from the newest frame.
 import { jointName } from "./keymap.js";
 import { stateOf } from "./states.js";
-import { turnTo } from "./turn.js";
+import { centimetres } from "./way.js";
 
 const byId = (id) => document.getElementById(id);
 const STARTS = { ready: "Start", paused: "Go on", stopped: "Release" };
@@ -102,7 +102,7 @@ export class Panels {
     } else if (!you.driving) {
       const asks = button(you.asking ? "Asked; waiting" : you.free ? "Drive" : "Ask to drive", () => this.link.ask("take"));
       asks.disabled = you.asking;
-      drives.append(you.free ? "Nobody drives. " : "Someone else drives. You watch. ", asks);
+      drives.append(you.free ? "You watch. Nobody drives. " : "You watch: someone else drives. You too can press STOP. ", asks);
     }
     set("watchers", you.pages > 1 ? `${you.pages} pages open` : "");
     this.state();
@@ -149,17 +149,27 @@ export class Panels {
   }
 
   words(frame) {
-    const distance = frame.nearest ? `nearest ${(100 * frame.nearest.distance).toFixed(0)} cm` : "nothing near";
-    set("said", [frame.phase === "driving" ? frame.reason : "", distance].filter(Boolean).join(" · "));
+    const { nearest } = frame;
+    const near = nearest ? `nearest pair: ${nearest.names.join(" – ")}, ${centimetres(nearest.distance)} cm apart` : "";
+    set("said", [frame.phase === "driving" ? frame.reason : "", near].filter(Boolean).join(" · "));
     byId("said").classList.toggle("brakes", frame.phase === "driving" && Boolean(frame.reason));
+    if (this.stageNow) set("numbers", this.numbers(frame).join("\n"));
+  }
+
+  // How far the hand has to go still, in words.
+  way(words) {
+    set("way", words);
+    byId("way").hidden = !words;
+  }
+
+  // Where everything is [m], a line each; what the connection does.
+  numbers(frame) {
     const said = (numbers) => numbers.map((x) => x.toFixed(3)).join(" ");
-    const hand = frame.tool.slice(3);
-    const things = this.stageNow.shapes.bodies.map((name, index) => [name, frame.poses.slice(7 * index, 7 * index + 7)])
+    const things = this.stageNow.shapes.bodies.map((name, index) => [name, frame.poses.slice(7 * index, 7 * index + 3)])
       .filter(([name], index) => index > 0 && !name.endsWith("_body") && name !== "gripper")
-      .map(([name, at]) => `${name} ${said(at.slice(0, 3))} turn ${said(turnTo(hand, at.slice(3)))}`);
+      .map(([name, at]) => `${name} ${said(at)}`);
     const input = `input ${Math.round(1000 * frame.age)} ms old, there and back ${Math.round(1000 * frame.round_trip)} ms`;
-    const grip = `gripper ${Math.round(100 * frame.opening)} % open`;
-    const counts = Object.entries(frame.dropped ?? {}).map(([why, count]) => `${count} ${why}`).join(", ");
-    set("numbers", [`hand ${said(frame.tool.slice(0, 3))}`, grip, ...things, input, counts && `dropped: ${counts}`].filter(Boolean).join(" · "));
+    const counts = Object.entries(frame.dropped ?? {}).map(([why, count]) => `dropped: ${count} ${why}`);
+    return [`hand ${said(frame.tool.slice(0, 3))}`, `gripper ${Math.round(100 * frame.opening)} % open`, ...things, input, ...counts];
   }
 }

@@ -66,12 +66,15 @@ export class Playback {
     this.say();
   }
 
+  // Returns whether it was open.
   close() {
+    const wasOpen = this.isOpen;
     this.wanted = null;
-    if (!this.isOpen) return;
+    if (!wasOpen) return false;
     this.file = null;
     this.box.section.hidden = true;
     this.view.play(null);
+    return true;
   }
 
   // The time of a row since the first one [s].

@@ -5,18 +5,22 @@ const STATES = {
   driving: ["recording", ""],
   practice: ["practice: not recorded", ""],
   paused: ["paused", ""],
-  watching: ["watching", ""],
+  watching: ["you watch", ""],
   lost: ["no input: let go of everything", "Let go of everything. The robot stands still. Once all is let go, drive on."],
   stopped: ["STOPPED", "The robot is stopped. Look at it first. Then press Release."],
   offline: ["no connection", "No connection. The robot brakes. Trying again …"],
 };
 const LATE = "Too slow a connection to drive: what you see is older than 0.3 s.";
 
+const WATCHED = {
+  ready: "you watch: not begun", driving: "you watch: recording", paused: "you watch: paused", lost: "you watch: no input",
+};
+
 function nameOf({ isConnected, isDriver, frame }) {
   if (!isConnected) return "offline";
   if (!frame) return "preparing";
-  if (frame.phase !== "driving") return frame.phase;
-  return !isDriver ? "watching" : frame.practice ? "practice" : "driving";
+  if (!isDriver && frame.phase in WATCHED) return "watching";
+  return frame.phase === "driving" && frame.practice ? "practice" : frame.phase;
 }
 
 function overWords({ saved, folder, next }) {
@@ -29,5 +33,7 @@ function overWords({ saved, folder, next }) {
 export function stateOf(now) {
   if (now.over) return { name: "over", chip: "no connection: recording is over", banner: overWords(now.over) };
   const name = nameOf(now), [chip, banner] = STATES[name];
+  if (name === "watching") return { name, chip: WATCHED[now.frame.phase], banner: "" };
+  if (name === "stopped" && !now.isDriver) return { name, chip, banner: "The robot is stopped. Only the driver can release it." };
   return { name, chip, banner: banner || (now.isLate ? LATE : "") };
 }

@@ -1,9 +1,8 @@
 // Two sticks for thumbs, or the mouse: where a finger is on them, they are. Each finger has its own.
 import { shaped } from "./inputs.js";
-import { AXES, jointName } from "./keymap.js";
+import { SHORT, jointName } from "./keymap.js";
 
 const ENDS = ["pointerup", "pointercancel", "lostpointercapture"];
-const SHORT = { "ee.vx": "forward", "ee.vy": "sideways", "ee.vz": "up", "ee.wx": "roll", "ee.wy": "tip", "ee.wz": "turn", "base.vx": "drive", "base.vy": "sideways", "base.wz": "turn" };
 
 export class TouchSticks {
   constructor(box, inputs, act) {
@@ -63,7 +62,7 @@ export class TouchSticks {
   label() {
     const sticks = this.inputs.sticks();
     const said = (from) => sticks.filter(([index]) => index === from || index === from + 1)
-      .map(([, axis]) => (axis in AXES ? SHORT[axis] : jointName(axis))).join(" · ");
+      .map(([, axis]) => SHORT[axis] ?? jointName(axis)).join(" · ");
     this.knobs.forEach((stick, index) => {
       const part = sticks.find(([each]) => each >> 1 === index)?.[1] ?? "";
       const words = `${part.startsWith("base") ? "base" : part.startsWith("ee") ? "hand" : "joints"}: ${said(2 * index)}`;

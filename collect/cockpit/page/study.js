@@ -1,7 +1,7 @@
 // Cards of a user study: what a participant reads and answers, above everything else; a strip while they drive.
 // An answer is sent until the card comes back with it: then it is on the disk.
 import { drawItem } from "./form.js";
-import { axisName, keyName } from "./keymap.js";
+import { ACTIONS, axisName, keyName } from "./keymap.js";
 
 const AGAIN = 1000; // after which an answer that is not yet kept is sent again [ms]
 const NEXT = ":next", PAUSE = ":pause";
@@ -121,7 +121,7 @@ export class Study {
 
   keyTable(owned) {
     const table = make("dl", "study-keys");
-    const rows = [...this.keys(new Set(owned)), ["Enter", "start"], ["ArrowDown", "failed"], ["Escape", "pause"], ["Space", "STOP"]];
+    const rows = [...this.keys(new Set(owned)), ["Enter", "start"], ["ArrowDown", "failed"], [ACTIONS.quit.key, "pause"], ["Space", "STOP"]];
     for (const [code, axis, sign] of rows) {
       const name = document.createElement("dt"), key = document.createElement("dd");
       name.textContent = sign ? axisName(axis, sign) : axis;

@@ -1,10 +1,13 @@
 // What lies over the picture: the choice of cameras, what the marks mean, the bar of playback, the nearest distance.
 import { CAMERAS } from "./cameras.js";
+import { keep, recall } from "./store.js";
 
 const LEGEND = [ // class of the sample, words
   ["ghost", "you lead the hand"], ["outline", "you lead the base"], ["plan", "the robot's plan"],
-  ["near", "nearest to touching"], ["yours", "glows: yours"],
+  ["near", "nearest pair"], ["drop", "straight below"], ["within", "near enough"], ["yours", "glows: yours"],
 ];
+
+const OVER = ["hint", "decision"]; // what else may lie over it
 
 function make(tag, id, words = "", parent = null) {
   const element = document.createElement(tag);
@@ -23,7 +26,10 @@ function cameraChoice(parent, choose) {
 }
 
 function legend(parent) {
-  const box = make("p", "legend", "", parent);
+  const box = make("details", "legend", "", parent);
+  box.open = recall("legend", (value) => typeof value === "boolean", true);
+  box.addEventListener("toggle", () => keep("legend", box.open));
+  make("summary", "", "Marks", box);
   for (const [kind, words] of LEGEND) {
     const entry = make("span", "", "", box), sample = make("i", "", "", entry);
     sample.className = `mark ${kind}`;
@@ -43,6 +49,16 @@ function playbackBar(parent) {
   return { section, title, play, bar, time, close };
 }
 
+// What is left of the picture between the panels, and above and below what lies on it, {x, y, width, height} [px].
+export function free(box) {
+  const area = box.getBoundingClientRect(), over = [...box.children, ...OVER.map((id) => document.getElementById(id))];
+  const edges = over.map((each) => each.getBoundingClientRect()).filter(({ height, right }) => height && right > area.left);
+  const middle = area.top + area.height / 2;
+  const top = Math.max(area.top, ...edges.filter((each) => each.bottom < middle).map((each) => each.bottom));
+  const bottom = Math.min(area.bottom, ...edges.filter((each) => each.top > middle).map((each) => each.top));
+  return { x: area.left, y: top, width: Math.max(1, area.width), height: Math.max(1, bottom - top) };
+}
+
 // choose(name): a camera was chosen
 export function build(canvas, choose) {
   const style = document.createElement("link");
@@ -54,5 +70,5 @@ export function build(canvas, choose) {
   const camera = cameraChoice(box, choose);
   legend(box);
   const playback = playbackBar(box);
-  return { camera, playback, label };
+  return { camera, playback, label, free: () => free(box), over: [box, ...box.children, ...OVER.map((id) => document.getElementById(id))] };
 }

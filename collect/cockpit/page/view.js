@@ -1,5 +1,6 @@
 // The picture: the robot and things as they look, what is asked, what the plan makes of it; live, or played again.
 import { THREE } from "/lib/three.js";
+import { AimMarks } from "./aim.js";
 import { Cameras } from "./cameras.js";
 import { Marks } from "./marks.js";
 import { Playback } from "./playback.js";
@@ -30,12 +31,14 @@ export class View {
     this.cameras = new Cameras(canvas);
     this.ground = new Ground(this.scene, () => { this.stale = true; });
     this.marks = new Marks(this.scene, this.tools.label);
+    this.aimMarks = new AimMarks(this.scene);
     this.playback = new Playback(this, this.tools.playback);
     this.choose(this.cameras.choice);
     this.bodies = [];
     this.owned = new Set();
     this.isReady = false; // nobody drives who does not see
-    new ResizeObserver(() => this.fit()).observe(canvas);
+    const watch = new ResizeObserver(() => this.fit());
+    for (const each of [canvas, ...this.tools.over]) watch.observe(each);
     this.fit();
   }
 
@@ -44,6 +47,7 @@ export class View {
     forgetBodies(this.scene, this.bodies);
     this.bodies = bodies;
     this.marks.stage(stage, bodies);
+    this.aimMarks.scale = stage.scale;
     this.cameras.stage(stage);
     this.light_up(this.owned);
     if (this.played) return;
@@ -55,10 +59,16 @@ export class View {
   // Draws everything once and waits for it: how to draw is compiled at the first use, and who drives has no time for that.
   rehearse() {
     this.marks.rehearse();
+    this.aimMarks.show(true);
     this.renderer.render(this.scene, this.cameras.camera);
     const gl = this.renderer.getContext();
     gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4)); // waits
+    this.hideMarks();
+  }
+
+  hideMarks() {
     this.marks.hide();
+    this.aimMarks.show(false);
     this.stale = true;
   }
 
@@ -79,9 +89,10 @@ export class View {
     if (this.played) return;
     this.pose(this.bodies, frame.poses, 0);
     this.marks.frame(frame);
+    this.aimMarks.frame(frame);
     const tool = new THREE.Group();
     place(tool, frame.tool);
-    this.look(this.bodies, tool);
+    this.look(this.bodies, tool, frame.aim && new THREE.Vector3(...frame.aim.pose));
   }
 
   pose(bodies, numbers, start) {
@@ -89,8 +100,8 @@ export class View {
     this.stale = true;
   }
 
-  look(bodies, tool) {
-    this.cameras.frame(bodies[1], tool);
+  look(bodies, tool, aim) {
+    this.cameras.frame(bodies[1], tool, aim);
     this.ground.follow(bodies[1].position.clone().setZ(0));
   }
 
@@ -100,8 +111,7 @@ export class View {
     this.scene.remove(...this.bodies);
     this.scene.add(...(bodies ?? this.bodies));
     this.played = bodies;
-    this.marks.hide();
-    this.stale = true;
+    this.hideMarks();
   }
 
   playRow(numbers, start) {
@@ -128,8 +138,7 @@ export class View {
     if (!width || !height) return;
     this.renderer.setPixelRatio(this.ratio);
     this.renderer.setSize(width, height, false);
-    this.cameras.camera.aspect = width / height;
-    this.cameras.camera.updateProjectionMatrix();
+    this.cameras.fit(width, height, this.tools.free());
     this.stale = true;
   }
 

@@ -71,13 +71,15 @@ class Person:
         self.received = self.round_trip = 0.0
         self.practises = False
         self._event: EpisodeEvent | None = None
+        self._quits = False  # once the episode that was judged is saved
         self._armed = False  # everything was let go once since the robot had to brake
 
     def reset(self, view: View, rng: np.random.Generator) -> None:
         """Begin an episode: the robot waits for the operator."""
         self.setting = replace(self.setting, axis=-1, switches=0)
         self.phase = Phase.STOPPED if self.phase is Phase.STOPPED else Phase.READY
-        self._event, self._armed = None, False
+        self._event, self._armed = EpisodeEvent.QUIT if self._quits else None, False
+        self._quits = False
 
     def take(self, inputs: Inputs, received: float, round_trip: float = 0.0) -> None:
         """Take where the inputs are now.
@@ -150,8 +152,12 @@ class Person:
             self.setting = changed(self.setting, axis=axis)
 
     def _judge(self, event: EpisodeEvent) -> None:
-        """End the episode; one that has not begun cannot be judged."""
-        if self.phase is not Phase.READY or event.drops:
+        """End the episode, once it has begun; one that runs is paused before it is quit."""
+        if event is EpisodeEvent.QUIT and self._event is not None and self._event.judges:
+            self._quits = True
+        elif event is EpisodeEvent.QUIT and self.phase in (Phase.DRIVING, Phase.LOST):
+            self.phase = Phase.PAUSED
+        elif self.phase is not Phase.READY or event.drops:
             self._event = event
             self.phase = Phase.STOPPED if self.phase is Phase.STOPPED else Phase.PAUSED
 

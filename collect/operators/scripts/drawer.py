@@ -6,7 +6,7 @@ from handrail.collect.operators.operator import View
 from handrail.collect.operators.scripts.base_placement import standing_within_reach
 from handrail.collect.operators.scripts.phases import Phase, PhasedScript, from_phase
 from handrail.collect.tasks.cabinet import inward
-from handrail.collect.tasks.drawer import handle, opened
+from handrail.collect.tasks.drawer import handle, handle_rotation, opened
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.numerics.rotation import matrix_from_rpy
 from handrail.controllers.robot.model import Pose
@@ -77,11 +77,3 @@ def before_driving(hand: Pose, base: FloatArray, now: FloatArray) -> Pose:
     turn = matrix_from_rpy([0.0, 0.0, now[2] - base[2]])
     away = hand.position - [base[0], base[1], 0.0]
     return Pose(turn @ away + [now[0], now[1], 0.0], turn @ hand.rotation)
-
-
-def handle_rotation(tool: FloatArray, into: FloatArray) -> FloatArray:
-    """Return the rotation nearest to the tool's that points it into the cabinet, fingers above and below."""
-    candidates = [
-        np.column_stack([up, np.cross(into, up), into]) for up in ([0.0, 0.0, 1.0], [0.0, 0.0, -1.0])
-    ]
-    return max(candidates, key=lambda rotation: float(np.trace(rotation.T @ tool)))

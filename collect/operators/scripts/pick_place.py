@@ -5,11 +5,11 @@ from typing import ClassVar
 
 import numpy as np
 
-from handrail.collect.operators.human.steering import pose_errors
 from handrail.collect.operators.operator import View
 from handrail.collect.operators.scripts.phases import PLANNED, Phase, PhasedScript, from_phase
 from handrail.collect.operators.scripts.route import Route
 from handrail.collect.simulation.scene import SceneObject
+from handrail.collect.tasks.pick_place import grasp_rotation
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.robot.model import Pose, RobotModel
 
@@ -153,16 +153,3 @@ def tips_beyond_tool(model: RobotModel) -> float:
     frame, tool = model.pose(home, gripper.frame), model.pose(home)
     offset = gripper.placement.translation[2] + gripper.tip
     return float(offset - frame.rotation[:, 2] @ (tool.position - frame.position))
-
-
-def grasp_rotation(tool: FloatArray, cube: FloatArray) -> FloatArray:
-    """Return the rotation nearest to the tool's that points it down, fingers square to the cube, (3, 3)."""
-    yaw = np.arctan2(cube[1, 0], cube[0, 0])
-    candidates = []
-    for angle in yaw + np.pi / 2 * np.arange(4):
-        x = np.array([np.cos(angle), np.sin(angle), 0.0])
-        z = np.array([0.0, 0.0, -1.0])
-        candidates.append(np.column_stack([x, np.cross(z, x), z]))
-    origin = np.zeros(3)
-    turns = [pose_errors(Pose(origin, tool), Pose(origin, rotation))[1] for rotation in candidates]
-    return candidates[int(np.argmin(turns))]

@@ -37,23 +37,51 @@ def test_what_is_not_wanted_is_not_saved(new_page, tmp_path):
         driver.expect_phase("ready: press Start")
         assert driver.text("saved").startswith("0 saved")
         assert driver.at("episodes").locator("li").count() == 3
-        driver.press("Escape")
+        driver.end()
         assert process.wait(60) == 0
     assert saved(tmp_path / "d") == []
 
 
-def test_the_person_s_word_is_kept(new_page, tmp_path):
+def test_the_person_s_word_is_kept_beside_the_judge_s(new_page, tmp_path):
+    """Where they differ the page says so first; what counts as a success is what the judge says."""
     with recording(tmp_path / "d", "--task", "reach", "--dataset.num_episodes", 2) as (process, address):
         driver = PageDriver(new_page(), address)
-        for key in ("ArrowDown", "ArrowRight"):
-            driver.begin()
-            driver.push("KeyS", 0.6)
-            driver.press(key)
-            driver.wait(lambda: driver.phase.startswith(("ready", "no connection")))
+        driver.begin()
+        driver.push("KeyS", 0.6)
+        driver.press("ArrowDown")
+        driver.begin()
+        driver.push("KeyS", 0.6)
+        driver.press("ArrowRight")
+        expect(driver.at("decision")).to_contain_text("The task's judge says: not done (goal: ")
+        driver.expect_phase("paused")
+        driver.press("Escape")
+        expect(driver.at("decision")).to_be_hidden()
+        driver.press("Enter")
+        driver.expect_phase("recording")
+        driver.done()
         assert process.wait(60) == 0
-    assert [row["success"] for row in rows(tmp_path / "d")] == [False, True]
-    assert [row["failure_reason"] for row in rows(tmp_path / "d")] == ["operator: failure", ""]
-    assert [each["next.success"][-1] for each in saved(tmp_path / "d")] == [False, True]
+    assert [row["success"] for row in rows(tmp_path / "d")] == [False, False]
+    assert [row["operator_says"] for row in rows(tmp_path / "d")] == ["failure", "success"]
+    assert [row["failure_reason"] for row in rows(tmp_path / "d")] == ["operator: failure", "judge: not done"]
+    assert [each["next.success"][-1] for each in saved(tmp_path / "d")] == [False, False]
+
+
+def test_esc_ends_nothing_and_the_end_of_a_recording_loses_nothing(new_page, tmp_path):
+    with recording(tmp_path / "d", "--task", "reach") as (process, address):
+        driver = PageDriver(new_page(), address)
+        driver.begin()
+        driver.push("KeyS", 0.6)
+        for _ in range(3):
+            driver.press("Escape")
+        assert driver.phase == "recording"
+        driver.press("End")
+        expect(driver.at("decision")).to_contain_text("An episode is open")
+        driver.press("Enter")  # go on
+        driver.expect_phase("recording")
+        driver.push("KeyS", 0.4)
+        driver.end(save="ArrowDown")
+        assert process.wait(60) == 0
+    assert [row["operator_says"] for row in rows(tmp_path / "d")] == ["failure"]
 
 
 def test_undo_goes_back_to_the_pause(new_page, tmp_path):
@@ -65,11 +93,11 @@ def test_undo_goes_back_to_the_pause(new_page, tmp_path):
         driver.press("KeyP")
         driver.expect_phase("paused")
         driver.page.wait_for_timeout(1500)  # the robot brakes to rest first: that is what one goes back to
-        paused = driver.settled("goal")[0]
+        paused = driver.settled()
         driver.press("Enter")
         driver.expect_phase("recording")
         driver.push("KeyF", 0.8)
-        wrong = driver.settled("goal")[0]
+        wrong = driver.settled()
         assert np.abs(wrong - paused).max() > 0.03
         driver.press("Backquote")
         assert driver.wait(lambda: np.abs(driver.place() - paused).max() < 0.003)
@@ -77,7 +105,7 @@ def test_undo_goes_back_to_the_pause(new_page, tmp_path):
         driver.press("Enter")
         driver.expect_phase("recording")
         driver.push("KeyS", 0.5)
-        driver.press("ArrowRight")
+        driver.done()
         assert process.wait(60) == 0
     (frames,) = saved(tmp_path / "d")
     assert [row["undos"] for row in rows(tmp_path / "d")] == [1]

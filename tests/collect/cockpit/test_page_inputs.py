@@ -141,6 +141,7 @@ def test_any_mask_is_chosen_and_a_mode_goes_back(new_page):
         page.get_by_role("button", name="you own the base").click()
         both = made.wait(lambda intent: intent.mask.sum() == before.sum() + 3)
         assert both.mode.startswith("mask:")
+        page.get_by_text("More").click()
         page.get_by_text("Single channels").click()
         page.get_by_role("button", name="hand down, hand up").click()
         made.wait(lambda intent: intent.mask.sum() == both.mask.sum() - 1)

@@ -38,9 +38,8 @@ def test_from_the_demo_to_driving(new_page, tmp_path):
         start = driver.place()
         driver.push("KeyW", 1.0)
         assert driver.wait(lambda: abs(driver.place() - start).max() > 0.05)
-        driver.press("ArrowRight")
-        driver.expect_phase("ready: press Start")
-        driver.press("Escape")
+        driver.done()
+        driver.end()
         _, said = process.communicate(timeout=60)
     counts = {"demo": len(words(first)), "page": len(on_page), "card": len(card)}
     print("words to read:", counts)

@@ -42,7 +42,7 @@ def test_the_pictures_of_the_page(new_page, tmp_path):
     with recording("", *flags, "--dataset.num_episodes", 1, cwd=tmp_path) as (process, address):
         driver = PageDriver(new_page(**DESK), address)
         driver.begin()
-        learner = Learner(driver, Keys(driver), "cube_table")
+        learner = Learner(driver, Keys(driver))
         driver.set_speed(1.0)
         learner.learn()
         driver.press("ArrowLeft")

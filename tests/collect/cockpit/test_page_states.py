@@ -107,7 +107,7 @@ def test_someone_else_drives(new_page):
     with bench() as made:
         first = PageDriver(new_page(), made.address)
         second = PageDriver(new_page(), made.address)
-        expect(second.at("drives")).to_contain_text("Someone else drives")
+        expect(second.at("drives")).to_contain_text("someone else drives")
         assert second.at("start").is_disabled()
         shoot(second.page, "someone-else-drives")
         second.page.get_by_role("button", name="Ask to drive").click()

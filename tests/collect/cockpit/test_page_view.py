@@ -50,7 +50,7 @@ def test_the_picture_from_everywhere_the_intent_playback_and_the_end(new_page, f
         what_is_asked_leads(driver, "KeyW", "f.ghost.length === 7")
         driver.choose("mode", "base")
         what_is_asked_leads(driver, "KeyI", "f.ghost_base.length === 3")
-        driver.press("ArrowRight")
+        driver.done()
         driver.expect_phase("ready: press Start")
         what_was_is_played(driver)
         who_drives_sees_what_is(driver)

@@ -147,6 +147,7 @@ def test_the_nearest_pair_is_the_nearest_of_all(env):
         geom
         for geom in np.flatnonzero(solid & (model.geom_bodyid > 0)).tolist()
         if int(model.body_rootid[model.geom_bodyid[geom]]) not in roots
+        and not model.body_dofnum[model.geom_bodyid[geom]]  # what is meant to be taken
     ]
     line = np.zeros(6)
     pairs = own + [(first, second) for first in robot for second in scene]

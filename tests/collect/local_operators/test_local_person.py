@@ -101,7 +101,6 @@ def test_recorded_events_of_a_gamepad_move_only_where_they_should():
     [
         ("right", EpisodeEvent.SUCCESS),
         ("left", EpisodeEvent.RESTART),
-        ("escape", EpisodeEvent.QUIT),
         ("down", EpisodeEvent.FAILURE),
         ("backspace", EpisodeEvent.DISCARD),
         ("`", EpisodeEvent.UNDO),
@@ -114,6 +113,16 @@ def test_the_terminals_keys_end_episodes_beside_every_device(device, key, event)
     driven.begin()
     (driven.beside or driven.main).presses = [key]
     assert driven.act() is event
+
+
+def test_the_end_of_a_recording_loses_no_episode_at_the_first_word():
+    driven = Driven("keyboard")
+    driven.begin()
+    answers = []
+    for _ in range(2):
+        driven.main.presses = ["escape"]
+        answers.append(driven.act())
+    assert answers == [EpisodeEvent.PAUSE, EpisodeEvent.QUIT]
 
 
 def test_keys_beside_a_gamepad_move_nothing():

@@ -18,11 +18,10 @@ from handrail.collect.operators.scripts.base_placement import (
     standing_pose,
     standing_within_reach,
 )
-from handrail.collect.operators.scripts.drawer import handle_rotation
-from handrail.collect.operators.scripts.pick_place import grasp_rotation
 from handrail.collect.operators.scripts.scripted import gains_of
 from handrail.collect.tasks.cabinet import HANDLE, inward
-from handrail.collect.tasks.drawer import Drawer
+from handrail.collect.tasks.drawer import Drawer, handle_rotation
+from handrail.collect.tasks.pick_place import grasp_rotation
 from handrail.collect.tasks.reach import Reach
 from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.interface.controller import State

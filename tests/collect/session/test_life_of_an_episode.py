@@ -78,12 +78,23 @@ def run(env, says, controller=None, **options):
 
 
 @pytest.mark.parametrize(
-    ("event", "success", "reason"), [(SUCCESS, True, ""), (FAILURE, False, "operator: failure")]
+    ("event", "real", "success", "reason"),
+    [
+        (SUCCESS, False, False, "judge: not done"),
+        (FAILURE, False, False, "operator: failure"),
+        (SUCCESS, True, True, ""),
+        (FAILURE, True, False, "operator: failure"),
+    ],
 )
-def test_the_operator_ends_an_episode(env, event, success, reason):
-    """The frame in which they say so is the last one; the robot brakes in it, and rests in the end."""
+def test_the_operator_ends_an_episode(env, monkeypatch, event, real, success, reason):
+    """The frame in which they say so is the last one; the robot brakes in it, and rests in the end.
+
+    The task's judge says what a success is; of a real robot nobody knows the truth, and the operator does.
+    """
+    monkeypatch.setattr(env, "real", real)
     outcome, frames, _ = run(env, {15: event})
     assert (outcome.success, outcome.failure_reason, outcome.ended_by) == (success, reason, event)
+    assert outcome.operator_says == event
     assert outcome.kept
     assert [frame.done for frame in frames] == 14 * [False] + [True]
     assert [frame.success for frame in frames] == 14 * [False] + [success]
@@ -143,6 +154,21 @@ def test_what_is_not_kept_is_over_at_once(env, event, tmp_path):
     assert [row["length"] for row in read_episodes(tmp_path / "d")] == [5]
 
 
+def test_a_dataset_of_before_goes_on_with_the_columns_that_it_has(env, tmp_path):
+    """Its episodes do not say what the operator said; that is why it failed, in words."""
+    old = {"success": True, "failure_reason": "", "seed": 3, "started": 0.0, "wall_time": 1.0}
+    old |= dict.fromkeys(("brakes", "late", "undos", "contact_onsets", "contact_periods"), 0)
+    with EpisodeWriter.create(tmp_path / "d", Manifest("x/d", 20, "robot", session_features(env))) as writer:
+        recorder, person = Recorder(writer, "reach", {}), Person(env.model, *2 * [{5: SUCCESS}])
+        session = Session(env, DirectController(env.model, env.period), person, [recorder])
+        session.run(3)
+        writer.save_episode(old)
+        recorder.end(session.run(3))
+    rows = read_episodes(tmp_path / "d")
+    assert [row["failure_reason"] for row in rows] == ["", "judge: not done"]
+    assert "operator_says" not in rows[-1]
+
+
 def test_a_recording_counts_and_names_what_it_does_not_keep(tmp_path, monkeypatch, capsys):
     """After one thrown away comes another scene, after one begun again the same; both are said."""
     says = {6: DISCARD}, {7: RESTART}, {8: FAILURE}, {9: SUCCESS}
@@ -154,13 +180,14 @@ def test_a_recording_counts_and_names_what_it_does_not_keep(tmp_path, monkeypatc
     assert record(config) == 0
     rows = read_episodes(root)
     assert [row["length"] for row in rows] == [8, 9]
-    assert [row["success"] for row in rows] == [False, True]
-    assert [row["failure_reason"] for row in rows] == ["operator: failure", ""]
+    assert [row["success"] for row in rows] == [False, False]
+    assert [row["operator_says"] for row in rows] == ["failure", "success"]
+    assert [row["failure_reason"] for row in rows] == ["operator: failure", "judge: not done"]
     first, other = (episode_seed(0, 0, attempt) for attempt in (0, 1))
     assert [row["seed"] for row in rows] == [other, episode_seed(0, 1)]
     said = capsys.readouterr().err
     assert f"not saved: thrown away, seed {first}\nnot saved: begun again, seed {other}\n" in said
-    assert "1/2 succeeded, 1 thrown away, 1 begun again" in said
+    assert "0/2 succeeded, 1 thrown away, 1 begun again" in said
     done = read_frames(root, 0, ["next.done", "next.success"])
     assert done["next.done"].tolist() == 7 * [False] + [True]
 

@@ -105,7 +105,7 @@ def test_the_stop_holds_until_it_is_released_and_start_is_pressed(operator):
     assert isinstance(operator.act(view()), Intent)
 
 
-@pytest.mark.parametrize("event", ["success", "failure", "discard", "restart", "quit"])
+@pytest.mark.parametrize("event", ["success", "failure", "discard", "restart"])
 def test_the_operator_ends_an_episode(operator, event):
     begin(operator)
     operator.ask(Ask(event, True))
@@ -195,3 +195,24 @@ def test_any_channels_can_be_owned(operator):
     assert np.flatnonzero(intent.mask).tolist() == [0, 5]
     assert intent.mode == "mask:100001" + "0" * (intent.mask.size - 6)
     assert intent.raw.switches == 1
+
+
+def test_what_was_judged_is_saved_before_the_recording_ends(operator):
+    """However soon one word follows the other: no end overtakes a judgement."""
+    begin(operator)
+    for what in ("success", "quit"):
+        operator.ask(Ask(what))
+    assert operator.act(view()) is EpisodeEvent.SUCCESS
+    operator.reset(view(), np.random.default_rng(0))
+    assert operator.act(view()) is EpisodeEvent.QUIT
+    operator.reset(view(), np.random.default_rng(0))
+    assert operator.act(view()) is EpisodeEvent.PAUSE
+
+
+def test_an_episode_that_runs_is_paused_before_it_is_quit(operator):
+    begin(operator)
+    operator.ask(Ask("quit"))
+    assert operator.act(view()) is EpisodeEvent.PAUSE
+    assert operator.phase is Phase.PAUSED
+    operator.ask(Ask("quit"))
+    assert operator.act(view()) is EpisodeEvent.QUIT

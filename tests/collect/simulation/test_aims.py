@@ -1,0 +1,56 @@
+"""Where tasks say that the hand is to be brought: the judge agrees, and it changes as the task goes on."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from collect_helpers import environment, over_cube
+from scipy.spatial.transform import Rotation
+
+from handrail.collect.tasks.task import Aimed
+from handrail.controllers.robot.model import Pose
+
+
+@pytest.mark.parametrize("scale", [1.0, 0.2])
+def test_what_a_person_is_told_of_the_goal_is_what_the_judge_says(scale):
+    """Within the distance and the angle of the aim, and only there, the goal is reached."""
+    rng, told = np.random.default_rng(0), []
+    with environment("Reach") as env:
+        env.reset(seed=0)
+        state = replace(env.task_state(), scale=scale)
+        for _ in range(400):
+            aim = env.task.aim(state)
+            turn = rng.uniform(0.0, 2.0) * aim.angle * _direction(rng)
+            place = aim.position + rng.uniform(0.0, 2.0) * aim.distance * _direction(rng)
+            now = replace(state, tool=Pose(place, aim.rotation @ Rotation.from_rotvec(turn).as_matrix()))
+            near = np.linalg.norm(place - aim.position) <= aim.distance
+            told.append(bool(near and np.linalg.norm(turn) <= aim.angle))
+            assert env.task.outcome(now).success == told[-1]
+    assert 50 < sum(told) < 350
+
+
+def _direction(rng):
+    drawn = rng.normal(size=3)
+    return drawn / np.linalg.norm(drawn)
+
+
+@pytest.mark.parametrize("name", ["Reach", "PickPlace", "Drawer", "Tray"])
+def test_every_task_says_where_the_hand_is_to_be_brought(name):
+    with environment(name) as env:
+        env.reset(seed=1)
+        aim = env.task.aim(env.task_state())
+        assert isinstance(env.task, Aimed)
+        assert np.isfinite(aim.position).all()
+
+
+def test_the_hand_is_led_to_the_cube_then_to_the_bin():
+    with environment("PickPlace") as env:
+        env.reset(options={"start": over_cube(env, 3, 0.0)})
+        state = env.task_state()
+        aim = env.task.aim(state)
+        assert aim.name == "cube"
+        np.testing.assert_allclose(aim.position, state.pose("cube").position)
+        np.testing.assert_allclose(aim.rotation, state.tool.rotation, atol=1e-3)
+        taken = env.task.aim(replace(state, opening=0.5))
+        assert taken.name == "bin"
+        assert taken.position[2] > state.object("bin").top
