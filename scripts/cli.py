@@ -1,6 +1,7 @@
 """What every command shares: LeRobot-like flags, one line an error, exit codes."""
 
 import contextlib
+import ctypes
 import functools
 import importlib.metadata
 import inspect
@@ -14,8 +15,8 @@ from typing import NoReturn
 import tyro
 
 from handrail.controllers.errors import HandrailError, message_of
+from handrail.controllers.interrupts import Interrupts
 from handrail.controllers.numerics.first_use import tell_when_compiling
-from handrail.datasets.storage.interrupts import Interrupts
 from handrail.scripts import INTERRUPTED
 
 BAD_INPUT = 2
@@ -91,6 +92,9 @@ def run(main: Callable[[], int | None]) -> NoReturn:
 def fail(message: str, code: int) -> NoReturn:
     """Print one line on standard error and exit."""
     print(f"error: {message}", file=sys.stderr)
+    ctypes.pythonapi.PyRun_SimpleString(
+        b""
+    )  # else Python ends by SIGINT where it broke off a library's import
     sys.exit(code)
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from handrail.controllers.errors import HandrailError, message_of
-from handrail.datasets.storage.interrupts import interrupted
+from handrail.controllers.interrupts import interrupted
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from handrail.collect.user_study.erase import erase
 from handrail.collect.user_study.exports import export
 from handrail.collect.user_study.folder import StudyFolder
 from handrail.collect.user_study.status import status
-from handrail.datasets.storage.interrupts import Interrupts
+from handrail.controllers.interrupts import Interrupts
 
 _FAREWELL = 1.0  # in which the page shows its last card [s]
 Say = Callable[[str], None]
