@@ -1,5 +1,6 @@
 """One thin command a file; Ctrl-C and SIGTERM end it with one line and 130 while it loads, too."""
 
+import atexit
 import os
 import signal
 import sys
@@ -25,3 +26,4 @@ def _is_command() -> bool:
 if _is_command():  # here, for all that a command needs is imported after this
     for _number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(_number, _leave)
+        atexit.register(signal.signal, _number, signal.SIG_IGN)  # runs last: the command has its exit code

@@ -1,6 +1,7 @@
 """What every command shares: LeRobot-like flags, one line an error, exit codes."""
 
 import contextlib
+import ctypes
 import functools
 import importlib.metadata
 import inspect
@@ -14,9 +15,9 @@ from typing import NoReturn
 import tyro
 
 from handrail.controllers.errors import HandrailError, message_of
+from handrail.controllers.interrupts import Interrupts
 from handrail.controllers.numerics.first_use import tell_when_compiling
 from handrail.datasets.printable import printable
-from handrail.datasets.storage.interrupts import Interrupts
 from handrail.scripts import INTERRUPTED
 
 BAD_INPUT = 2
@@ -98,6 +99,8 @@ def say_starting() -> None:
 def fail(message: str, code: int) -> NoReturn:
     """Print one line on standard error and exit."""
     print(f"error: {printable(message)}", file=sys.stderr)
+    # else Python ends by SIGINT where it broke off a library's import
+    ctypes.pythonapi.PyRun_SimpleString(b"")
     sys.exit(code)
 
 

@@ -15,12 +15,12 @@ from handrail.collect.operators.operator import EpisodeEvent
 from handrail.collect.session.build import build_env, build_modes, build_session
 from handrail.collect.session.display import Display
 from handrail.controllers.errors import HandrailError
+from handrail.controllers.interrupts import Interrupts
 from handrail.controllers.registry import resolved
 from handrail.datasets.format.layout import Layout
 from handrail.datasets.presentation.terminal import Terminal
 from handrail.datasets.recording.folder import check_target
 from handrail.datasets.recording.writer import EpisodeWriter
-from handrail.datasets.storage.interrupts import Interrupts
 
 INTERRUPTED = 130
 FAILED = 1

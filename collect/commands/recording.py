@@ -23,10 +23,10 @@ from handrail.collect.session.recorded_settings import settings_json
 from handrail.collect.session.recorder import Recorder
 from handrail.collect.session.rehearsal import Rehearsal
 from handrail.collect.session.session import Observer
+from handrail.controllers.interrupts import Interrupts
 from handrail.datasets.format.columns import CLIENT, Scalar
 from handrail.datasets.format.manifest import Manifest
 from handrail.datasets.recording.writer import EpisodeWriter
-from handrail.datasets.storage.interrupts import Interrupts
 
 _NICE = -10  # of a loop that a person steers, where the system allows that
 

@@ -20,13 +20,13 @@ from handrail.collect.execution.job import Job
 from handrail.collect.session.build import build_env, build_session
 from handrail.collect.session.outcome import Outcome
 from handrail.controllers.errors import HandrailError
+from handrail.controllers.interrupts import Interrupts
 from handrail.datasets.format.layout import Layout
 from handrail.datasets.format.lines import each_line
 from handrail.datasets.format.metadata import EpisodeRecord
 from handrail.datasets.presentation.terminal import Terminal
 from handrail.datasets.reading.reader import read_info
 from handrail.datasets.recording.writer import EpisodeWriter
-from handrail.datasets.storage.interrupts import Interrupts
 from handrail.datasets.storage.lock import HeldError
 
 INTERRUPTED = 130

@@ -18,8 +18,8 @@ from rich.progress import (
 from handrail.collect.execution.config import ExecutionConfig
 from handrail.collect.execution.engine import engine_of
 from handrail.collect.execution.job import Job, Result
+from handrail.controllers.interrupts import Interrupts
 from handrail.datasets.presentation.terminal import Terminal
-from handrail.datasets.storage.interrupts import Interrupts
 
 _SLOWEST = 3  # jobs that are named at the end
 _WORTH_NAMING = 5.0  # [s]

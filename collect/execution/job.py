@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from handrail.controllers.errors import HandrailError, message_of
+from handrail.controllers.interrupts import interrupted
 from handrail.datasets.presentation.terminal import Terminal
-from handrail.datasets.storage.interrupts import interrupted
 
 
 @dataclass(frozen=True)

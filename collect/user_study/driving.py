@@ -14,8 +14,8 @@ from handrail.collect.user_study.design import ALLOWED, UserStudy
 from handrail.collect.user_study.folder import StudyFolder
 from handrail.collect.user_study.plan import Step, trial_seed
 from handrail.controllers.interface.channels import Channels
+from handrail.controllers.interrupts import Interrupts
 from handrail.datasets.recording.writer import EpisodeWriter
-from handrail.datasets.storage.interrupts import Interrupts
 
 
 class Driving:

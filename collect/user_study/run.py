@@ -14,8 +14,8 @@ from handrail.collect.user_study.erase import erase
 from handrail.collect.user_study.exports import export
 from handrail.collect.user_study.folder import StudyFolder
 from handrail.collect.user_study.status import status
+from handrail.controllers.interrupts import Interrupts
 from handrail.datasets.presentation.terminal import Terminal
-from handrail.datasets.storage.interrupts import Interrupts
 
 _FAREWELL = 1.0  # in which the page shows its last card [s]
 Say = Callable[[str], None]

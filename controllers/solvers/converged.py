@@ -16,6 +16,7 @@ import numpy as np
 from handrail.controllers.arrays import FloatArray, IntArray
 from handrail.controllers.collision.slacks import LIMITS, SLACKS, VELOCITY_SLACK
 from handrail.controllers.errors import HandrailError, message_of
+from handrail.controllers.interrupts import interrupted
 from handrail.controllers.ocp.nodes import Nodes
 from handrail.controllers.ocp.problem import Plan, Problem
 from handrail.controllers.ocp.residuals import StageResiduals
@@ -220,6 +221,8 @@ class ConvergedSolver:
             )
         except RuntimeError as error:
             raise HandrailError(f"converged solver: CasADi failed: {message_of(error)}") from error
+        if interrupted():  # CasADi only warns of it
+            raise KeyboardInterrupt
         change, stats = np.array(found["x"]).ravel()[: u.size], solver.stats()
         moved = np.array(found["g"]).ravel()[2 * len(upper) :][: u.size].reshape(u.shape)
         return _Solution(change, moved, float(found["f"]), bool(stats["success"]), int(stats["iter_count"]))

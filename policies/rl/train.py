@@ -19,10 +19,10 @@ from stable_baselines3 import SAC
 from stable_baselines3.common.callbacks import BaseCallback
 
 from handrail.collect.experiments.benchmark.tables import PUBLISHED
+from handrail.controllers.interrupts import Interrupts
 from handrail.datasets.presentation.drawing import COLOURS, GREY, new_figure, png, tidy
 from handrail.datasets.presentation.terminal import Terminal
 from handrail.datasets.storage.atomic import write_whole
-from handrail.datasets.storage.interrupts import Interrupts
 from handrail.datasets.storage.strict_json import write_json
 from handrail.policies.rl.checkpoint import (
     SHOWN,

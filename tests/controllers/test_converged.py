@@ -1,5 +1,8 @@
 """The converged solver's laws: it minimises the very problem that the real-time solver steps on."""
 
+import os
+import signal
+import threading
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -7,6 +10,7 @@ import pytest
 
 from handrail.controllers.interface.controller import State
 from handrail.controllers.interface.intent import Intent
+from handrail.controllers.interrupts import Interrupts
 from handrail.controllers.mpc.masked_mpc import MaskedMpc
 from handrail.controllers.numerics.threads import single_threaded
 from handrail.controllers.ocp.nodes import Nodes
@@ -144,6 +148,24 @@ def test_it_prints_nothing(capfd):
     problem = mpc.build_problem(State(DESCRIPTION.home, np.zeros(9)), Intent.idle(mpc.channels))
     solver(mpc).solve(problem, np.zeros((10, 9)))
     assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.filterwarnings("ignore:.*KeyboardInterruptException")
+def test_an_interrupt_is_heard_though_casadi_takes_it(capfd):
+    """Law: SIGTERM at any moment of a solution ends it; CasADi makes a warning of it, and goes on."""
+    mpc, rng = MaskedMpc(ALONE), np.random.default_rng(0)
+    problem = mpc.build_problem(State(DESCRIPTION.home, np.zeros(9)), random_intent(mpc, rng))
+    solve = solver(mpc).solve
+
+    def solved_until_interrupted(delay):
+        with Interrupts() as interrupts:
+            threading.Timer(delay, os.kill, (os.getpid(), signal.SIGTERM)).start()
+            while not interrupts.asked:
+                solve(problem, np.zeros((10, 9)))
+
+    for delay in rng.uniform(0.0, 0.05, 20):
+        with pytest.raises(KeyboardInterrupt):
+            solved_until_interrupted(delay)
 
 
 @dataclass(frozen=True)

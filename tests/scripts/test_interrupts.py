@@ -14,7 +14,14 @@ import pytest
 from places import ROOT
 
 COMMANDS = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["scripts"]
-LIGHT = "import sys; sys.argv = ['handrail-x']; import handrail.scripts; print(*sys.modules)"
+LIGHT = """
+import signal, sys
+sys.argv = ["handrail-x"]
+import handrail.scripts
+assert all(callable(signal.getsignal(number)) for number in (signal.SIGINT, signal.SIGTERM))
+assert signal.getsignal(signal.SIGINT) is not signal.default_int_handler
+print(*sys.modules)
+"""
 SET = ("--task", "reach", "--dataset.num_episodes")
 WORK = {
     "record": ("OUT", *SET, "50"),

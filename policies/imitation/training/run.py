@@ -19,9 +19,9 @@ from lerobot.utils.random_utils import set_seed
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from torch.utils.data import BatchSampler
 
+from handrail.controllers.interrupts import Interrupts
 from handrail.datasets.presentation.terminal import Terminal
 from handrail.datasets.storage.atomic import publish_folder
-from handrail.datasets.storage.interrupts import Interrupts
 from handrail.policies.imitation.interface.checkpoint import MODEL, point_to
 from handrail.policies.imitation.interface.completion import Completion
 from handrail.policies.imitation.interface.interface import PolicyInterface
