@@ -9,7 +9,7 @@ from user_study_helpers import study_folder
 from handrail.collect.cockpit.pipe import STILL, STOP
 from handrail.collect.user_study.driving import Driving
 from handrail.collect.user_study.plan import Step
-from handrail.datasets.storage.interrupts import Interrupts
+from handrail.controllers.interrupts import Interrupts
 
 
 class StoppingServer:
