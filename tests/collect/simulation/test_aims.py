@@ -54,6 +54,7 @@ def test_the_hand_is_led_to_the_cube_then_to_the_bin():
         aim = aim_of(env, state)
         assert aim.name == "cube"
         np.testing.assert_allclose(aim.position, state.pose("cube").position)
+        assert aim.rotation is not None
         np.testing.assert_allclose(aim.rotation, state.tool.rotation, atol=1e-3)
         taken = aim_of(env, replace(state, opening=0.5))
         assert taken.name == "bin"
