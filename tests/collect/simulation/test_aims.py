@@ -11,6 +11,11 @@ from handrail.collect.tasks.task import Aimed
 from handrail.controllers.robot.model import Pose
 
 
+def aim_of(env, state):
+    assert isinstance(env.task, Aimed)
+    return env.task.aim(state)
+
+
 @pytest.mark.parametrize("scale", [1.0, 0.2])
 def test_what_a_person_is_told_of_the_goal_is_what_the_judge_says(scale):
     """Within the distance and the angle of the aim, and only there, the goal is reached."""
@@ -19,7 +24,7 @@ def test_what_a_person_is_told_of_the_goal_is_what_the_judge_says(scale):
         env.reset(seed=0)
         state = replace(env.task_state(), scale=scale)
         for _ in range(400):
-            aim = env.task.aim(state)
+            aim = aim_of(env, state)
             turn = rng.uniform(0.0, 2.0) * aim.angle * _direction(rng)
             place = aim.position + rng.uniform(0.0, 2.0) * aim.distance * _direction(rng)
             now = replace(state, tool=Pose(place, aim.rotation @ Rotation.from_rotvec(turn).as_matrix()))
@@ -38,8 +43,7 @@ def _direction(rng):
 def test_every_task_says_where_the_hand_is_to_be_brought(name):
     with environment(name) as env:
         env.reset(seed=1)
-        aim = env.task.aim(env.task_state())
-        assert isinstance(env.task, Aimed)
+        aim = aim_of(env, env.task_state())
         assert np.isfinite(aim.position).all()
 
 
@@ -47,10 +51,10 @@ def test_the_hand_is_led_to_the_cube_then_to_the_bin():
     with environment("PickPlace") as env:
         env.reset(options={"start": over_cube(env, 3, 0.0)})
         state = env.task_state()
-        aim = env.task.aim(state)
+        aim = aim_of(env, state)
         assert aim.name == "cube"
         np.testing.assert_allclose(aim.position, state.pose("cube").position)
         np.testing.assert_allclose(aim.rotation, state.tool.rotation, atol=1e-3)
-        taken = env.task.aim(replace(state, opening=0.5))
+        taken = aim_of(env, replace(state, opening=0.5))
         assert taken.name == "bin"
         assert taken.position[2] > state.object("bin").top
