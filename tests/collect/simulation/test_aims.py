@@ -53,7 +53,6 @@ def test_the_hand_is_led_to_the_cube_then_to_the_bin():
         state = env.task_state()
         aim = aim_of(env, state)
         assert aim.name == "cube"
-        assert aim.rotation is not None
         np.testing.assert_allclose(aim.position, state.pose("cube").position)
         assert aim.rotation is not None
         np.testing.assert_allclose(aim.rotation, state.tool.rotation, atol=1e-3)
