@@ -99,7 +99,7 @@ def say_starting() -> None:
 def fail(message: str, code: int) -> NoReturn:
     """Print one line on standard error and exit."""
     print(f"error: {printable(message)}", file=sys.stderr)
-    # else Python ends by SIGINT where it broke off a library's import
+    # where an interrupt broke off a library's import, Python would end by SIGINT in place of the code
     ctypes.pythonapi.PyRun_SimpleString(b"")
     sys.exit(code)
 
