@@ -1,10 +1,10 @@
 # setup: a Python environment in .venv     demo: record five real episodes     drive: a robot, in the browser
 # test: the tests
 # check: everything that CI checks          format: put the code in order      constraints: pin what is installed
-# soak: hours of commands and faults (HOURS=2)
+# bench: list what measures Handrail        soak: hours of commands and faults (HOURS=2)
 # Another Python than the one found: make setup PYTHON=/path/to/python3.12
 
-.PHONY: setup demo drive test check format constraints soak
+.PHONY: setup demo drive test check format constraints bench soak
 .DELETE_ON_ERROR:
 .DEFAULT_GOAL := setup
 
@@ -44,5 +44,8 @@ format: $(STAMP)
 constraints: $(STAMP)
 	$(BIN)/python .ci/constraints.py
 
+bench: $(STAMP)
+	$(BIN)/python -m handrail.scripts.bench
+
 soak: $(STAMP)
-	$(BIN)/python tests/soak/soak.py outputs/soak --hours $(or $(HOURS),2) --drive
+	$(BIN)/python -m handrail.scripts.bench soak --hours $(or $(HOURS),2) --drive

@@ -1,7 +1,6 @@
 """What settings of several commands have in common: two ways to say one thing, names from a list, a page."""
 
 from collections.abc import Collection
-from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -88,15 +87,3 @@ def check_whole(config: Any, **least: int) -> None:
     for name, smallest in least.items():
         if getattr(config, name) < smallest:
             raise HandrailError(f"--{name} {getattr(config, name)}: expected a whole number >= {smallest}")
-
-
-def command_line(command: str, config: Any) -> str:
-    """Return the command that gives these settings: the flags that differ from their defaults."""
-    words = [command]
-    for entry in fields(config):
-        value = getattr(config, entry.name)
-        if isinstance(value, bool) and value != entry.default:
-            words.append("--" + ("" if value else "no_") + entry.name)
-        elif value != entry.default:
-            words.append(f"--{entry.name} {value}")
-    return " ".join(words)

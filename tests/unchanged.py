@@ -46,9 +46,9 @@ TIMED = {
 }
 
 
-def run(*words: str) -> str:
+def run(name: str, *words: str) -> str:
     """Run a command of Handrail's; return what it printed."""
-    words = (sys.executable, "-m", f"handrail.scripts.{words[0]}", *words[1:])
+    words = (sys.executable, "-m", f"handrail.scripts.{name}", *words)
     done = subprocess.run(words, capture_output=True, text=True, env=os.environ | {"HF_HUB_OFFLINE": "1"})
     if done.returncode:
         raise SystemExit(f"{' '.join(words)}\n{done.stdout}{done.stderr}")
@@ -112,7 +112,7 @@ def pictures(folder: Path) -> dict:
 
 def table(folder: Path) -> dict:
     place = folder / "benchmark.json"
-    run("benchmark", "--controllers=mpc,mink", "--goals=6", f"--json={place}")
+    run("bench", "goal_reaching", "--controllers=mpc,mink", "--goals=6", f"--json={place}")
     rows = json.loads(place.read_text())["profiles"]
     return {f"Table I {key}": value for key, value in numbers(rows).items()}
 
@@ -158,8 +158,7 @@ def lerobot(folder: Path) -> dict:
     from lerobot.robots import make_robot_from_config
     from lerobot.robots.config import RobotConfig
 
-    import handrail.collect.lerobot
-    import handrail.policies  # noqa: F401
+    import handrail.collect.lerobot  # noqa: F401
 
     config = RobotConfig.get_choice_class("handrail_sim")(task="reach", realtime=False)
     robot = make_robot_from_config(config)
@@ -170,7 +169,7 @@ def lerobot(folder: Path) -> dict:
         seen.append([float(v) for v in (*sent.values(), *robot.get_observation().values()) if np.isscalar(v)])
     robot.disconnect()
     found = {"lerobot robot": digest(np.array(seen))}
-    for name in ("PickPlace", "Reach", "GoalReaching"):
+    for name in ("PickPlace", "Reach"):
         env = gymnasium.make(f"handrail/{name}-v0")
         env.reset(seed=3)
         env.action_space.seed(0)

@@ -9,7 +9,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from handrail.collect.experiments.benchmark.catalogue import BASELINES
 from handrail.collect.tasks.goal_reaching import STEP
 from handrail.controllers.baselines.arm_completion import WeldedBaseCompletion
 from handrail.controllers.baselines.base_following import FREE, BaseFollowingCompletion
@@ -28,6 +27,7 @@ from handrail.controllers.objectives.objective import Stage
 from handrail.controllers.objectives.tracking import channel_velocities
 from handrail.controllers.registry import resolved
 from handrail.controllers.robot.model import RobotModel, load_model
+from handrail.scripts.bench.goal_reaching.catalogue import BASELINES
 
 MODEL = load_model()
 HOME = MODEL.description.home

@@ -23,9 +23,10 @@ class Done:
 
 
 def command(*arguments: Any, name: str = "record") -> Done:
-    """Run `handrail-<name>` with its command line, in this process, without its words about starting."""
-    main = importlib.import_module(f"handrail.scripts.{name}").main
-    words = [f"handrail-{name}", *map(str, arguments)]
+    """Run `handrail-<name>`, or `bench <name>`, with its command line, without its words about starting."""
+    _, is_bench, last = name.rpartition("bench ")
+    main = importlib.import_module(f"handrail.scripts.{'bench.__main__' if is_bench else name}").main
+    words = [f"handrail-{name}", *([last] if is_bench else []), *map(str, arguments)]
     out, error = io.StringIO(), io.StringIO()
     with (
         mock.patch.object(sys, "argv", words),

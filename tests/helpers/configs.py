@@ -2,13 +2,7 @@
 
 from handrail.collect.commands.config import DemoConfig, InspectConfig, PushConfig, RepairConfig, ReplayConfig
 from handrail.collect.config import DriveConfig, RecordConfig
-from handrail.collect.experiments.benchmark.config import BenchmarkConfig
-from handrail.collect.experiments.latency.config import LatencyConfig
 from handrail.collect.experiments.operator_fit.config import FitOperatorConfig
-from handrail.collect.experiments.profiling.config import ProfileConfig
-from handrail.collect.experiments.scaling.config import ScalingConfig
-from handrail.collect.experiments.showcase.config import ShowcaseConfig
-from handrail.collect.experiments.trials.config import TrialsConfig
 from handrail.collect.lekiwi.host_config import HostConfig
 from handrail.collect.teleop_config import CalibrateConfig
 from handrail.collect.user_study.config import StudySessionConfig
@@ -17,8 +11,8 @@ from handrail.datasets.editing.config import EditConfig
 from handrail.datasets.editing.pack_config import MergeConfig, PackConfig
 from handrail.policies.imitation.config import TrainConfig
 from handrail.policies.imitation.evaluation.config import EvaluateConfig
-from handrail.policies.rl.config import TrainRlConfig
 from handrail.policies.study.config import StudyConfig
+from handrail.scripts.bench.__main__ import BENCHES
 
 CONFIGS = {
     "handrail-record": RecordConfig,
@@ -33,17 +27,11 @@ CONFIGS = {
     "handrail-merge": MergeConfig,
     "handrail-push": PushConfig,
     "handrail-demo": DemoConfig,
-    "handrail-showcase": ShowcaseConfig,
-    "handrail-profile": ProfileConfig,
-    "handrail-latency": LatencyConfig,
-    "handrail-scaling": ScalingConfig,
     "handrail-train": TrainConfig,
-    "handrail-train-rl": TrainRlConfig,
-    "handrail-benchmark": BenchmarkConfig,
     "handrail-compare": CompareConfig,
     "handrail-evaluate": EvaluateConfig,
     "handrail-study": StudyConfig,
     "handrail-study-session": StudySessionConfig,
-    "handrail-trials": TrialsConfig,
     "handrail-fit-operator": FitOperatorConfig,
 }
+BENCH_CONFIGS = {f"bench {name}": bench.settings for name, bench in BENCHES.items()}

@@ -14,20 +14,20 @@ LESS = {  # flag → the value that it gets where a page gives it
     "handrail-record": {"--dataset.num_episodes": "2"},
     "handrail-train": {"--episodes": "1", "--minutes": "0.1"},
     "handrail-evaluate": {"--episodes": "2", "--workers": "1"},
-    "handrail-trials": {"--episodes": "1"},
+    "bench operators": {"--episodes": "1"},
     "handrail-study": {"--workers": "2"},
-    "handrail-benchmark": {"--goals": "2", "--workers": "1"},
-    "handrail-scaling": {"--episodes": "2"},
+    "bench goal_reaching": {"--goals": "2", "--workers": "1"},
+    "bench scaling": {"--episodes": "2"},
     "lerobot-train": {"--steps": "4", "--batch_size": "4", "--num_workers": "0"},
 }
 MORE = {  # what is added where a page leaves it out
     "handrail-record": {"--dataset.num_episodes": "2"},
     "handrail-train": {"--steps": "4", "--batch_size": "4", "--device": "cpu"},
     "handrail-evaluate": {"--time_limit": "1", "--workers": "1"},
-    "handrail-trials": {"--workers": "1"},
-    "handrail-showcase": {"--seconds": "1"},
-    "handrail-profile": {"--updates": "10", "--solves": "1", "--tasks": "reach"},
-    "handrail-train-rl": {
+    "bench operators": {"--workers": "1"},
+    "bench cases": {"--seconds": "1"},
+    "bench speed": {"--updates": "10", "--solves": "1", "--tasks": "reach"},
+    "bench rl": {
         "--steps": "60",
         "--random_steps": "20",
         "--save_every": "30",
@@ -47,14 +47,11 @@ NOT_RUN = {
     "apt-get": "needs the network and the administrator",
     "tensorboard": "runs until Ctrl-C",
 }
+BENCH = ["python", "-m", "handrail.scripts.bench"]
 MINUTES = (
     "lerobot-",
     "handrail-study",
-    "handrail-profile",
-    "handrail-latency",
-    "handrail-scaling",
-    "handrail-train-rl",
-    "handrail-benchmark",
+    "bench ",
 )
 MINUTES_TOO = (
     "pick_place",
@@ -67,8 +64,6 @@ MINUTES_TOO = (
     "watched",
     "film",
     "--video",
-    "trials",
-    "showcase",
     "demo",
 )
 
@@ -78,7 +73,12 @@ def page_commands(page: str) -> list[list[str]]:
     text = (ROOT / page).read_text()
     blocks = re.findall(r"^```sh\n(.*?)^```", text, flags=re.DOTALL | re.MULTILINE)
     lines = "\n".join(blocks).replace("\\\n", " ").splitlines()
-    return [words for line in lines if (words := shlex.split(line, comments=True))]
+    return [joined(words) for line in lines if (words := shlex.split(line, comments=True))]
+
+
+def joined(words: list[str]) -> list[str]:
+    """Return the words of a command; `python -m handrail.scripts.bench NAME` is one of them, `bench NAME`."""
+    return [f"bench {words[3]}", *words[4:]] if words[:3] == BENCH else words
 
 
 def small_study() -> str:

@@ -13,6 +13,7 @@ from places import ROOT
 
 FLOORS = ("controllers", "datasets", "collect", "policies", "scripts")  # from the ground up
 PAGE = ROOT / "docs" / "architecture.md"
+NAMED = re.compile(rf"handrail\.(?:{'|'.join(FLOORS)})[\w.]*(?::\w+)?")
 _DRAWING = re.compile(r"```mermaid\n.*?```", re.DOTALL)
 
 
@@ -31,6 +32,12 @@ def imported(path: Path) -> set[str]:
             assert node.level == 0, f"{path}: relative import"
             names |= {node.module or ""} | {f"{node.module}.{alias.name}" for alias in node.names}
     return names
+
+
+def named(path: Path) -> set[str]:
+    """Return the modules that texts of a file name, as `module:name` of a registry."""
+    texts = [node.value for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, ast.Constant)]
+    return {text.partition(":")[0] for text in texts if isinstance(text, str) and NAMED.fullmatch(text)}
 
 
 @functools.cache

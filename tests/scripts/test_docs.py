@@ -13,15 +13,14 @@ from typing import Any
 
 import pytest
 from command_helpers import command
-from configs import CONFIGS
+from configs import BENCH_CONFIGS, CONFIGS
 from places import ROOT
+from readme_commands import joined
 
 from handrail.collect.config import (
     RecordConfig,
     SessionConfig,
 )
-from handrail.collect.experiments.benchmark.catalogue import BASELINES
-from handrail.collect.experiments.benchmark.config import PROFILES
 from handrail.collect.operators.modes import MODES
 from handrail.collect.perturbations.perturbations import DEFAULTS
 from handrail.collect.session.build import build_env, session_features
@@ -30,6 +29,8 @@ from handrail.controllers.interface.command import Status
 from handrail.datasets.quality.catalogue import METRICS
 from handrail.policies.imitation.evaluation.config import PROTECTIONS
 from handrail.scripts import cli
+from handrail.scripts.bench.goal_reaching.catalogue import BASELINES
+from handrail.scripts.bench.goal_reaching.config import PROFILES
 
 PAGES = ("README.md", *sorted(str(path.relative_to(ROOT)) for path in (ROOT / "docs").glob("*.md")))
 RESULTS = sorted(str(path.relative_to(ROOT)) for path in (ROOT / "docs" / "results").glob("*.md"))
@@ -49,7 +50,9 @@ def command_lines(document: str) -> Sequence[str]:
 
 
 def commands(prefix: str, documents: Sequence[str] = DOCUMENTS) -> list[list[str]]:
-    lines = [shlex.split(line, comments=True) for document in documents for line in command_lines(document)]
+    lines = [
+        joined(shlex.split(line, comments=True)) for document in documents for line in command_lines(document)
+    ]
     return [words for words in lines if words and words[0].startswith(prefix)]
 
 
@@ -70,11 +73,12 @@ def test_every_command_is_known_and_shown():
     scripts = tomllib.loads(text("pyproject.toml"))["project"]["scripts"]
     assert set(CONFIGS) == set(scripts)
     assert {words[0] for words in commands("handrail-", PAGES)} == set(scripts)
+    assert {words[0] for words in commands("bench ")} == set(BENCH_CONFIGS) - {"bench soak"}  # make soak
 
 
-@pytest.mark.parametrize("words", commands("handrail-"), ids=" ".join)
+@pytest.mark.parametrize("words", [*commands("handrail-"), *commands("bench ")], ids=" ".join)
 def test_commands_parse(words):
-    config = cli.parse(CONFIGS[words[0]], words[0], words[1:])
+    config = cli.parse((CONFIGS | BENCH_CONFIGS)[words[0]], words[0], words[1:])
     if isinstance(config, SessionConfig):
         config.check()
 
@@ -175,7 +179,7 @@ def test_modes_tasks_and_cameras_are_all_there():
 
 def test_controllers_and_profiles_of_the_benchmark_are_all_there():
     assert table("benchmark", "Goal reaching") == set(BASELINES) | set(PROFILES)
-    shown = command("--help", name="benchmark").stdout
+    shown = command("--help", name="bench goal_reaching").stdout
     assert all(re.search(rf"\b{name}\b", shown) for name in (*BASELINES, *PROFILES))
 
 

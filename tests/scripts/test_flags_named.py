@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from command_helpers import command
+from configs import BENCH_CONFIGS
 from lerobot.configs.dataset import DatasetRecordConfig
 from lerobot.configs.default import EvalConfig
 from lerobot.envs.configs import EnvConfig
@@ -40,7 +41,8 @@ OTHERS = {  # flags of other programs, by the word that the same text must say
     "ray start": {"--head", "--port", "--address", "--disable-usage-stats"},
 }
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
-FOREIGN = {ROOT / "collect/session/viewer.py", ROOT / "collect/experiments/latency/measure.py"}
+FOREIGN = {ROOT / "collect/session/viewer.py", ROOT / "scripts/bench/latency/measure.py"}
+FOREIGN |= {ROOT / "scripts/bench/soak/child.py", ROOT / "scripts/bench/soak/notes.py"}
 type Function = ast.FunctionDef | ast.AsyncFunctionDef | ast.Module
 
 
@@ -53,8 +55,8 @@ def flags_of(name: str) -> set[str]:
 
 @pytest.fixture(scope="module")
 def known() -> set[str]:
-    ours = {"--version"}.union(*map(flags_of, SCRIPTS))  # which every command has, beside its own
-    return ours | flags_of_lerobot()
+    own = map(flags_of, [*SCRIPTS, *BENCH_CONFIGS])
+    return {"--version"}.union(*own) | flags_of_lerobot()
 
 
 def flags_of_lerobot() -> set[str]:
@@ -71,7 +73,7 @@ def flags_of_lerobot() -> set[str]:
 def texts() -> Iterator[tuple[str, ast.expr, Function]]:
     """Yield every text in the source, whole, with where it is and the function around it.
 
-    Two files speak to other programs, rerun's and Chromium, in the flags of those.
+    Some files speak to other programs, such as Chromium, in the flags of those.
     """
     for floor in ("controllers", "datasets", "collect", "policies", "scripts"):
         for path in sorted(set((ROOT / floor).rglob("*.py")) - FOREIGN):

@@ -10,8 +10,8 @@ import pytest
 from places import ROOT
 from results_helpers import RESULTS, words
 
-from handrail.collect.experiments.benchmark.metrics import METRICS
 from handrail.datasets.statistics.paired import paired_difference, paired_success
+from handrail.scripts.bench.goal_reaching.metrics import METRICS
 
 TEXT = words((RESULTS / "goal_reaching.md").read_text())
 

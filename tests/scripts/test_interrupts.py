@@ -32,8 +32,8 @@ WORK = {
     "evaluate": ("OUT/none",),
     "pack": ("SET", "--output", "OUT"),
     "lekiwi_host": (),
-    "benchmark": (),
-    "profile": (),
+    "bench": ("goal_reaching",),
+    "bench with workers": ("goal_reaching", "--workers", "2"),
 }
 
 

@@ -14,10 +14,11 @@ import pytest
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 from places import ROOT
-from rooms import FLOORS, imported, sources
+from rooms import FLOORS, imported, named, sources
 
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
 SETUPTOOLS = PROJECT["tool"]["setuptools"]
+BENCH = Path("scripts/bench")
 FORBIDDEN = {
     "controllers": {"mujoco", "gymnasium", "torch", "lerobot", "rerun", "datasets"},
     "datasets": {"mujoco", "gymnasium", "torch", "rerun"},
@@ -26,6 +27,7 @@ FORBIDDEN = {
 
 def test_every_package_is_listed():
     folders = {path.parent.relative_to(ROOT) for floor in FLOORS for path in sources(floor)}
+    folders = {folder for folder in folders if BENCH not in (folder, *folder.parents)}  # not in the wheel
     assert set(SETUPTOOLS["packages"]) == {".".join(("handrail", *folder.parts)) for folder in folders}
     assert SETUPTOOLS["package-dir"] == {f"handrail.{floor}": floor for floor in FLOORS}
 
@@ -64,7 +66,7 @@ def test_datasets_stays_hugging_face_s(path):
 
 
 def test_every_command_is_there():
-    files = {path.stem for path in sources("scripts") if "\ndef main(" in path.read_text()}
+    files = {path.stem for path in (ROOT / "scripts").glob("*.py") if "\ndef main(" in path.read_text()}
     assert PROJECT["project"]["scripts"] == {
         f"handrail-{name.replace('_', '-')}": f"handrail.scripts.{name}:main" for name in files
     }
@@ -113,10 +115,13 @@ def test_what_the_pins_need_is_pinned():
 def test_imports_go_downwards_and_by_the_full_name(floor):
     allowed = FLOORS[: FLOORS.index(floor) + 1]
     for path in sources(floor):
-        for name in imported(path):
+        for name in imported(path) | named(path):
             parts = name.split(".")
             if parts[0] == "handrail":
-                assert len(parts) == 1 or parts[1] in allowed, f"{path}: imports {name} from a floor above"
+                assert len(parts) == 1 or parts[1] in allowed, f"{path}: names {name} from a floor above"
+                assert "bench" not in parts or BENCH in path.relative_to(ROOT).parents, (
+                    f"{path}: names {name}"
+                )
             assert parts[0] not in {*FLOORS, "tests"} - {"datasets"}, f"{path}: import handrail.{name}"
             assert parts[0] not in FORBIDDEN.get(floor, ()), f"{path}: {name} does not belong on this floor"
 

@@ -16,7 +16,7 @@ _DRAW = ("--cameras", "--video")
 
 def run(words: list[str]) -> None:
     """Run one command; it must end well."""
-    if words[0].startswith("handrail-"):
+    if words[0].startswith(("handrail-", "bench ")):
         done = command(*words[1:], name=words[0].removeprefix("handrail-").replace("-", "_"))
     else:
         beside = Path(sys.executable).parent / words[0]

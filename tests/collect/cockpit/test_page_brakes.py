@@ -19,8 +19,8 @@ pytest.importorskip("playwright.sync_api", reason="the extra 'dev' is not instal
 from cockpit_witness import Relay, Witness, closing, is_moving, is_still
 from page_driver import PageDriver
 
-from handrail.collect.experiments.latency.machine import family
 from handrail.datasets.reading.reader import read_episodes, read_frames
+from handrail.scripts.bench.latency.machine import family
 
 pytestmark = pytest.mark.slow
 WITHIN = 0.3  # [s]

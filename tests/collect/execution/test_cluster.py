@@ -124,7 +124,7 @@ def test_an_interrupt_ends_all_at_once_and_one_core_goes_on(cluster, alone, tmp_
 def test_the_same_rows_from_one_two_and_three_workers_and_from_the_cluster(cluster, tmp_path):
     file = tmp_path / "scaling.json"
     flags = ["--episodes", 12, "--workers", "1,2,3", "--ray", cluster.address, "--folder", tmp_path]
-    done = command(*flags, "--json", file, name="scaling")
+    done = command(*flags, "--json", file, name="bench scaling")
     assert done.returncode == 0, done.stderr
     runs = json.loads(file.read_text())["runs"]
     assert [(run["workers"], run["ray"]) for run in runs] == [(1, False), (2, False), (3, False), (2, True)]

@@ -16,7 +16,7 @@ from handrail.controllers.interface.controller import State
 from handrail.controllers.interface.intent import Intent
 from handrail.controllers.robot.model import Pose, load_model
 from handrail.policies.rl.controller import RlController
-from handrail.policies.rl.env import GoalReachingEnv
+from handrail.scripts.bench.rl.env import GoalReachingEnv
 
 MODEL = load_model()
 CHANNELS = Channels.of(MODEL.description)

@@ -56,7 +56,7 @@ def test_what_is_no_actor_is_refused(tmp_path, spoil):
 def test_plain_arrays_act_like_the_trained_network():
     """Law: the numpy forward pass is Stable-Baselines3's deterministic action."""
     sac = pytest.importorskip("stable_baselines3").SAC
-    from handrail.policies.rl.env import GoalReachingEnv
+    from handrail.scripts.bench.rl.env import GoalReachingEnv
 
     env = GoalReachingEnv()
     P = conditioning()

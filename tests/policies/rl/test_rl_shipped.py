@@ -10,8 +10,8 @@ from handrail.controllers.interface.controller import State
 from handrail.controllers.interface.intent import Intent
 from handrail.controllers.robot.model import load_model
 from handrail.policies.rl.controller import RlController
-from handrail.policies.rl.evaluation import FINAL_SEED, evaluate, evaluation_goals
 from handrail.policies.rl.policy import SHIPPED, Actor
+from handrail.scripts.bench.rl.evaluation import FINAL_SEED, evaluate, evaluation_goals
 
 MODEL = load_model()
 CHANNELS = Channels.of(MODEL.description)

@@ -1,0 +1,196 @@
+"""The showcase: the paper's three cases with one controller; a video, a figure and the figures as JSON."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from handrail.collect.envs.env import HandrailEnv
+from handrail.collect.operators.operator import View
+from handrail.collect.session.film import SIZE, Filmer
+from handrail.collect.session.session import Observer, Session
+from handrail.collect.simulation.gl import graphics_trouble
+from handrail.collect.tasks.fixed import FixedTask
+from handrail.collect.tasks.task import Start, Verdict
+from handrail.controllers.arrays import FloatArray
+from handrail.controllers.collision.model import CollisionModel
+from handrail.controllers.interface.channel_matrix import channel_matrix
+from handrail.controllers.interface.channels import Channels
+from handrail.controllers.interface.controller import State
+from handrail.controllers.interface.intent import Intent
+from handrail.controllers.interface.prediction import Extrapolated
+from handrail.controllers.mpc.masked_mpc import MaskedMpc
+from handrail.controllers.objectives.hold import end_effector_hold, hold_parameters
+from handrail.controllers.objectives.switch import switchable, switched
+from handrail.controllers.ocp.settings import MpcSettings
+from handrail.controllers.robot.model import Pose, RobotModel, load_model
+from handrail.datasets.presentation.drawing import png
+from handrail.datasets.presentation.terminal import Terminal
+from handrail.datasets.recording.frames import Frame
+from handrail.datasets.storage.atomic import explained, write_whole
+from handrail.datasets.storage.strict_json import write_json
+from handrail.scripts.bench.cases.cases import Case, cases
+from handrail.scripts.bench.cases.config import ShowcaseConfig
+from handrail.scripts.bench.cases.figure import case_figure
+from handrail.scripts.bench.cases.trace import Trace
+
+FPS = 20
+_WINDOW, _FADE = 0.2, 1.0  # of the intent's prediction [s]
+_HOLD = 20.0  # weight of the hand's position in case C [1/m²]
+
+
+def showcase(config: ShowcaseConfig) -> dict[str, Any]:
+    """Run a case and write `<case>.mp4`, `<case>.png` and `<case>.json`; return what the JSON says.
+
+    Without OpenGL there is no video, and `video` says why.
+
+    Raises:
+        HandrailError: a setting is wrong, or the folder cannot be written.
+    """
+    config.check()
+    case = cases()[config.case]
+    case = replace(case, seconds=config.seconds or case.seconds)
+    with explained(f"--output {config.output}: cannot be made"):
+        config.folder.mkdir(parents=True, exist_ok=True)
+    file = config.folder / f"{case.name}.mp4"
+    mpc = build_controller(load_model())
+    trouble = graphics_trouble() if config.video else "not asked for"
+    if trouble:
+        trace = run_case(case, mpc)
+    else:
+        with Filmer(file, FPS, case.title, partial(_words, case)) as filmer:
+            trace = run_case(case, mpc, (filmer,), render_mode="rgb_array", render_size=SIZE)
+    result = trace.summary() | {"video": f"none: {trouble}" if trouble else file.name}
+    write_whole(file.with_suffix(".png"), png(case_figure(trace, mpc.model, mpc.settings.margin)))
+    write_json(file.with_suffix(".json"), result)
+    return result
+
+
+def _words(case: Case, frame: Frame) -> str:
+    """Say what is steered and how near things are."""
+    diagnostics = frame.diagnostics
+    return (
+        f"{frame.intent.time:5.1f} s     commanded: {', '.join(case.channels)}     "
+        f"nearest: {diagnostics.smallest_distance:.3f} m     update: {1e3 * diagnostics.solve_time:.1f} ms"
+    )
+
+
+def build_controller(model: RobotModel) -> MaskedMpc:
+    """Return the one controller of all cases: the masked MPC with a hold that can be switched on."""
+    hold = end_effector_hold(Channels.of(model.description), position=_HOLD)
+    settings = MpcSettings(posture=0.0)  # no posture to return to
+    return MaskedMpc(model, settings, objectives=(switchable(hold),), predict=Extrapolated(_WINDOW, _FADE))
+
+
+def parameters(case: Case) -> Mapping[str, FloatArray]:
+    """Return the parameters of the objectives in a case, by objective."""
+    point = np.array(case.held) if case.held else np.zeros(3)
+    return {"hold": switched(hold_parameters(Pose(point, np.eye(3))), bool(case.held))}
+
+
+def run_case(case: Case, mpc: MaskedMpc, observers: tuple[Observer, ...] = (), **render: Any) -> Trace:
+    """Run a case and return what happened.
+
+    Args:
+        case: which.
+        mpc: the controller.
+        observers: who else sees it.
+        render: mode and size of the environment's pictures.
+    """
+    begin, end = Start(case.scene, case.q), case.seconds - 0.5 / FPS
+    task = FixedTask(begin, lambda state: Verdict(state.time > end), case.seconds + 1.0)
+    env, observer = HandrailEnv(task, mpc.model, fps=FPS, **render), _Observer(case, mpc)
+    try:
+        operator = _Operator(case, mpc.channels)
+        outcome = Session(env, mpc, operator, (observer, *observers)).run(seed=0)
+    finally:
+        env.close()
+    states, collision = observer.states, CollisionModel(mpc.model, case.scene.obstacles())
+    q = np.array([state.q for state in states])
+    return Trace(
+        case=case,
+        times=np.array([state.time for state in states]),
+        q=q,
+        asked=np.array([case.command(state.time, case.seconds) for state in states]),
+        realised=np.array([_realised(case, mpc, state) for state in states]),
+        hand=np.array([mpc.model.pose(row).position for row in q]),
+        pairs=collision.pairs,
+        own_margin=collision.largest_margin < mpc.settings.margin,
+        distances=collision.values(q),
+        solve_times=np.array(observer.solve_times),
+        outcome=outcome,
+    )
+
+
+def _realised(case: Case, mpc: MaskedMpc, state: State) -> FloatArray:
+    """Return the measured velocity on the commanded channels."""
+    velocity = channel_matrix(mpc.model, mpc.channels, state.q) @ state.v
+    if case.frames.base == "world":
+        velocity[:3] = state.v[:3]
+    return velocity[mpc.channels.mask(*case.channels)]
+
+
+class _Operator:
+    """Commands what the case says."""
+
+    def __init__(self, case: Case, channels: Channels) -> None:
+        self._case, self._mask = case, channels.mask(*case.channels)
+
+    def reset(self, view: View, rng: np.random.Generator) -> None:
+        """Begin."""
+
+    def act(self, view: View) -> Intent:
+        time, case = view.state.time, self._case
+        values = np.zeros(len(self._mask))
+        values[self._mask] = case.command(time, case.seconds)
+        return Intent(values, self._mask, mode=f"case {case.name}", time=time, frames=case.frames)
+
+
+class _Observer:
+    """Gives the objectives the case's parameters, once the controller is reset; notes what happens."""
+
+    def __init__(self, case: Case, mpc: MaskedMpc) -> None:
+        self._case, self._mpc = case, mpc
+        self.states: list[State] = []
+        self.solve_times: list[float] = []
+
+    def begin(self, env: HandrailEnv, seed: int) -> None:
+        self._env = env
+        for objective, values in parameters(self._case).items():
+            self._mpc.set_parameters(objective, values)
+
+    def see(self, frame: Frame) -> None:
+        self.states.append(self._env.state())
+        self.solve_times.append(frame.diagnostics.solve_time)
+
+
+def main(config: ShowcaseConfig) -> int:
+    """Run a case and print the results."""
+    console = Terminal()
+    console.print(f"Running case {config.case.upper()} …")
+    result = showcase(config)
+    for line in _lines(result):
+        console.print(line)
+    if result["video"].startswith("none: ") and config.video:
+        console.print(f"Without a video: {result['video'].removeprefix('none: ')}")
+    console.print(f"Written: {config.folder}/{config.case}.*")
+    return 0
+
+
+def _lines(result: dict[str, Any]) -> list[str]:
+    tracking, nearest, solve = result["tracking"], result["smallest_distance"], result["solve_time_ms"]
+    lines = [
+        result["title"],
+        f"tracking error   {tracking['share']:.2%} of {tracking['cruising_speed']:.2f} m/s in the mean, "
+        f"{1e3 * tracking['max']:.1f} mm/s at most",
+        f"nearest          {nearest['value']:.3f} m ({' – '.join(nearest['pair'])}), "
+        f"contacts {result['contacts']}, brakes {result['brakes']}",
+        f"update           {solve['median']:.2f} ms median, {solve['p99']:.2f} ms p99",
+    ]
+    if "hold" in result:
+        hold = result["hold"]
+        mean, most = 1e3 * hold["mean"], 1e3 * hold["max"]
+        lines.append(f"hand held        {mean:.1f} mm off in the mean, {most:.1f} mm at most")
+    return lines

@@ -1,0 +1,91 @@
+"""What happened in a case's run, and what it amounts to in numbers."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from handrail.collect.session.outcome import Outcome
+from handrail.controllers.arrays import BoolArray, FloatArray
+from handrail.scripts.bench.cases.cases import Case
+
+
+@dataclass(frozen=True)
+class Trace:
+    """What happened, after each of the T control periods.
+
+    Attributes:
+        case: which.
+        times: [s], (T,).
+        q: positions, (T, n).
+        asked: what the operator asks for at these times on the commanded channels, (T, c).
+        realised: measured on these channels, (T, c).
+        hand: position of the tool [m], (T, 3).
+        pairs: names of the pairs that keep apart, (P,).
+        own_margin: which of them keep a smaller margin than the controller's, (P,).
+        distances: signed [m], (T, P).
+        solve_times: of the updates [s], (T,).
+        outcome: of the session.
+    """
+
+    case: Case
+    times: FloatArray
+    q: FloatArray
+    asked: FloatArray
+    realised: FloatArray
+    hand: FloatArray
+    pairs: tuple[tuple[str, str], ...]
+    own_margin: BoolArray
+    distances: FloatArray
+    solve_times: FloatArray
+    outcome: Outcome
+
+    @property
+    def tracking_error(self) -> FloatArray:
+        """‖realised - asked‖ over the commanded channels, (T,)."""
+        return np.linalg.norm(self.realised - self.asked, axis=1)
+
+    @property
+    def held_error(self) -> FloatArray:
+        """How far the hand is from the held point, (T,) [m]."""
+        return np.linalg.norm(self.hand - np.array(self.case.held), axis=1)
+
+    @property
+    def cruise(self) -> float:
+        """The largest speed that is asked for."""
+        return float(np.linalg.norm(self.asked, axis=1).max())
+
+    def summary(self) -> dict[str, Any]:
+        """Return the figures of the run, ready for JSON; lengths in [m], speeds in [m/s] and [rad/s].
+
+        `tracking` is the error at every moment, from the start on; `share` is its mean over the cruise.
+        """
+        error, every = self.tracking_error, np.ones(len(self.pairs), dtype=bool)
+        times = np.percentile(1e3 * self.solve_times, (50, 95, 99, 100)).tolist()
+        result = {
+            "case": self.case.name,
+            "title": self.case.title,
+            "channels": list(self.case.channels),
+            "seconds": self.outcome.seconds,
+            "frames": self.outcome.frames,
+            "contacts": self.outcome.contacts,
+            "brakes": self.outcome.brakes,
+            "tracking": {
+                **_mean_and_max(error),
+                "cruising_speed": self.cruise,
+                "share": float(error.mean() / self.cruise) if self.cruise else 0.0,
+            },
+            "smallest_distance": self._closest(every),
+            "smallest_distance_at_full_margin": self._closest(~self.own_margin),
+            "solve_time_ms": dict(zip(("median", "p95", "p99", "worst"), times, strict=True)),
+        }
+        return result | ({"hold": _mean_and_max(self.held_error)} if self.case.held else {})
+
+    def _closest(self, which: BoolArray) -> dict[str, Any]:
+        smallest = np.where(which, self.distances.min(axis=0), np.inf)
+        index = int(np.argmin(smallest))
+        return {"value": float(smallest[index]), "pair": list(self.pairs[index])}
+
+
+def _mean_and_max(values: FloatArray) -> dict[str, float]:
+    return {"mean": float(values.mean()), "max": float(values.max())}

@@ -1,0 +1,151 @@
+"""The benchmark's figures: paths from above, distributions, success by profile, paired differences."""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from handrail.controllers.robot.model import Pose
+from handrail.datasets.presentation.drawing import COLOURS, GREY, INK, new_figure, tidy
+from handrail.scripts.bench.goal_reaching.results import column, rows_of
+from handrail.scripts.bench.goal_reaching.run import Episode
+from handrail.scripts.bench.goal_reaching.tables import HEADINGS, PUBLISHED
+
+CAPTIONS = {
+    "distributions": "Every episode's measures; dashed: means published, grey RL, orange proposed.",
+    "paths": "Base (blue) and hand (orange) from above [m]; failed episodes dotted, goals as stars.",
+    "profiles": "Success with its 95 % interval, and jerkiness, by profile.",
+    "paired": "The first controller minus the others on the same goals, with 95 % bootstrap intervals;"
+    " blue below zero, orange above, grey where zero is inside.",
+}
+_BASE, _HAND = COLOURS[:2]
+_WIDTH = 11.0  # [inch]
+_SHOWN = (
+    "final_position_error",
+    "final_orientation_error",
+    "arm_effort",
+    "base_path",
+    "jerkiness",
+    "wall_time_s",
+)
+_LOGARITHMIC = ("final_position_error", "arm_effort", "jerkiness", "wall_time_s")
+_COLUMNS = 4  # panels side by side
+
+
+def figures(results: Mapping[str, Any], episodes: Sequence[Episode], goals: Sequence[Pose]) -> dict[str, Any]:
+    """Return matplotlib figures by name.
+
+    Args:
+        results: as summarised.
+        episodes: with the paths of some goals.
+        goals: of the run.
+    """
+    profile, names = next(iter(results["profiles"])), list(results["controllers"])
+    kept = [each for each in episodes if each.paths and each.row["profile"] == profile]
+    drawn = {"distributions": _distributions(results, profile), "paths": _paths(kept, names, goals)}
+    if len(results["profiles"]) > 1:
+        drawn["profiles"] = _profiles(results)
+    if results["paired"][profile]:
+        drawn["paired"] = _paired(results["paired"][profile])
+    return drawn
+
+
+def _panels(labels: Sequence[str], draw: Callable[[Any, str], None]) -> Any:
+    """Return a figure with a panel for each measure, and a line in it for each label, from the top down."""
+    figure = new_figure(_WIDTH, 1.4 + 0.55 * len(labels))
+    axes = np.ravel(figure.subplots(2, 3, sharey=True))
+    for ax, metric in zip(axes, _SHOWN, strict=True):
+        draw(ax, metric)
+        ax.set(title=HEADINGS[metric])
+        ax.set_yticks(range(len(labels)), labels)
+        tidy(ax, "x")
+    axes[0].invert_yaxis()
+    return figure
+
+
+def _distributions(results: Mapping[str, Any], profile: str) -> Any:
+    """Draw every episode's measures as box plots; the published means as dashed lines."""
+    names = list(results["controllers"])
+    rows = [rows_of(results["episodes"], profile, name) for name in names]
+
+    def draw(ax: Any, metric: str) -> None:
+        ax.boxplot(
+            [column(own, metric, known=True) for own in rows],
+            positions=range(len(names)),
+            orientation="horizontal",
+            widths=0.55,
+            flierprops={"markersize": 2},
+            medianprops={"color": _BASE, "lw": 1.6},
+        )
+        if metric in _LOGARITHMIC:
+            _logarithmic(ax)
+        for colour, published in zip((GREY, _HAND), PUBLISHED.values(), strict=True):
+            ax.axvline(published[metric]["mean"], color=colour, ls="--", lw=1)
+
+    return _panels(names, draw)
+
+
+def _paired(differences: Mapping[str, Any]) -> Any:
+    """Draw the first controller minus the others on the same goals, with bootstrap intervals."""
+
+    def draw(ax: Any, metric: str) -> None:
+        for row, entry in enumerate(differences.values()):
+            low, high = entry[metric]["bootstrap_interval"]
+            colour = GREY if low <= 0.0 <= high else _BASE if high < 0 else _HAND
+            ax.plot([low, high], [row, row], color=colour, lw=2)
+            ax.plot(entry[metric]["mean"], row, "o", color=colour, ms=4)
+        ax.axvline(0.0, color=INK, lw=0.8)
+
+    return _panels(list(differences), draw)
+
+
+def _paths(episodes: Sequence[Episode], names: Sequence[str], goals: Sequence[Pose]) -> Any:
+    """Draw base and hand of some goals from above, one panel a controller."""
+    rows = -(-len(names) // _COLUMNS)
+    figure = new_figure(_WIDTH, 2.9 * rows)
+    grid = np.ravel(figure.subplots(rows, _COLUMNS, sharex=True, sharey=True, squeeze=False))
+    for ax, name in zip(grid, names, strict=False):
+        for episode in episodes:
+            if episode.row["controller"] == name:
+                style = "-" if episode.row["success"] else ":"
+                for path, colour in zip(episode.paths, (_BASE, _HAND), strict=True):
+                    ax.plot(*path.T, color=colour, lw=1.0, ls=style)
+                ax.plot(*goals[episode.row["goal"]].position[:2], "*", color=INK, ms=5)
+        ax.set(title=name, aspect="equal")
+        tidy(ax)
+    for ax in grid[len(names) :]:
+        ax.axis("off")
+    return figure
+
+
+def _profiles(results: Mapping[str, Any]) -> Any:
+    """Draw success with Wilson intervals, and jerkiness, by profile."""
+    figure = new_figure(_WIDTH, 6)
+    upper, lower = figure.subplots(2, 1, sharex=True)
+    names, profiles = list(results["controllers"]), list(results["profiles"])
+    for index, name in enumerate(names):
+        cells = [results["profiles"][profile][name] for profile in profiles]
+        at = np.arange(len(profiles)) + 0.8 * (index - (len(names) - 1) / 2) / len(names)
+        share = np.array([100.0 * cell["success"]["mean"] for cell in cells])
+        ends = 100.0 * np.array([cell["success"]["interval"] for cell in cells]).T
+        style = {"color": COLOURS[index % len(COLOURS)], "fmt": "o", "ms": 4}
+        upper.errorbar(at, share, np.maximum(np.abs(ends - share), 0.0), label=name, lw=1, **style)
+        jerk = [cell["jerkiness"]["mean"] if "jerkiness" in cell else np.nan for cell in cells]
+        lower.errorbar(at, jerk, **style)
+    upper.set(ylabel="success % (95 % interval)", ylim=(0, 105))
+    lower.set(ylabel=HEADINGS["jerkiness"], yscale="log")
+    lower.set_xticks(range(len(profiles)), profiles)
+    upper.legend(fontsize=8, ncols=5, loc="lower center")
+    for ax in (upper, lower):
+        tidy(ax, "y")
+    return figure
+
+
+def _logarithmic(axes: Any) -> None:
+    """Let the values of axes rise by factors, with few plain numbers along them."""
+    from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
+
+    axes.set_xscale("log")
+    axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 3.0), numticks=5))
+    axes.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
+    axes.xaxis.set_minor_formatter(NullFormatter())

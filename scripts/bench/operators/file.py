@@ -1,0 +1,109 @@
+"""The file that trials write, `handrail.trials/1`: one line an episode, there whole after each."""
+
+import json
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from handrail.collect.session.build import software_versions
+from handrail.controllers.errors import HandrailError
+from handrail.datasets.storage.atomic import explained, write_whole
+from handrail.datasets.storage.strict_json import read_json
+from handrail.scripts.bench.operators.config import TrialsConfig
+
+FORMAT = "handrail.trials/1"
+_PLACES = 4  # digits that are kept
+_UNNAMED = {"robot": "ridgeback_ur10"}  # of files from before there was a choice
+
+
+@dataclass(frozen=True)
+class Trial:
+    """How one episode went.
+
+    Attributes:
+        task: what was done.
+        mode: in which teleop mode.
+        episode: its number; scenes are the same in all modes.
+        person: who steered.
+        success: whether the task was done.
+        failure_reason: why not.
+        seconds: simulated time [s].
+        frames: control periods.
+        contacts: forbidden contacts that began; in files that name no robot, control periods with one.
+        smallest_distance: signed, tool against work surfaces left out [m].
+        brakes: updates in which the controller braked the robot.
+        switches: how often the operator changed to other channels.
+        switching: time for which their hands were away from the input meanwhile [s].
+    """
+
+    task: str
+    mode: str
+    episode: int
+    person: int
+    success: bool
+    failure_reason: str
+    seconds: float
+    frames: int
+    contacts: int
+    smallest_distance: float
+    brakes: int
+    switches: int
+    switching: float
+
+
+class TrialsFile:
+    """Trials of one robot, seed, noise and number of persons, in memory and on the disk.
+
+    Args:
+        path: of the file.
+        config: what is asked for.
+
+    Raises:
+        HandrailError: the file is none of trials, or of other settings.
+    """
+
+    def __init__(self, path: Path, config: TrialsConfig) -> None:
+        self._path = path
+        settings = {name: getattr(config, name) for name in ("robot", "seed", "noise", "persons")}
+        self._head = {"format": FORMAT, **settings}
+        self._trials = {_key(trial): trial for trial in self._read()} if path.exists() else {}
+
+    def add(self, trial: Trial) -> None:
+        """Keep a trial, on the disk too."""
+        self._trials[_key(trial)] = trial
+        head = self._head | {"versions": software_versions()}
+        rows = ",\n".join(json.dumps(_rounded(each)) for _, each in sorted(self._trials.items()))
+        text = f'{json.dumps(head)[:-1]}, "trials": [\n{rows}\n]}}\n'
+        with explained(f"--json {self._path}"):
+            write_whole(self._path, text.encode())
+
+    def missing(self, task: str, mode: str, episodes: int) -> list[int]:
+        """Return the numbers of the episodes that have not been run."""
+        return [episode for episode in range(episodes) if (task, mode, episode) not in self._trials]
+
+    def trials(self, tasks: Sequence[str], modes: Sequence[str], episodes: int) -> list[Trial]:
+        """Return those that are there, by task, mode and number."""
+        keys = [(task, mode, episode) for task in tasks for mode in modes for episode in range(episodes)]
+        return [self._trials[key] for key in keys if key in self._trials]
+
+    def _read(self) -> list[Trial]:
+        try:
+            content = read_json(self._path)
+            found = {name: content.get(name, _UNNAMED.get(name)) for name in self._head}
+            if found == self._head:
+                return [Trial(**row) for row in content["trials"]]
+        except (OSError, ValueError, AttributeError, KeyError, TypeError) as error:
+            raise HandrailError(f"--json {self._path}: expected a file of trials, got {error}") from error
+        raise HandrailError(f"--json {self._path}: expected {self._head}, got {found}; choose another file")
+
+
+def _key(trial: Trial) -> tuple[str, str, int]:
+    return trial.task, trial.mode, trial.episode
+
+
+def _rounded(trial: Trial) -> dict[str, Any]:
+    return {
+        name: round(value, _PLACES) if isinstance(value, float) else value
+        for name, value in asdict(trial).items()
+    }

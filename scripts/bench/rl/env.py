@@ -1,0 +1,162 @@
+"""The goal-reaching task as a Gymnasium environment: the policy drives the base, the arm follows the tool."""
+
+from collections import deque
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+import numpy as np
+from gymnasium import spaces
+
+from handrail.collect.tasks.goal_reaching import (
+    ORIENTATION_TOLERANCE,
+    POSITION_TOLERANCE,
+    STEP,
+    T_MAX,
+    StraightPlanner,
+    pose_error,
+    reached,
+    sample_goal,
+)
+from handrail.controllers.arrays import FloatArray
+from handrail.controllers.baselines.arm_completion import ArmCompletion, clamp_twist
+from handrail.controllers.robot.model import Pose, load_model
+from handrail.policies.rl.observation import (
+    ACTION_SIZE,
+    OBSERVATION_SIZE,
+    Situation,
+    base_velocity,
+    check_robot,
+    observe,
+)
+from handrail.scripts.bench.goal_reaching.scenes import empty_floor, plant
+
+_BOUND = 20.0  # of any number in an observation
+_MISSED = 200  # goals kept to be tried again
+_FAILURES = 20  # steps off the planner's pose, by more than a success allows, that end an episode
+
+
+@dataclass(frozen=True)
+class Reward:
+    """`s(−½[(d/0.1)² + (r/0.05)²] − w_Δ‖a − a⁻‖² − w_a‖a‖²)`, d and r against the planner's pose.
+
+    Attributes:
+        scale: s.
+        change: w_Δ.
+        size: w_a.
+        failure: s times this is subtracted when an episode is given up.
+    """
+
+    scale: float = 1.0
+    change: float = 0.05
+    size: float = 0.05
+    failure: float = 0.0
+
+    def value(self, d: float, r: float, action: FloatArray, previous: FloatArray) -> float:
+        """Return the reward of a step that ended d [m] and r off the planner's pose."""
+        tracking = (d / POSITION_TOLERANCE) ** 2 + (r / ORIENTATION_TOLERANCE) ** 2
+        change = action - previous
+        regularisation = self.change * (change @ change) + self.size * (action @ action)
+        return -self.scale * float(0.5 * tracking + regularisation)
+
+
+class GoalReachingEnv(gymnasium.Env[FloatArray, FloatArray]):
+    """A planner steers the tool to a goal, open loop; the action, in [−1, 1]³, drives the base.
+
+    The damped least squares of the arm make a velocity of all joints, inside the robot's limits, and the
+    benchmark's own robot follows it. An episode ends with success, after 1000 steps, or, where
+    `early_failure` is on, after 20 steps off the planner's pose or when the robot touches itself or the
+    floor. `reset(options={"goal": Pose(…)})` sets the goal.
+
+    Args:
+        robot: name or description file; its base must be planar and its arm must have six joints.
+        early_failure: whether to give up an episode that has left the planner's pose.
+        reward: of every step.
+        physics: MuJoCo, or an ideal robot whose overlapping shapes count as contacts.
+        repeat_missed: share of the episodes that try again a goal that was missed before.
+    """
+
+    def __init__(
+        self,
+        robot: str | Path = "ridgeback_ur10",
+        early_failure: bool = True,
+        reward: Reward | None = None,
+        physics: bool = True,
+        repeat_missed: float = 0.0,
+    ) -> None:
+        self.model = load_model(robot)
+        check_robot(self.model)
+        self.observation_space = spaces.Box(-_BOUND, _BOUND, (OBSERVATION_SIZE,), np.float32)
+        self.action_space = spaces.Box(-1.0, 1.0, (ACTION_SIZE,), np.float32)
+        self.arm = ArmCompletion(self.model)
+        self._reward = reward or Reward()
+        self._early_failure, self._physics = early_failure, physics
+        self._repeat_missed = repeat_missed
+        self._missed: deque[Pose] = deque(maxlen=_MISSED)
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[FloatArray, dict[str, Any]]:
+        """Put the robot home and draw a goal; forget the previous action."""
+        super().reset(seed=seed)
+        goal = (options or {}).get("goal") or self._draw()
+        home = self.model.description.home
+        self._plant = plant(self._physics)(self.model, empty_floor(), home, STEP)
+        self.command = np.zeros(self.model.size)
+        self._measure()
+        self.planner = StraightPlanner.plan(*self._pose, goal)
+        self._start, self._previous = self.q[:3].copy(), np.zeros(ACTION_SIZE)
+        self.time = self._failures = 0
+        return self._observation(), {}
+
+    def step(self, action: FloatArray) -> tuple[FloatArray, float, bool, bool, dict[str, Any]]:
+        """Drive the base for one step and let the arm follow the planner's twist."""
+        action = np.clip(np.asarray(action, dtype=np.float64), -1.0, 1.0)
+        base, twist = base_velocity(action, self.q[2]), clamp_twist(self.planner.twist(self.time))
+        self.command = self.arm.velocity(self.q, self.command, base, twist, STEP)
+        self._plant.send(np.append(self.command, 0.0))
+        touches = bool(self._plant.contacts)
+        self._measure()
+        self.time += 1
+        d, r = pose_error(*self._pose, Pose(*self.planner.pose(self.time)))
+        reward = self._reward.value(d, r, action, self._previous)
+        self._previous = action
+        self._failures += not reached(d, r)
+        failed = self._early_failure and (touches or self._failures >= _FAILURES)
+        reward -= self._reward.scale * self._reward.failure * failed
+        d_p, d_r = pose_error(*self._pose, self.planner.goal)
+        success = reached(d_p, d_r) and not failed
+        timed_out = self.time >= T_MAX
+        if (failed or timed_out) and not success:
+            self._missed.append(self.planner.goal)
+        info = {"is_success": success, "failed": failed, "touches": touches}
+        info |= {"position_error": d_p, "orientation_error": d_r}
+        return self._observation(), reward, success or failed, timed_out, info
+
+    def _draw(self) -> Pose:
+        """Draw a goal, or take one that was missed: out of the list, into which it comes again if missed."""
+        if self._repeat_missed and self._missed and self.np_random.random() < self._repeat_missed:
+            index = int(self.np_random.integers(len(self._missed)))
+            goal = self._missed[index]
+            del self._missed[index]
+            return goal
+        return sample_goal(self.np_random)
+
+    def _measure(self) -> None:
+        """Look where the robot is and how it moves."""
+        state, tool = self._plant.state(), self._plant.tool
+        self.q, self.velocity, self._pose = state.q, state.v, (tool.position, tool.rotation)
+
+    def _observation(self) -> FloatArray:
+        goal = self.planner.goal
+        situation = Situation(
+            q=self.q,
+            start=self._start,
+            twist=clamp_twist(self.planner.twist(self.time)),
+            current=self._pose,
+            desired=self.planner.pose(self.time),
+            goal=(goal.position, goal.rotation),
+            previous=self._previous,
+        )
+        return np.clip(observe(situation), -_BOUND, _BOUND).astype(np.float32)

@@ -1,0 +1,260 @@
+"""Training of the reinforcement-learning baseline with soft actor-critic from Stable-Baselines3."""
+
+import importlib.metadata
+import itertools
+import os
+import platform
+import time
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+import numpy as np
+import torch
+from gymnasium import spaces
+from gymnasium.wrappers import TransformObservation
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from stable_baselines3 import SAC
+from stable_baselines3.common.callbacks import BaseCallback
+
+from handrail.controllers.interrupts import Interrupts
+from handrail.datasets.presentation.drawing import COLOURS, GREY, new_figure, png, tidy
+from handrail.datasets.presentation.terminal import Terminal
+from handrail.datasets.storage.atomic import write_whole
+from handrail.datasets.storage.strict_json import write_json
+from handrail.policies.rl.observation import conditioning
+from handrail.policies.rl.policy import Actor
+from handrail.scripts.bench.goal_reaching.tables import PUBLISHED
+from handrail.scripts.bench.rl.checkpoint import (
+    SHOWN,
+    Curve,
+    begin_run,
+    check_resumes,
+    evaluated_actors,
+    resume_run,
+    start_from,
+    write_checkpoint,
+)
+from handrail.scripts.bench.rl.config import TrainRlConfig
+from handrail.scripts.bench.rl.env import GoalReachingEnv, Reward
+from handrail.scripts.bench.rl.evaluation import FINAL_SEED, evaluate, evaluation_goals, means, spreads
+
+_TARGET_ENTROPY = -3.0
+_VERSIONED = ("handrail", "stable-baselines3", "torch", "gymnasium", "numpy", "pin")
+_PLACES = ("output_dir", "resume", "overwrite")  # of a run, not of what came out
+
+
+def train(config: TrainRlConfig) -> dict[str, Any]:
+    """Train, or go on training, and return the record that was written beside the actor.
+
+    The folder holds `config.json`, `checkpoints/<steps>/` (networks, replay buffer, curve; only the last),
+    `actors/<steps>.npz` (all), `tensorboard/`, and at the end `actor.npz`, `actor.json` and `curve.png`.
+
+    Raises:
+        HandrailError: a setting is wrong, there is a run already, or there is none to resume.
+        KeyboardInterrupt: it was interrupted; a checkpoint is written, and it can be resumed.
+    """
+    config.check()
+    torch.set_num_threads(config.threads)
+    model, curve, seconds = _resumed(config) if config.resume else _new(config)
+    _learn(config, model, curve, seconds)
+    actor = Actor.mean(evaluated_actors(config.folder, config.average))
+    actor.save(config.folder / "actor.npz")
+    final = spreads(evaluate(actor, evaluation_goals(config.final_goals, FINAL_SEED), config.physics))
+    record = _record(config, curve, final)
+    write_json(config.folder / "actor.json", record)
+    write_whole(config.folder / "curve.png", png(_figure(curve)))
+    return record
+
+
+def _learn(config: TrainRlConfig, model: SAC, curve: Curve, seconds: float) -> None:
+    """Make the steps that remain, until an interrupt."""
+    remaining = max(config.steps - model.num_timesteps, 0)
+    if not remaining and _is_evaluated(model, curve):
+        return
+    with Interrupts() as interrupts:
+        callback = Watch(config, curve, seconds, interrupts)
+        try:
+            with interrupts.deferred():
+                model.learn(remaining, callback, log_interval=20, reset_num_timesteps=not config.resume)
+        except KeyboardInterrupt:
+            goes_on = f"--resume goes on after step {model.num_timesteps}"
+            raise KeyboardInterrupt(f"training: interrupted; {goes_on}") from None
+
+
+def _is_evaluated(model: SAC, curve: Curve) -> bool:
+    return bool(curve) and curve[-1]["steps"] == model.num_timesteps
+
+
+def actor_of(model: SAC) -> Actor:
+    """Return the actor of a model as plain arrays."""
+    state = {name: value.cpu().numpy() for name, value in model.actor.state_dict().items()}
+    return Actor.from_state(state, conditioning())
+
+
+class Watch(BaseCallback):
+    """Evaluates and saves every so many steps, and shows how far the training is.
+
+    Args:
+        config: of the training.
+        curve: evaluations so far; more are appended.
+        seconds: of training so far.
+        interrupts: one of them ends the training, and an evaluation too.
+    """
+
+    model: SAC
+
+    def __init__(self, config: TrainRlConfig, curve: Curve, seconds: float, interrupts: Interrupts) -> None:
+        super().__init__()
+        self._config, self._curve, self._interrupts = config, curve, interrupts
+        self._goals = evaluation_goals(config.goals)
+        self._began = time.monotonic() - seconds
+        columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+        self._progress = Progress(*columns, console=Terminal())
+        self._bar = self._progress.add_task("training", total=config.steps)
+
+    def _on_training_start(self) -> None:
+        self._progress.start()
+
+    def _on_step(self) -> bool:
+        self._progress.update(self._bar, completed=self.num_timesteps)
+        if self.num_timesteps % self._config.save_every == 0:
+            self._evaluate_and_save()
+        return not self._interrupts.asked
+
+    def _on_training_end(self) -> None:
+        if not _is_evaluated(self.model, self._curve):
+            self._evaluate_and_save()
+        if not _is_evaluated(self.model, self._curve):  # an interrupt does not wait for that
+            write_checkpoint(self._config.folder, self.model, None, [*self._curve, self._row()])
+        self._progress.stop()
+
+    def _row(self) -> dict[str, float]:
+        """Return how far the training is."""
+        seconds, updates = time.monotonic() - self._began, float(self.model._n_updates)
+        return {"steps": self.num_timesteps, "updates": updates, "seconds": seconds}
+
+    def _evaluate_and_save(self) -> None:
+        actor = actor_of(self.model)
+        goals = itertools.takewhile(lambda _: not self._interrupts.asked, self._goals)
+        scores = evaluate(actor, goals, self._config.physics)
+        if self._interrupts.asked:
+            return
+        row = self._row()
+        score = means(scores)
+        self._curve.append({**row, "learning_rate": self._config.learning_rate, **score})
+        for name, value in score.items():
+            self.logger.record(f"evaluation/{name}", value)
+        self.logger.dump(self.num_timesteps)
+        self._progress.console.print(
+            f"{self.num_timesteps} steps, {row['seconds']:.0f} s: {score['success']:.0%} of the goals, "
+            f"effort {score['arm_effort']:.1f}, jerkiness {score['jerkiness']:.3f}"
+        )
+        write_checkpoint(self._config.folder, self.model, actor, self._curve)
+
+
+def _new(config: TrainRlConfig) -> tuple[SAC, Curve, float]:
+    begin_run(config)
+    model = new_model(config)
+    if config.start_from:
+        start_from(Path(config.start_from).expanduser(), model)
+    return model, [], 0.0
+
+
+def new_model(config: TrainRlConfig) -> SAC:
+    """Return an actor and critics that have learned nothing."""
+    return SAC(
+        "MlpPolicy",
+        _environment(config),
+        learning_rate=config.learning_rate,
+        buffer_size=config.buffer_size,
+        learning_starts=config.random_steps,
+        batch_size=config.batch_size,
+        tau=config.tau,
+        gamma=config.gamma,
+        train_freq=config.train_freq,
+        gradient_steps=config.gradient_steps,
+        ent_coef=f"auto_{config.temperature}",
+        target_entropy=_TARGET_ENTROPY,
+        policy_kwargs={"net_arch": list(config.layers), "optimizer_kwargs": {"fused": True}},
+        tensorboard_log=str(config.folder / "tensorboard"),
+        seed=config.seed,
+        device="cpu",
+    )
+
+
+def _resumed(config: TrainRlConfig) -> tuple[SAC, Curve, float]:
+    last = check_resumes(config)
+    model = new_model(config)
+    curve, seconds = resume_run(last, model)
+    model.set_random_seed(config.seed + model.num_timesteps)  # else the same goals would come again
+    return model, curve, seconds
+
+
+def _environment(config: TrainRlConfig) -> gymnasium.Env:
+    reward = Reward(
+        scale=config.reward_scale,
+        change=config.action_change,
+        size=config.action_size,
+        failure=config.failure_cost,
+    )
+    matrix = conditioning()
+    space = spaces.Box(-np.inf, np.inf, (len(matrix),), np.float32)
+    env = GoalReachingEnv(reward=reward, physics=config.physics, repeat_missed=config.repeat_missed)
+    return TransformObservation(env, lambda values: (matrix @ values).astype(np.float32), space)
+
+
+def _record(config: TrainRlConfig, curve: Curve, final: dict[str, dict[str, float]]) -> dict[str, Any]:
+    """Return what a reader needs to repeat a training, the seed too."""
+    settings = {name: value for name, value in asdict(config).items() if name not in _PLACES}
+    if config.start_from:
+        settings["start_from"] = Path(config.start_from).name
+    return {
+        "algorithm": "soft actor-critic",
+        "settings": settings,
+        "seconds": curve[-1]["seconds"],
+        "updates": curve[-1]["updates"],
+        "hardware": {"processor": _processor(), "cores": os.cpu_count(), "threads": config.threads},
+        "versions": {
+            "python": platform.python_version(),
+            **{name: importlib.metadata.version(name) for name in _VERSIONED},
+        },
+        "final": final,
+        "curve": curve,
+    }
+
+
+def _processor() -> str:
+    """Return the processor's name, or at least its architecture."""
+    info = Path("/proc/cpuinfo")
+    lines = info.read_text().splitlines() if info.is_file() else []
+    names = [line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")]
+    return names[0] if names else platform.machine()
+
+
+def _figure(curve: Curve) -> Any:
+    """Return what the evaluations said over steps, with the published figures, as a figure."""
+    figure = new_figure(11, 3.4)
+    axes = figure.subplots(1, len(SHOWN))
+    for ax, (name, title) in zip(axes, SHOWN.items(), strict=True):
+        published = PUBLISHED["paper: RL"][name]["mean"]
+        ax.plot([row["steps"] / 1000 for row in curve], [row[name] for row in curve], color=COLOURS[0])
+        ax.axhline(published, color=GREY, linestyle="--", label="published")
+        ax.set(xlabel="thousand steps", title=title, ylim=(0.0, None))
+        tidy(ax)
+    axes[0].legend(loc="lower right")
+    return figure
+
+
+def main(config: TrainRlConfig) -> int:
+    """Train and print how good the actor is."""
+    record = train(config)
+    score = {name: values["mean"] for name, values in record["final"].items()}
+    console = Terminal()
+    console.print(
+        f"{score['success']:.1%} of new goals after {record['curve'][-1]['steps']} steps, "
+        f"effort {score['arm_effort']:.1f}, jerkiness {score['jerkiness']:.3f}"
+    )
+    console.print(f"written: {config.folder}/actor.npz, actor.json, curve.png")
+    return 0

@@ -1,0 +1,49 @@
+"""Settings of the soak; light to import."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import tyro
+
+from handrail.collect.flags import check_page, check_whole
+from handrail.controllers.errors import HandrailError
+
+
+@dataclass(frozen=True)
+class SoakConfig:
+    """Let faults befall Handrail's own commands for hours; a new start goes on with further seeds."""
+
+    output: tyro.conf.Positional[str] = "outputs/soak"
+    """Folder of the results: every round adds a line to rounds.jsonl."""
+    hours: float = 2.0
+    """Duration [h]."""
+    rounds: int = 10**9
+    """Most rounds."""
+    fault: str = ""
+    """Only faults with this in their name."""
+    work: str = ""
+    """Only this kind of work."""
+    drive: bool = False
+    """Also drive in the browser, all the time."""
+    seed: int = 0
+    """Of the rounds; two may run at once."""
+    page: str = ""
+    """Put the tables of all rounds into this Markdown page, at the end."""
+
+    @property
+    def folder(self) -> Path:
+        """The folder of the results."""
+        return Path(self.output).expanduser().absolute()
+
+    def check(self) -> None:
+        """Check the settings.
+
+        Raises:
+            HandrailError: one is wrong.
+        """
+        check_whole(self, rounds=0, seed=0)
+        check_page(self.page)
+        if not 0.0 <= self.hours <= 1000.0:
+            raise HandrailError(f"--hours {self.hours}: expected 0 to 1000")
+        if self.folder.is_file():
+            raise HandrailError(f"OUTPUT {self.output}: expected a folder, found a file")

@@ -1,0 +1,285 @@
+"""Laws of `handrail-benchmark`: paired, reproducible, self-contained; the masked MPC arrives."""
+
+import base64
+import json
+import re
+from dataclasses import replace
+from io import StringIO
+
+import numpy as np
+import pytest
+from command_helpers import command
+from figure_helpers import shows
+from rich.console import Console
+
+from handrail.controllers.collision.model import CollisionModel
+from handrail.controllers.errors import HandrailError
+from handrail.controllers.robot.model import load_model
+from handrail.scripts.bench.goal_reaching import video
+from handrail.scripts.bench.goal_reaching.benchmark import benchmark
+from handrail.scripts.bench.goal_reaching.catalogue import BASELINES
+from handrail.scripts.bench.goal_reaching.config import BenchmarkConfig
+from handrail.scripts.bench.goal_reaching.figures import figures
+from handrail.scripts.bench.goal_reaching.metrics import METRICS
+from handrail.scripts.bench.goal_reaching.report import write_page
+from handrail.scripts.bench.goal_reaching.run import available, conditions, goals, run, trace_of
+from handrail.scripts.bench.goal_reaching.tables import benchmark_tables
+
+MODEL = load_model()
+QUIET = Console(quiet=True)
+TIMED = ("wall_time_s", "cpu_time_s", "update_ms_median")  # what depends on the machine
+QUICK = BenchmarkConfig(controllers="mpc,dls", goals=2, physics=False, video=False)
+
+
+def rows(config, *names):
+    who = tuple(BASELINES[name] for name in names)
+    found = [episode.row for episode in run(config, who)]
+    found.sort(key=lambda row: (row["goal"], row["profile"], row["controller"]))
+    return [{key: value for key, value in row.items() if key not in TIMED} for row in found]
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("benchmark")
+    config = replace(
+        QUICK,
+        json=str(folder / "all.json"),
+        report=str(folder / "report"),
+        page=str(folder / "page.md"),
+        profile="nominal,fast3",
+    )
+    return folder, benchmark(config, BASELINES, QUIET)
+
+
+def test_the_json_has_every_controller_measure_and_episode(written):
+    folder, _ = written
+    found = json.loads((folder / "all.json").read_text())
+    assert list(found["controllers"]) == ["mpc", "dls"]
+    for summary in found["controllers"].values():
+        assert all(set(summary[metric]) >= {"mean", "std", "min", "max"} for metric in METRICS)
+    assert found["controllers"] == found["profiles"]["nominal"]
+    keys = {(row["controller"], row["profile"], row["goal"]) for row in found["episodes"]}
+    assert len(keys) == len(found["episodes"]) == 8
+    assert set(METRICS) <= set(found["episodes"][0])
+
+
+def test_figures_show_what_was_measured(written):
+    folder, _ = written
+    found = json.loads((folder / "all.json").read_text())
+    config = replace(QUICK, profile="nominal,fast3")
+    episodes = run(config, (BASELINES["mpc"], BASELINES["dls"]))
+    made = figures(found, episodes, goals(config))
+    for name in ("mpc", "dls"):
+        own = [row for row in found["episodes"] if row["profile"] == "nominal" and row["controller"] == name]
+        assert shows(made["distributions"], np.median([row["arm_effort"] for row in own]))
+        assert shows(
+            made["profiles"], [cell[name]["jerkiness"]["mean"] for cell in found["profiles"].values()]
+        )
+    entry = found["paired"]["nominal"]["dls"]["base_path"]
+    assert shows(made["paired"], [entry["mean"], *entry["bootstrap_interval"]])
+    for each in episodes:
+        if each.paths and each.row["profile"] == "nominal":
+            assert shows(made["paths"], each.paths[1][[0, -1]])
+    assert not shows(made["paired"], 12.345)
+
+
+def test_the_report_carries_everything_with_it(written):
+    folder, _ = written
+    html = (folder / "report" / "benchmark.html").read_text()
+    sources = re.findall(r'(?:src|href)="([^"]+)"', html)
+    assert len(sources) == 4  # paths, distributions, profiles, paired
+    assert all(source.startswith("data:image/svg+xml;base64,") for source in sources)
+    assert all(base64.b64decode(s.split(",")[1]).startswith(b"<?xml") for s in sources)
+    for words in ("masked MPC", "paper: proposed", "0.098 ± 0.047", "Wilcoxon", "fast3", "dt 0."):
+        assert words in html
+
+
+def test_the_page_keeps_what_others_wrote(written):
+    folder, results = written
+    page = folder / "page.md"
+    config = replace(QUICK, profile="nominal,fast3")
+    first = page.read_text()
+    assert "| paper: proposed | 97.0 |" in first
+    assert "| controller | CPU time s | update ms | updates a second |" in first
+    assert re.search(r"\| mpc \|.*\| 10\.\d ± .*\n\| dls \|.*\| 33\.3 ± ", first)
+    assert re.search(r"\d+ cores; load at the end \d+\.\d, of which 1 by this run", first)
+    assert "not corrected for how many there are" in first
+    assert all((folder / link).is_file() for link in re.findall(r"\]\((.+?)\)", first))
+    beside = json.loads((folder / "page_nominal_fast3_ideal_seed_1.json").read_text())
+    for row in results["episodes"]:
+        measured = beside["episodes"][row["profile"]][row["controller"]]
+        assert not measured.keys() & TIMED
+        assert measured.keys() >= set(METRICS) - set(TIMED)
+        assert {name: values[row["goal"]] for name, values in measured.items()}.items() <= row.items()
+    page.write_text("# Mine\n\nBefore.\n\n" + first.split("\n\n", 1)[1] + "\nAfter.\n")
+    write_page(results, {}, page, config)
+    again = page.read_text()
+    assert again.startswith("# Mine\n\nBefore.\n")
+    assert again.endswith("\nAfter.\n")
+    assert again.count("<!-- nominal_fast3_ideal_seed_1 -->") == 1
+    assert "![" not in again
+    for other in (replace(config, seed=2), replace(config, profile="nominal,steps"), QUICK):
+        write_page(results, {}, page, other)  # a part of its own: no other run's part is touched
+        assert page.read_text().startswith(again.rstrip())
+    assert replace(config, profile="all").label == "profiles_ideal_seed_1"
+
+
+def test_page_report_and_terminal_hold_a_closed_loop_to_its_aim(tmp_path):
+    places = {"report": str(tmp_path / "report"), "page": str(tmp_path / "page.md")}
+    config = BenchmarkConfig(controllers="dls", goals=1, physics=False, video=False, **places)
+    results = benchmark(replace(config, early_stop=False, closed_loop=True), BASELINES, QUIET)
+    console = Console(width=200, record=True, file=StringIO())
+    console.print(*benchmark_tables(results))
+    html = (tmp_path / "report" / "benchmark.html").read_text()
+    for text in ((tmp_path / "page.md").read_text(), html, console.export_text()):
+        assert "beyond 10 mm" in text
+        assert "4 s later" in text
+
+
+def test_tables_show_every_controller(written):
+    console = Console(width=200, record=True, file=StringIO())
+    console.print(*benchmark_tables(written[1]))
+    text = console.export_text()
+    for words in ("mpc", "dls", "paper: RL", "success %", "mpc minus"):
+        assert words in text
+
+
+DROPOUTS = BenchmarkConfig(goals=2, profile="dropouts", physics=False)
+
+
+def test_the_same_seed_gives_the_same_episodes_and_another_one_others():
+    alone = rows(DROPOUTS, "dls")
+    assert alone == rows(DROPOUTS, "dls")
+    assert alone != rows(replace(DROPOUTS, seed=2), "dls")
+
+
+@pytest.mark.slow
+def test_several_processes_give_the_same_episodes():
+    assert rows(DROPOUTS, "dls") == rows(replace(DROPOUTS, workers=2), "dls")
+
+
+def test_goals_are_paired_and_do_not_depend_on_how_many_there_are():
+    few, many = goals(BenchmarkConfig(goals=3)), goals(BenchmarkConfig(goals=30))
+    for one, other in zip(few, many, strict=False):
+        np.testing.assert_array_equal(one.position, other.position)
+    one, other = (conditions(BenchmarkConfig(clutter=True), 5, "noise") for _ in range(2))
+    np.testing.assert_array_equal(one.goal.position, other.goal.position)
+    assert one.seed == other.seed
+    for a, b in zip(one.scene.objects, other.scene.objects, strict=True):
+        np.testing.assert_array_equal(a.position, b.position)
+
+
+def test_clutter_leaves_start_and_way_free():
+    hand = MODEL.pose(MODEL.description.home).position[:2]
+    for index in range(12):
+        given = conditions(BenchmarkConfig(clutter=True, seed=7), index, "nominal")
+        collision = CollisionModel(MODEL, given.scene.obstacles())
+        distances = collision.values(MODEL.description.home[None])[0]
+        outside = [d for d, pair in zip(distances, collision.pairs, strict=True) if "cylinder" in pair[1]]
+        assert min(outside) >= 0.2
+        tall = [item for item in given.scene.objects if item.top > 1.0]
+        assert len(tall) == 1
+        way = hand + np.linspace(0, 1, 50)[:, None] * (given.goal.position[:2] - hand)
+        assert np.linalg.norm(way - tall[0].position[:2], axis=1).min() >= 0.59
+
+
+def test_the_mpc_arrives_in_physics_without_contact():
+    for episode in rows(BenchmarkConfig(goals=3), "mpc"):
+        assert episode["success"]
+        assert episode["final_position_error"] <= 0.101
+        assert (episode["contacts"], episode["brakes"]) == (0, 0)
+        assert episode["smallest_distance"] > 0.04
+
+
+def test_a_planner_that_sees_the_hand_gets_it_there():
+    config = BenchmarkConfig(goals=2, early_stop=False, closed_loop=True)
+    for episode in rows(config, "mpc"):
+        assert episode["planned_position_error"] <= 0.01
+        assert episode["planned_orientation_error"] <= 0.001
+        assert episode["final_position_error"] <= 0.003
+
+
+def test_who_knows_the_lag_of_the_low_pass_does_not_ring():
+    """A planner that does not know it swings about the goal, and the error grows while it settles."""
+    config = BenchmarkConfig(goals=2, early_stop=False, closed_loop=True)
+    known = BASELINES["mpc"]
+    unknown = replace(known, lag=(0.0, 0.0))
+    errors = [
+        [1e3 * trace_of(config, baseline, index)[1].errors[-1, 0] for index in (0, 1)]
+        for baseline in (known, unknown)
+    ]
+    assert max(errors[0]) <= 3.0 < min(errors[1])
+
+
+def test_physics_and_ideal_robot_tell_the_same_story():
+    real, ideal = (rows(BenchmarkConfig(goals=2, physics=physics), "mpc") for physics in (True, False))
+    for one, other in zip(real, ideal, strict=True):
+        assert abs(one["length"] - other["length"]) <= 3
+        assert one["arm_effort"] == pytest.approx(other["arm_effort"], rel=0.05)
+        assert one["base_path"] == pytest.approx(other["base_path"], rel=0.05)
+
+
+def test_an_update_is_asked_for_at_its_period():
+    """10 Hz against steps of 0.03 s: after 0, 4, 7, 10, 14, … steps."""
+    _, trace = trace_of(replace(QUICK, goals=1), BASELINES["mpc"], 0)
+    assert len(trace.updates) == int(np.ceil(len(trace.v) * 0.03 / 0.1))
+
+
+def test_clutter_is_seen_by_the_mpc_and_not_by_plain_least_squares():
+    config = BenchmarkConfig(goals=4, clutter=True, physics=False)
+    found = rows(config, "mpc", "dls")
+    contacts = {name: sum(r["contacts"] for r in found if r["controller"] == name) for name in ("mpc", "dls")}
+    assert contacts["mpc"] == 0
+    assert contacts["dls"] > 0
+
+
+def _fails(model, period):
+    raise HandrailError("robot missing")
+
+
+def test_with_all_what_is_missing_is_left_out_and_said():
+    broken = replace(BASELINES["mink"], build=_fails)
+    baselines = dict.fromkeys(BASELINES, BASELINES["dls"]) | {"mink": broken}
+    present, skipped = available(baselines, BenchmarkConfig(controllers="all"))
+    assert len(present) == len(BASELINES) - 1
+    assert skipped == {"mink": "robot missing"}
+    with pytest.raises(HandrailError, match="robot missing"):
+        available(baselines, BenchmarkConfig(controllers="dls,mink"))
+
+
+WRONG = {
+    "controller": (["--controllers", "mpc,pid"], "unknown controller 'pid': expected one of all, blended"),
+    "profile": (["--profile", "slow"], "unknown profile 'slow': expected one of all, delay"),
+    "no controllers": (["--controllers", ","], "--controllers: expected all, or some of mpc, rl"),
+    "twice": (["--controllers", "mpc,mpc"], "--controllers mpc,mpc: expected each controller once"),
+    "goals": (["--goals", "0"], "--goals 0: expected a whole number >= 1"),
+    "seed": (["--seed", "-1"], "--seed -1: expected a whole number >= 0"),
+    "workers": (["--workers", "1000"], "--workers 1000: expected a whole number from 1 to 256"),
+    "json": (
+        ["--json", "/nowhere/at/all.json"],
+        "/nowhere/at/all.json: expected a file in an existing",
+    ),
+    "page": (["--page", "results.txt"], "--page results.txt: expected a .md file"),
+    "report": (["--report", __file__], "expected a folder, found a file"),
+    "text": (["--goals", "many"], "--goals"),
+}
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_wrong_input_is_one_clear_line(case):
+    arguments, words = WRONG[case]
+    done = command(*arguments, name="bench goal_reaching")
+    assert done.returncode == 2, done.stderr
+    assert words in done.stderr
+    assert done.stderr.startswith("error: ")
+    assert done.stderr.count("\n") == 1, done.stderr
+
+
+@pytest.mark.needs_gl
+def test_the_report_has_a_video(tmp_path, monkeypatch):
+    monkeypatch.setattr(video, "EVERY", 30)  # steps between pictures: ten times as few
+    config = replace(QUICK, goals=1, video=True, report=str(tmp_path / "report"))
+    benchmark(config, BASELINES, QUIET)
+    html = (tmp_path / "report" / "benchmark.html").read_text()
+    assert 'src="data:video/mp4;base64,' in html
+    assert (tmp_path / "report" / "benchmark.mp4").stat().st_size > 10_000

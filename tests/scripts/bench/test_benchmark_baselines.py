@@ -1,0 +1,100 @@
+"""Who else takes part: the paper's own horizon, and baselines behind the masked MPC's low-pass."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from handrail.collect.tasks.goal_reaching import STEP
+from handrail.controllers.interface.channels import Channels
+from handrail.controllers.interface.controller import State
+from handrail.controllers.interface.prediction import after
+from handrail.controllers.mpc.masked_mpc import MaskedMpc
+from handrail.controllers.registry import resolved
+from handrail.controllers.robot.model import load_model
+from handrail.scripts.bench.goal_reaching.baselines import (
+    goal_reaching_prediction,
+    hand_intent,
+    smoothed_hand_intent,
+)
+from handrail.scripts.bench.goal_reaching.catalogue import BASELINES, TAKE_UP
+from handrail.scripts.bench.goal_reaching.config import BenchmarkConfig
+from handrail.scripts.bench.goal_reaching.run import trace_of
+
+MODEL = load_model()
+CHANNELS = Channels.of(MODEL.description)
+STATE = State(MODEL.description.home, np.zeros(9))
+IDEAL = BenchmarkConfig(goals=1, seed=103, physics=False)
+KEYS = replace(IDEAL, profile="quantised")
+
+
+def test_a_baseline_s_low_pass_is_the_mpc_s():
+    """At every moment it sends what the MPC's prediction says of that moment, rests and gaps included."""
+    twists = np.random.default_rng(0).normal(size=(40, 6))
+    twists[10:20] = 0.0
+    times = np.cumsum(np.random.default_rng(1).choice([STEP, 0.0, 0.5], 40, p=[0.8, 0.1, 0.1]))
+    hand, smooth = hand_intent(MODEL), smoothed_hand_intent(MODEL)
+    predict = goal_reaching_prediction(CHANNELS)
+    for twist, time in zip(twists, times, strict=True):
+        asked = hand(twist, STATE, time)
+        predict = after(predict, asked)
+        expected = predict(asked, np.array([0.0, 0.5, 1.0]))[0]
+        sent = smooth(twist, STATE, time)
+        np.testing.assert_allclose(sent.values, expected)
+        assert (sent.time, sent.mask.tolist()) == (time, CHANNELS.mask("ee").tolist())
+
+
+def test_the_low_pass_takes_a_step_up_in_its_time_and_keeps_the_way():
+    steps, held = 600, 200
+    smooth = smoothed_hand_intent(MODEL)
+    sent = np.array([smooth(np.ones(6) * (k < held), STATE, k * STEP).values for k in range(steps)])
+    hand = sent[:, CHANNELS.tool_slice]
+    constants = np.array([TAKE_UP[0]] * 3 + [TAKE_UP[1]] * 3)
+    for k in (0, 20, 100):
+        np.testing.assert_allclose(hand[k], 1.0 - np.exp(-k * STEP / constants), atol=1e-9)
+    np.testing.assert_allclose(hand.sum(0), held, rtol=0.01)
+
+
+def test_who_has_the_low_pass_differs_from_their_twin_in_nothing_else():
+    for name in ("mink", "rl"):
+        bare, smooth = BASELINES[name], BASELINES[f"{name}_low_pass"]
+        assert resolved(smooth.operator) is smoothed_hand_intent
+        assert resolved(bare.operator) is hand_intent
+        own = {"name": bare.name, "help": bare.help, "operator": bare.operator, "lag": bare.lag}
+        assert replace(smooth, **own) == bare
+
+
+def test_behind_the_low_pass_keys_jerk_less():
+    bare = BASELINES["dls"]
+    smooth = replace(bare, operator=smoothed_hand_intent)
+    rough, smoothed = (trace_of(KEYS, who, 0)[1] for who in (bare, smooth))
+    jerks = [np.linalg.norm(np.diff(trace.v, axis=0), axis=1).mean() for trace in (rough, smoothed)]
+    assert jerks[1] < 0.5 * jerks[0]
+
+
+def test_the_low_pass_begins_at_rest_in_every_episode():
+    who = replace(BASELINES["dls"], operator=smoothed_hand_intent)
+    first, second = (trace_of(KEYS, who, 0)[1] for _ in range(2))
+    np.testing.assert_array_equal(first.v, second.v)
+
+
+def test_the_paper_s_horizon_is_the_paper_s():
+    """N = 10, dt = 0.1 s, γ = 1, the command held constant, no posture and no terminal cost."""
+    baseline = BASELINES["mpc_paper"]
+    mpc = baseline.controller(MODEL)
+    assert isinstance(mpc, MaskedMpc)
+    assert (mpc.settings.horizon, mpc.settings.dt, baseline.period) == (10, 0.1, 0.1)
+    intent = hand_intent(MODEL)(np.full(6, 0.1), STATE, 0.0)
+    problem = mpc.build_problem(STATE, intent)
+    tool = CHANNELS.tool_slice
+    np.testing.assert_allclose(problem.reference[:, tool], 0.1)
+    assert np.ptp(problem.weights, axis=0).max() == 0.0  # every stage alike, the last one too
+    np.testing.assert_allclose(problem.weights[:, tool], 1000.0)
+    assert (mpc.settings.posture, mpc.settings.terminal_velocity) == (0.0, 0.0)
+
+
+@pytest.mark.parametrize("name", ["mpc_paper", "mpc"])
+def test_both_horizons_arrive(name):
+    _, trace = trace_of(IDEAL, BASELINES[name], 0)
+    assert trace.errors[-1, 0] <= 0.1
+    assert not any(trace.contacts)

@@ -1,0 +1,188 @@
+"""Training: a run can be stopped and resumed, its settings stay, and what it writes can be used."""
+
+import json
+import os
+import signal
+from collections import Counter
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from handrail.controllers.errors import HandrailError
+from handrail.policies.rl.policy import Actor
+from handrail.scripts.bench.rl.config import TrainRlConfig
+from handrail.scripts.bench.rl.env import GoalReachingEnv
+from handrail.scripts.bench.rl.evaluation import FINAL_SEED, evaluate, evaluation_goals, means
+
+pytest.importorskip("stable_baselines3")
+pytest.importorskip("tensorboard")
+from stable_baselines3 import SAC
+
+from handrail.scripts.bench.rl.train import train
+
+TINY = TrainRlConfig(
+    steps=60,
+    random_steps=20,
+    layers=(8, 8),
+    batch_size=8,
+    buffer_size=200,
+    save_every=40,
+    goals=1,
+    final_goals=2,
+)
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    """A run of 60 steps, stopped and resumed to 100."""
+    config = replace(TINY, output_dir=str(tmp_path_factory.mktemp("runs") / "rl"))
+    train(config)
+    first = Actor.load(config.folder / "actor.npz")
+    record = train(replace(config, steps=100, resume=True, learning_rate=2e-4))
+    return config, first, record
+
+
+def test_a_resumed_run_goes_on_where_it_stopped(run):
+    config, first, record = run
+    assert [row["steps"] for row in record["curve"]] == [40, 60, 80, 100]
+    assert record["curve"][-1]["updates"] == 100 - config.random_steps
+    assert [row["learning_rate"] for row in record["curve"]] == [1e-4, 1e-4, 2e-4, 2e-4]
+    seconds = [row["seconds"] for row in record["curve"]]
+    assert seconds == sorted(seconds)
+    assert not np.array_equal(Actor.load(config.folder / "actor.npz").weights[0], first.weights[0])
+
+
+def test_a_resumed_run_learns_at_the_new_rate(run):
+    model = SAC.load(run[0].folder / "checkpoints" / "00000100" / "model.zip", device="cpu")
+    for part in (model.actor, model.critic):
+        assert part.optimizer.param_groups[0]["lr"] == 2e-4
+
+
+def test_a_resumed_run_remembers_and_meets_new_goals(run):
+    config, *_ = run
+    with np.load(config.folder / "checkpoints" / "00000100" / "replay_buffer.npz") as buffer:
+        assert buffer["place"].tolist() == [100, 0]
+        first, resumed = buffer["observations"][0, 0], buffer["observations"][60, 0]
+    assert not np.allclose(first[30:42], resumed[30:42])  # the goal
+
+
+def test_a_run_may_start_from_the_networks_of_another(run, tmp_path):
+    """Law: before any update the new run's actor is the last one of the other."""
+    config, *_ = run
+    other = replace(TINY, output_dir=str(tmp_path / "rl"), start_from=config.output_dir, steps=20)
+    train(other)
+    pair = Actor.load(other.folder / "actor.npz"), Actor.load(config.folder / "actors" / "00000100.npz")
+    assert all(np.array_equal(*weights) for weights in zip(*(actor.weights for actor in pair), strict=True))
+    with pytest.raises(HandrailError, match="--start_from: expected a run with a checkpoint"):
+        train(replace(other, start_from=str(tmp_path / "nothing"), output_dir=str(tmp_path / "another")))
+
+
+def test_the_folder_holds_what_is_needed_and_no_more(run):
+    config, *_ = run
+    assert [path.name for path in (config.folder / "checkpoints").iterdir()] == ["00000100"]
+    assert sorted(path.name for path in (config.folder / "actors").iterdir()) == [
+        "00000040.npz", "00000060.npz", "00000080.npz", "00000100.npz",
+    ]  # fmt: skip
+    assert (config.folder / "curve.png").stat().st_size > 5000
+    assert list((config.folder / "tensorboard").rglob("events.*"))
+
+
+def test_the_record_says_how_the_actor_was_made(run):
+    config, _, record = run
+    assert json.loads((config.folder / "actor.json").read_text()) == json.loads(json.dumps(record))
+    assert record["settings"]["seed"] == config.seed
+    assert {"stable-baselines3", "torch", "python", "handrail"} <= set(record["versions"])
+    assert record["hardware"]["threads"] == 1
+    last = Actor.load(config.folder / "actor.npz")
+    score = means(evaluate(last, evaluation_goals(config.goals)))  # the mean of one actor is that actor
+    assert {name: record["curve"][-1][name] for name in score} == score
+    final = evaluate(last, evaluation_goals(2, FINAL_SEED))
+    assert record["final"]["length"]["max"] == max(score["length"] for score in final)
+    assert record["final"]["length"]["mean"] == means(final)["length"]
+
+
+def test_the_same_seed_gives_the_same_actor(tmp_path):
+    actors = []
+    for name in ("one", "other"):
+        config = replace(TINY, output_dir=str(tmp_path / name), steps=40)
+        train(config)
+        actors.append(Actor.load(config.folder / "actor.npz"))
+    assert all(np.array_equal(*pair) for pair in zip(actors[0].weights, actors[1].weights, strict=True))
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({}, "there is something already"),
+        ({"resume": True, "gamma": 0.9}, "--resume with --gamma 0.9: expected 0.99"),
+        ({"resume": True, "layers": (8,)}, "--layers"),
+        ({"resume": True, "physics": False}, "--physics"),
+        ({"resume": True, "overwrite": True}, "expected one of them"),
+    ],
+)
+def test_a_run_is_not_spoiled_by_accident(run, change, message):
+    with pytest.raises(HandrailError, match=message):
+        train(replace(run[0], **change))
+    assert Actor.load(run[0].folder / "actor.npz")
+
+
+def test_the_actor_may_be_the_mean_of_the_last_ones(run):
+    config, *_ = run
+    train(replace(config, steps=100, resume=True, average=2))
+    last = [Actor.load(config.folder / "actors" / f"{steps:08d}.npz") for steps in (80, 100)]
+    found = Actor.load(config.folder / "actor.npz")
+    assert np.allclose(found.weights[0], (last[0].weights[0] + last[1].weights[0]) / 2)
+
+
+def test_only_a_training_run_is_overwritten(tmp_path):
+    (tmp_path / "thesis.txt").write_text("years of work")
+    for settings in ("{}", None):  # a config.json alone makes no training run of a folder
+        if settings:
+            (tmp_path / "config.json").write_text(settings)
+        else:
+            (tmp_path / "config.json").unlink()
+        with pytest.raises(HandrailError, match="expected only a training run"):
+            train(replace(TINY, output_dir=str(tmp_path), overwrite=True))
+    with pytest.raises(HandrailError, match="expected a run with a checkpoint"):
+        train(replace(TINY, output_dir=str(tmp_path), resume=True))
+    assert (tmp_path / "thesis.txt").read_text() == "years of work"
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        *({"steps": 0}, {"gamma": 1.5}, {"tau": 0.0}, {"layers": ()}, {"seed": -1}, {"reward_scale": 0.0}),
+        {"repeat_missed": 1.5},
+    ],
+)
+def test_settings_that_make_no_sense_are_refused(change):
+    with pytest.raises(HandrailError, match="expected"):
+        replace(TINY, **change).check()
+
+
+@pytest.mark.parametrize(("at", "steps"), [("step", 30), ("evaluation", 40)])
+def test_an_interrupted_run_saves_a_checkpoint_and_goes_on(at, steps, tmp_path, monkeypatch):
+    """SIGTERM comes before the first evaluation, or during it; no evaluation is waited for."""
+    config, calls = replace(TINY, output_dir=str(tmp_path / "rl"), goals=2, steps=50), Counter[str]()
+    reset, step = GoalReachingEnv.reset, GoalReachingEnv.step
+
+    def counted(name, call):
+        def called(*arguments, **options):
+            calls[name] += name == "step" or bool(options.get("options"))
+            if name.endswith(at) and calls[name] == {"step": 30, "evaluation": 1}[at]:
+                os.kill(os.getpid(), signal.SIGTERM)
+            return call(*arguments, **options)
+
+        return called
+
+    with monkeypatch.context() as patch:
+        patch.setattr(GoalReachingEnv, "step", counted("step", step))
+        patch.setattr(GoalReachingEnv, "reset", counted("evaluation", reset))
+        with pytest.raises(KeyboardInterrupt, match=f"interrupted; --resume goes on after step {steps}$"):
+            train(config)
+    assert calls["evaluation"] == (at == "evaluation"), "it evaluates on"
+    assert [path.name for path in (config.folder / "checkpoints").iterdir()] == [f"{steps:08d}"]
+    record = train(replace(config, resume=True))
+    assert [row["steps"] for row in record["curve"]] == ([40, 50] if at == "step" else [50])
+    assert record["updates"] == 29  # the interrupted step makes none

@@ -1,0 +1,148 @@
+"""The showcase's laws: one controller for all cases, safe and exact in each; files that say what happened."""
+
+import json
+from dataclasses import fields, replace
+from functools import cache
+
+import av
+import numpy as np
+import pytest
+from command_helpers import command
+
+from handrail.controllers.errors import HandrailError
+from handrail.controllers.robot.model import load_model
+from handrail.scripts.bench.cases.cases import cases
+from handrail.scripts.bench.cases.config import CASES, ShowcaseConfig
+from handrail.scripts.bench.cases.showcase import (
+    FPS,
+    build_controller,
+    parameters,
+    run_case,
+    showcase,
+)
+
+MODEL = load_model()
+MPC = build_controller(MODEL)  # one object for all tests
+
+
+@cache
+def run(name, seconds=0.0):
+    case = cases()[name]
+    return run_case(replace(case, seconds=seconds or case.seconds), MPC)
+
+
+def test_cases_differ_only_in_what_is_asked_and_where():
+    """The same controller object serves all; nothing of it is in a case."""
+    assert set(cases()) == set(CASES)
+    allowed = {"name", "title", "scene", "q", "seconds", "channels", "command", "frames", "held"}
+    assert {field.name for field in fields(cases()["a"])} == allowed
+    before = MPC.settings, MPC.residuals.objectives, MPC.solver, MPC.channels
+    for name in CASES:
+        run(name, 1.0)
+        assert (MPC.settings, MPC.residuals.objectives, MPC.solver, MPC.channels) == before
+        assert set(parameters(cases()[name])) == {"hold"}
+    assert len({cases()[name].channels for name in CASES}) == 2
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_a_case_is_tracked_and_safe(name):
+    trace = run(name)
+    result = trace.summary()
+    assert trace.outcome.success
+    assert (result["contacts"], result["brakes"]) == (0, 0)
+    assert result["tracking"]["share"] < 0.01
+    assert result["smallest_distance_at_full_margin"]["value"] >= 0.09
+    assert result["smallest_distance"]["value"] >= 0.09
+    assert np.all(np.abs(trace.q[:, :2]) < MODEL.description.limits.position_upper[:2])
+
+
+def test_the_base_goes_round_while_the_hand_keeps_its_course():
+    trace = run("a")
+    assert np.ptp(trace.q[:, 1]) > 0.3
+    assert np.ptp(trace.hand[:, 1]) < 0.02
+    assert trace.hand[-1, 0] - trace.hand[0, 0] > 3.8
+
+
+def test_the_arm_gives_way_while_the_base_keeps_its_course():
+    trace = run("b")
+    relative = trace.hand - np.pad(trace.q[:, :2], ((0, 0), (0, 1)))
+    assert np.max(np.linalg.norm(relative - relative[0], axis=1)) > 0.15
+    assert np.ptp(trace.q[:, 1]) < 0.005
+    np.testing.assert_allclose(trace.q[-1, 0] - trace.q[0, 0], 2.5, atol=0.02)
+
+
+def test_the_hand_is_held_while_the_base_goes_round_in_a_circle():
+    trace = run("c")
+    assert trace.held_error.max() < 0.02
+    assert np.linalg.norm(trace.q[-1, :2] - cases()["c"].q[:2]) < 0.3
+    assert np.ptp(trace.q[:, 0]) > 0.45
+    assert np.ptp(trace.q[:, 1]) > 0.45
+
+
+def test_without_the_hold_the_hand_leaves():
+    case = replace(cases()["c"], held=(), seconds=8.0)
+    trace = run_case(case, MPC)
+    assert np.max(np.linalg.norm(trace.hand - cases()["c"].held, axis=1)) > 0.2
+
+
+def test_a_command_and_its_integral_agree():
+    """Case C's angle is the integral of its turning rate: the circle closes after a whole turn."""
+    case = cases()["c"]
+    times = np.arange(0.0, case.seconds, 1e-3)
+    path = 1e-3 * np.cumsum([case.command(time, case.seconds)[:2] for time in times], axis=0)
+    centre = 0.5 * (path.max(axis=0) + path.min(axis=0))
+    radii = np.linalg.norm(path - centre, axis=1)
+    assert np.ptp(radii) < 1e-3
+
+
+def test_the_trace_compares_with_what_is_asked_at_that_moment():
+    trace = run("a", 1.0)
+    expected = [trace.case.command(time, 1.0) for time in trace.times]
+    np.testing.assert_allclose(trace.asked, expected)
+    assert trace.tracking_error.shape == trace.times.shape
+
+
+def test_without_opengl_there_is_everything_but_the_video(tmp_path, monkeypatch):
+    monkeypatch.setattr(
+        "handrail.scripts.bench.cases.showcase.graphics_trouble", lambda: "cameras need OpenGL"
+    )
+    result = showcase(ShowcaseConfig("c", str(tmp_path), seconds=1.0))
+    assert result["video"] == "none: cameras need OpenGL"
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["c.json", "c.png"]
+    assert json.loads((tmp_path / "c.json").read_text()) == result
+    assert result["frames"] == FPS
+    assert {"tracking", "smallest_distance", "solve_time_ms", "contacts", "hold"} <= set(result)
+
+
+@pytest.mark.needs_gl
+def test_the_video_has_a_picture_a_period(tmp_path):
+    showcase(ShowcaseConfig("a", str(tmp_path), seconds=0.5))
+    with av.open(str(tmp_path / "a.mp4")) as container:
+        stream = container.streams.video[0]
+        assert stream.codec_context.name == "h264"
+        pictures = [frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)]
+    assert len(pictures) == FPS // 2
+    assert pictures[-1].std() > 20.0
+
+
+WRONG = {
+    "case": (ShowcaseConfig("d"), "unknown case 'd': expected one of a, b, c"),
+    "seconds": (ShowcaseConfig("a", seconds=-1.0), "--seconds -1.0: expected 0.5 to 120"),
+    "nan": (ShowcaseConfig("a", seconds=float("nan")), "--seconds nan"),
+    "output": (ShowcaseConfig("a", output=__file__), "expected a folder, found a file"),
+}
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_wrong_settings_are_named(case):
+    config, words = WRONG[case]
+    with pytest.raises(HandrailError, match=words.replace("(", r"\(")):
+        config.check()
+
+
+def test_the_command_says_what_came_out(tmp_path):
+    done = command("b", "--no_video", "--seconds", 1, "--output", tmp_path, name="bench cases")
+    assert done.returncode == 0, done.stderr
+    assert "tracking error" in done.stdout
+    wrong = command("d", name="bench cases")
+    assert (wrong.returncode, wrong.stderr.count("\n")) == (2, 1), wrong.stderr

@@ -1,0 +1,118 @@
+"""The laws of trials: stopped and gone on is the same as run through; a table says what the episodes were."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from handrail.controllers.errors import HandrailError
+from handrail.scripts.bench.operators.config import TrialsConfig
+from handrail.scripts.bench.operators.file import Trial, TrialsFile
+from handrail.scripts.bench.operators.table import HEADINGS, trials_table, write_page
+from handrail.scripts.bench.operators.trials import run_trials
+
+DONE = Trial("reach", "ee", 0, 0, True, "", 4.0, 80, 0, 0.05, 0, 0, 0.0)
+
+
+@pytest.fixture(scope="module")
+def config(tmp_path_factory):
+    path = tmp_path_factory.mktemp("trials") / "new" / "trials.json"
+    settings = {"episodes": 3, "persons": 2, "noise": 0.5, "workers": 1}
+    return TrialsConfig(tasks="reach", modes="ee,decoupled", json=str(path), **settings)
+
+
+@pytest.fixture(scope="module")
+def trials(config):
+    return run_trials(config, lambda trial: None)
+
+
+def test_stopped_and_gone_on_is_the_same_as_run_through(config, trials, tmp_path):
+    other = replace(config, json=str(tmp_path / "trials.json"))
+
+    def stop(trial):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run_trials(other, stop)
+    run_trials(replace(other, modes="decoupled", episodes=1), lambda trial: None)
+    ran = []
+    run_trials(other, ran.append)
+    assert [(trial.mode, trial.episode) for trial in ran] == [
+        *(("ee", 1), ("ee", 2), ("decoupled", 1), ("decoupled", 2)),
+    ]
+    assert (tmp_path / "trials.json").read_bytes() == Path(config.json).read_bytes()
+    run_trials(other, lambda trial: pytest.fail("ran again"))
+
+
+def test_persons_take_turns_and_only_who_switches_loses_time(trials):
+    assert [trial.person for trial in trials] == [0, 1, 0] * 2
+    steering, driving = trials[:3], trials[3:]
+    assert all(trial.success and 0 < trial.seconds < 30 for trial in trials)
+    assert all(trial.switches == 0 and trial.switching == 0 for trial in steering)
+    assert any(trial.switches for trial in driving)
+    for trial in driving:
+        assert (trial.switching > 0) == (trial.switches > 0)
+        assert trial.switching < min(trial.seconds, 0.5 * trial.switches + 1e-9)
+
+
+def test_a_file_from_before_robots_could_be_chosen_is_of_the_ur10(config, trials, tmp_path):
+    old = tmp_path / "old.json"
+    text = Path(config.json).read_text()
+    assert '"robot": "ridgeback_ur10", ' in text
+    old.write_text(text.replace('"robot": "ridgeback_ur10", ', "", 1))
+    assert TrialsFile(old, config).missing("reach", "ee", 3) == []
+    with pytest.raises(HandrailError, match="choose another file"):
+        TrialsFile(old, replace(config, robot="ridgeback_panda"))
+
+
+@pytest.mark.parametrize("wrong", [{"seed": 1}, {"noise": 2.0}, {"persons": 3}, {"robot": "ridgeback_panda"}])
+def test_trials_of_other_settings_are_not_mixed(config, trials, wrong):
+    with pytest.raises(HandrailError, match="choose another file"):
+        run_trials(replace(config, **wrong), lambda trial: None)
+
+
+def test_another_file_is_left_alone(config, tmp_path):
+    path = tmp_path / "other.json"
+    for content in ("[1]", "{", '{"format": "else"}'):
+        path.write_text(content)
+        with pytest.raises(HandrailError, match="--json"):
+            TrialsFile(path, config)
+        assert path.read_text() == content
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"tasks": "juggle"}, {"modes": ""}, {"modes": "ee,ee"}, {"episodes": 0}, {"json": "x"}]
+)
+def test_wrong_settings_name_the_flag(config, wrong):
+    with pytest.raises(HandrailError, match=f"--{next(iter(wrong))}|unknown task"):
+        replace(config, **wrong).check()
+
+
+def test_a_table_counts_every_episode():
+    failed = replace(DONE, success=False, failure_reason="timeout", seconds=16.0, switches=3, switching=2.0)
+    line = trials_table(
+        [DONE, DONE, replace(failed, contacts=7, smallest_distance=-0.01)], ["base", "ee"], "reach"
+    ).rows
+    cells = dict(zip(HEADINGS, line[0], strict=True))
+    assert len(line) == 1
+    assert cells["success"] == "2 of 3"
+    assert cells["95 %"] == "21 to 94 %"
+    assert cells["failures"] == "timeout (1)"
+    assert cells["time of successes [s]"] == "4.0 ± 0.0"
+    assert cells["episodes with contact"] == "1"
+    assert cells["smallest distance [m]"] == "-0.010"
+    assert cells["switches"] == "1.0"
+    assert cells["time in switches"] == "8.3 %"
+
+
+def test_a_page_keeps_what_is_around_the_tables(config, tmp_path):
+    page = tmp_path / "page.md"
+    page.write_text("# Ours\n\nBefore.\n\n<!-- trials -->\nold\n<!-- end trials -->\n\nAfter.\n")
+    of_page = replace(config, page=str(page))
+    for _ in range(2):
+        write_page([DONE], of_page)
+    text = page.read_text()
+    assert text.startswith("# Ours\n\nBefore.")
+    assert text.endswith("After.\n")
+    assert "old" not in text
+    assert text.count("| ee | 1 of 1 |") == 1
