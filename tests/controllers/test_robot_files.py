@@ -3,6 +3,7 @@
 import os
 import re
 import shutil
+import signal
 from pathlib import Path
 
 import pytest
@@ -154,6 +155,17 @@ def test_a_urdf_that_pinocchio_cannot_stand_is_one_line(content, said, tmp_path)
     assert "\n" not in str(raised.value)
 
 
+@pytest.fixture
+def hangs():
+    """Opening a named pipe waits for ever: that fails."""
+    before = signal.signal(signal.SIGALRM, lambda *_: pytest.fail("it hangs"))
+    signal.alarm(60)
+    yield
+    signal.alarm(0)
+    signal.signal(signal.SIGALRM, before)
+
+
+@pytest.mark.usefixtures("hangs")
 def test_a_named_pipe_is_one_line(tmp_path):
     os.mkfifo(tmp_path / "robot.toml")
     with pytest.raises(HandrailError, match=r"robot description .*found a named pipe"):

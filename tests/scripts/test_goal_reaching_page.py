@@ -104,8 +104,11 @@ def test_a_page_of_one_run_has_tables_of_one_run():
     assert {run["machine"]["cores"] for run in runs().values()} == {2}
 
 
-def test_table_i_has_every_episode():
-    assert "episodes" in runs()["nominal_seed_1"]
+def test_table_i_has_every_episode_where_the_page_says_so():
+    (told,) = re.findall(r"by goal, are in the JSON files of seeds (\d(?:(?:, | and )\d)*) beside", TEXT)
+    assert "1" in told
+    for seed in re.findall(r"\d", told):
+        assert "episodes" in runs()[f"nominal_seed_{seed}"]
 
 
 @pytest.mark.parametrize("label", [label for label, run in runs().items() if "episodes" in run])

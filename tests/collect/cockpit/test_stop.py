@@ -226,8 +226,9 @@ def test_a_stop_is_a_stop_whatever_else_it_says(hub, ends, press):
     assert (STOP, b"") in ends[0].receive()
 
 
-def test_a_server_that_was_stopped_hears_the_stop():
-    """The web server itself stands still; a page says 600 messages, another one STOP, before it goes on."""
+@pytest.mark.parametrize("who", ["driver", "watcher"])
+def test_a_server_that_was_stopped_hears_the_stop(who):
+    """The web server itself stands still; a page says 600 messages, then it or another one STOP."""
     with server() as served:
         stage(served)
         robot = Robot(served.pipe)
@@ -238,11 +239,13 @@ def test_a_server_that_was_stopped_hears_the_stop():
             show(served, n=2)
             for number in range(BURST):
                 driver.send(drive(number, stamp, HELD))
-            watcher.send(ask_for("stop", press=3))
+            {"driver": driver, "watcher": watcher}[who].send(ask_for("stop", press=3))
             driver.send(drive(BURST, stamp))
             driver.send(drive(BURST + 1, stamp, HELD))
             os.kill(served.process.pid, signal.SIGCONT)
+            deadline = time.monotonic() + 60.0
             while robot.person.phase is not Phase.STOPPED:
+                assert time.monotonic() < deadline
                 robot.moves()
                 time.sleep(0.01)
             number = BURST + 2

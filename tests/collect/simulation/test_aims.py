@@ -47,6 +47,41 @@ def test_every_task_says_where_the_hand_is_to_be_brought(name):
         assert np.isfinite(aim.position).all()
 
 
+def done(env, state, position):
+    """Return what the judge says of an open hand 7.9 and 8.1 cm from a place, on all of its six sides."""
+
+    def around(far):
+        tools = [Pose(position + far * side, np.eye(3)) for side in (*np.eye(3), *-np.eye(3))]
+        return {env.task.outcome(replace(state, opening=1.0, tool=tool)).success for tool in tools}
+
+    return around(0.079), around(0.081)
+
+
+def test_the_hand_is_led_to_the_handle_of_the_drawer_however_far_it_is_open():
+    """Who holds it has not let go, and who is 8 cm away has."""
+    with environment("Drawer") as env:
+        env.reset(seed=1)
+        state, into = env.task_state(), env.task_state().object("cabinet").rotation[:, 0]
+        shut = state.pose("drawer")
+        poses = {**state.poses, "drawer": Pose(shut.position - 0.3 * into, shut.rotation)}
+        state = replace(state, poses=poses)
+        aim = aim_of(env, state)
+        assert done(env, state, aim.position) == ({False}, {True})
+        assert aim.rotation is not None
+        np.testing.assert_allclose(aim.rotation[:, 2], into, atol=1e-9)
+
+
+def test_the_hand_is_led_to_where_it_puts_the_tray_on_the_middle_of_the_table():
+    with environment("Tray") as env:
+        env.reset(seed=1)
+        state, table = env.task_state(), env.task_state().object("table")
+        place = np.array([*table.position[:2], table.top])
+        can = Pose(place + [0.0, 0.0, 0.05], np.eye(3))
+        poses = {**state.poses, "tray": Pose(place, np.eye(3)), "can": can}
+        state, aim = replace(state, poses=poses, still=frozenset({"tray"})), aim_of(env, state)
+        assert done(env, state, aim.position) == ({False}, {True})
+
+
 def test_the_hand_is_led_to_the_cube_then_to_the_bin():
     with environment("PickPlace") as env:
         env.reset(options={"start": over_cube(env, 3, 0.0)})
