@@ -12,8 +12,10 @@ from handrail.collect.envs.env import Observation
 from handrail.collect.envs.observation import box_space
 from handrail.collect.envs.obstacle_numbers import MOST, WIDTH, to_numbers
 from handrail.collect.lerobot.mode_action import ModeAction
+from handrail.collect.operators.modes import MODES, TeleopMode
 from handrail.collect.session.build import build_controller, build_env, build_mode
-from handrail.collect.session.driver import Driver
+from handrail.collect.session.loop import EpisodeLoop
+from handrail.collect.session.mode_controller import ModeController
 from handrail.collect.simulation.rendering import Painter
 from handrail.controllers.baselines.direct import DirectController
 from handrail.controllers.errors import HandrailError
@@ -53,8 +55,16 @@ class EvaluatedEnv(gymnasium.Wrapper[Observation, NDArray[np.float32], Observati
         super().__init__(env)
         self._env, self._first_seed, self._painter = env, first_seed, None
         self._channels = Channels.of(env.model.description)
-        self._direct = DirectController(env.model, env.period)
-        self._action, self._controller = self._steered(config, fps) if mode else (None, self._direct)
+        self._mode = build_mode(config, env.model) if mode else MODES["direct"]
+        self._action = ModeAction(self._mode, self._channels) if mode else None
+        direct = DirectController(env.model, env.period)
+
+        def build(taken: TeleopMode) -> Controller:
+            whole = taken is MODES["direct"]
+            return direct if whole else build_controller(taken, env.model, fps, config.task)
+
+        modes = {each.name: each for each in (MODES["direct"], self._mode)}
+        self._loop = EpisodeLoop(env, ModeController(modes, build, self._mode))
         self._joined = scene_in_state
         self.observation_space = self._space_shown(env.observation_space)
         size = len(self._action.names) if self._action else env.model.size + 1
@@ -75,12 +85,8 @@ class EvaluatedEnv(gymnasium.Wrapper[Observation, NDArray[np.float32], Observati
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
         """Begin an episode."""
-        observation, info = self._env.reset(seed=None if seed is None else seed + self._first_seed)
-        self._driver, self._whole = (
-            Driver(each, self._env, self._env.period) for each in (self._controller, self._direct)
-        )
-        self._steps = 0
-        return self._shown(observation), _plain(info)
+        self._loop.begin(None if seed is None else seed + self._first_seed)
+        return self._shown(self._loop.observation), _plain(self._loop.info)
 
     def step(self, action: ArrayLike) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Do what an action asks for, for one period.
@@ -96,11 +102,11 @@ class EvaluatedEnv(gymnasium.Wrapper[Observation, NDArray[np.float32], Observati
                 " --env.mode is for policies that write a mode's channels, and for no others"
             )
         channels = self._action is not None and numbers.shape == self.action_space.shape
-        driver = self._driver if channels else self._whole
-        driver.drive(self._steps, self._env.state(), self._intent(numbers, channels))
-        observation, reward, terminated, truncated, info = self._env.step(driver.action(self._steps))
-        self._steps += 1
-        return self._shown(observation), reward, terminated, truncated, _plain(info)
+        loop = self._loop
+        loop.look()
+        frame = loop.step(self._intent(numbers, channels))
+        over, cut_short = loop.terminated, loop.done and not loop.terminated
+        return self._shown(loop.observation), float(frame.success), over, cut_short, _plain(loop.info)
 
     def render(self) -> NDArray[np.uint8]:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Return a quick picture from the scene camera: LeRobot films every step of ten episodes."""
@@ -125,7 +131,7 @@ class EvaluatedEnv(gymnasium.Wrapper[Observation, NDArray[np.float32], Observati
             return self._action.decided(numbers, time)
         values = np.zeros(self._channels.size)
         values[self._channels.joint_slice] = numbers[:-1]
-        return Intent(values, self._channels.mask("joint"), gripper, time=time)
+        return Intent(values, self._channels.mask("joint"), gripper, "direct", time)
 
     def _space_shown(self, plain: spaces.Space[Any]) -> spaces.Dict:
         assert isinstance(plain, spaces.Dict)
@@ -147,10 +153,6 @@ class EvaluatedEnv(gymnasium.Wrapper[Observation, NDArray[np.float32], Observati
             "sent": state.commanded.astype(np.float32),
             "obstacles": to_numbers(self._env.obstacles()),
         }
-
-    def _steered(self, config: SessionConfig, fps: int) -> tuple[ModeAction, Controller]:
-        mode = build_mode(config, self._env.model)
-        return ModeAction(mode, self._channels), build_controller(mode, self._env.model, fps, config.task)
 
 
 def _plain(info: dict[str, Any]) -> dict[str, Any]:

@@ -42,7 +42,7 @@ class HandrailScripted(SimTeleoperator):
         self._begun = 0
 
     def _act(self, session: Stepwise) -> dict[str, float]:
-        phase = self._clock.phase(session.done)
+        phase = self._clock.phase(session.loop.done)
         if phase is not Phase.DRIVE:
             return session.action.still(session.gripper) | {NEXT if phase is Phase.NEXT else HOLD: 1.0}
         if session.episodes != self._begun:

@@ -1,6 +1,5 @@
 """A session that somebody else's loop runs, one period at a time."""
 
-import time
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -13,25 +12,23 @@ from handrail.collect.lerobot.mode_action import ModeAction
 from handrail.collect.lerobot.names import lerobot_name
 from handrail.collect.operators.human.steering import FOLLOW
 from handrail.collect.operators.modes import MODES
-from handrail.collect.operators.operator import View
+from handrail.collect.operators.operator import EpisodeEvent, View
 from handrail.collect.seeds import evaluation_seed
 from handrail.collect.session.build import build_controller, build_env, build_mode
-from handrail.collect.session.driver import Driver
+from handrail.collect.session.loop import EpisodeLoop
 from handrail.collect.session.mode_controller import ModeController
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.command import Diagnostics, Status
-from handrail.controllers.interface.intent import Intent
+from handrail.controllers.interface.intent import LONG_AGO, Intent
 from handrail.datasets.recording.frames import Frame, finite_distance
 
-_CREEP = 1e-3  # slower, a robot that is held is sent rest [m/s, rad/s]
 _TOWARD = MODES["joints"]  # the mode in which joints are led to positions
-_LONG_AGO = -1e6  # when nobody who steers has asked last [s]
 _STATUSES = tuple(Status)
 
 
 class Stepwise:
-    """A robot in its world, a task and a controller; who asks has the loop.
+    """An episode loop in LeRobot's words; the caller steps it.
 
     Args:
         config: of the session.
@@ -46,15 +43,12 @@ class Stepwise:
         action: what is asked for every period.
         scene: number of the episode's beginning.
         episodes: how many have begun.
-        view: what there is to see now.
-        success: whether the task succeeded in this episode.
-        done: whether it is over, as the task judges.
+        loop: of the episode.
         frame: what happened in the last period; None before any.
         driven: whether an intent was completed in this episode.
         led: where the joints were led in the last period, (n,) [m, rad]; None if they were not.
     """
 
-    view: View
     frame: Frame | None
     led: FloatArray | None
 
@@ -68,27 +62,31 @@ class Stepwise:
         self.action = ModeAction(self.mode, self._channels)
         build = partial(build_controller, model=self.env.model, fps=fps, task=config.task)
         modes = {mode.name: mode for mode in (_TOWARD, self.mode)}
-        self._controller = ModeController(modes, build, self.mode)
-        self._steps = self.brakes = self.episodes = 0
-        self.scene, self.success, self.done, self.frame = -1, False, False, None
+        self.loop = EpisodeLoop(self.env, ModeController(modes, build, self.mode))
+        self.scene, self.episodes, self.frame = -1, 0, None
 
     def begin(self, scene: int) -> None:
         """Begin an episode in a scene, by its number: the same number, the same beginning."""
-        self.scene, self._steps, self.brakes = scene, 0, 0
+        self.scene = scene
         self.episodes += 1
-        self._started, self.frame = time.perf_counter(), None
-        self._observation, self._info = self.env.reset(seed=self.seed)
-        self._driver = Driver(self._controller, self.env, self.env.period)
-        self._diagnostics = Diagnostics()
-        self.success = self.done = self.driven = False
-        self.led = None
-        self._look()
+        self.loop.begin(self.seed)
+        self.driven, self.led, self.frame = False, None, None
 
     @property
     def seed(self) -> int:
         """Of the episode."""
         seed_of = evaluation_seed if self._evaluation else episode_seed
         return seed_of(self.config.seed, self.scene)
+
+    @property
+    def view(self) -> View:
+        """What there is to see now."""
+        return self.loop.look()
+
+    @property
+    def brakes(self) -> int:
+        """Updates of this episode in which the controller braked the robot."""
+        return self.loop.tally.brakes
 
     def step(self, intent: Intent) -> None:
         """Let the controller complete an intent, and the robot move for a period."""
@@ -97,9 +95,10 @@ class Stepwise:
 
     def hold(self) -> None:
         """Brake; once the robot rests, time stands still."""
-        if np.any(self.view.state.commanded):
-            nothing = Intent.idle(self._channels, _LONG_AGO)
-            self._move(replace(nothing, gripper=self.gripper, mode=self.mode.name), stops=True)
+        self.loop.look()
+        if not self.loop.rests:
+            nothing = Intent.idle(self._channels, LONG_AGO)
+            self._move(replace(nothing, gripper=self.gripper, mode=self.mode.name), EpisodeEvent.PAUSE)
 
     def lead(self, positions: FloatArray) -> None:
         """Lead the joints towards positions for a period, whatever the mode; that is no part of the task.
@@ -107,54 +106,22 @@ class Stepwise:
         Args:
             positions: (n,) [m, rad].
         """
-        judged, fastest = (self.success, self.done), self.env.model.description.limits.velocity
+        fastest, state = self.env.model.description.limits.velocity, self.view.state
         values, before = np.zeros(self._channels.size), positions if self.led is None else self.led
-        toward = (positions - before) * self.fps + FOLLOW * (positions - self.view.state.q)
+        toward = (positions - before) * self.fps + FOLLOW * (positions - state.q)
         values[self._channels.joint_slice] = np.clip(toward, -fastest, fastest)
-        mask, now = self._channels.mask("joint"), self.view.state.time
-        self._move(Intent(values, mask, self.gripper, _TOWARD.name, now))
-        self.led, (self.success, self.done) = positions, judged
+        mask = self._channels.mask("joint")
+        self._move(Intent(values, mask, self.gripper, _TOWARD.name, state.time), counts=False)
+        self.led = positions
 
     @property
     def gripper(self) -> float:
         """What the gripper was sent last, 0 open, 1 closed."""
-        return float(self._info["sent"][-1])
+        return float(self.loop.info["sent"][-1])
 
-    def _move(self, intent: Intent, stops: bool = False) -> None:
-        self.led = None
-        seen, wall_clock = self._observation, time.perf_counter() - self._started
-        self._driver.drive(self._steps, self.view.state, intent)
-        self._diagnostics = self._driver.command.diagnostics
-        self.brakes += Status(self._diagnostics.status).brakes
-        sent = self._driver.action(self._steps)
-        if stops and np.abs(sent[:-1]).max() < _CREEP:
-            sent[:-1] = 0.0  # a controller may come ever nearer to rest
-        commanded = time.perf_counter() - self._started
-        self._observation, _, terminated, truncated, self._info = self.env.step(sent)
-        self.success |= bool(self._info["is_success"])
-        self.done |= terminated or truncated
-        self.frame = Frame(
-            state=seen["agent_pos"],
-            environment=seen["environment_state"],
-            images=seen.get("pixels", {}),
-            intent=intent,
-            action=self._info["sent"],
-            command=sent.astype(np.float32),
-            diagnostics=self._diagnostics,
-            contacts=self._info["contacts"],
-            success=self.success,
-            done=self.done,
-            wall_clock=wall_clock,
-            number=self._steps,
-            safe=self._steps + 1,
-            plan=self._driver.command.plan or self._driver.command,
-            commanded=commanded,
-        )
-        self._steps += 1
-        self._look()
-
-    def _look(self) -> None:
-        self.view = View(self.env.robot.state(), self.env.task_state(), self._observation)
+    def _move(self, intent: Intent, event: EpisodeEvent | None = None, counts: bool = True) -> None:
+        self.loop.look()
+        self.frame, self.led = self.loop.step(intent, event, counts), None
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -171,22 +138,22 @@ class Stepwise:
         The mode is its place in the list of modes, −1 for a mask of one's own; the status that of `Status`;
         the distance the smallest one now, cut to 10 m.
         """
-        seen = self._observation
+        seen = self.loop.observation
         numbers = [*seen["agent_pos"], *seen["environment_state"]]
         if self._told:
             modes = list(MODES)
             mode = modes.index(self.mode.name) if self.mode.name in modes else -1
-            status = _STATUSES.index(Status(self._diagnostics.status))
-            distance = finite_distance(self._diagnostics.smallest_distance)
-            contacts = self._info["contacts"]
-            told = (mode, status, distance, contacts, self.brakes, self.success, self.scene)
-            numbers += [*self._info["sent"], *told]
+            diagnostics, info = self.frame.diagnostics if self.frame else Diagnostics(), self.loop.info
+            status = _STATUSES.index(Status(diagnostics.status))
+            distance = finite_distance(diagnostics.smallest_distance)
+            told = (mode, status, distance, info["contacts"], self.brakes, self.loop.success, self.scene)
+            numbers += [*info["sent"], *told]
         return dict(zip(self.names, map(float, numbers), strict=True))
 
     @property
     def pictures(self) -> dict[str, Any]:
         """What the cameras see, (height, width, 3) uint8 each."""
-        return dict(self._observation.get("pixels", {}))
+        return dict(self.loop.observation.get("pixels", {}))
 
     def close(self) -> None:
         """Give the pictures' contexts back."""

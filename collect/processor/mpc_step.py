@@ -33,6 +33,7 @@ from handrail.controllers.errors import HandrailError, message_of, shown
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.command import Diagnostics
 from handrail.controllers.interface.frames import Frames
+from handrail.controllers.interface.intent import LONG_AGO
 from handrail.controllers.mpc.masked_mpc import MaskedMpc
 from handrail.controllers.objectives.regularisation import narrow_joint_centring
 from handrail.controllers.ocp.settings import MpcSettings
@@ -42,7 +43,6 @@ from handrail.datasets.storage.strict_json import load_json
 
 NAME = "handrail_masked_mpc"
 _CENTRED = 10.0  # weight of the middle of joints that cannot turn half around
-_LONG_AGO = -1e6  # when nobody who is listened to has asked [s]
 _KEPT = (
     *("robot", "units", "fps", "inputs", "tool_frame", "base_frame", "gripper"),
     *("obstacles", "start", "settings", "timeout"),
@@ -133,7 +133,7 @@ class MaskedMpcStep(RobotActionProcessorStep):
         state = self._body.observe(self.transition.get(TransitionKey.OBSERVATION), now)
         intent = self._intent.read(action, self._body.targets, self._body.opening, now)
         if self._body.trouble:
-            intent = replace(intent, time=_LONG_AGO)
+            intent = replace(intent, time=LONG_AGO)
         command = self._mpc.update(state, intent)
         self.diagnostics = command.diagnostics
         self._count(command.diagnostics)

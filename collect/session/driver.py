@@ -3,32 +3,11 @@
 import numpy as np
 
 from handrail.collect.envs.env import HandrailEnv
+from handrail.collect.session.rate import Rate
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.interface.command import Command
 from handrail.controllers.interface.controller import Controller, State
 from handrail.controllers.interface.intent import Intent
-
-_ROUNDING = 1e-9  # [s]
-
-
-class Rate:
-    """Says at which steps something is due that happens once a period; the first time at once.
-
-    Args:
-        period: [s].
-        start: when it is due first [s].
-    """
-
-    def __init__(self, period: float, start: float = 0.0) -> None:
-        self._period, self._next = period, start
-
-    def due(self, time: float) -> bool:
-        """Whether it is due at a step's time [s]."""
-        return time >= self._next - _ROUNDING
-
-    def take(self) -> None:
-        """Take note that it happens."""
-        self._next += self._period
 
 
 class Driver:

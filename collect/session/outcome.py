@@ -11,7 +11,6 @@ import numpy as np
 
 from handrail.collect.operators.operator import EpisodeEvent
 from handrail.controllers.interface.command import Command, Status
-from handrail.datasets.quality.safety import contacts_begun
 
 _NOT_DONE = "judge: not done"  # why an episode failed that the operator calls a success
 
@@ -79,14 +78,16 @@ class Tally:
 
     def __init__(self, seed: int, period: float) -> None:
         self._seed, self._period = seed, period
-        self._started, self._start = time.time(), time.perf_counter()
-        self.frames = self.undos = 0
-        self._brakes = self._late = self._held = 0
-        self._deadline = 0.0
-        self._contacts: list[int] = []
+        self.frames = self.undos = self.brakes = 0
+        self._late = self._held = self._contacts = self._contacts_begun = self._contact_periods = 0
         self._smallest = np.inf
         self._spent: dict[str, float] = {}
         self.solve_times: list[float] = []
+        self.start()
+
+    def start(self) -> None:
+        """Let the clock begin now."""
+        self._started, self._start, self._deadline = time.time(), time.perf_counter(), 0.0
 
     @property
     def elapsed(self) -> float:
@@ -103,29 +104,26 @@ class Tally:
     def updated(self, command: Command) -> None:
         """Count an update of the controller."""
         self.solve_times.append(command.diagnostics.solve_time)
-        self._brakes += Status(command.diagnostics.status).brakes
+        self.brakes += Status(command.diagnostics.status).brakes
         self._smallest = min(self._smallest, command.diagnostics.smallest_distance)
 
     def moved(self, contacts: int) -> None:
         """Count a period of the robot."""
         self.frames += 1
-        self._contacts.append(contacts)
+        self._contacts_begun += max(contacts - self._contacts, 0)
+        self._contact_periods += contacts > 0
+        self._contacts = contacts
 
     def held(self) -> None:
         """Count a period in which a paused robot stood still."""
         self._held += 1
 
-    def mark(self) -> "Tally":
-        """Return what was counted so far."""
-        marked = copy(self)
-        marked._contacts = list(self._contacts)
-        return marked
-
-    def undo(self, marked: "Tally") -> None:
-        """Forget what the robot did since a mark; how often that happened, and the clock, go on."""
-        self.frames, self._brakes = marked.frames, marked._brakes
-        self._contacts, self._smallest = list(marked._contacts), marked._smallest
-        self.undos += 1
+    def back_to(self, before: "Tally") -> "Tally":
+        """Return the counts of an earlier moment; how often that happened, and the clock, go on."""
+        tally = copy(before)
+        tally.undos, tally._late, tally._held = self.undos + 1, self._late, self._held
+        tally._deadline = self._deadline
+        return tally
 
     def pace(self) -> None:
         """Wait for the end of the period, or note that it is over.
@@ -161,10 +159,10 @@ class Tally:
             frames=self.frames,
             seconds=self.frames * self._period,
             wall_time=self.elapsed,
-            brakes=self._brakes,
+            brakes=self.brakes,
             late=self._late,
-            contacts=int(contacts_begun(self._contacts)),
-            contact_periods=int(np.count_nonzero(self._contacts)),
+            contacts=self._contacts_begun,
+            contact_periods=self._contact_periods,
             smallest_distance=float(self._smallest),
             spent=dict(self._spent),
             started=self._started,

@@ -1,34 +1,32 @@
-"""The one loop that runs task, operator, controller and recorder: observe, ask, complete, act, record.
+"""Runs episodes by the wall clock: an operator steers, observers watch.
 
 ```
-view ─▶ operator ─ intent ─▶ controller ─ command ─▶ env.step ─▶ robot.send   at the robot's rate,
-          │                  (at its own rate)          │                     along the command's trajectory
-          └ event: end, throw away, begin again, pause  └─▶ frame ─▶ observers (at the recording rate)
+view ─▶ operator ─ intent ─▶ loop.step ─▶ frame ─▶ observers (at the recording rate)
+          └ event: end, throw away, begin again, pause, go back
 ```
 """
 
 import gc
 import logging
 from collections.abc import Callable, Sequence
-from copy import copy
 from dataclasses import replace
-from typing import NamedTuple, Protocol
+from typing import Protocol
 
 import numpy as np
 
 from handrail.collect.envs.env import HandrailEnv
-from handrail.collect.operators.operator import EpisodeEvent, Operator, View
-from handrail.collect.session.driver import Driver, Rate
+from handrail.collect.operators.operator import EpisodeEvent, Operator
+from handrail.collect.session.loop import Disturbance, EpisodeLoop
 from handrail.collect.session.outcome import Outcome, Tally
+from handrail.collect.session.rate import Sampling
+from handrail.collect.session.undo import Undo
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import Controller
-from handrail.controllers.interface.intent import Intent
+from handrail.controllers.interface.intent import LONG_AGO, Intent
 from handrail.controllers.numerics.threads import single_threaded
 from handrail.datasets.recording.frames import Frame
 
 _log = logging.getLogger(__name__)
-_CREEP = 1e-3  # slower, a paused robot is sent rest [m/s, rad/s]
-_LONG_AGO = -1e6  # when nobody who steers has asked last [s]
 
 
 class Observer(Protocol):
@@ -43,33 +41,8 @@ class Observer(Protocol):
         ...
 
 
-class Disturbance(Protocol):
-    """Something from outside that acts on the robot: pushes."""
-
-    def begin(self, env: HandrailEnv, seed: int) -> None:
-        """Take note that an episode begins."""
-        ...
-
-    def act(self) -> None:
-        """Act during the period that begins now."""
-        ...
-
-
-class _Mark(NamedTuple):
-    """A moment to come back to."""
-
-    world: object
-    tally: Tally
-    recording: Rate
-    frame: Frame | None
-    number: int
-
-
 class Session:
     """Runs episodes.
-
-    The robot is sent a command every step of the environment; a controller that is asked less often says what
-    to send in between.
 
     Args:
         env: a robot, its world and a task.
@@ -96,14 +69,10 @@ class Session:
         undoes: bool = False,
     ) -> None:
         self.env = env
-        self._controller = controller
-        self._operator = operator
-        self._observers = observers
-        self._realtime = realtime
-        self._disturbances = disturbances
-        self._control_period = control_period or env.period
+        self._loop = EpisodeLoop(env, controller, control_period, disturbances)
+        self._operator, self._observers = operator, observers
+        self._realtime, self._undoes = realtime, undoes
         self._record_period = record_period or env.period
-        self._undoes = undoes
 
     def warm_up(self, seed: int, operator: Operator) -> None:
         """Run an episode that nobody sees, so that what is compiled or built at its first use is there.
@@ -112,9 +81,7 @@ class Session:
             seed: of the episode.
             operator: steers in every way that there will be.
         """
-        unseen = copy(self)
-        unseen._operator, unseen._observers, unseen._realtime = operator, (), False
-        unseen.run(seed)
+        self._run(seed, operator, (), False)
 
     def run(self, seed: int, tell_paused: Callable[[bool], None] = lambda paused: None) -> Outcome:
         """Run one episode and return how it went; the same seed gives the same episode.
@@ -126,143 +93,86 @@ class Session:
             seed: of the episode.
             tell_paused: is told when the operator pauses, and when they go on.
         """
+        return self._run(seed, self._operator, self._observers, self._realtime, tell_paused)
+
+    def _run(
+        self,
+        seed: int,
+        operator: Operator,
+        observers: Sequence[Observer],
+        realtime: bool,
+        tell_paused: Callable[[bool], None] = lambda paused: None,
+    ) -> Outcome:
+        loop, tell = self._loop, _Change(tell_paused)
         with single_threaded():
-            self._begin(seed)
+            if realtime:
+                _tidy()
+            operator.reset(loop.begin(seed), np.random.default_rng([seed, 1]))
+            for observer in observers:
+                observer.begin(self.env, seed)
+            loop.tally.start()
+            sampling = Sampling(self._record_period)
+            undo = Undo(loop, sampling) if self._undoes else None
+            asked, event = Intent.idle(Channels.of(self.env.model.description)), None
             try:
-                while not self._done:
-                    self._listen(tell_paused)
-                    if self._event is not None and self._event.drops:
+                while not loop.done:
+                    asked, event = _listen(loop, operator, asked)
+                    tell(event is EpisodeEvent.PAUSE)
+                    if event is not None and event.drops:
                         break
-                    if self._event is EpisodeEvent.UNDO and self._undoes:
-                        self._undo()
-                    elif self._event is EpisodeEvent.PAUSE and self._rests:
-                        self._mark()
-                        self._tally.held()
-                    else:
-                        self._show(self._step())
-                    if self._realtime:
-                        self._tally.pace()
+                    if event is EpisodeEvent.UNDO and undo:
+                        sampling = undo.back(sampling)
+                    elif event is EpisodeEvent.PAUSE and loop.rests:
+                        if undo:
+                            undo.mark(sampling)
+                        loop.tally.held()
+                    elif frame := sampling.add(loop.step(asked, event), loop.time):
+                        _show(replace(frame, safe=undo.safe) if undo else frame, loop.tally, observers)
+                    if realtime:
+                        loop.tally.pace()
             finally:
                 self.env.robot.stop()
-                self._warn_if_slow()
-            paused = self._event is EpisodeEvent.PAUSE
-            return self._tally.outcome(self._info, None if paused else self._event, not self.env.real)
+                self._warn_if_slow(loop.tally, realtime)
+        ended_by = None if event is EpisodeEvent.PAUSE else event
+        return loop.tally.outcome(loop.info, ended_by, not self.env.real)
 
-    def _warn_if_slow(self) -> None:
+    def _warn_if_slow(self, tally: Tally, realtime: bool) -> None:
         """Warn when more than one update in a hundred took longer than the period, in real time."""
-        slow = [seconds for seconds in self._tally.solve_times if seconds > self._control_period]
-        often = 100 * len(slow) > len(self._tally.solve_times)
-        if often and (self._realtime or self.env.real):
+        period = self._loop.control_period
+        slow = [seconds for seconds in tally.solve_times if seconds > period]
+        if 100 * len(slow) > len(tally.solve_times) and (realtime or self.env.real):
             _log.warning(
                 "controller: %d of %d updates took longer than the period of %.0f ms, the longest %.0f ms",
-                *(len(slow), len(self._tally.solve_times)),
-                *(1e3 * self._control_period, 1e3 * max(slow)),
+                *(len(slow), len(tally.solve_times), 1e3 * period, 1e3 * max(slow)),
             )
 
-    def _begin(self, seed: int) -> None:
-        if self._realtime:
-            _tidy()
-        self._observation, self._info = self.env.reset(seed=seed)
-        self._driver = Driver(self._controller, self.env, self._control_period)
-        self._operator.reset(self._view(), np.random.default_rng([seed, 1]))
-        for other in (*self._observers, *self._disturbances):
-            other.begin(self.env, seed)
-        self._tally, self._recording = Tally(seed, self.env.period), Rate(self._record_period)
-        self._recording.take()
-        self._intent = Intent.idle(Channels.of(self.env.model.description))
-        self._event: EpisodeEvent | None = None
-        self._frame: Frame | None = None
-        self._done, self._number = False, 0
-        self._marked: _Mark | None = None
-        self._mark()
 
-    def _mark(self) -> None:
-        """Take note of this moment, to come back to; the robot rests."""
-        if self._undoes and (self._marked is None or self._marked.tally.frames < self._tally.frames):
-            now = self.env.checkpoint(), self._tally.mark(), copy(self._recording), self._frame, self._number
-            self._marked = _Mark(*now)
+def _show(frame: Frame, tally: Tally, observers: Sequence[Observer]) -> None:
+    with tally.timed("observers"):
+        for observer in observers:
+            observer.see(frame)
 
-    def _undo(self) -> None:
-        """Go back to the moment that was noted last."""
-        marked = self._marked
-        if marked is None or marked.tally.frames == self._tally.frames:
-            return
-        self._observation, self._info = self.env.restore(marked.world)
-        self._tally.undo(marked.tally)
-        self._recording, self._frame, self._number = copy(marked.recording), marked.frame, marked.number
-        self._driver = Driver(self._controller, self.env, self._control_period, self._tally.frames)
 
-    def _listen(self, tell_paused: Callable[[bool], None]) -> None:
-        """Ask the operator; while they do not steer, what the controller hears is stale, and it brakes."""
-        self._wall_clock, before = self._tally.elapsed, self._event
-        with self._tally.timed("operator"):
-            view = self._view()
-            asked = self._operator.act(view)
-        self._state = view.state
-        if isinstance(asked, EpisodeEvent):
-            self._event = asked
-            self._intent = replace(self._intent, mask=np.zeros_like(self._intent.mask), time=_LONG_AGO)
-        else:
-            self._event, self._intent = None, asked
-        if EpisodeEvent.PAUSE in (before, self._event) and before is not self._event:
-            tell_paused(self._event is EpisodeEvent.PAUSE)
+class _Change:
+    """Tells whether something is so, whenever that changes."""
 
-    def _step(self) -> Frame:
-        """Move the robot for one of its periods; return what happened."""
-        env, tally, observation = self.env, self._tally, self._observation
-        with tally.timed("controller"):
-            if self._driver.drive(tally.frames, self._state, self._intent):
-                tally.updated(self._driver.command)
-            action = self._driver.action(tally.frames)
-            if self._event is EpisodeEvent.PAUSE and np.abs(action[:-1]).max() < _CREEP:
-                action[:-1] = 0.0  # a controller may come ever nearer to rest
-        commanded = tally.elapsed
-        with tally.timed("environment"):
-            for disturbance in self._disturbances:
-                disturbance.act()
-            self._observation, _, terminated, truncated, self._info = env.step(action)
-        tally.moved(self._info["contacts"])
-        judged = self._event is not None and self._event.judges
-        self._done = terminated or truncated or judged
-        return Frame(
-            state=observation["agent_pos"],
-            environment=observation["environment_state"],
-            images=observation.get("pixels", {}),
-            intent=self._intent,
-            action=self._info["sent"],
-            command=action.astype(np.float32),
-            diagnostics=self._driver.command.diagnostics,
-            contacts=self._info["contacts"],
-            success=self._event is EpisodeEvent.SUCCESS
-            if judged and env.real
-            else bool(self._info["is_success"]),
-            done=self._done,
-            wall_clock=self._wall_clock,
-            number=self._number,
-            safe=self._marked.number if self._marked else self._number + 1,
-            undos=self._tally.undos,
-            plan=self._driver.command.plan or self._driver.command,
-            commanded=commanded,
-        )
+    def __init__(self, tell: Callable[[bool], None]) -> None:
+        self._tell, self._before = tell, False
 
-    def _show(self, frame: Frame) -> None:
-        """Show the observers a frame when its time is over."""
-        self._frame = frame if self._frame is None else _lasting(self._frame, frame)
-        if not (self._done or self._recording.due(self._tally.frames * self.env.period)):
-            return
-        with self._tally.timed("observers"):
-            for observer in self._observers:
-                observer.see(self._frame)
-        self._recording.take()
-        self._frame, self._number = None, self._number + 1
+    def __call__(self, now: bool) -> None:
+        if now is not self._before:
+            self._tell(now)
+        self._before = now
 
-    @property
-    def _rests(self) -> bool:
-        commanded = self._state.commanded
-        return commanded is not None and not commanded.any()
 
-    def _view(self) -> View:
-        return View(self.env.robot.state(), self.env.task_state(), self._observation)
+def _listen(loop: EpisodeLoop, operator: Operator, before: Intent) -> tuple[Intent, EpisodeEvent | None]:
+    """Ask the operator; while they do not steer, what the controller hears is stale, and it brakes."""
+    view = loop.look()
+    with loop.tally.timed("operator"):
+        asked = operator.act(view)
+    if isinstance(asked, EpisodeEvent):
+        return replace(before, mask=np.zeros_like(before.mask), time=LONG_AGO), asked
+    return asked, None
 
 
 def _tidy() -> None:
@@ -270,16 +180,3 @@ def _tidy() -> None:
     gc.unfreeze()
     gc.collect()
     gc.freeze()
-
-
-def _lasting(first: Frame, last: Frame) -> Frame:
-    """Return the frame of some periods: observed and asked at the first one, sent at the last one."""
-    return replace(
-        last,
-        state=first.state,
-        environment=first.environment,
-        images=first.images,
-        intent=first.intent,
-        wall_clock=first.wall_clock,
-        contacts=max(first.contacts, last.contacts),
-    )

@@ -1,5 +1,6 @@
 """What Handrail records of every moment: the columns of a frame."""
 
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -51,7 +52,7 @@ class Frame:
     done: bool
     wall_clock: float
     number: int
-    safe: int
+    safe: int = sys.maxsize
     undos: int = 0
     plan: Trajectory | None = None
     commanded: float = 0.0

@@ -1,0 +1,203 @@
+"""One episode, step by step: look, let the controller complete what is asked, move the robot.
+
+```
+look ─▶ view            whoever has the loop decides what is asked
+step(intent) ─▶ controller ─ command ─▶ env.step ─▶ robot.send ─▶ frame
+               (at its own rate)        at the robot's rate, along the command's trajectory
+```
+"""
+
+from collections.abc import Sequence
+from copy import copy
+from dataclasses import dataclass, replace
+from typing import Any, Protocol
+
+import numpy as np
+
+from handrail.collect.envs.env import HandrailEnv, Observation
+from handrail.collect.operators.operator import EpisodeEvent, View
+from handrail.collect.session.driver import Driver
+from handrail.collect.session.outcome import Tally
+from handrail.controllers.interface.controller import Controller
+from handrail.controllers.interface.intent import Intent
+from handrail.datasets.recording.frames import Frame
+
+_CREEP = 1e-3  # slower, a robot that brakes is sent rest [m/s, rad/s]
+
+
+class Disturbance(Protocol):
+    """Something from outside that acts on the robot: pushes."""
+
+    def begin(self, env: HandrailEnv, seed: int) -> None:
+        """Take note that an episode begins."""
+        ...
+
+    def act(self) -> None:
+        """Act during the period that begins now."""
+        ...
+
+
+@dataclass
+class _Moment:
+    """Everything that lasts from one step of an episode to the next."""
+
+    observation: Observation
+    info: dict[str, Any]
+    driver: Driver
+    tally: Tally
+    view: View
+    success: bool = False
+    terminated: bool = False
+    truncated: bool = False
+    looked: float = 0.0  # wall time since the episode began [s]
+
+    @property
+    def done(self) -> bool:
+        return self.terminated or self.truncated
+
+
+class EpisodeLoop:
+    """A robot in its world, a task and a controller: `begin` an episode, then `look` and `step`.
+
+    The robot is sent a command every step of the environment; a controller that is asked less often says what
+    to send in between.
+
+    Args:
+        env: a robot, its world and a task.
+        controller: completes the intent.
+        control_period: of the controller [s]; the robot's by default.
+        disturbances: what acts on the robot from outside.
+    """
+
+    _now: _Moment
+
+    def __init__(
+        self,
+        env: HandrailEnv,
+        controller: Controller,
+        control_period: float | None = None,
+        disturbances: Sequence[Disturbance] = (),
+    ) -> None:
+        self.env, self._controller, self._disturbances = env, controller, disturbances
+        self.control_period = control_period or env.period
+
+    @property
+    def tally(self) -> Tally:
+        """The counts along the episode."""
+        return self._now.tally
+
+    @property
+    def info(self) -> dict[str, Any]:
+        """The environment's info of the last step."""
+        return self._now.info
+
+    @property
+    def observation(self) -> Observation:
+        """The observation after the last step."""
+        return self._now.observation
+
+    @property
+    def success(self) -> bool:
+        """Whether the task has succeeded in this episode."""
+        return self._now.success
+
+    @property
+    def terminated(self) -> bool:
+        """Whether the task or a person has ended the episode."""
+        return self._now.terminated
+
+    @property
+    def done(self) -> bool:
+        """Whether the episode is over, at the latest by its time limit."""
+        return self._now.done
+
+    @property
+    def time(self) -> float:
+        """Time since the episode began, on the robot's clock [s]."""
+        return self.tally.frames * self.env.period
+
+    def begin(self, seed: int | None) -> View:
+        """Begin an episode; the same seed begins the same one.
+
+        Args:
+            seed: of the environment.
+        """
+        observation, info = self.env.reset(seed=seed)
+        driver = Driver(self._controller, self.env, self.control_period)
+        tally = Tally(seed or 0, self.env.period)
+        self._now = _Moment(observation, info, driver, tally, self._view(observation))
+        for disturbance in self._disturbances:
+            disturbance.begin(self.env, seed or 0)
+        return self._now.view
+
+    def look(self) -> View:
+        """Return the robot and its world as they are now; the next step acts on that."""
+        self._now.looked = self.tally.elapsed
+        self._now.view = self._view(self._now.observation)
+        return self._now.view
+
+    @property
+    def rests(self) -> bool:
+        """Whether the robot was at rest at the last look, as it was told."""
+        commanded = self._now.view.state.commanded
+        return commanded is not None and not commanded.any()
+
+    def step(self, intent: Intent, event: EpisodeEvent | None = None, counts: bool = True) -> Frame:
+        """Move the robot for one of its periods; return what happened.
+
+        Args:
+            intent: what the operator asks for.
+            event: what they say of the episode; a judgement makes this step the last.
+            counts: whether the task judges this step.
+        """
+        env, now, seen, wall_clock = self.env, self._now, self._now.observation, self._now.looked
+        driver, tally = now.driver, now.tally
+        with tally.timed("controller"):
+            if driver.drive(tally.frames, now.view.state, intent):
+                tally.updated(driver.command)
+            action = driver.action(tally.frames)
+            if event is EpisodeEvent.PAUSE and np.abs(action[:-1]).max() < _CREEP:
+                action[:-1] = 0.0  # a controller may come ever nearer to rest
+        commanded = tally.elapsed
+        with tally.timed("environment"):
+            for disturbance in self._disturbances:
+                disturbance.act()
+            now.observation, _, terminated, truncated, now.info = env.step(action)
+        tally.moved(now.info["contacts"])
+        if counts:
+            judged, says = event is not None and event.judges, event is EpisodeEvent.SUCCESS
+            now.success |= says if judged and env.real else bool(now.info["is_success"])
+            now.terminated |= terminated or judged
+            now.truncated |= truncated
+        return Frame(
+            state=seen["agent_pos"],
+            environment=seen["environment_state"],
+            images=seen.get("pixels", {}),
+            intent=intent,
+            action=now.info["sent"],
+            command=action.astype(np.float32),
+            diagnostics=driver.command.diagnostics,
+            contacts=now.info["contacts"],
+            success=now.success,
+            done=now.done,
+            wall_clock=wall_clock,
+            number=tally.frames - 1,
+            undos=tally.undos,
+            plan=driver.command.plan or driver.command,
+            commanded=commanded,
+        )
+
+    def checkpoint(self) -> object:
+        """Return where the episode stands, to come back to."""
+        return self.env.checkpoint(), replace(self._now, tally=copy(self.tally))
+
+    def restore(self, checkpoint: Any) -> None:
+        """Come back to where the episode stood; the clock and what was spent go on."""
+        world, then = checkpoint
+        observation, info = self.env.restore(world)
+        tally = self.tally.back_to(then.tally)
+        driver = Driver(self._controller, self.env, self.control_period, tally.frames)
+        self._now = replace(then, observation=observation, info=info, driver=driver, tally=tally)
+
+    def _view(self, observation: Observation) -> View:
+        return View(self.env.robot.state(), self.env.task_state(), observation)
