@@ -1,7 +1,7 @@
 """What Handrail records of every moment: the columns of a frame."""
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -58,6 +58,58 @@ class Frame:
     commanded: float = 0.0
 
 
+@dataclass(frozen=True)
+class Column:
+    """A column of what is recorded of every moment.
+
+    Attributes:
+        name: of the column.
+        dtype: of its numbers.
+        value: what a frame has in it.
+        parts: which names its numbers have; none for a single one.
+    """
+
+    name: str
+    dtype: str
+    value: Callable[[Frame], Any]
+    parts: str = ""
+
+
+COLUMNS = (
+    Column("observation.state", "float32", lambda frame: frame.state, "state"),
+    Column("observation.environment_state", "float32", lambda frame: frame.environment, "environment"),
+    Column("action", "float32", lambda frame: frame.action, "velocities"),
+    Column("teleop.values", "float32", lambda frame: _asked(frame.intent), "asked"),
+    Column("teleop.mask", "bool", lambda frame: np.append(frame.intent.mask, True), "asked"),
+    Column("teleop.mode", "string", lambda frame: frame.intent.mode),
+    Column("teleop.raw", "float32", lambda frame: _raw(frame.intent), "channels"),
+    Column("teleop.axes", "int64", lambda frame: frame.intent.raw.axes),
+    Column("teleop.switches", "int64", lambda frame: frame.intent.raw.switches),
+    Column("teleop.device", "string", lambda frame: frame.intent.raw.device),
+    Column("teleop.age", "float32", lambda frame: _finite(frame.intent.raw.age)),
+    Column("teleop.round_trip", "float32", lambda frame: _finite(frame.intent.raw.round_trip)),
+    Column("teleop.undos", "int64", lambda frame: frame.undos),
+    Column("controller.command", "float32", lambda frame: frame.command, "velocities"),
+    Column("controller.solve_time", "float32", lambda frame: frame.diagnostics.solve_time),
+    Column("controller.status", "string", lambda frame: frame.diagnostics.status.value),
+    Column("controller.slack", "float32", lambda frame: _finite(frame.diagnostics.slack)),
+    Column(
+        "controller.smallest_distance", "float32", lambda f: finite_distance(f.diagnostics.smallest_distance)
+    ),
+    Column("controller.work_distance", "float32", lambda f: finite_distance(f.diagnostics.work_distance)),
+    Column("safety.contacts", "int64", lambda frame: frame.contacts),
+    Column("next.success", "bool", lambda frame: frame.success),
+    Column("next.done", "bool", lambda frame: frame.done),
+    Column("wall_clock", "float64", lambda frame: frame.wall_clock),
+)
+"""What is recorded of every moment, beside the pictures: one line a column.
+
+Policies read `observation.*` and write `action`; LeRobot leaves the rest alone.
+All numbers are finite: no tool's statistics may become NaN.
+"""
+_PICTURE = "observation.images."
+
+
 def frame_features(
     state: Sequence[str],
     environment: Sequence[str],
@@ -68,9 +120,6 @@ def frame_features(
 ) -> dict[str, Feature]:
     """Return the columns of a robot, a task and its cameras.
 
-    Policy inputs are under `observation.*`, the policy output is `action`; the rest is beside them, so that
-    LeRobot's policies do not read it.
-
     Args:
         state: names of the observed robot state.
         environment: names of the observed task state.
@@ -79,71 +128,35 @@ def frame_features(
         cameras: names of the cameras.
         image_size: height and width [pixels].
     """
-    scalar = Feature("float32")
-    asked = (*channels, "gripper")
-    pictures = {f"observation.images.{name}": Feature("video", (*image_size, 3)) for name in cameras}
-    velocities = (*(f"v_{name}" for name in joints), "gripper")
-    return {
-        "observation.state": Feature("float32", (len(state),), tuple(state)),
-        "observation.environment_state": Feature("float32", (len(environment),), tuple(environment)),
-        **pictures,
-        "action": Feature("float32", (len(velocities),), velocities),
-        "teleop.values": Feature("float32", (len(asked),), asked),
-        "teleop.mask": Feature("bool", (len(asked),), asked),
-        "teleop.mode": Feature("string"),
-        "teleop.raw": Feature("float32", (len(channels),), tuple(channels)),
-        "teleop.axes": Feature("int64"),
-        "teleop.switches": Feature("int64"),
-        "teleop.device": Feature("string"),
-        "teleop.age": scalar,
-        "teleop.round_trip": scalar,
-        "teleop.undos": Feature("int64"),
-        "controller.command": Feature("float32", (len(velocities),), velocities),
-        "controller.solve_time": scalar,
-        "controller.status": Feature("string"),
-        "controller.slack": scalar,
-        "controller.smallest_distance": scalar,
-        "controller.work_distance": scalar,
-        "safety.contacts": Feature("int64"),
-        "next.success": Feature("bool"),
-        "next.done": Feature("bool"),
-        "wall_clock": Feature("float64"),
+    names = {
+        "state": tuple(state),
+        "environment": tuple(environment),
+        "velocities": (*(f"v_{name}" for name in joints), "gripper"),
+        "channels": tuple(channels),
+        "asked": (*channels, "gripper"),
     }
+    features = {column.name: Feature(column.dtype) for column in COLUMNS} | {
+        column.name: Feature(column.dtype, (len(names[column.parts]),), names[column.parts])
+        for column in COLUMNS
+        if column.parts
+    }
+    observed = {name: each for name, each in features.items() if name.startswith("observation.")}
+    pictures = {_PICTURE + name: Feature("video", (*image_size, 3)) for name in cameras}
+    return observed | pictures | features
 
 
 def frame_row(frame: Frame) -> dict[str, Any]:
-    """Return a moment as a frame of `frame_features`.
+    """Return a moment as a frame of `frame_features`."""
+    pictures = {_PICTURE + name: image for name, image in frame.images.items()}
+    return {column.name: column.value(frame) for column in COLUMNS} | pictures
 
-    What stands beside a policy's inputs and outputs is finite too: no tool's statistics may become NaN.
-    """
-    intent, raw, diagnostics = frame.intent, frame.intent.raw.values, frame.diagnostics
-    pictures = {f"observation.images.{name}": image for name, image in frame.images.items()}
-    return {
-        "observation.state": frame.state,
-        "observation.environment_state": frame.environment,
-        **pictures,
-        "action": frame.action,
-        "teleop.values": _finite(np.append(np.where(intent.mask, intent.values, 0.0), intent.gripper)),
-        "teleop.mask": np.append(intent.mask, True),
-        "teleop.mode": intent.mode,
-        "teleop.raw": _finite(raw if raw.size else np.zeros(len(intent.values))),
-        "teleop.axes": intent.raw.axes,
-        "teleop.switches": intent.raw.switches,
-        "teleop.device": intent.raw.device,
-        "teleop.age": _finite(intent.raw.age),
-        "teleop.round_trip": _finite(intent.raw.round_trip),
-        "teleop.undos": frame.undos,
-        "controller.command": frame.command,
-        "controller.solve_time": diagnostics.solve_time,
-        "controller.status": diagnostics.status.value,
-        "controller.slack": _finite(diagnostics.slack),
-        "controller.smallest_distance": finite_distance(diagnostics.smallest_distance),
-        "controller.work_distance": finite_distance(diagnostics.work_distance),
-        "safety.contacts": frame.contacts,
-        "next.success": frame.success,
-        "next.done": frame.done,
-        "wall_clock": frame.wall_clock,
-    }
+
+def _asked(intent: Intent) -> FloatArray:
+    return _finite(np.append(np.where(intent.mask, intent.values, 0.0), intent.gripper))
+
+
+def _raw(intent: Intent) -> FloatArray:
+    return _finite(intent.raw.values if intent.raw.values.size else np.zeros(len(intent.values)))
 
 
 def _finite(numbers: FloatArray | float) -> FloatArray:
