@@ -2,6 +2,8 @@
 
 from collections.abc import Iterable
 
+FAILED, BAD_INPUT, INTERRUPTED = 1, 2, 130
+"""Exit codes of commands: work that failed, input that is refused, Ctrl-C or SIGTERM."""
 _LONGEST_MESSAGE = 300  # characters of what a library says: PyTorch names every tensor that does not fit
 _LONGEST_VALUE = 80  # characters of what came that a message shows
 

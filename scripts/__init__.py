@@ -7,7 +7,7 @@ import sys
 from types import FrameType
 from typing import NoReturn
 
-INTERRUPTED = 130
+from handrail.controllers.errors import INTERRUPTED
 
 
 def _leave(number: int, frame: FrameType | None) -> NoReturn:

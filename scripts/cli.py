@@ -14,14 +14,11 @@ from typing import NoReturn
 
 import tyro
 
-from handrail.controllers.errors import HandrailError, message_of
+from handrail.controllers.errors import BAD_INPUT, FAILED, INTERRUPTED, HandrailError, message_of
 from handrail.controllers.interrupts import Interrupts
 from handrail.controllers.numerics.first_use import tell_when_compiling
 from handrail.datasets.printable import printable
-from handrail.scripts import INTERRUPTED
 
-BAD_INPUT = 2
-FAILED = 1
 VERSION = "--version"
 STARTING = "Starting; this takes some seconds …"
 COMPILING = "Compiling the controller for this machine, once; this can take a minute …"

@@ -14,16 +14,13 @@ from handrail.collect.operators.catalogue import OPERATORS
 from handrail.collect.operators.operator import EpisodeEvent
 from handrail.collect.session.build import build_env, build_modes, build_session
 from handrail.collect.session.display import Display
-from handrail.controllers.errors import HandrailError
+from handrail.controllers.errors import FAILED, INTERRUPTED, HandrailError
 from handrail.controllers.interrupts import Interrupts
 from handrail.controllers.registry import resolved
 from handrail.datasets.format.layout import Layout
 from handrail.datasets.presentation.terminal import Terminal
 from handrail.datasets.recording.folder import check_target
 from handrail.datasets.recording.writer import EpisodeWriter
-
-INTERRUPTED = 130
-FAILED = 1
 
 
 def record(config: RecordConfig) -> int:

@@ -15,7 +15,6 @@ from handrail.collect.session.build import (
     build_modes,
     build_session,
     session_features,
-    software_versions,
 )
 from handrail.collect.session.outcome import Outcome
 from handrail.collect.session.recorded_settings import COLUMN as SETTINGS
@@ -24,6 +23,7 @@ from handrail.collect.session.recorder import Recorder
 from handrail.collect.session.rehearsal import Rehearsal
 from handrail.collect.session.session import Observer
 from handrail.controllers.interrupts import Interrupts
+from handrail.controllers.versions import SIMULATION, versions
 from handrail.datasets.format.columns import CLIENT, Scalar
 from handrail.datasets.format.manifest import Manifest
 from handrail.datasets.recording.writer import EpisodeWriter
@@ -184,5 +184,5 @@ def manifest_of(config: RecordConfig, env: HandrailEnv) -> Manifest:
     """Return the schema of a recording's dataset."""
     dataset = config.dataset
     return Manifest(
-        dataset.name, dataset.fps, env.model.description.name, session_features(env), software_versions()
+        dataset.name, dataset.fps, env.model.description.name, session_features(env), versions(*SIMULATION)
     )

@@ -19,7 +19,7 @@ from handrail.collect.execution.forking import RECORDING
 from handrail.collect.execution.job import Job
 from handrail.collect.session.build import build_env, build_session
 from handrail.collect.session.outcome import Outcome
-from handrail.controllers.errors import HandrailError
+from handrail.controllers.errors import FAILED, INTERRUPTED, HandrailError
 from handrail.controllers.interrupts import Interrupts
 from handrail.datasets.format.layout import Layout
 from handrail.datasets.format.lines import each_line
@@ -29,8 +29,6 @@ from handrail.datasets.reading.reader import read_info
 from handrail.datasets.recording.writer import EpisodeWriter
 from handrail.datasets.storage.lock import HeldError
 
-INTERRUPTED = 130
-FAILED = 1
 _DYING = 60.0  # of a worker whose parent or computer is lost [s]
 _MOMENT = 0.1  # [s]
 _RECORDINGS: dict[RecordConfig, Recording] = {}

@@ -33,7 +33,7 @@ from handrail.controllers.errors import HandrailError, message_of, shown
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.command import Diagnostics
 from handrail.controllers.interface.frames import Frames
-from handrail.controllers.interface.intent import LONG_AGO
+from handrail.controllers.interface.intent import DEAD_MAN_TIME, LONG_AGO
 from handrail.controllers.mpc.masked_mpc import MaskedMpc
 from handrail.controllers.objectives.regularisation import narrow_joint_centring
 from handrail.controllers.ocp.settings import MpcSettings
@@ -85,7 +85,7 @@ class MaskedMpcStep(RobotActionProcessorStep):
     obstacles: list[dict[str, Any]] = field(default_factory=list)
     start: list[float] = field(default_factory=lambda: [0.0, 0.0, 0.0])
     settings: dict[str, Any] = field(default_factory=dict)
-    timeout: float = 0.25
+    timeout: float = DEAD_MAN_TIME
     clock: Callable[[], float] = field(default=time.monotonic, repr=False)
     counts: Counter[str] = field(default_factory=Counter, init=False, repr=False)
     diagnostics: Diagnostics | None = field(default=None, init=False, repr=False)

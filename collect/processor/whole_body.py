@@ -12,6 +12,7 @@ from handrail.collect.simulation.gate import Gate
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import HandrailError, shown
 from handrail.controllers.interface.controller import State
+from handrail.controllers.interface.intent import DEAD_MAN_TIME
 from handrail.controllers.numerics.rotation import turned
 from handrail.controllers.robot.model import RobotModel
 
@@ -42,7 +43,9 @@ class WholeBody:
         sent: the command sent last, inside the limits, (n + 1,).
     """
 
-    def __init__(self, model: RobotModel, units: RobotUnits, period: float, timeout: float = 0.25) -> None:
+    def __init__(
+        self, model: RobotModel, units: RobotUnits, period: float, timeout: float = DEAD_MAN_TIME
+    ) -> None:
         self._model, self._units, self._period, self._timeout = model, units, period, timeout
         self._b = len(model.description.base_joints)
         gripper = model.description.gripper

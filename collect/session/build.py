@@ -1,6 +1,5 @@
 """From settings to a session: the robot, the environment, the operator and the controller."""
 
-import importlib.metadata
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
@@ -31,7 +30,6 @@ from handrail.datasets.format.schema import Feature
 from handrail.datasets.recording.frames import frame_features
 
 _CENTRED = 10.0  # weight of the middle of joints that cannot turn half around
-_VERSIONED = ("handrail", "lerobot", "mujoco", "pin", "coal", "casadi", "daqp", "numpy", "gymnasium")
 
 
 def build_env(
@@ -165,8 +163,3 @@ def session_features(env: HandrailEnv) -> dict[str, Feature]:
         cameras=env.cameras,
         image_size=env.image_size,
     )
-
-
-def software_versions() -> dict[str, str]:
-    """Return the versions that a dataset depends on."""
-    return {name: importlib.metadata.version(name) for name in _VERSIONED}

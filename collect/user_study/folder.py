@@ -14,7 +14,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from handrail.collect.session.build import software_versions
 from handrail.collect.user_study.design import UserStudy
 from handrail.collect.user_study.load import parse_study
 from handrail.collect.user_study.participant import Participant, check_id, now
@@ -22,6 +21,7 @@ from handrail.collect.user_study.plan import Step, orders, plan, practice_is_ove
 from handrail.controllers.entries import Entry, check_entries, is_table, is_text
 from handrail.controllers.errors import HandrailError, unknown_name
 from handrail.controllers.strict_toml import read_toml
+from handrail.controllers.versions import SIMULATION, versions
 from handrail.datasets.reading.reader import read_episodes
 from handrail.datasets.recording.rewrite import settle
 from handrail.datasets.storage.atomic import explained, remove, sync_folder, write_whole
@@ -92,7 +92,7 @@ class StudyFolder:
         """
         study = self.study()
         if not self._frozen.exists():
-            content = {"study": self._content(), "demo": study.demo, "versions": software_versions()}
+            content = {"study": self._content(), "demo": study.demo, "versions": versions(*SIMULATION)}
             with explained(f"cannot write {str(self._frozen)!r}"):
                 write_json(self._frozen, content | {"frozen": now()})
         return study

@@ -12,7 +12,7 @@ from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.command import Command, Diagnostics, Status
 from handrail.controllers.interface.controller import State
-from handrail.controllers.interface.intent import Intent
+from handrail.controllers.interface.intent import DEAD_MAN_TIME, Intent
 from handrail.controllers.interface.validation import InputHistory, InputValidator
 from handrail.controllers.robot.model import RobotModel
 from handrail.controllers.robot.shape import Obstacle
@@ -51,7 +51,7 @@ class ReactiveController:
         model: RobotModel,
         ask: Ask,
         period: float = 0.05,
-        intent_timeout: float = 0.25,
+        intent_timeout: float = DEAD_MAN_TIME,
         understood: BoolArray | None = None,
         margins: tuple[float, float] = (0.0, 0.0),
     ) -> None:

@@ -8,7 +8,7 @@ from handrail.controllers.arrays import FloatArray
 from handrail.controllers.baselines.reactive import ReactiveController
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import State
-from handrail.controllers.interface.intent import Intent
+from handrail.controllers.interface.intent import DEAD_MAN_TIME, Intent
 from handrail.controllers.numerics.rotation import turned
 from handrail.controllers.robot.model import Pose, RobotModel
 
@@ -69,7 +69,7 @@ def blended(operator: Completion, autonomy: Completion, share: float = 0.5) -> C
 
 
 def twist_controller(
-    model: RobotModel, complete: Completion, period: float = 0.05, intent_timeout: float = 0.25
+    model: RobotModel, complete: Completion, period: float = 0.05, intent_timeout: float = DEAD_MAN_TIME
 ) -> ReactiveController:
     """Return the controller that completes the tool's twist by a rule; other channels make it brake.
 

@@ -10,6 +10,8 @@ from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.frames import Frames
 from handrail.controllers.numerics.jit import are_finite
 
+DEAD_MAN_TIME = 0.25
+"""Age from which an input or an intent is stale, and the robot brakes [s]."""
 LONG_AGO = -1e6
 """Time of the intent of an operator who does not steer [s]: it is stale, and the controller brakes."""
 _USUAL = Frames()

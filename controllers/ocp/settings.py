@@ -6,6 +6,7 @@ from typing import Self
 import numpy as np
 
 from handrail.controllers.errors import HandrailError
+from handrail.controllers.interface.intent import DEAD_MAN_TIME
 
 _LENGTHS = ("margin", "work_margin", "activation_distance", "largest_speed", "length")
 
@@ -59,7 +60,7 @@ class MpcSettings:
     slack_quadratic: float = 1e6
     largest_speed: float = 2.0
     largest_rate: float = 4.0
-    intent_timeout: float = 0.25
+    intent_timeout: float = DEAD_MAN_TIME
     velocity_tolerance: float = 0.1
 
     length: float = 1.0

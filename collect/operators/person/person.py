@@ -22,10 +22,9 @@ from handrail.collect.operators.modes import TeleopMode, mode_of_mask
 from handrail.collect.operators.operator import EpisodeEvent, View
 from handrail.collect.operators.person.inputs import STILLS, Ask, Inputs
 from handrail.collect.operators.person.meaning import HAND_FRAMES, InputMeaning, Setting
-from handrail.controllers.interface.intent import Intent
+from handrail.controllers.interface.intent import DEAD_MAN_TIME, Intent
 from handrail.controllers.robot.model import RobotModel
 
-MOST_AGE = 0.25  # of an input that steers [s]
 _EVENTS = {what: EpisodeEvent(what) for what in STILLS - {"pause"}}
 
 
@@ -139,7 +138,7 @@ class Person:
         return self._clock() - self.received if self.inputs else np.inf
 
     def _is_driven(self) -> bool:
-        return self.inputs is not None and self.inputs.on and self.age <= MOST_AGE
+        return self.inputs is not None and self.inputs.on and self.age <= DEAD_MAN_TIME
 
     def _pick_axis(self, inputs: Inputs) -> None:
         """Take the axis that is moved most, once the one before was let go; another one is a switch."""

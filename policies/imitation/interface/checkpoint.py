@@ -11,7 +11,6 @@ import json
 import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
-from importlib import metadata
 from pathlib import Path
 from typing import Any
 
@@ -32,7 +31,6 @@ from handrail.policies.imitation.interface.trust import CONFIG, check_policy_fol
 FORMAT = "handrail.policy/2"
 NAME = "handrail.json"
 MODEL = "pretrained_model"
-_VERSIONED = ("handrail", "lerobot", "torch", "numpy")
 _LOW, _HIGH = FPS_RANGE
 _CHECKED = {  # what more has to hold of `PolicyMeta` than the types of its fields say
     "robot": Entry("the name of a robot", lambda value: is_name(value) and not value.endswith(".toml")),
@@ -261,8 +259,3 @@ def point_to(checkpoint: Path) -> None:
     fresh.symlink_to(checkpoint.name)
     os.replace(fresh, link)
     sync_folder(checkpoint.parent)
-
-
-def software_versions() -> dict[str, str]:
-    """Return the versions of what trains."""
-    return {name: metadata.version(name) for name in _VERSIONED}

@@ -13,13 +13,13 @@ from handrail.collect.session.build import build_task
 from handrail.collect.session.recorded_settings import COLUMN, recorded_settings
 from handrail.controllers.entries import is_name
 from handrail.controllers.errors import HandrailError
+from handrail.controllers.versions import TRAINING, versions
 from handrail.policies.imitation.config import TrainConfig
 from handrail.policies.imitation.interface.checkpoint import (
     MODEL,
     PolicyMeta,
     last_checkpoint,
     read_meta,
-    software_versions,
     write_meta,
 )
 from handrail.policies.imitation.interface.torch_state import threads
@@ -188,7 +188,7 @@ def _meta(source: Source, steps: int, losses: Mapping[int, float] | None = None)
         policy=config.policy,
         steps=steps,
         training=asdict(config),
-        versions=software_versions(),
+        versions=versions(*TRAINING),
         sizes=as_json(resolved(config)),
         episodes=[int(row["episode_index"]) for row in rows],
         data=source.digest,

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from handrail.collect.execution.execution import Execution
 from handrail.collect.execution.job import Job as Piece
+from handrail.controllers.errors import FAILED
 from handrail.datasets.presentation.markdown import read_page, with_part
 from handrail.datasets.presentation.terminal import Terminal
 from handrail.datasets.storage.atomic import explained
@@ -21,7 +22,6 @@ from handrail.policies.study.design.progress import StudyProgress
 from handrail.policies.study.design.settings import check_policies
 from handrail.policies.study.execution.work import do
 
-FAILED = 1
 _PRELOAD = ("handrail.policies.study.execution.preload",)
 
 

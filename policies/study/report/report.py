@@ -1,12 +1,11 @@
 """What a study writes: a page for people, JSON for programs, and its part of a Markdown page."""
 
-import importlib.metadata
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from handrail.collect.session.build import software_versions
+from handrail.controllers.versions import SIMULATION, versions
 from handrail.datasets.comparison.prediction import MetricPrediction
 from handrail.datasets.comparison.report.prediction import prediction_table, prediction_words
 from handrail.datasets.comparison.report.report import json_text
@@ -134,7 +133,7 @@ def _json(findings: _Findings) -> str:
         "design": asdict(progress.design),
         "designs": designs(progress.layout),
         "missing": progress.missing,
-        "versions": software_versions() | {"torch": importlib.metadata.version("torch")},
+        "versions": versions(*SIMULATION, "torch"),
         "answer": findings.answer,
         "contrasts": [asdict(each) for each in findings.contrasts],
         "conditions": [_numbers(noise, each) for (noise, *_), each in findings.results.conditions.items()],

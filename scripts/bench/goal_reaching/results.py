@@ -3,12 +3,12 @@
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
-from importlib import metadata
 from typing import Any
 
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray
+from handrail.controllers.versions import SIMULATION, versions
 from handrail.datasets.statistics.paired import paired_difference, paired_success, wilson
 from handrail.scripts.bench.goal_reaching.baselines import goal_reaching_settings, paper_settings
 from handrail.scripts.bench.goal_reaching.catalogue import TAKE_UP, Baseline
@@ -26,7 +26,6 @@ Row = Mapping[str, Any]
 _COMPARED = (*(name for name in METRICS if name != "success"), "update_ms_median")
 _KEPT = (*(name for name in METRICS if name != "wall_time_s"), *SAFETY_METRICS, *SETTLED_METRICS)
 _PLACES = ("json", "report", "page")  # settings that say where results are written on a machine
-_VERSIONED = ("casadi", "coal", "daqp", "mujoco", "numpy", "pin", "scipy")
 
 
 def summarise(
@@ -59,7 +58,7 @@ def summarise(
         "mpc_paper_settings": asdict(paper_settings()),
         "physics": dict(PHYSICS) if config.physics else {},
         "machine": {"cores": os.cpu_count(), "load": os.getloadavg()[0]},
-        "versions": {name: metadata.version(name) for name in _VERSIONED},
+        "versions": versions(*SIMULATION, "scipy"),
         "episodes": [dict(row) for row in rows],
     }
 

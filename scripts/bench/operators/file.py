@@ -6,8 +6,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from handrail.collect.session.build import software_versions
 from handrail.controllers.errors import HandrailError
+from handrail.controllers.versions import SIMULATION, versions
 from handrail.datasets.storage.atomic import explained, write_whole
 from handrail.datasets.storage.strict_json import read_json
 from handrail.scripts.bench.operators.config import TrialsConfig
@@ -72,7 +72,7 @@ class TrialsFile:
     def add(self, trial: Trial) -> None:
         """Keep a trial, on the disk too."""
         self._trials[_key(trial)] = trial
-        head = self._head | {"versions": software_versions()}
+        head = self._head | {"versions": versions(*SIMULATION)}
         rows = ",\n".join(json.dumps(_rounded(each)) for _, each in sorted(self._trials.items()))
         text = f'{json.dumps(head)[:-1]}, "trials": [\n{rows}\n]}}\n'
         with explained(f"--json {self._path}"):

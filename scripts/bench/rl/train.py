@@ -1,6 +1,5 @@
 """Training of the reinforcement-learning baseline with soft actor-critic from Stable-Baselines3."""
 
-import importlib.metadata
 import itertools
 import os
 import platform
@@ -19,6 +18,7 @@ from stable_baselines3 import SAC
 from stable_baselines3.common.callbacks import BaseCallback
 
 from handrail.controllers.interrupts import Interrupts
+from handrail.controllers.versions import SIMULATION, versions
 from handrail.datasets.presentation.drawing import COLOURS, GREY, new_figure, png, tidy
 from handrail.datasets.presentation.terminal import Terminal
 from handrail.datasets.storage.atomic import write_whole
@@ -41,7 +41,6 @@ from handrail.scripts.bench.rl.env import GoalReachingEnv, Reward
 from handrail.scripts.bench.rl.evaluation import FINAL_SEED, evaluate, evaluation_goals, means, spreads
 
 _TARGET_ENTROPY = -3.0
-_VERSIONED = ("handrail", "stable-baselines3", "torch", "gymnasium", "numpy", "pin")
 _PLACES = ("output_dir", "resume", "overwrite")  # of a run, not of what came out
 
 
@@ -218,7 +217,7 @@ def _record(config: TrainRlConfig, curve: Curve, final: dict[str, dict[str, floa
         "hardware": {"processor": _processor(), "cores": os.cpu_count(), "threads": config.threads},
         "versions": {
             "python": platform.python_version(),
-            **{name: importlib.metadata.version(name) for name in _VERSIONED},
+            **versions(*SIMULATION, "stable-baselines3", "torch"),
         },
         "final": final,
         "curve": curve,

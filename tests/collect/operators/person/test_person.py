@@ -8,9 +8,9 @@ import pytest
 from handrail.collect.operators.modes import MODES
 from handrail.collect.operators.operator import EpisodeEvent, View
 from handrail.collect.operators.person.inputs import Ask, Inputs
-from handrail.collect.operators.person.person import MOST_AGE, Person, Phase
+from handrail.collect.operators.person.person import Person, Phase
 from handrail.controllers.interface.controller import State
-from handrail.controllers.interface.intent import Intent
+from handrail.controllers.interface.intent import DEAD_MAN_TIME, Intent
 from handrail.controllers.robot.model import load_model
 
 MODEL = load_model()
@@ -75,7 +75,7 @@ def test_doubtful_input_pauses_until_all_is_let_go(operator, trouble):
     drive(operator, ee_vx=1.0)
     assert isinstance(operator.act(view()), Intent)
     if trouble == "old":
-        CLOCK[0] += MOST_AGE + 0.01
+        CLOCK[0] += DEAD_MAN_TIME + 0.01
     elif trouble == "off":
         drive(operator, on=False)
     else:
