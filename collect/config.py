@@ -76,7 +76,7 @@ class SessionConfig:
     robot_fps: int = 0
     """How often the robot is sent a command [Hz], a multiple of the recording rate; that rate when 0."""
     control_fps: int = 0
-    """How often the controller is asked [Hz], at most as often as the robot; the recording rate when 0."""
+    """How often the controller is asked [Hz], a divisor of the robot's rate; the recording rate when 0."""
 
     @property
     def camera_names(self) -> tuple[str, ...]:
@@ -273,8 +273,10 @@ class RecordConfig(SessionConfig, ExecutionConfig):
             raise HandrailError(
                 f"--robot_fps {robot}: expected a multiple of --dataset.fps {fps}, at most {FPS_RANGE[1]}"
             )
-        if self.control_fps and not 1 <= self.control_fps <= robot:
-            raise HandrailError(f"--control_fps {self.control_fps}: expected 1 to {robot}, the robot's rate")
+        if self.control_fps and (self.control_fps < 1 or robot % self.control_fps):  # else updates come late
+            raise HandrailError(
+                f"--control_fps {self.control_fps}: expected a divisor of the robot's rate {robot}"
+            )
 
 
 @dataclass(frozen=True)

@@ -42,6 +42,7 @@ WRONG = {
     "camera": (["--cameras", "wrist,roof"], "unknown camera 'roof'"),
     "mask size": (["--mask", "0101"], "expected 18 characters 0 or 1"),
     "fps 0": (["--dataset.fps", "0"], "--dataset.fps 0: expected 10 to 100"),
+    "late updates": (["--control_fps", "15"], "--control_fps 15: expected a divisor of the robot's rate 20"),
     "fps text": (["--dataset.fps", "fast"], "--dataset.fps"),
     "no episodes": (["--dataset.num_episodes", "0"], "expected 1 or more"),
     "nan noise": (["--noise", "nan"], "--noise nan: expected a number"),

@@ -53,6 +53,7 @@ def paper_settings() -> MpcSettings:
 
     N = 10, dt = 0.1 s, γ = 1, no posture to return to, no terminal cost; the weights are those of its code.
     Margins, the penalty of slack and the check that a stop remains are ours, as in `goal_reaching_settings`.
+    It is asked every 0.09 s: the simulation has steps of 0.03 s, and after a stage the certified stop begins.
     """
     return MpcSettings(
         horizon=10,

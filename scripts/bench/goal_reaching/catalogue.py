@@ -56,7 +56,7 @@ BASELINES = Registry(
         Baseline("mpc", "masked MPC", f"{_HERE}:mpc", period=0.1, lag=TAKE_UP),
         Baseline("rl", "reinforcement-learning baseline (SAC)", _RL, aims=True),
         Baseline("mink", "differential IK with collision avoidance (mink)", _MINK),
-        Baseline("mpc_paper", "masked MPC, the paper's horizon", f"{_HERE}:mpc_paper", period=0.1),
+        Baseline("mpc_paper", "masked MPC, the paper's horizon", f"{_HERE}:mpc_paper", period=0.09),
         Baseline("rl_low_pass", "SAC behind the MPC's low-pass", _RL, _SMOOTHED, aims=True, lag=TAKE_UP),
         Baseline("mink_low_pass", "mink behind the MPC's low-pass", _MINK, _SMOOTHED, lag=TAKE_UP),
         Baseline("dls", "damped least squares, whole body", f"{_HERE}:whole_body"),

@@ -83,7 +83,7 @@ def test_the_paper_s_horizon_is_the_paper_s():
     baseline = BASELINES["mpc_paper"]
     mpc = baseline.controller(MODEL)
     assert isinstance(mpc, MaskedMpc)
-    assert (mpc.settings.horizon, mpc.settings.dt, baseline.period) == (10, 0.1, 0.1)
+    assert (mpc.settings.horizon, mpc.settings.dt, baseline.period) == (10, 0.1, 0.09)
     intent = hand_intent(MODEL)(np.full(6, 0.1), STATE, 0.0)
     problem = mpc.build_problem(STATE, intent)
     tool = CHANNELS.tool_slice
@@ -91,6 +91,14 @@ def test_the_paper_s_horizon_is_the_paper_s():
     assert np.ptp(problem.weights, axis=0).max() == 0.0  # every stage alike, the last one too
     np.testing.assert_allclose(problem.weights[:, tool], 1000.0)
     assert (mpc.settings.posture, mpc.settings.terminal_velocity) == (0.0, 0.0)
+
+
+@pytest.mark.parametrize("name", ["mpc_paper", "mpc"])
+def test_no_update_comes_so_late_that_the_certified_stop_begins(name):
+    """The simulation's steps decide when a controller is asked, not its period alone."""
+    baseline = BASELINES[name]
+    longest = STEP * np.ceil(round(baseline.period / STEP, 9))
+    assert longest <= baseline.controller(MODEL).settings.dt
 
 
 @pytest.mark.parametrize("name", ["mpc_paper", "mpc"])
