@@ -70,11 +70,6 @@ class HumanSettings:
         if not self.briskness:
             raise HandrailError("--human.briskness: expected a number > 0, got 0")
 
-    @classmethod
-    def perfect(cls) -> "HumanSettings":
-        """Return an operator without delay, noise or drift."""
-        return cls(**dict.fromkeys(_weaknesses(), 0.0))
-
     def scaled(self, factor: float) -> "HumanSettings":
         """Return the settings with every weakness but the correlation time multiplied by a factor."""
         values = {name: getattr(self, name) * factor for name in _weaknesses()}
