@@ -44,13 +44,13 @@ def first_view() -> View:
         return View(env.state(), env.task_state())
 
 
-def drive(view, mode, human, seconds=12.0, script=None, start=HOME):
+def drive(view, mode, human, seconds=12.0, script=None, start=HOME, seed=0):
     """Integrate what the operator asks for, without physics; return intents and configurations."""
     mode = MODES[mode]
     operator = ScriptedOperator(MODEL, script or Wisher(), mode, human, gains_of(MODEL, mode, human))
     controller = split_controller(MODEL) if mode.controller == "split" else DirectController(MODEL)
     q, v, intents, path = start.copy(), np.zeros(MODEL.size), [], [start.copy()]
-    operator.reset(at(view, q, v, 0.0), np.random.default_rng(0))
+    operator.reset(at(view, q, v, 0.0), np.random.default_rng(seed))
     for step in range(int(seconds / PERIOD)):
         now = at(view, q, v, step * PERIOD)
         intents.append(operator.act(now))

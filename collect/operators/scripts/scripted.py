@@ -1,14 +1,13 @@
 """The scripted operator: a script that knows what it wants, seen and steered as a person would."""
 
 from dataclasses import replace
-from typing import ClassVar, Protocol
+from typing import Protocol
 
 import numpy as np
 
 from handrail.collect.operators.devices.devices import DEVICES
 from handrail.collect.operators.human.hand import HumanHand
-from handrail.collect.operators.human.hidden import Hidden
-from handrail.collect.operators.human.human import MOOD, PERSON, HumanSettings
+from handrail.collect.operators.human.human import HumanSettings
 from handrail.collect.operators.human.motion_goal import MotionGoal
 from handrail.collect.operators.human.perception import Perception
 from handrail.collect.operators.human.steering import Gains
@@ -19,8 +18,6 @@ from handrail.controllers.arrays import BoolArray
 from handrail.controllers.interface.intent import Intent, RawInput
 from handrail.controllers.registry import resolved
 from handrail.controllers.robot.model import RobotModel
-
-_CHANGE = Hidden("hands off while they change to other channels", "0.3 s", "never", "no")
 
 
 class Script(Protocol):
@@ -54,10 +51,6 @@ class ScriptedOperator:
     Attributes:
         free_at: when the hand is back on the input after the last change of channels [s]; −∞ before any.
     """
-
-    HIDDEN: ClassVar = {"_human": PERSON, "_settings": MOOD, "_mask": _CHANGE, "_switches": _CHANGE} | {
-        "free_at": _CHANGE
-    }
 
     def __init__(
         self,

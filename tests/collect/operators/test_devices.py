@@ -14,7 +14,8 @@ from handrail.collect.operators.human.motion_goal import MotionGoal
 from handrail.collect.operators.human.steering import Gains
 from handrail.collect.operators.modes import MODES
 from handrail.collect.operators.operator import View
-from handrail.collect.operators.scripts.scripted import scripted_operator
+from handrail.collect.operators.scripts.reach import ReachScript
+from handrail.collect.operators.scripts.scripted import gains_of, scripted_operator
 from handrail.collect.tasks.catalogue import TaskSpec
 from handrail.controllers.baselines.split_controller import split_controller
 from handrail.controllers.collision.model import CollisionModel
@@ -114,6 +115,17 @@ def test_the_same_seed_is_the_same_operator(view, name):
     for a, b in zip(first, again, strict=True):
         np.testing.assert_array_equal(a.values, b.values)
         np.testing.assert_array_equal(a.raw.values, b.raw.values)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_nothing_that_is_drawn_decides_where_they_go(view, name):
+    """Who errs in nothing and has no moods does the same in every episode of a scene."""
+    human = HumanSettings(noise=0.0, drift=0.0, misjudgement=0.0, moods=0.0)
+    script = ReachScript(MODEL, gains_of(MODEL, MODES[name], human), drives=False)
+    one, same = (drive(view, name, human, 6.0, script, seed=seed)[1] for seed in (0, 1))
+    np.testing.assert_array_equal(one, same)
+    other = drive(view, name, replace(human, moods=0.3), 6.0, script, seed=1)[1]
+    assert not np.array_equal(one, other)
 
 
 def test_joints_are_moved_in_an_order_that_hits_nothing():
