@@ -33,7 +33,6 @@ from places import HELPERS
 
 from handrail.datasets.format.layout import Layout
 from handrail.datasets.reading.reader import read_episodes, read_frames
-from handrail.datasets.recording.folder import set_aside
 from handrail.datasets.recording.repair import repair
 from handrail.datasets.storage.lock import LOCK_NAME
 
@@ -177,22 +176,6 @@ def test_repair_killed_at_every_change(tmp_path, quick_collector, torn, every):
         if lived:
             break
     assert k > 30
-
-
-def test_an_older_repair_that_was_cut_short_is_undone(tmp_path):
-    """It moved everything from the damaged episode on into `.damaged/`, the lines last and from the end."""
-    original = record(tmp_path / "original", 4, features=TINY_FEATURES)
-    kept = _damage(original)
-    layout, before = Layout(original), tree(original)
-    del before["data/chunk-000/file-001.parquet"]  # it is not what its seal says, and stays in `.damaged/`
-    moved = [*(layout.data(number) for number in (1, 2, 3)), *(layout.row(number) for number in (3, 2, 1))]
-    for count in range(1, len(moved) + 1):
-        root = shutil.copytree(original, tmp_path / str(count))
-        set_aside(Layout(root), [root / layout.relative(path) for path in moved[:count]])
-        report = repair(root)
-        assert [fault.split(":")[0] for fault in report.damage] == ["episode 1"]
-        assert {name: content for name, content in tree(root).items() if name in before} == before
-        _check_nothing_lost(root, kept)
 
 
 def _run(folder: Path, k: int, *words: object) -> subprocess.CompletedProcess:

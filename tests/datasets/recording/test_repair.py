@@ -24,6 +24,7 @@ from datasets_helpers import (
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.format.layout import Layout
 from handrail.datasets.reading.reader import read_episodes, read_frames
+from handrail.datasets.recording.folder import set_aside
 from handrail.datasets.recording.repair import repair
 
 
@@ -154,6 +155,24 @@ def test_one_byte_missing_in_episode_2_of_24(tmp_path):
     report = repair(root, set_aside_damaged=True)
     assert (report.episodes, len(report.lost), report.complete) == (23, 1, False)
     _check_is(root, [0, 1, *range(3, 24)])
+
+
+def test_an_older_repair_that_was_cut_short_is_undone(tmp_path):
+    """It moved everything from the damaged episode on into `.damaged/`, the lines last and from the end."""
+    original = record(tmp_path / "original", 4)
+    layout = Layout(original)
+    os.truncate(layout.data(1), 100)
+    before = tree(original)
+    del before["data/chunk-000/file-001.parquet"]  # it is not what its seal says, and stays in `.damaged/`
+    moved = [*(layout.data(number) for number in (1, 2, 3)), *(layout.row(number) for number in (3, 2, 1))]
+    for count in range(1, len(moved) + 1):
+        root = shutil.copytree(original, tmp_path / str(count))
+        set_aside(Layout(root), [root / layout.relative(path) for path in moved[:count]])
+        report = repair(root)
+        assert [fault.split(":")[0] for fault in report.damage] == ["episode 1"]
+        assert {name: content for name, content in tree(root).items() if name in before} == before
+        assert repair(root, set_aside_damaged=True).episodes == 3
+        _check_is(root, [0, 2, 3])
 
 
 def test_leftovers_of_a_save_that_was_never_committed_are_removed(root):
