@@ -68,14 +68,14 @@ def check_page(page: str) -> None:
         raise HandrailError(f"--page {page}: expected a .md file in an existing folder")
 
 
-def check_json(path: str, flag: str = "--json") -> None:
-    """Check that a file for a flag can be written, if one is asked for.
+def check_json(path: str) -> None:
+    """Check that a file of JSON can be written, if one is asked for.
 
     Raises:
         HandrailError: it cannot.
     """
     if path and not Path(path).expanduser().absolute().parent.is_dir():
-        raise HandrailError(f"{flag} {path}: expected a file in an existing folder")
+        raise HandrailError(f"--json {path}: expected a file in an existing folder")
 
 
 def check_whole(config: Any, **least: int) -> None:

@@ -52,14 +52,14 @@ class ReplayConfig:
 
 @dataclass(frozen=True)
 class RepairConfig:
-    """Say what is wrong with a dataset, mend it, and put back what was set aside and is whole.
+    """Say what is wrong with a dataset, and mend it.
 
     Exit code 0 only if everything that was saved is in the dataset and whole, else 1.
     """
 
     dataset: StoredConfig = field(default_factory=StoredConfig)
     set_aside: bool = False
-    """Move episodes that cannot be mended to .damaged, and those after them up; without, they stay."""
+    """Keep episodes that cannot be mended in .damaged; those after them move up. Without, they stay."""
 
 
 @dataclass(frozen=True)

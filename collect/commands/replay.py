@@ -64,17 +64,13 @@ class Replay:
         return float(np.linalg.norm(self.final[tool]))
 
 
-def replay_episode(
-    root: Path, episode: int, pictures: int = 0, video: Path | None = None, said: Collection[str] = ()
-) -> tuple[Replay, list[NDArray[np.uint8]]]:
+def replay_episode(root: Path, episode: int, pictures: int = 0) -> tuple[Replay, list[NDArray[np.uint8]]]:
     """Run the recorded commands of an episode in its environment, from the same seed.
 
     Args:
         root: folder of the dataset.
         episode: its number.
         pictures: how many pictures to take, evenly over the episode.
-        video: also film the whole episode to this .mp4 file.
-        said: names of the command line, which the dataset may name as `module:name`.
 
     Returns:
         What came out, and the pictures, (height, width, 3) each.
@@ -83,7 +79,7 @@ def replay_episode(
         HandrailError: no such dataset or episode, or one that Handrail did not record.
     """
     with open_dataset(root) as dataset:
-        return replay_one_of(dataset, episode, pictures, video, said)
+        return replay_one_of(dataset, episode, pictures)
 
 
 def replay_one_of(
@@ -93,7 +89,15 @@ def replay_one_of(
     video: Path | None = None,
     said: Collection[str] = (),
 ) -> tuple[Replay, list[NDArray[np.uint8]]]:
-    """Run the recorded commands of an episode of an open dataset; see `replay_episode`."""
+    """Run the recorded commands of an episode of an open dataset; see `replay_episode`.
+
+    Args:
+        dataset: it.
+        episode: its number.
+        pictures: how many pictures to take, evenly over the episode.
+        video: also film the whole episode to this .mp4 file.
+        said: names of the command line, which the dataset may name as `module:name`.
+    """
     info, row = dataset.info, _row(dataset, episode)
     frames = dataset.frames(episode, ["action", "observation.state"])
     length = len(frames["action"])

@@ -30,12 +30,11 @@ def to_numbers(obstacles: tuple[Obstacle, ...]) -> NDArray[np.float32]:
     return rows
 
 
-def from_numbers(rows: ArrayLike, held_by: str = "tool") -> tuple[Obstacle, ...]:
-    """Return the obstacles in rows of numbers; their names are the numbers of the rows.
+def from_numbers(rows: ArrayLike) -> tuple[Obstacle, ...]:
+    """Return the obstacles in rows of numbers, named by the rows' numbers; what is held moves with the tool.
 
     Args:
         rows: (…, 21).
-        held_by: the robot's frame to which it fixes what it holds.
 
     Raises:
         HandrailError: a row is none of `to_numbers`.
@@ -44,10 +43,10 @@ def from_numbers(rows: ArrayLike, held_by: str = "tool") -> tuple[Obstacle, ...]
     kinds = table[:, 0] if table.ndim == 2 and table.shape[1] == WIDTH else [np.nan]
     if not set(kinds) <= set(range(len(_KINDS))):
         raise HandrailError(f"obstacles: expected rows of {WIDTH} numbers, got an array {table.shape}")
-    return tuple(_obstacle(str(i), row, held_by) for i, row in enumerate(table) if row[0])
+    return tuple(_obstacle(str(i), row) for i, row in enumerate(table) if row[0])
 
 
-def _obstacle(name: str, row: NDArray[np.float64], held_by: str) -> Obstacle:
+def _obstacle(name: str, row: NDArray[np.float64]) -> Obstacle:
     kind = _KINDS[int(row[0])]
     shape = Shape(kind, row[1 : 1 + _LENGTHS[kind]])  # pyright: ignore[reportArgumentType]
     return Obstacle(
@@ -57,5 +56,5 @@ def _obstacle(name: str, row: NDArray[np.float64], held_by: str) -> Obstacle:
         rotation=row[7:16].reshape(3, 3),
         velocity=row[16:19],
         work_surface=bool(row[19]),
-        frame=held_by if row[20] else "",
+        frame="tool" if row[20] else "",
     )

@@ -99,6 +99,6 @@ class ModeAction:
         return dict.fromkeys(self.names, 0.0) | {lerobot_name(GRIPPER): gripper}
 
 
-def pressed(action: Mapping[str, float], buttons: Sequence[str] = BUTTONS) -> str:
+def pressed(action: Mapping[str, float]) -> str:
     """Return the button that an action presses; "" if none."""
-    return next((button for button in buttons if float(action.get(button, 0.0)) > _HALF), "")
+    return next((button for button in BUTTONS if float(action.get(button, 0.0)) > _HALF), "")

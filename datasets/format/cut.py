@@ -1,4 +1,4 @@
-"""Cutting pictures out of an mp4: packets are copied where that can be, else they are encoded anew."""
+"""Pictures out of the middle of an mp4, encoded anew where their packets cannot be copied."""
 
 from pathlib import Path
 
@@ -7,13 +7,13 @@ import av.error
 
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.regular_file import regular
-from handrail.datasets.format.join import VideoJoin, place_of, videos
+from handrail.datasets.format.join import place_of
 from handrail.datasets.format.schema import Feature
 from handrail.datasets.format.video import VideoEncoder
 
 
-def cut_video(source: Path, first: int, count: int, target: Path, fps: int, feature: Feature) -> None:
-    """Write a stretch of a video as one of its own.
+def encode_stretch(source: Path, first: int, count: int, target: Path, fps: int, feature: Feature) -> None:
+    """Write a stretch of a video as one of its own whose pictures are encoded anew.
 
     Args:
         source: An mp4 at `fps`.
@@ -27,18 +27,6 @@ def cut_video(source: Path, first: int, count: int, target: Path, fps: int, feat
         HandrailError: The source is not a whole mp4, or has no such pictures.
         OSError: The disk does not take it.
     """
-    with videos(fps) as opened:
-        stretch = opened.stretch(source, first, count)
-        if stretch is not None:
-            join = VideoJoin(target, fps)
-            join.add(stretch)
-            join.close()
-    if stretch is None:
-        encode_stretch(source, first, count, target, fps, feature)
-
-
-def encode_stretch(source: Path, first: int, count: int, target: Path, fps: int, feature: Feature) -> None:
-    """Write a stretch of a video as one of its own whose pictures are encoded anew; see `cut_video`."""
     encoder = VideoEncoder(target, fps, feature)
     try:
         with av.open(str(regular(source))) as container:

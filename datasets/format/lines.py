@@ -39,7 +39,6 @@ from handrail.datasets.format.tables import parquet_bytes
 from handrail.datasets.storage.strict_json import parse_json
 
 _SEALS = b"handrail"  # key in the metadata of a file of lines: sizes and hashes of the volume's files
-_ORIGIN = b"handrail.origin"
 _TOTALS = b"handrail.totals"
 _STATS = "stats/"
 
@@ -58,7 +57,6 @@ class Lines:
         rows: Their values, a row an episode.
         files: Seals of the volume's data and video files by relative path.
         totals: What all episodes up to the last one here add up to; None where that was not kept.
-        origin: SHA-256 of the line that the episode had before it was set aside and put back, or "".
         table: All columns, where they were read at once.
     """
 
@@ -67,7 +65,6 @@ class Lines:
     rows: Sequence[tuple]
     files: Mapping[str, FileSeal]
     totals: Totals | None
-    origin: str
     table: pa.Table | None
 
     @classmethod
@@ -93,9 +90,7 @@ class Lines:
             raise ValueError("no line")
         seals = {inside(name): FileSeal(*seal) for name, seal in parse_json(marks[_SEALS]).items()}
         totals = _totals(parse_json(marks[_TOTALS])) if _TOTALS in marks else None
-        return cls(
-            path, names, rows, seals, totals, marks.get(_ORIGIN, b"").decode(), table if at_once else None
-        )
+        return cls(path, names, rows, seals, totals, table if at_once else None)
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -185,7 +180,6 @@ def lines_bytes(
     records: Sequence[EpisodeRecord],
     types: ColumnTypes,
     totals: Totals | None = None,
-    origin: str = "",
 ) -> bytes:
     """Return the file of lines of a volume, as LeRobot lays it out, with Handrail's seals.
 
@@ -194,7 +188,6 @@ def lines_bytes(
         records: The episodes, with statistics; all of one slot.
         types: Of the extra columns.
         totals: What all episodes up to the last one add up to; kept for a volume of many.
-        origin: Of an episode that is put back, see `Lines`.
     """
     extras = {
         name: scalars([record.columns.get(name) for record in records], kind) for name, kind in types.items()
@@ -202,7 +195,7 @@ def lines_bytes(
     columns = _line_columns(manifest, records) | extras | _stats_columns([r.stats or {} for r in records])
     columns |= _place("meta/episodes", records)
     table = pa.Table.from_arrays(list(columns.values()), names=list(columns))
-    marks = {_SEALS: _seals_json(records[0].files)} | ({_ORIGIN: origin} if origin else {})
+    marks = {_SEALS: _seals_json(records[0].files)}
     marks |= {_TOTALS: _totals_json(totals)} if totals is not None else {}
     return _bytes(table, marks)
 

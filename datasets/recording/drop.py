@@ -53,7 +53,7 @@ def check_nothing_set_aside(layout: Layout) -> None:
     if layout.damaged.exists():
         raise HandrailError(
             f"dataset {str(layout.root)!r}: in {layout.damaged.name} are episodes that were set aside;"
-            " some may have to go too: put them back with handrail-repair, or remove that folder"
+            " some may have to go too: remove that folder"
         )
 
 

@@ -139,12 +139,17 @@ def set_aside(layout: Layout, paths: list[Path]) -> list[str]:
     """
     if not paths:
         return []
-    there = [int(path.name) for path in layout.damaged.glob("*") if path.name.isdecimal()]
-    target = layout.damaged / f"{max(there, default=-1) + 1:03d}"
+    target = next_damaged(layout)
     make_folder(target)
     for path in paths:
         move(path, target / layout.relative(path))
     return [layout.relative(path) for path in paths]
+
+
+def next_damaged(layout: Layout) -> Path:
+    """Return the next folder below `.damaged`."""
+    there = [int(path.name) for path in layout.damaged.glob("*") if path.name.isdecimal()]
+    return layout.damaged / f"{max(there, default=-1) + 1:03d}"
 
 
 def _foreign(layout: Layout) -> list[str]:

@@ -1,15 +1,14 @@
 """Bringing a dataset that Handrail wrote into order, without losing an episode that was saved.
 
-Whatever was saved stays where it is: an episode that is not whole is named, and set aside only when asked
-(`set_aside`), whereupon those after it move up. What a crash leaves behind (staged files, the published files
-of the one episode that was never saved) is removed. `info.json`, `stats.json` and `tasks.parquet` are rebuilt
-if they are not, to the byte, what the episodes say.
+Whatever was saved stays where it is: an episode that is not whole is named, and kept in `.damaged/` only when
+asked (`set_aside`), whereupon those after it move up. What a crash leaves behind (staged files, the published
+files of the one episode that was never saved) is removed. `info.json`, `stats.json` and `tasks.parquet` are
+rebuilt if they are not, to the byte, what the episodes say.
 
     handrail-repair path/to/dataset
 """
 
 from dataclasses import dataclass
-from dataclasses import replace as replaced
 from pathlib import Path
 from typing import Any
 
@@ -18,11 +17,11 @@ from handrail.datasets.format.layout import Layout
 from handrail.datasets.format.lines import resealed_bytes
 from handrail.datasets.format.manifest import Manifest, read_manifest
 from handrail.datasets.format.metadata import Totals, info_bytes, read_encodings, stats_bytes
-from handrail.datasets.format.schema import video_keys
 from handrail.datasets.format.tables import tasks_bytes
 from handrail.datasets.recording.checksums import Checksums
 from handrail.datasets.recording.folder import check_folders, clear_staging, finish_clearing, set_aside
-from handrail.datasets.recording.put_back import put_back, restore
+from handrail.datasets.recording.quarantine import restore, without_damaged
+from handrail.datasets.recording.rewrite import settle
 from handrail.datasets.recording.survey import Survey, said_to_be_saved, survey
 from handrail.datasets.storage.atomic import explained, remove, replace, sync_folder
 from handrail.datasets.storage.lock import DatasetLock
@@ -39,7 +38,6 @@ class RepairReport:
         episodes: Number of episodes in it now.
         damage: What is wrong with each episode that is not whole and still in its place.
         lost: What was wrong with each episode that was set aside.
-        put_back: How many episodes of `.damaged/` are in the dataset again.
         rewritten: Files that another tool wrote anew and that are whole; a repair renews their checksums.
         removed: Leftovers of an interrupted recording, deleted; paths in the dataset.
         moved: Files set aside in `.damaged/`; the paths that they had.
@@ -51,7 +49,6 @@ class RepairReport:
     episodes: int
     damage: tuple[str, ...] = ()
     lost: tuple[str, ...] = ()
-    put_back: int = 0
     rewritten: tuple[str, ...] = ()
     removed: tuple[str, ...] = ()
     moved: tuple[str, ...] = ()
@@ -61,7 +58,7 @@ class RepairReport:
     @property
     def clean(self) -> bool:
         """Whether there was nothing to do."""
-        return not (self.damage or self.lost or self.put_back or any(self._files().values()))
+        return not (self.damage or self.lost or any(self._files().values()))
 
     @property
     def complete(self) -> bool:
@@ -72,7 +69,6 @@ class RepairReport:
         said = [f"dataset {str(self.root)!r}: {self.episodes} episodes"]
         said += [f"{len(self.damage)} damaged ({shortened(self.damage)})"] if self.damage else []
         said += [f"{len(self.lost)} set aside in .damaged ({shortened(self.lost)})"] if self.lost else []
-        said += [f"{self.put_back} put back"] if self.put_back else []
         said += [f"{what}: {shortened(paths, ', ')}" for what, paths in self._files().items() if paths]
         return "; ".join(said if not self.clean else [*said, "nothing to repair"])
 
@@ -104,9 +100,10 @@ def repair(root: str | Path, set_aside_damaged: bool = False) -> RepairReport:
             written. Nothing has been changed then.
     """
     layout = Layout(Path(root).expanduser().absolute())
-    manifest = read_manifest(layout)
-    check_folders(layout)
     with explained(f"cannot repair dataset {str(layout.root)!r}"):
+        settle(layout.root)
+        manifest = read_manifest(layout)
+        check_folders(layout)
         lock = DatasetLock(layout.staging)
         try:
             return _repair_locked(layout, manifest, set_aside_damaged)
@@ -164,40 +161,12 @@ def _repair_locked(layout: Layout, manifest: Manifest, set_aside_damaged: bool) 
     done = _clear(layout, found)
     _reseal(layout, found)
     rebuilt = _rebuild(layout, manifest, found.totals) if found.counted else ()
-    lost: list[str] = []
-    if set_aside_damaged and not found.whole:
-        lost, found = found.faults(), _without_damaged(layout, manifest, found, sums)
-    totals, back = put_back(layout, manifest, found.totals) if found.whole else (found.totals, 0)
-    rebuilt += _rebuild(layout, manifest, totals) if found.counted else ()
     sums.remember()
-    return _report(
-        layout,
-        found,
-        totals,
-        lost=tuple(lost),
-        put_back=back,
-        restored=tuple(restored),
-        rebuilt=tuple(dict.fromkeys(rebuilt)),
-        **done,
-    )
-
-
-def _without_damaged(layout: Layout, manifest: Manifest, found: Survey, sums: Checksums) -> Survey:
-    """Set aside every episode from the first that is not whole on; `put_back` brings the whole ones back.
-
-    Lines of metadata go last and from the end: cut short, `restore` undoes this. From when `info.json` counts
-    only the episodes that stay, `put_back` finishes it.
-    """
-    first = found.damaged[0].slot if found.damaged else len(found.states)
-    streams, rows = [], []
-    for number in range(first, len(found.states)):
-        videos = [layout.video(key, number) for key in video_keys(manifest.features)]
-        streams += [path for path in (*videos, layout.data(number)) if path.exists()]
-        rows += [layout.row(number)] if layout.row(number).exists() else []
-    set_aside(layout, streams + rows[::-1])
-    left = survey(layout, manifest, sums.of)
-    _rebuild(layout, manifest, left.totals)
-    return replaced(left, absent=0)
+    done |= {"restored": tuple(restored), "rebuilt": rebuilt}
+    if found.whole or not set_aside_damaged:
+        return _report(layout, found, found.totals, **done)
+    totals = without_damaged(layout, manifest, found)
+    return RepairReport(layout.root, totals.episodes, lost=tuple(found.faults()), **done)
 
 
 def _clear(layout: Layout, found: Survey) -> dict[str, tuple[str, ...]]:

@@ -6,21 +6,30 @@ short before that, nothing has changed; after it, `settle` finishes what is left
 
 import os
 import shutil
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from handrail.controllers.errors import HandrailError
+from handrail.controllers.regular_file import regular
 from handrail.datasets.format.columns import ColumnTypes
 from handrail.datasets.format.layout import DAMAGED, FOLDERS, STAGING, Layout
 from handrail.datasets.format.manifest import Manifest
 from handrail.datasets.format.metadata import Totals, info_bytes, stats_bytes
 from handrail.datasets.format.tables import tasks_bytes
-from handrail.datasets.recording.append import copy_file
+from handrail.datasets.recording.folder import next_damaged
 from handrail.datasets.recording.piece import Piece
 from handrail.datasets.recording.volume import write_volumes
-from handrail.datasets.storage.atomic import beside, publish_folder, remove, replace, sync_folder
+from handrail.datasets.storage.atomic import (
+    beside,
+    make_folder,
+    publish_folder,
+    remove,
+    replace,
+    sync_file,
+    sync_folder,
+)
 from handrail.datasets.storage.lock import LOCK_NAME, DatasetLock
 
 Encodings = Mapping[str, Mapping[str, Any]]
@@ -34,6 +43,7 @@ def write_anew(
     types: ColumnTypes,
     encodings: Encodings,
     in_place: bool = False,
+    damaged: Sequence[Path] | None = None,
 ) -> Totals:
     """Write a dataset in one pass over its pieces, in files of many episodes.
 
@@ -44,6 +54,8 @@ def write_anew(
         types: Of its extra columns.
         encodings: How its videos are encoded, where that is not as Handrail does it.
         in_place: Whether the pieces are of the dataset that is replaced: what lies beside its files stays.
+        damaged: Files of the dataset that is replaced, which are kept in its `.damaged/`; no piece need be
+            left then.
 
     Returns:
         What the episodes add up to.
@@ -55,16 +67,19 @@ def write_anew(
     """
     with drafted(root) as draft:
         totals = write_volumes(draft, manifest, pieces, types)
-        if not totals.episodes:
+        if not totals.episodes and damaged is None:
             raise HandrailError(
                 f"{str(root)!r}: expected at least one episode, got none; nothing was written"
             )
         replace(draft.manifest, manifest.to_bytes(), draft.staging)
-        replace(draft.tasks, tasks_bytes(totals.tasks), draft.staging)
-        replace(draft.stats, stats_bytes(totals.stats or {}), draft.staging)
+        if totals.episodes:
+            replace(draft.tasks, tasks_bytes(totals.tasks), draft.staging)
+            replace(draft.stats, stats_bytes(totals.stats or {}), draft.staging)
         replace(draft.info, info_bytes(manifest, totals, encodings), draft.staging)
         if in_place:
             _carry_over(root, draft.root)
+        if damaged is not None:
+            _keep(Layout(root), draft, damaged)
     return totals
 
 
@@ -146,7 +161,27 @@ def _carry_over(root: Path, draft: Path) -> None:
         elif path.is_symlink():
             os.symlink(os.readlink(path), draft / path.name)
         else:
-            copy_file(path, draft / path.name)
+            _copy_file(path, draft / path.name)
+
+
+def _keep(layout: Layout, draft: Layout, damaged: Sequence[Path]) -> None:
+    """Copy what lies in `.damaged/`, and files into a new folder there, at the same place in it."""
+    if layout.damaged.is_dir():
+        shutil.copytree(layout.damaged, draft.damaged)
+    target = next_damaged(draft)
+    for path in damaged:
+        _copy_file(path, target / layout.relative(path))
+
+
+def _copy_file(source: Path, target: Path) -> None:
+    """Give a file a second name, or copy it where the file system has no such thing."""
+    make_folder(target.parent)
+    remove(target)
+    try:
+        os.link(regular(source), target)
+    except OSError:
+        shutil.copyfile(regular(source), target)
+    sync_file(target)
 
 
 def _draft(root: Path) -> Path:

@@ -8,7 +8,7 @@ from handrail.collect.config import StoredConfig
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.lists import Words
 
-ACTION_SPACES = ("realised", "targets", "intent", "recorded")
+ACTION_SPACES = ("realised", "intent", "recorded")
 FREE_ON_RESUME = (
     "output",
     "save_freq",
@@ -33,10 +33,9 @@ class TrainConfig:
     """A policy that LeRobot has registered: act, diffusion, vqbet, …"""
     preset: Literal["cpu", "gpu"] = "cpu"
     """Sizes that learn from the state on two CPU cores, or larger ones for a GPU and images."""
-    actions: Literal["realised", "targets", "intent", "recorded"] = "realised"
-    """What the policy writes: the joint velocities that came about; `targets`, joint positions that lead to
-    them, as a leader arm says them; the operator's own command, which the controller completes when the
-    policy drives; or `recorded`, all columns as they are in any dataset."""
+    actions: Literal["realised", "intent", "recorded"] = "realised"
+    """What the policy writes: the joint velocities that came about; the operator's own command, which the
+    controller completes when the policy drives; or `recorded`, all columns as they are in any dataset."""
     base_pose: bool = True
     """Let the policy see where the base is, as operators do who plan where to stand."""
     images: bool = False

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from handrail.controllers.errors import HandrailError
-from handrail.datasets.format.cut import cut_video
+from handrail.datasets.format.cut import encode_stretch
+from handrail.datasets.format.join import VideoJoin, videos
 from handrail.datasets.format.schema import Feature
 from handrail.datasets.format.video import VideoEncoder, count_frames
 
@@ -45,6 +46,18 @@ def video(request, tmp_path_factory):
     return path
 
 
+def cut(source, first, count, target):
+    """Write a stretch as a volume does: its packets if they can be copied, else encoded anew."""
+    with videos(FPS) as opened:
+        stretch = opened.stretch(source, first, count)
+        if stretch is None:
+            encode_stretch(source, first, count, target, FPS, CAMERA)
+            return
+        join = VideoJoin(target, FPS)
+        join.add(stretch)
+        join.close()
+
+
 def shown(path) -> list[tuple[float, float]]:
     """Return time [s] and brightness of every picture."""
     found: list[tuple[float, float]] = []
@@ -58,7 +71,7 @@ def shown(path) -> list[tuple[float, float]]:
 
 @pytest.mark.parametrize(("first", "count"), [(0, 24), (0, 7), (4, 9), (5, 8), (8, 8), (16, 8), (23, 1)])
 def test_a_stretch_shows_its_pictures(video, tmp_path, first, count):
-    cut_video(video, first, count, tmp_path / "cut.mp4", FPS, CAMERA)
+    cut(video, first, count, tmp_path / "cut.mp4")
     assert count_frames(tmp_path / "cut.mp4") == count
     times, levels = np.array(shown(tmp_path / "cut.mp4")).T
     assert times == pytest.approx(np.arange(count) / FPS, abs=1e-3)
@@ -68,10 +81,10 @@ def test_a_stretch_shows_its_pictures(video, tmp_path, first, count):
 def test_more_than_there_is_cannot_be_cut(video, tmp_path):
     for first, count in ((20, 9), (40, 2)):
         with pytest.raises(HandrailError, match="expected"):
-            cut_video(video, first, count, tmp_path / "cut.mp4", FPS, CAMERA)
+            cut(video, first, count, tmp_path / "cut.mp4")
 
 
 def test_what_is_no_video_is_said_in_one_line(tmp_path):
     (tmp_path / "text.mp4").write_text("no video")
     with pytest.raises(HandrailError, match="expected a whole mp4"):
-        cut_video(tmp_path / "text.mp4", 0, 1, tmp_path / "cut.mp4", FPS, CAMERA)
+        cut(tmp_path / "text.mp4", 0, 1, tmp_path / "cut.mp4")

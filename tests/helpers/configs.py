@@ -2,7 +2,6 @@
 
 from handrail.collect.commands.config import DemoConfig, InspectConfig, PushConfig, RepairConfig, ReplayConfig
 from handrail.collect.config import DriveConfig, RecordConfig
-from handrail.collect.experiments.operator_fit.config import FitOperatorConfig
 from handrail.collect.lekiwi.host_config import HostConfig
 from handrail.collect.teleop_config import CalibrateConfig
 from handrail.collect.user_study.config import StudySessionConfig
@@ -32,6 +31,5 @@ CONFIGS = {
     "handrail-evaluate": EvaluateConfig,
     "handrail-study": StudyConfig,
     "handrail-study-session": StudySessionConfig,
-    "handrail-fit-operator": FitOperatorConfig,
 }
 BENCH_CONFIGS = {f"bench {name}": bench.settings for name, bench in BENCHES.items()}

@@ -3,10 +3,11 @@
 import numpy as np
 from collect_helpers import environment
 
+from handrail.collect.operators.human.human import HumanSettings
 from handrail.collect.operators.human.motion_goal import MotionGoal, Target
 from handrail.collect.operators.modes import MODES
 from handrail.collect.operators.operator import View
-from handrail.collect.operators.scripts.scripted import ScriptedOperator
+from handrail.collect.operators.scripts.scripted import ScriptedOperator, gains_of
 from handrail.collect.tasks.task import TaskState
 from handrail.controllers.baselines.direct import DirectController
 from handrail.controllers.baselines.split_controller import split_controller
@@ -16,6 +17,7 @@ from handrail.controllers.robot.model import Pose, load_model
 MODEL = load_model()
 HOME = np.array(MODEL.description.home)
 PERIOD = 0.05
+PERFECT = HumanSettings().scaled(0.0)
 GOAL = Pose(MODEL.pose(HOME).position + [0.10, -0.10, 0.15], MODEL.pose(HOME).rotation)
 
 
@@ -42,13 +44,13 @@ def first_view() -> View:
         return View(env.state(), env.task_state())
 
 
-def drive(view, mode, human, seconds=12.0, script=None, start=HOME):
+def drive(view, mode, human, seconds=12.0, script=None, start=HOME, seed=0):
     """Integrate what the operator asks for, without physics; return intents and configurations."""
     mode = MODES[mode]
-    operator = ScriptedOperator(MODEL, script or Wisher(), mode, human)
+    operator = ScriptedOperator(MODEL, script or Wisher(), mode, human, gains_of(MODEL, mode, human))
     controller = split_controller(MODEL) if mode.controller == "split" else DirectController(MODEL)
     q, v, intents, path = start.copy(), np.zeros(MODEL.size), [], [start.copy()]
-    operator.reset(at(view, q, v, 0.0), np.random.default_rng(0))
+    operator.reset(at(view, q, v, 0.0), np.random.default_rng(seed))
     for step in range(int(seconds / PERIOD)):
         now = at(view, q, v, step * PERIOD)
         intents.append(operator.act(now))

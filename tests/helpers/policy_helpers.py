@@ -6,12 +6,10 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from handrail.collect.config import SessionConfig
-from handrail.collect.operators.human.steering import FOLLOW
 from handrail.collect.operators.modes import MODES
 from handrail.collect.session.build import build_env
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.channels import Channels
-from handrail.controllers.numerics.rotation import turned
 from handrail.controllers.robot.model import load_model
 from handrail.policies.imitation.interface.checkpoint import PolicyMeta, read_meta, write_meta
 from handrail.policies.imitation.interface.interface import PolicyInterface
@@ -47,11 +45,6 @@ class StandIn:
             return np.append(twist, 0.0)
         jacobian = load_model().jacobian(np.concatenate([np.zeros(3), state[:6]]))
         velocity = jacobian.T @ np.linalg.solve(jacobian @ jacobian.T + 0.01 * np.eye(6), twist)
-        if self.interface.actions == "targets":
-            x, y, cosine, sine = state[-4:]
-            yaw = np.arctan2(sine, cosine)
-            velocity[:3] = turned(velocity[:3], yaw)
-            velocity = np.concatenate([[x, y, yaw], state[:6]]) + velocity / FOLLOW
         return np.append(velocity, 0.0)
 
     def _random(self, state, environment):

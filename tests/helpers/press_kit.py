@@ -59,7 +59,7 @@ def dls(model, period):
 
 
 def robot_like(model, mode, task, human):
-    return scripted_operator(model, mode, task, HumanSettings.perfect())
+    return scripted_operator(model, mode, task, HumanSettings().scaled(0.0))
 
 
 PRESS = TaskSpec("press", Press, PressScript, "press a button")

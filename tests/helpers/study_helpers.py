@@ -29,7 +29,6 @@ episodes = 5
 steps = 10
 [beside]
 intents = ["ee"]
-targets = ["direct"]
 draws = 2
 [robustness]
 perturbations = ["push"]
@@ -59,7 +58,6 @@ every = 5
 patience = 1
 [beside]
 intents = ["ee"]
-targets = ["direct"]
 draws = 1
 same_number = 1
 [robustness]

@@ -115,7 +115,6 @@ COMMANDS = {
     "push": ("push", "{}", "--dataset.repo_id", "me/x"),
     "replay": ("replay", "{}"),
     "train": ("train", "{}", "--output", "{out}", "--steps", "1"),
-    "fit operator": ("fit_operator", "{}", "--draws", "50"),
 }
 
 

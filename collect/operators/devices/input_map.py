@@ -1,13 +1,10 @@
 """Input maps: how a goal becomes values on the channels of a mode; nothing else differs between modes."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
-from typing import ClassVar
 
 import numpy as np
 
 from handrail.collect.operators.devices.large_turn import LargeTurn
-from handrail.collect.operators.human.hidden import Hidden
 from handrail.collect.operators.human.human import HumanSettings
 from handrail.collect.operators.human.motion_goal import MotionGoal
 from handrail.collect.operators.human.steering import Gains
@@ -52,8 +49,6 @@ class InputMap(ABC):
         self.full: FloatArray = np.concatenate([base, gains.full[:6], joints])
         finely = as_fine(model, joints, gains.full[:6]) * joints
         self.fine: FloatArray = np.concatenate([base, gains.full[:6], finely])
-
-    HIDDEN: ClassVar[Mapping[str, Hidden]] = {}
 
     @abstractmethod
     def reset(self, view: View, settings: HumanSettings, rng: np.random.Generator) -> None:

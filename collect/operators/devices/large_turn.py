@@ -1,11 +1,8 @@
 """Large turns by joints: the operator thinks of where the joints belong, and brings them straight there."""
 
-from typing import ClassVar
-
 import numpy as np
 
 from handrail.collect.operators.devices.arm_solutions import straight_solution
-from handrail.collect.operators.human.hidden import Hidden
 from handrail.collect.operators.human.motion_goal import Target
 from handrail.collect.operators.human.steering import Gains
 from handrail.collect.operators.operator import View
@@ -17,13 +14,6 @@ from handrail.controllers.robot.model import RobotModel
 
 _CLEAR = 0.03  # what the motion shall keep clear [m]
 _EXACTLY = 1e-3  # how well one knows where joints belong [m, rad]
-
-_SOLUTION = Hidden(
-    "which of the arm's solutions they bring it to, where the hand has to turn far",
-    "one of up to eight",
-    "never",
-    "the arm's angles: the nearest that is clear, chosen once a target",
-)
 
 
 class LargeTurn:
@@ -39,8 +29,6 @@ class LargeTurn:
         large: turn of the hand from which on it matters how the arm gets there [rad].
         view: of the scene, at the beginning of an episode.
     """
-
-    HIDDEN: ClassVar = dict.fromkeys(("_goal", "_thought"), _SOLUTION)
 
     def __init__(self, model: RobotModel, gains: Gains, large: float, view: View) -> None:
         self._model, self._gains, self._large = model, gains, large

@@ -1,11 +1,8 @@
 """A leader arm: the operator moves a small copy of the arm; the robot's joints go where its joints are."""
 
-from typing import ClassVar
-
 import numpy as np
 
 from handrail.collect.operators.devices.input_map import StickMap
-from handrail.collect.operators.human.hidden import Hidden
 from handrail.collect.operators.human.human import HumanSettings
 from handrail.collect.operators.human.motion_goal import MotionGoal
 from handrail.collect.operators.human.steering import FOLLOW
@@ -13,8 +10,6 @@ from handrail.collect.operators.operator import View
 from handrail.controllers.arrays import BoolArray, FloatArray
 from handrail.controllers.interface.controller import State
 from handrail.controllers.numerics.rotation import turned
-
-_AHEAD = Hidden("where the leader's joints are", "0.2 s ahead of the arm", "never", "where the arm is")
 
 
 class LeaderArmMap(StickMap):
@@ -24,8 +19,6 @@ class LeaderArmMap(StickMap):
     joints q_L are taken along so fast, and the robot is sent `q̇ = q̇_L + k (q_L − q)`. The leader starts
     where the arm is, so that nothing jumps.
     """
-
-    HIDDEN: ClassVar = dict.fromkeys(("_leader", "_time"), _AHEAD)
 
     def reset(self, view: View, settings: HumanSettings, rng: np.random.Generator) -> None:
         """Take hold of the leader, which stands as the arm does."""

@@ -1,13 +1,10 @@
 """One axis at a time: the operator picks a joint, drives it where it seems to belong, picks the next."""
 
-from typing import ClassVar
-
 import numpy as np
 
 from handrail.collect.operators.devices.input_map import InputMap
 from handrail.collect.operators.devices.joint_order import plan_joints, sweep_clearance
-from handrail.collect.operators.human.hidden import Hidden
-from handrail.collect.operators.human.human import MOOD, HumanSettings
+from handrail.collect.operators.human.human import HumanSettings
 from handrail.collect.operators.human.motion_goal import MotionGoal, Target
 from handrail.collect.operators.operator import View
 from handrail.controllers.arrays import BoolArray, FloatArray
@@ -22,14 +19,6 @@ _SHARES = (1.0, 0.5, 0.25)  # of an axis' way that the operator considers
 _SMALL_SHARES = (1.0, 0.5, 0.25, 0.12, 0.06)  # the same where the hand must not lean
 _CLEAR = 0.03  # what a sweep shall keep clear [m]
 
-_AXIS = Hidden("which axis is steered, and how far this time", "until it is there", "never", "no")
-_PLAN = Hidden(
-    "where the joints belong, in which order they go, how exactly",
-    "until all are near",
-    "never",
-    "the arm's angles when it was thought of",
-)
-
 
 class SingleAxisMap(InputMap):
     """A single stick on the base's axes and the arm's joints, one at a time; changing is a mode switch.
@@ -38,12 +27,6 @@ class SingleAxisMap(InputMap):
     other, in an order in which nothing is hit, and think anew when all are near. The base likewise, axis by
     axis.
     """
-
-    HIDDEN: ClassVar = {
-        "_least": MOOD,
-        **dict.fromkeys(("_axis", "_axis_holds", "_left"), _AXIS),
-        **dict.fromkeys(("_goal", "_thought", "_thinks_at", "_order", "_care"), _PLAN),
-    }
 
     def reset(self, view: View, settings: HumanSettings, rng: np.random.Generator) -> None:
         """Begin with no axis chosen and nothing thought."""

@@ -1,28 +1,12 @@
 """The human-like hand: delay, intermittency, minimum-jerk movements, signal-dependent noise, drift."""
 
 from collections import deque
-from typing import ClassVar
 
 import numpy as np
 
-from handrail.collect.operators.human.hidden import Hidden
-from handrail.collect.operators.human.human import MOOD, HumanSettings
+from handrail.collect.operators.human.human import HumanSettings
 from handrail.collect.operators.human.wander import Wander
 from handrail.controllers.arrays import FloatArray
-
-_LATE = Hidden("what they saw and have not answered yet", "0.2 s (`delay`)", "never", "no")
-_MOVEMENT = Hidden(
-    "the movement of the hand that is under way, and the pause after it",
-    "0.15 s, 0.35 s (`movement`, `refractory`)",
-    "never",
-    "no",
-)
-_SHAKE = Hidden(
-    "noise and drift of the hand",
-    "10 % of the deflection, 2 % of full deflection",
-    "all the time",
-    "no; forgotten within 0.5 s",
-)
 
 
 class HumanHand:
@@ -39,13 +23,6 @@ class HumanHand:
         fine: what dead zone and drift are shares of, (k,).
         rng: of the episode, which begins with the hand at rest.
     """
-
-    HIDDEN: ClassVar = {
-        "_settings": MOOD,
-        "_seen": _LATE,
-        **dict.fromkeys(("_left", "_held", "_moved"), _MOVEMENT),
-        "_wander": _SHAKE,
-    }
 
     def __init__(
         self, settings: HumanSettings, full: FloatArray, fine: FloatArray, rng: np.random.Generator

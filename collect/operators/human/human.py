@@ -4,22 +4,9 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from handrail.collect.operators.human.hidden import Hidden
 from handrail.controllers.errors import HandrailError
 
 _WIDEST = 2.0  # a person is at most this many standard deviations from the average
-PERSON = Hidden(
-    "who steers: delay, pauses, noise, misjudgement",
-    "each by a factor of e^0.15z (`persons`)",
-    "once a recording",
-    "no; the same in every mode of a `--person`",
-)
-MOOD = Hidden(
-    "how they are today: the same numbers again",
-    "each by a factor of e^0.08z (`moods`)",
-    "as an episode begins",
-    "no; the same in every mode of a seed",
-)
 
 
 @dataclass(frozen=True)
@@ -69,11 +56,6 @@ class HumanSettings:
                 raise HandrailError(f"--human.{entry.name}: expected a finite number >= 0, got {value}")
         if not self.briskness:
             raise HandrailError("--human.briskness: expected a number > 0, got 0")
-
-    @classmethod
-    def perfect(cls) -> "HumanSettings":
-        """Return an operator without delay, noise or drift."""
-        return cls(**dict.fromkeys(_weaknesses(), 0.0))
 
     def scaled(self, factor: float) -> "HumanSettings":
         """Return the settings with every weakness but the correlation time multiplied by a factor."""

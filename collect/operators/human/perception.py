@@ -1,25 +1,16 @@
 """Perception: people misjudge how far it is, more the farther it is; nothing else is imagined wrongly."""
 
 from dataclasses import replace
-from typing import ClassVar
 
 import numpy as np
 
-from handrail.collect.operators.human.hidden import Hidden
-from handrail.collect.operators.human.human import MOOD, HumanSettings
+from handrail.collect.operators.human.human import HumanSettings
 from handrail.collect.operators.human.motion_goal import MotionGoal
 from handrail.collect.operators.human.steering import hand_errors
 from handrail.collect.operators.human.wander import Wander
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.numerics.rotation import matrix_from_vector
 from handrail.controllers.robot.model import Pose
-
-_MISJUDGED = Hidden(
-    "how far they think it is, of hand and base, to go and to turn",
-    "5 % of the way (`misjudgement`)",
-    "all the time",
-    "no; forgotten within 0.5 s",
-)
 
 
 class Perception:
@@ -33,8 +24,6 @@ class Perception:
         settings: of the person.
         rng: of the episode.
     """
-
-    HIDDEN: ClassVar = {"_share": MOOD, "_wander": _MISJUDGED}
 
     def __init__(self, settings: HumanSettings, rng: np.random.Generator) -> None:
         self._share = settings.misjudgement

@@ -10,7 +10,7 @@ from handrail.controllers.robot.description import World
 from handrail.controllers.robot.model import Pose
 
 FOLLOW = 6.0
-"""k of joints that follow a target, q̇ = k (q_target − q) [1/s]: a leader arm's, sliders', a policy's."""
+"""k of joints that follow a target, q̇ = k (q_target − q) [1/s]: a leader arm's, sliders', LeRobot's."""
 
 
 @dataclass(frozen=True)
@@ -67,19 +67,15 @@ def hand_twist(tool: Pose, goal: Pose, gains: Gains, pace: float = 1.0) -> Float
 
     `v = sat(gain (p_goal - p))`, `ω = sat(gain log(R_goal Rᵀ))`; `pace` scales the largest speeds.
     """
-    return steered(hand_errors(tool, goal), gains, pace)
+    errors = hand_errors(tool, goal)
+    linear = saturated(gains.gain * errors[:3], pace * gains.hand_speed)
+    return np.concatenate([linear, saturated(gains.gain * errors[3:], pace * gains.hand_rate)])
 
 
 def hand_errors(tool: Pose, goal: Pose) -> FloatArray:
     """Return how far the hand has to go, `p_goal - p` [m], and to turn, `log(R_goal Rᵀ)` [rad], (6,)."""
     turn = rotation_vector(goal.rotation @ tool.rotation.T)
     return np.concatenate([goal.position - tool.position, turn])
-
-
-def steered(errors: FloatArray, gains: Gains, pace: float = 1.0) -> FloatArray:
-    """Return the hand's twist for how far it has to go and to turn, (6,)."""
-    linear = saturated(gains.gain * errors[:3], pace * gains.hand_speed)
-    return np.concatenate([linear, saturated(gains.gain * errors[3:], pace * gains.hand_rate)])
 
 
 def base_twist(q: FloatArray, goal: FloatArray, gains: Gains) -> FloatArray:

@@ -2,11 +2,9 @@
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 
-from handrail.collect.operators.human.hidden import Hidden
 from handrail.collect.operators.human.motion_goal import MotionGoal, Target
 from handrail.collect.operators.human.steering import Gains, base_twist, hand_twist, pose_errors
 from handrail.collect.operators.modes import Focus
@@ -35,20 +33,6 @@ class Phase(Target):
     patience: float = np.inf
 
 
-PLANNED = Hidden(
-    "what is to be done, and where the base shall stand; only who owns base or joints steers by that",
-    "poses of hand and base",
-    "never",
-    "scene, goal, where the base is; not how the robot stood as it was planned",
-)
-_PHASE = Hidden(
-    "which phase it is, and since when: patience, dwelling",
-    "1 to 15 phases; dwelling 0.8 to 1.2 s",
-    "never",
-    "partly: where hand, gripper and things are",
-)
-
-
 class PhasedScript(ABC):
     """Does one phase after the other; a script.
 
@@ -57,11 +41,6 @@ class PhasedScript(ABC):
         gains: of the operator.
         drives: whether the operator drives the base by itself from place to place.
     """
-
-    HIDDEN: ClassVar = {
-        "_phases": PLANNED,
-        **dict.fromkeys(("_index", "_entered", "_reached_at"), _PHASE),
-    }
 
     def __init__(self, model: RobotModel, gains: Gains, drives: bool) -> None:
         self._model, self._gains, self._drives = model, gains, drives

@@ -1,12 +1,11 @@
 """How an operator carries a cube from one table to a bin on another."""
 
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 
 from handrail.collect.operators.operator import View
-from handrail.collect.operators.scripts.phases import PLANNED, Phase, PhasedScript, from_phase
+from handrail.collect.operators.scripts.phases import Phase, PhasedScript, from_phase
 from handrail.collect.operators.scripts.route import Route
 from handrail.collect.simulation.scene import SceneObject
 from handrail.collect.tasks.pick_place import grasp_rotation
@@ -30,8 +29,6 @@ class _Place:
 
 class PickPlaceScript(PhasedScript):
     """Approach, grasp, lift, carry, place for `handrail/PickPlace-v0`; a script."""
-
-    HIDDEN: ClassVar = {"_route": PLANNED}
 
     def replan(self, view: View, name: str) -> list[Phase] | None:
         """Grasp again when the cube stayed behind."""

@@ -1,14 +1,13 @@
 """The scripted operator: a script that knows what it wants, seen and steered as a person would."""
 
 from dataclasses import replace
-from typing import ClassVar, Protocol
+from typing import Protocol
 
 import numpy as np
 
 from handrail.collect.operators.devices.devices import DEVICES
 from handrail.collect.operators.human.hand import HumanHand
-from handrail.collect.operators.human.hidden import Hidden
-from handrail.collect.operators.human.human import MOOD, PERSON, HumanSettings
+from handrail.collect.operators.human.human import HumanSettings
 from handrail.collect.operators.human.motion_goal import MotionGoal
 from handrail.collect.operators.human.perception import Perception
 from handrail.collect.operators.human.steering import Gains
@@ -19,8 +18,6 @@ from handrail.controllers.arrays import BoolArray
 from handrail.controllers.interface.intent import Intent, RawInput
 from handrail.controllers.registry import resolved
 from handrail.controllers.robot.model import RobotModel
-
-_CHANGE = Hidden("hands off while they change to other channels", "0.3 s", "never", "no")
 
 
 class Script(Protocol):
@@ -49,15 +46,11 @@ class ScriptedOperator:
         script: of the task.
         mode: the teleop mode.
         human: who steers.
-        gains: how briskly; as people are with the mode's device, and this person is, by default.
+        gains: how briskly they steer.
 
     Attributes:
         free_at: when the hand is back on the input after the last change of channels [s]; −∞ before any.
     """
-
-    HIDDEN: ClassVar = {"_human": PERSON, "_settings": MOOD, "_mask": _CHANGE, "_switches": _CHANGE} | {
-        "free_at": _CHANGE
-    }
 
     def __init__(
         self,
@@ -65,12 +58,12 @@ class ScriptedOperator:
         script: Script,
         mode: TeleopMode,
         human: HumanSettings,
-        gains: Gains | None = None,
+        gains: Gains,
     ) -> None:
         self._script = script
         self._mode = mode
         device = DEVICES.find(mode.device)
-        self._map = device.build(model, mode, gains or gains_of(model, mode, human))
+        self._map = device.build(model, mode, gains)
         self._human = replace(human, refractory=human.refractory * device.refractory)
 
     def reset(self, view: View, rng: np.random.Generator) -> None:
@@ -109,13 +102,9 @@ def scripted_operator(
 ) -> ScriptedOperator:
     """Return who does a task's script in a mode, as brisk as people are with its device."""
     gains = gains_of(model, mode, human)
-    return ScriptedOperator(model, script_of(model, mode, task, gains), mode, human, gains)
-
-
-def script_of(model: RobotModel, mode: TeleopMode, task: TaskSpec, gains: Gains) -> Script:
-    """Return a task's script for an operator of a mode."""
     drives = DEVICES.find(mode.device).drives or mode.by_focus
-    return resolved(task.script)(model, gains, drives=drives)
+    script = resolved(task.script)(model, gains, drives=drives)
+    return ScriptedOperator(model, script, mode, human, gains)
 
 
 def gains_of(model: RobotModel, mode: TeleopMode, human: HumanSettings) -> Gains:

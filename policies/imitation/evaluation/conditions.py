@@ -200,7 +200,7 @@ def _condition(
             f"--protection {protection}: expected a policy of joint velocities, or own or none; "
             f"{checkpoint.folder} decides on the intent of mode {meta.mode}"
         )
-    written = meta.actions if checkpoint.intent_mode or meta.actions == "targets" else ""
+    written = meta.actions if checkpoint.intent_mode else ""
     name = " ".join(filter(None, (meta.mode or meta.policy, written)))
     protected = "" if chosen == own else "unprotected" if chosen == "none" else chosen
     label = " ".join(filter(None, (config.label or name, protected, perturbation.words)))

@@ -1,9 +1,7 @@
 """What a policy reads and writes, and how both come from and go to what Handrail records.
 
 It writes the joint velocities that came about, or the operator's own command: both are values on channels, in
-the base's axes like what the policy sees. Or it writes positions that all joints shall go to, as a leader arm
-says them: `q* = q + v / k`, from which the same velocity comes back, `v = k (q* − q)`, and another one where
-the robot is elsewhere. Whatever comes out, the robot's limits bound it.
+the base's axes like what the policy sees. Whatever comes out, the robot's limits bound it.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -13,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from handrail.collect.operators.human.steering import FOLLOW
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.entries import Entry, is_text, lists
 from handrail.controllers.errors import HandrailError, unknown_name
@@ -25,7 +22,7 @@ from handrail.policies.imitation.interface.relative import RelativeView
 
 Columns = Mapping[str, np.ndarray]
 Mask = tuple[bool, ...]
-ACTIONS = ("realised", "targets", "intent")
+ACTIONS = ("realised", "intent")
 STATE, ENVIRONMENT, ACTION = "observation.state", "observation.environment_state", "action"
 MASK = "teleop.mask"
 COLUMNS = (STATE, ENVIRONMENT, ACTION, "teleop.values", MASK)
@@ -39,8 +36,7 @@ class PolicyInterface:
     """Between what is recorded and what a policy reads and writes; saved beside every checkpoint.
 
     Attributes:
-        actions: `realised`, the joint velocities that came about, `targets`, joint positions that lead there,
-            or `intent`, the operator's own command.
+        actions: `realised`, the joint velocities that came about, or `intent`, the operator's own command.
         state_names: of `observation.state` as recorded, (s,).
         environment_names: of `observation.environment_state` as recorded, (e,).
         channels: names of the command channels as recorded, (m,).
@@ -76,8 +72,6 @@ class PolicyInterface:
         """
         if actions not in ACTIONS:
             raise unknown_name("action space", actions, ACTIONS)
-        if actions == "targets" and not base_pose:
-            raise HandrailError("--actions targets: expected a policy that sees where the base is, got none")
         state, environment, asked = (_names(features, key) for key in (STATE, ENVIRONMENT, "teleop.values"))
         names = tuple(name for name in asked if name != _GRIPPER)
         masks = _masks_of(_channels(names), episodes) if actions == "intent" else ()
@@ -91,8 +85,6 @@ class PolicyInterface:
     @property
     def action_names(self) -> tuple[str, ...]:
         """Names of what the policy writes: channels, a number for each mask if several, the gripper, (a,)."""
-        if self.actions == "targets":
-            return (*(f"{joint.removeprefix('joint.')}.pos" for joint in self._known.joints), _GRIPPER)
         flags = tuple(f"mask.{index}" for index in range(len(self.masks))) if len(self.masks) > 1 else ()
         return (*(self.channels[index] for index in self.commanded), *flags, _GRIPPER)
 
@@ -112,10 +104,6 @@ class PolicyInterface:
         """Return the actions of a recorded episode, (T, a) float32, from its `COLUMNS`."""
         state = columns[STATE].astype(float)
         values, gripper = self._asked(columns) if self.masks else self._realised(state, columns)
-        if self.actions == "targets":
-            values[:, self._known.joint_slice] = (
-                self._view.positions(state) + values[:, self._known.joint_slice] / FOLLOW
-            )
         pose = self._view.pose(state)
         for pair in self._pairs:
             values[:, pair] = pose.turned(values[:, pair])
@@ -131,8 +119,6 @@ class PolicyInterface:
         values[0, self.commanded] = action[:count]
         for pair in self._pairs:
             values[:, pair] = pose.turned_back(values[:, pair])
-        if self.actions == "targets":
-            values[0, self._known.joint_slice] = self._toward(action[:count], self._view.positions(state)[0])
         flags = action[count:-1]
         mask = np.array(self._sets[int(np.argmax(flags)) if len(flags) else 0], dtype=bool)
         return Intent(values[0], mask, gripper=decided_gripper(action[-1]))
@@ -181,13 +167,6 @@ class PolicyInterface:
         values[:, self._known.joint_slice] = np.concatenate([velocities[1:], velocities[-1:]])
         return values, columns[ACTION][:, -1]
 
-    def _toward(self, target: FloatArray, q: FloatArray) -> FloatArray:
-        """Return the velocities that take the joints to a target, (n,); a base turns the shorter way."""
-        way = target - q
-        if self._known.base:
-            way[2] = (way[2] + np.pi) % (2.0 * np.pi) - np.pi
-        return FOLLOW * way
-
     @cached_property
     def _known(self) -> Channels:
         return _channels(self.channels)
@@ -212,8 +191,6 @@ class PolicyInterface:
     @cached_property
     def _pairs(self) -> list[list[int]]:
         """(x, y) pairs of velocities along the world's axes; one that a mask splits stays so."""
-        if self.actions == "targets":
-            return []
         tool, joint = self._known.tool_slice.start, self._known.joint_slice.start
         starts = (tool, tool + 3, joint) if self._known.base else (tool, tool + 3)
         whole = [start for start in starts if all(mask[start] == mask[start + 1] for mask in self._sets)]

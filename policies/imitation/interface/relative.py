@@ -165,10 +165,6 @@ class RelativeView:
         rotation = Rotation.from_quat(tool[:, 3:], scalar_first=True).as_matrix()
         return RobotPose(base[:, :2], base[:, 2], tool[:, :3], rotation)
 
-    def positions(self, state: FloatArray) -> FloatArray:
-        """Return the joint positions in recorded states, (T, n)."""
-        return self._of(state, [f"{joint}.pos" for joint in self.joints])
-
     def velocities(self, state: FloatArray) -> FloatArray:
         """Return the joint velocities in recorded states, (T, n)."""
         return self._of(state, [f"{joint}.vel" for joint in self.joints])

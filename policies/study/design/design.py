@@ -34,7 +34,6 @@ sd = 0.1                        of a policy's success from draw to draw, for the
 
 [beside]                        optional, exploratory: more policies
 intents = ["ee"]                of these modes also the operator's intent is learnt, completed when it drives
-targets = ["direct"]            of these modes joint positions are learnt too, as a leader arm says them
 draws = 2                       on the first so many draws
 same_number = 1                 draws of which policies also learn from `episodes` demonstrations each
 
@@ -125,7 +124,6 @@ class Beside:
     intents: tuple[str, ...] = ()
     draws: int = 0
     same_number: int = 0
-    targets: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -205,7 +203,6 @@ class StudyDesign:
         if self.beside:
             completed = [mode for mode in self.modes if MODES[mode].controller == "mpc"]
             _known("mode of intents, which the MPC completes", self.beside.intents, completed)
-            _known("mode of targets", self.beside.targets, self.modes)
         if self.sweep:
             _known("task of the sweep", self.sweep.tasks, tuple(self.tasks))
         for name, chosen in self._chosen():

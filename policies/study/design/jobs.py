@@ -8,7 +8,7 @@ from typing import Literal
 
 from handrail.policies.study.design.design import StudyDesign
 
-Actions = Literal["realised", "targets", "intent"]
+Actions = Literal["realised", "intent"]
 Budget = Literal["time", "number"]
 CONDITIONS = ("nominal", "disturbed", "protected")
 
@@ -34,7 +34,7 @@ class StudyPolicy:
 
     Attributes:
         cell: whose dataset.
-        actions: `realised` joint velocities, `targets`, joint positions, or the operator's `intent`.
+        actions: `realised` joint velocities, or the operator's `intent`.
         budget: how much of the dataset: the same operator's `time`, or the same `number` of demonstrations.
     """
 
@@ -91,8 +91,6 @@ def _draw(design: StudyDesign, draw: int) -> Iterator[Job]:
     for cell in (cell for task in design.tasks for cell in cells[task]):
         if design.beside and draw < design.beside.draws and cell.mode in design.beside.intents:
             yield _policy(StudyPolicy(cell, "intent"), robust)
-        if design.beside and draw < design.beside.draws and cell.mode in design.beside.targets:
-            yield _policy(StudyPolicy(cell, "targets"), robust)
         if design.beside and draw < design.beside.same_number:
             yield _policy(StudyPolicy(cell, budget="number"), robust=False)
     if design.sweep and draw < design.sweep.draws:

@@ -83,8 +83,6 @@ def _exploratory(results: Results, design: StudyDesign) -> Iterator[Contrast | N
         for mode in () if factors else design.modes:
             if mode != design.baseline:
                 yield _pair(results, mode, design.baseline, scope)
-        for mode in design.beside.targets if design.beside else ():
-            yield _pair(results, f"{mode} targets", mode, scope)
         yield from _systems(results, design, scope)
         for name in CONTRASTS if factors else ():
             yield _factor(results, design, name, scope, EXPLORATORY, " same number")

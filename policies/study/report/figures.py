@@ -11,7 +11,6 @@ from handrail.policies.study.report.results import Condition, Results
 from handrail.policies.study.report.tables import sweep
 
 _WIDTH = 10.4  # [inch]
-_MARKS = {"intent": "D", "targets": "^"}
 
 
 def figures(results: Results, found: Sequence[Contrast]) -> dict[str, Any]:
@@ -64,7 +63,7 @@ def _contrasts(found: Sequence[Contrast]) -> Any:
 def _style(condition: Condition, results: Results) -> dict[str, Any]:
     """Return how a condition is drawn: the mode's colour, the action's mark."""
     modes, policy = results.progress.design.modes, next(iter(condition.draws.values())).policy
-    mark = _MARKS.get(policy.actions) or ("s" if policy.budget == "number" else "o")
+    mark = "D" if policy.actions == "intent" else "s" if policy.budget == "number" else "o"
     colour = COLOURS[modes.index(policy.cell.mode) % len(COLOURS)]
     return {"color": colour, "marker": mark, "label": _name(condition)}
 

@@ -27,7 +27,7 @@ from handrail.policies.study.report.words import answer, cautions, how
 _CAPTIONS = {
     "contrasts": "What makes a difference: declared, over all tasks (dark), and in each task (grey).",
     "answer": "Success of the policies; lines: 95 %, ticks: draws. Round: joint velocities, unprotected;"
-    " diamonds: intent through the MPC, policy and controller; triangles: joint targets;"
+    " diamonds: intent through the MPC, policy and controller;"
     " squares: the same number of demonstrations.",
     "training": "Loss on held-out episodes while the policies learnt; a dot is where the training ended.",
     "robustness": "Success disturbed and undisturbed.",

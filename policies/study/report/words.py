@@ -144,8 +144,6 @@ def _how(design: StudyDesign, results: Results, found: Sequence[Contrast]) -> It
         " policy writes the operator's command, and the MPC completes it and keeps it safe when the policy"
         " drives, too."
     )
-    if design.beside and design.beside.targets:
-        yield "“Targets” are joint positions, toward which the joints are driven at once."
     if design.draws > 1:
         yield (
             "Intervals are 95 %, Student's t over draws, where a draw varies at least as its rollouts do."

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from device_helpers import GOAL, HOME, MODEL, PERIOD, Wisher, drive, first_view
+from device_helpers import GOAL, HOME, MODEL, PERFECT, PERIOD, Wisher, drive, first_view
 
 from handrail.collect.operators.devices.devices import DEVICES
 from handrail.collect.operators.devices.input_map import StickMap
@@ -14,7 +14,8 @@ from handrail.collect.operators.human.motion_goal import MotionGoal
 from handrail.collect.operators.human.steering import Gains
 from handrail.collect.operators.modes import MODES
 from handrail.collect.operators.operator import View
-from handrail.collect.operators.scripts.scripted import scripted_operator
+from handrail.collect.operators.scripts.reach import ReachScript
+from handrail.collect.operators.scripts.scripted import gains_of, scripted_operator
 from handrail.collect.tasks.catalogue import TaskSpec
 from handrail.controllers.baselines.split_controller import split_controller
 from handrail.controllers.collision.model import CollisionModel
@@ -33,7 +34,7 @@ def view() -> View:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_every_device_brings_the_hand_to_the_goal(view, name):
-    _, path = drive(view, name, HumanSettings.perfect(), seconds=30.0)
+    _, path = drive(view, name, PERFECT, seconds=30.0)
     nearest = min(np.linalg.norm(MODEL.pose(q).position - GOAL.position) for q in path[::10])
     assert nearest < 0.03
 
@@ -51,7 +52,7 @@ def test_one_axis_at_a_time(view):
 
 @pytest.mark.parametrize("name", ["direct_single", "decoupled", "leader", "ee"])
 def test_switches_are_counted_and_cost_time(view, name):
-    human = replace(HumanSettings.perfect(), switch_time=0.6)
+    human = replace(PERFECT, switch_time=0.6)
     intents, _ = drive(view, name, human, seconds=6.0)
     masks = [intent.mask.tobytes() for intent in intents]
     changes = [step for step in range(1, len(masks)) if masks[step] != masks[step - 1]]
@@ -78,7 +79,7 @@ def test_a_leader_starts_without_a_jump_and_never_outruns_its_operator(view):
 
 def test_a_leader_moves_base_and_arm_at_once(view):
     """Whatever the script attends to."""
-    intents, path = drive(view, "leader", HumanSettings.perfect(), seconds=2.0)
+    intents, path = drive(view, "leader", PERFECT, seconds=2.0)
     moving = np.abs(np.array([intent.values[intent.mask] for intent in intents[1:]])) > 1e-3
     both = moving[:, :3].any(axis=1) & moving[:, 3:].any(axis=1)
     assert both.mean() > 0.9
@@ -114,6 +115,17 @@ def test_the_same_seed_is_the_same_operator(view, name):
     for a, b in zip(first, again, strict=True):
         np.testing.assert_array_equal(a.values, b.values)
         np.testing.assert_array_equal(a.raw.values, b.raw.values)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_nothing_that_is_drawn_decides_where_they_go(view, name):
+    """Who errs in nothing and has no moods does the same in every episode of a scene."""
+    human = HumanSettings(noise=0.0, drift=0.0, misjudgement=0.0, moods=0.0)
+    script = ReachScript(MODEL, gains_of(MODEL, MODES[name], human), drives=False)
+    one, same = (drive(view, name, human, 6.0, script, seed=seed)[1] for seed in (0, 1))
+    np.testing.assert_array_equal(one, same)
+    other = drive(view, name, replace(human, moods=0.3), 6.0, script, seed=1)[1]
+    assert not np.array_equal(one, other)
 
 
 def test_joints_are_moved_in_an_order_that_hits_nothing():

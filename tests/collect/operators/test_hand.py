@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from device_helpers import PERFECT
 
 from handrail.collect.operators.devices.input_map import StickMap
 from handrail.collect.operators.human.hand import HumanHand, minimum_jerk
@@ -28,13 +29,12 @@ def run(settings, wanted, times, seed=0):
 
 
 def human(**numbers):
-    return replace(HumanSettings.perfect(), **numbers)
+    return replace(PERFECT, **numbers)
 
 
 def test_a_perfect_hand_is_transparent():
     times, wanted = signal()
-    np.testing.assert_array_equal(run(HumanSettings.perfect(), wanted, times), wanted)
-    np.testing.assert_array_equal(run(HumanSettings().scaled(0.0), wanted, times), wanted)
+    np.testing.assert_array_equal(run(PERFECT, wanted, times), wanted)
 
 
 def test_delay_is_a_shift():

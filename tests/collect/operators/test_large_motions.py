@@ -4,12 +4,11 @@ from contextlib import closing
 
 import numpy as np
 import pytest
-from device_helpers import HOME, MODEL, drive, first_view
+from device_helpers import HOME, MODEL, PERFECT, drive, first_view
 
 from handrail.collect.commands.recording import episode_seed
 from handrail.collect.config import SessionConfig
 from handrail.collect.operators.devices.arm_solutions import REACHED, arm_solutions, straight_solution
-from handrail.collect.operators.human.human import HumanSettings
 from handrail.collect.operators.human.motion_goal import MotionGoal, Target
 from handrail.collect.operators.human.steering import Gains, hand_twist, pose_errors
 from handrail.collect.operators.operator import View
@@ -71,7 +70,7 @@ def leans(path):
 def test_a_leader_makes_large_turns_without_folding_the_arm(view, offsets):
     """By the hand's straight way, the forearm would come within 36 mm of the palm."""
     goal = by_joints(*offsets)
-    _, path = drive(view, "leader", HumanSettings.perfect(), 16.0, Bring(goal))
+    _, path = drive(view, "leader", PERFECT, 16.0, Bring(goal))
     end = MODEL.pose(path[-1])
     assert np.linalg.norm(end.position - goal.position) < 0.02
     assert np.trace(end.rotation.T @ goal.rotation) > 2.98
@@ -105,7 +104,7 @@ def test_one_axis_at_a_time_keeps_the_hand_upright_where_it_must_not_lean(view):
     worst = {}
     for tilt in (0.06, np.inf):
         script = Bring(goal, tilt)
-        _, path = drive(view, "direct_single", HumanSettings.perfect(), 40.0, script, start=down)
+        _, path = drive(view, "direct_single", PERFECT, 40.0, script, start=down)
         assert np.linalg.norm(MODEL.pose(path[-1]).position - goal.position) < 0.03
         worst[tilt] = leans(path).max()
     assert worst[0.06] < 0.08

@@ -4,7 +4,7 @@ from dataclasses import astuple, replace
 
 import numpy as np
 import pytest
-from device_helpers import first_view
+from device_helpers import PERFECT, first_view
 from scipy.spatial.transform import Rotation
 
 from handrail.collect.operators.devices.input_map import StickMap
@@ -24,6 +24,7 @@ from handrail.collect.tasks.drawer import Drawer, handle_rotation
 from handrail.collect.tasks.pick_place import grasp_rotation
 from handrail.collect.tasks.reach import Reach
 from handrail.controllers.collision.model import CollisionModel
+from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.controller import State
 from handrail.controllers.robot.inverse_kinematics import arm_configuration
 from handrail.controllers.robot.model import Pose, load_model
@@ -34,7 +35,7 @@ HOME = MODEL.description.home
 
 
 def human(**numbers):
-    return replace(HumanSettings.perfect(), **numbers)
+    return replace(PERFECT, **numbers)
 
 
 def test_steering_obeys_fitts_law():
@@ -53,10 +54,17 @@ def test_persons_differ_and_a_perfect_one_does_not():
     first, again, other = (HumanSettings().person(np.random.default_rng(seed)) for seed in (1, 1, 2))
     assert first == again != other
     assert all(0.7 < a / b < 1.4 for a, b in zip(astuple(first), astuple(HumanSettings()), strict=True))
-    assert HumanSettings.perfect().person(np.random.default_rng(1)) == HumanSettings.perfect()
+    assert PERFECT.person(np.random.default_rng(1)) == PERFECT
     moods = first.episode(np.random.default_rng(3))
     assert moods != first
     assert (moods.persons, moods.moods) == (first.persons, first.moods)
+
+
+def test_briskness_is_no_weakness():
+    brisk, rng = HumanSettings(briskness=1.5), np.random.default_rng(0)
+    assert brisk.scaled(3.0).briskness == brisk.person(rng).briskness == brisk.episode(rng).briskness == 1.5
+    with pytest.raises(HandrailError, match="briskness: expected a number > 0"):
+        HumanSettings(briskness=0.0)
 
 
 def test_what_is_near_is_judged_well():
@@ -99,7 +107,7 @@ def state(q=HOME, time=0.0):
 
 def sticks(mode):
     inputs = StickMap(MODEL, mode, Gains())
-    inputs.reset(first_view(), HumanSettings.perfect(), np.random.default_rng(0))
+    inputs.reset(first_view(), PERFECT, np.random.default_rng(0))
     return inputs
 
 

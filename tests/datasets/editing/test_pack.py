@@ -193,13 +193,13 @@ def test_damage_in_a_packed_file_is_named_and_can_be_set_aside(tmp_path, stream)
         resume(root, cameras=True)
     report = repair(root, set_aside_damaged=True)
     assert 0 < len(report.lost) <= 4
-    assert report.put_back == 4 - len(report.lost)
+    assert report.episodes == 4 - len(report.lost)
     kept = [int(frames["observation.state"][0][0]) // 1000 for _, frames in content(root)]
     lost = [int(fault.split(":")[0].removeprefix("episode ")) for fault in report.lost]
     assert sorted(kept + lost) == [0, 1, 2, 3]
     for (_, frames), episode in zip(content(root), kept, strict=True):
         assert frames["action"] == before[episode]["action"]
-    assert repair(root, set_aside_damaged=True).put_back == 0
+    assert repair(root, set_aside_damaged=True).clean
 
 
 def test_a_file_named_after_an_episode_of_a_packed_file_is_no_episode(tmp_path):

@@ -167,11 +167,12 @@ def test_repair_killed_at_every_change(tmp_path, quick_collector, torn, every):
     if torn:
         Layout(original).info.write_bytes(b"{torn")
     for k in itertools.count(1, every):
-        root = shutil.copytree(original, tmp_path / str(k))
-        lived = GUILLOTINE.run(root, k, lambda root=root: repair(root, set_aside_damaged=True))
+        root = shutil.copytree(original, tmp_path / str(k) / "set")
+        lived = GUILLOTINE.run(root.parent, k, lambda root=root: repair(root, set_aside_damaged=True))
         if k % 2:
             tear_staged_files(root)
         _check_nothing_lost(root, kept)
+        assert list(root.parent.iterdir()) == [root]
         if lived:
             break
     assert k > 30
@@ -199,12 +200,12 @@ def _changes(folder: Path, *words: object) -> int:
 def test_repair_killed_30_times(tmp_path):
     original = record(tmp_path / "original", 4, features=TINY_FEATURES)
     kept = _damage(original)
-    trial = shutil.copytree(original, tmp_path / "trial")
-    changes = _changes(trial, "repair", trial, "--set_aside")
+    trial = shutil.copytree(original, tmp_path / "trial" / "set")
+    changes = _changes(trial.parent, "repair", trial, "--set_aside")
     assert changes >= 30
     for k in np.linspace(1, changes, 30).astype(int).tolist():
-        root = shutil.copytree(original, tmp_path / str(k))
-        assert _killed(root, k, "repair", root, "--set_aside")
+        root = shutil.copytree(original, tmp_path / str(k) / "set")
+        assert _killed(root.parent, k, "repair", root, "--set_aside")
         _check_nothing_lost(root, kept)
 
 

@@ -139,7 +139,7 @@ def refused(settings):
 
 
 def test_settings_come_back_as_they_were():
-    config = SessionConfig(robot="other.toml", cameras="wrist", person=4, human=HumanSettings.perfect())
+    config = SessionConfig(robot="other.toml", cameras="wrist", person=4, human=HumanSettings().scaled(0.0))
     assert recorded_settings({"settings": settings_json(config)}) == config
 
 

@@ -24,6 +24,7 @@ from datasets_helpers import (
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.format.layout import Layout
 from handrail.datasets.reading.reader import read_episodes, read_frames
+from handrail.datasets.recording.folder import set_aside
 from handrail.datasets.recording.repair import repair
 
 
@@ -124,8 +125,6 @@ def test_a_damaged_episode_is_named_and_costs_no_other(root, stream, harm):
     assert tree(root) == before  # nothing that was saved is moved without being asked
     done = command(root, "--set_aside", name="repair")
     assert (done.returncode, done.stdout.count("\n")) == (1, 1)
-    assert "3 put back" not in done.stdout
-    assert "2 put back" in done.stdout
     _check_is(root, [0, 2, 3])
     assert not path.exists() or path.read_bytes() != before.get(path.relative_to(root).as_posix())
     assert repair(root).clean
@@ -154,29 +153,26 @@ def test_one_byte_missing_in_episode_2_of_24(tmp_path):
         resume(root)
     assert tree(root) == before
     report = repair(root, set_aside_damaged=True)
-    assert (report.episodes, len(report.lost), report.put_back, report.complete) == (23, 1, 21, False)
+    assert (report.episodes, len(report.lost), report.complete) == (23, 1, False)
     _check_is(root, [0, 1, *range(3, 24)])
 
 
-def test_what_the_first_version_moved_away_is_put_back(tmp_path):
-    """As it left them: everything from the damaged episode on in `.damaged/000`, and recorded on since."""
-    root = record(tmp_path / "set", 6)
-    os.truncate(Layout(root).data(2), 100)
-    layout, target = Layout(root), tmp_path / "set" / ".damaged" / "000"
-    for number in range(2, 6):
-        for path in (layout.data(number), layout.row(number)):
-            (target / layout.relative(path)).parent.mkdir(parents=True, exist_ok=True)
-            path.rename(target / layout.relative(path))
-    layout.info.write_text(layout.info.read_text().replace('"total_episodes": 6', '"total_episodes": 2'))
-    with resume(root) as writer:
-        record_one(writer, cameras=False)
-    done = command(root, name="repair")
-    assert done.returncode == 0
-    assert "3 put back" in done.stdout
-    _check_is(root, [0, 1, 2, 3, 4, 5])
-    assert [path.name for path in target.rglob("*.parquet")] == ["file-002.parquet"] * 2  # what is not whole
-    assert repair(root).clean
-    assert open_with_lerobot(root).num_episodes == 6
+def test_an_older_repair_that_was_cut_short_is_undone(tmp_path):
+    """It moved everything from the damaged episode on into `.damaged/`, the lines last and from the end."""
+    original = record(tmp_path / "original", 4)
+    layout = Layout(original)
+    os.truncate(layout.data(1), 100)
+    before = tree(original)
+    del before["data/chunk-000/file-001.parquet"]  # it is not what its seal says, and stays in `.damaged/`
+    moved = [*(layout.data(number) for number in (1, 2, 3)), *(layout.row(number) for number in (3, 2, 1))]
+    for count in range(1, len(moved) + 1):
+        root = shutil.copytree(original, tmp_path / str(count))
+        set_aside(Layout(root), [root / layout.relative(path) for path in moved[:count]])
+        report = repair(root)
+        assert [fault.split(":")[0] for fault in report.damage] == ["episode 1"]
+        assert {name: content for name, content in tree(root).items() if name in before} == before
+        assert repair(root, set_aside_damaged=True).episodes == 3
+        _check_is(root, [0, 2, 3])
 
 
 def test_leftovers_of_a_save_that_was_never_committed_are_removed(root):
@@ -228,22 +224,6 @@ def test_a_dataset_with_no_episode(tmp_path):
     Layout(tmp_path / "set").info.unlink()
     assert repair(tmp_path / "set").rebuilt == ("meta/info.json",)
     assert json.loads(Layout(tmp_path / "set").info.read_bytes())["total_episodes"] == 0
-
-
-def test_an_episode_put_back_comes_once(root):
-    """Cut short after the episode was saved and before `.damaged` was cleared, nothing comes twice."""
-    os.truncate(Layout(root).data(1), 10)
-    copies = shutil.copytree(root, root.parent / "copies")
-    repair(root, set_aside_damaged=True)
-    for number in (2, 3):
-        for path in files_of(copies, number, cameras=True):
-            target = root / ".damaged" / "007" / path.relative_to(copies)
-            target.parent.mkdir(parents=True, exist_ok=True)
-            shutil.copy(path, target)
-    report = repair(root)
-    assert (report.episodes, report.put_back) == (3, 0)
-    assert not (root / ".damaged" / "007").exists()
-    _check_is(root, [0, 2, 3])
 
 
 def test_chunks_roll_over(tmp_path, monkeypatch):

@@ -37,6 +37,14 @@ def test_lost_lines_of_metadata_never_cost_data(root, asked):
     assert not report.removed
 
 
+def test_a_dataset_of_which_only_the_count_is_left_may_begin_anew(root):
+    for name in ("data", "videos", "meta/episodes"):
+        shutil.rmtree(root / name)
+    assert repair(root).damage == ("episodes 0 to 3: missing",)
+    assert repair(root, set_aside_damaged=True).episodes == 0
+    assert repair(root).clean
+
+
 @pytest.mark.parametrize("episodes", [1, 3])
 @pytest.mark.parametrize("info", [None, "{"])
 def test_the_last_line_and_the_count_gone_cost_no_data(tmp_path, episodes, info):

@@ -25,7 +25,6 @@ def folder(tmp_path_factory):
     checkpoint(root / "chase")
     checkpoint(root / "chase_1", training_seed=1)
     checkpoint(root / "chase_realised", actions="realised")
-    checkpoint(root / "chase_targets", actions="targets")
     checkpoint(root / "brief", kind="still", time_limit=0.5)
     checkpoint(root / "random", kind="random")
     checkpoint(root / "torch", kind="torch")
@@ -155,15 +154,15 @@ def test_a_killed_worker_is_one_line_and_the_same_command_goes_on(folder, tmp_pa
 def test_an_intent_meets_the_controller_of_its_mode(folder):
     """What the policy asks for in teleop mode is completed as in teleop: the hand goes to the goal."""
     content = evaluate(
-        config(folder, "chase", "chase_realised", "chase_targets", protection="own,none", time_limit=12.0),
+        config(folder, "chase", "chase_realised", protection="own,none", time_limit=12.0),
         load=load,
     )
-    assert set(content["arms"]) == {"ee intent", "ee intent unprotected", "ee", "ee targets"}
+    assert set(content["arms"]) == {"ee intent", "ee intent unprotected", "ee"}
     for label in content["arms"]:
         assert all(row["success"] for row in rollouts(content, label)), label
         assert all(row["time_to_success"] == row["length"] for row in rollouts(content, label))
     table = evaluation_table(content)
-    assert len(table.rows) == 4
+    assert len(table.rows) == 3
 
 
 def test_a_rollout_has_the_time_that_the_demonstrations_had(folder):

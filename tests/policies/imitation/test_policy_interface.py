@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from handrail.collect.operators.human.steering import FOLLOW
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.robot.description import load_description
@@ -110,27 +109,6 @@ def test_a_policy_sees_where_the_base_is():
     np.testing.assert_allclose(state[:, -4:], np.column_stack([x, y, np.cos(yaw), np.sin(yaw)]), atol=1e-6)
     np.testing.assert_array_equal(state[:, :-4], less)
     np.testing.assert_array_equal(around, same)
-
-
-def test_a_target_gives_the_velocity_back_and_pulls_from_elsewhere():
-    """From where it was recorded the velocity that came about; from elsewhere the way to the same place."""
-    columns = episode(np.random.default_rng(4), [("joint",)])
-    state, n = columns["observation.state"], len(JOINTS)
-    state[:, 2] = np.linspace(3.0, 3.3, len(state))  # past half a turn
-    interface = PolicyInterface.of_dataset(FEATURES, [columns], "targets")
-    assert interface.action_names == (*(f"{joint}.pos" for joint in JOINTS), "gripper")
-    targets = interface.encode(columns)
-    for t, target in enumerate(targets):
-        after = state[min(t + 1, len(state) - 1), n : 2 * n]
-        intent = interface.decode(target, state[t])
-        np.testing.assert_array_equal(intent.mask, CHANNELS.mask("joint"))
-        np.testing.assert_allclose(intent.values[CHANNELS.joint_slice], after, atol=1e-5)
-        elsewhere = state[t] + np.where(np.arange(len(STATE)) < n, 0.1, 0.0)
-        elsewhere[2] -= 2.0 * np.pi  # the same heading
-        pulled = interface.decode(target, elsewhere).values[CHANNELS.joint_slice]
-        np.testing.assert_allclose((after - pulled) / 0.1, np.full(n, FOLLOW), atol=1e-3)
-    with pytest.raises(HandrailError, match="sees where the base is"):
-        PolicyInterface.of_dataset(FEATURES, [columns], "targets", base_pose=False)
 
 
 def test_an_older_checkpoint_keeps_its_view():

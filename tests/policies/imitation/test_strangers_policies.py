@@ -225,7 +225,7 @@ def test_a_malformed_file_is_one_line(name, policy):
         ("mode", "[/x]"),
         ("mode", ["ee"]),
         ("environment", ["reach"]),
-        ("actions", "telepathic"),
+        ("actions", "targets"),  # joint positions, which an older Handrail had
         ("training_seed", -1),
         ("training_seed", True),
         ("trained_on", {"episodes": "many"}),
@@ -246,7 +246,14 @@ def test_what_a_policy_says_of_itself_is_checked(entry, value, policy):
 
 @pytest.mark.parametrize(
     ("entry", "value"),
-    [("state_names", "abc"), ("channels", [1]), ("masks", [[True]]), ("masks", 3), ("actions", {})],
+    [
+        ("state_names", "abc"),
+        ("channels", [1]),
+        ("masks", [[True]]),
+        ("masks", 3),
+        ("actions", {}),
+        ("actions", "targets"),
+    ],
 )
 def test_what_an_interface_says_is_checked(entry, value, policy):
     interface = json.loads((policy / "handrail.json").read_text())["interface"]

@@ -106,20 +106,6 @@ def test_a_checkpoint_says_how_long_its_episodes_could_last(limits, longest, tmp
     assert read_meta(folder)[1].time_limit == longest
 
 
-def test_joint_targets_are_trained_like_any_action(recorded, tmp_path):
-    """A step of the checkpoint's own turns them into velocities of the whole robot."""
-    folder = train(tiny(recorded, tmp_path, actions="targets", steps=1), quiet=True)
-    interface, meta = read_meta(folder)
-    assert interface is not None
-    assert (interface.actions, meta.actions) == ("targets", "targets")
-    policy, frames = load_policy(folder), read_frames(recorded, 0)
-    seen = interface.observe(frames["observation.state"][0], frames["observation.environment_state"][0])
-    intent = interface.decode(policy.act(*seen), frames["observation.state"][0])
-    assert np.isfinite(intent.values).all()
-    with pytest.raises(HandrailError, match="sees where the base is"):
-        train(tiny(recorded, tmp_path / "blind", actions="targets", base_pose=False), quiet=True)
-
-
 def test_a_loaded_policy_acts_like_lerobot_s(trained, recorded):
     from lerobot.policies.act.modeling_act import ACTPolicy
 

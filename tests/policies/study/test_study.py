@@ -67,7 +67,7 @@ def test_report_says_what_is_in_the_files(tmp_path, preset):
     content = json.loads((tmp_path / "study/study.json").read_text())
     found = content["conditions"]
     arms = {each["label"]: each for each in found if (each["treatment"], each["noise"]) == ("", 1.0)}
-    assert set(arms) == {"ee", "ee intent", "direct", "direct targets"}
+    assert set(arms) == {"ee", "ee intent", "direct"}
     assert all(arm["rollouts"] == 80 for arm in arms.values())
     (ee,) = [each for each in content["contrasts"] if each["name"] == "ee − direct"]
     assert ee["estimate"]["value"] == pytest.approx(

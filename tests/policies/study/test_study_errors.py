@@ -63,7 +63,7 @@ def preset(tmp_path):
         (("rollouts = 40", "seed = -1\nrollouts = 40"), "seed: expected a whole number, 0 or more, got -1"),
         (("draws = 2", "draws = -1"), "draws: expected a whole number, 0 or more, got -1"),
         (('intents = ["ee"]', 'intents = ["direct"]'), "unknown mode of intents, which the MPC completes"),
-        (('targets = ["direct"]', 'targets = ["joints"]'), "unknown mode of targets 'joints'"),
+        (("[beside]", '[beside]\ntargets = ["direct"]'), "targets"),
         (("[beside]", "[flat]\nheld_out = 1.5\n[beside]"), "--eval_split 1.5: expected 0 to below 1"),
         (("[beside]", "[factors]\nhand_mpc = 'ee'\n[beside]"), "hand_none"),
         (("[beside]", FACTORS.replace("direct", "leader") + "[beside]"), "unknown mode of the factors"),

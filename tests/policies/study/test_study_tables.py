@@ -2,16 +2,14 @@
 
 from dataclasses import replace
 
-import numpy as np
-import pytest
 from compare_helpers import check_texts
 from figure_helpers import shows
-from made_study import DESIGN, MODES, SHARES, TASK
+from made_study import DESIGN, MODES, TASK
 
-from handrail.policies.study.design.design import Beside, Flat, Robustness, Sweep
+from handrail.policies.study.design.design import Flat, Robustness, Sweep
 from handrail.policies.study.design.power import plan
 from handrail.policies.study.report import tables
-from handrail.policies.study.report.contrasts import DECLARED, EXPLORATORY, contrasts
+from handrail.policies.study.report.contrasts import DECLARED, contrasts
 from handrail.policies.study.report.figures import figures
 from handrail.policies.study.report.words import cautions, how
 
@@ -45,22 +43,6 @@ def test_intents_without_the_mpc_and_velocities_through_it_stand_beside_what_the
         assert row[3] != "–"
         assert row[-1] == "50 %"  # every other scene has contact, whatever the policy
         assert set(whole.draws) >= {0, 1}
-
-
-def test_joint_targets_are_compared_with_the_same_recordings_velocities(gathered):
-    design = replace(DESIGN, beside=Beside(targets=("direct",), draws=3))
-    results = gathered(design, SHARES | {"direct targets": (0.9, 0.9, 0.9)})
-    known = [each for each in contrasts(results) if each.name == "direct targets − direct"]
-    for each in known:
-        sides = [
-            np.mean([results.find(task, label).shares[draw] for task in each.tasks for draw in range(3)])
-            for label in ("direct targets", "direct")
-        ]
-        assert each.sides == pytest.approx(sides)
-        assert (each.kind, each.estimate.replicates) == (EXPLORATORY, 3)
-    assert {each.tasks for each in known} == {("reach",), ("tray",), ("reach", "tray")}
-    assert "joint positions" in how(results, known)
-    assert "joint positions" not in how(gathered(), known)
 
 
 def test_failures_are_counted_by_stage(gathered):

@@ -41,16 +41,14 @@ def test_from_collecting_to_the_report(ran):
     count = {"nominal": 0, "disturbed": 0, "protected": 0}
     for file in files:
         count[file.parent.name] += 1
-    assert count == {"nominal": 8, "disturbed": 4, "protected": 3}  # an intent has a protection of its own
+    assert count == {"nominal": 7, "disturbed": 3, "protected": 2}  # an intent has a protection of its own
     arms = [json.loads(file.read_text())["arms"] for file in files]
     rows = [row for entries in arms for runs in entries.values() for run in runs for row in run["rollouts"]]
-    assert len(rows) == 8 * 3 + 4 * 2 + 3 * 2
+    assert len(rows) == 7 * 3 + 3 * 2 + 2 * 2
     assert max(row["length"] for row in rows) == pytest.approx(1.5)  # untrained: none arrives before
     assert {row["ended"] for row in rows if not row["success"]} <= {"stalled", "moving"}
     page = (study / "report.html").read_text()
-    assert all(
-        label in page for label in ("ee intent", "direct targets", "direct same number", "pushed", "filter")
-    )
+    assert all(label in page for label in ("ee intent", "direct same number", "pushed", "filter"))
     content = json.loads((study / "study.json").read_text())
     assert content["missing"] == []
     for name, job in content["jobs"].items():
