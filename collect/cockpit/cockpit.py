@@ -50,7 +50,7 @@ from handrail.controllers.interface.intent import Intent
 from handrail.controllers.robot.model import RobotModel
 from handrail.datasets.recording.frames import Frame
 
-_NEEDED = ("uvicorn", "starlette", "websockets", "nicegui", "cryptography")  # of the extra 'cockpit'
+_NEEDED = ("uvicorn", "starlette", "websockets", "cryptography")  # of the extra 'cockpit'
 _JPEG_QUALITY = 70
 _PICTURE_SIDE = 320  # of a live picture at most; the recorded one is as large as it is [px]
 

@@ -71,7 +71,6 @@ class Site:
         self.app = Starlette(
             routes=[
                 Route("/login", self._log_in, methods=["POST"]),
-                Route("/lib/three.js", self._three),
                 Route("/meshes/{name}", self._kept),
                 Route("/played/{name}", self._kept),
                 Route("/{name:path}", self._file),
@@ -86,12 +85,6 @@ class Site:
         if name not in self._files:
             return Response("not found", 404, headers=_HEADERS)
         return FileResponse(self._files[name], headers=_HEADERS)
-
-    async def _three(self, request: Request) -> Response:
-        import nicegui.elements.scene as scene
-
-        path = Path(scene.__file__).parent / "dist" / "index.js"
-        return FileResponse(path, headers=_HEADERS) if self._admits(request) else _refused()
 
     async def _kept(self, request: Request) -> Response:
         files = {path.name: path for path in self._folder.iterdir()}

@@ -1,6 +1,6 @@
 // What the hand is to do, drawn: its axes and those of where it is to be brought, straight lines down from both to the
 // floor, and how near is near enough.
-import { THREE } from "/lib/three.js";
+import { THREE } from "./three.min.js";
 import { place } from "./scene.js";
 
 const HAND = 0x00a0a8, AIM = 0xe3b505, WITHIN = 0x2fbf71;

@@ -1,5 +1,5 @@
 // From where the person looks: so that hand and aim are in view, from above, from the hand, or from where they like.
-import { OrbitControls, THREE } from "/lib/three.js";
+import { OrbitControls, THREE } from "./three.min.js";
 import { keep, recall } from "./store.js";
 
 export const CAMERAS = { follow: "hand and goal", free: "from where I put it", hand: "from the hand", above: "from above" };

@@ -1,6 +1,6 @@
 // What is asked and what is made of it, drawn into the scene: ghosts, the plan, the nearest pair. Each has a line of
 // its own kind, so that nobody needs the colours: the ghosts are hollow, the plan is solid, the nearest pair is dotted.
-import { THREE } from "/lib/three.js";
+import { THREE } from "./three.min.js";
 import { place } from "./scene.js";
 import { centimetres } from "./way.js";
 

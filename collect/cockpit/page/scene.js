@@ -1,5 +1,5 @@
 // What there is to draw, made from the server's list: bodies of shapes and meshes, a floor, lights.
-import { THREE } from "/lib/three.js";
+import { THREE } from "./three.min.js";
 
 const SIDE = 60; // of the floor [m]
 

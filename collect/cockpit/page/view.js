@@ -1,5 +1,5 @@
 // The picture: the robot and things as they look, what is asked, what the plan makes of it; live, or played again.
-import { THREE } from "/lib/three.js";
+import { THREE } from "./three.min.js";
 import { AimMarks } from "./aim.js";
 import { Cameras } from "./cameras.js";
 import { Marks } from "./marks.js";

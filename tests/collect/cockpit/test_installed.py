@@ -7,7 +7,7 @@ import pytest
 from command_helpers import command
 
 
-@pytest.mark.parametrize("missing", ["uvicorn", "nicegui"])
+@pytest.mark.parametrize("missing", ["uvicorn", "starlette"])
 def test_what_is_missing_is_named(tmp_path, monkeypatch, missing):
     found = importlib.util.find_spec
     with monkeypatch.context() as patch:

@@ -27,7 +27,7 @@ _FREE = """async () => {
   return { ...area, hit };
 }"""
 _FRAMED = """async ([width, height, points]) => {
-  const { Cameras } = await import("./cameras.js"), { THREE } = await import("/lib/three.js");
+  const { Cameras } = await import("./cameras.js"), { THREE } = await import("./three.min.js");
   const own = Cameras.prototype, { frame } = own, seen = [];
   const cameras = await new Promise((found) => { own.frame = function () { found(this); }; }); // the page's
   own.frame = frame;

@@ -205,7 +205,7 @@ def test_too_large_a_message_ends_the_connection(served):
 
 def test_the_door_is_closed_without_the_token(guarded):
     token = guarded.address.split("#")[1]
-    for name in ("link.js", "view.js", "meshes/x.bin", "lib/three.js"):
+    for name in ("link.js", "view.js", "meshes/x.bin", "three.min.js"):
         assert ask(guarded, f"/{name}")[0] == 403
     assert ask(guarded, "/index.html")[0] == 200
     with pytest.raises(InvalidStatus):
