@@ -21,18 +21,14 @@ def main(config: CompareConfig) -> int:
     from handrail.datasets.comparison.compare import compare
     from handrail.datasets.comparison.findings import findings
     from handrail.datasets.comparison.report.report import write_report
-    from handrail.datasets.learnability.tables import learnability_tables
-    from handrail.policies.imitation.interface.policy_rows import policy_rows
 
-    comparison = compare(config, policy_rows)
+    comparison = compare(config)
     files = write_report(comparison)
     for finding in findings(comparison):
         console.print(
             f"{'!' if finding.kind == 'caution' else '●' if finding.detected else '·'} {finding.text}"
         )
     console.print()
-    for table in learnability_tables(comparison.learnability):
-        console.print(table)
     console.print("Written: " + ", ".join(map(str, files)))
     return 0
 

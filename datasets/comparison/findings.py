@@ -11,7 +11,6 @@ from handrail.datasets.comparison.compare import Comparison
 from handrail.datasets.comparison.differences import Difference
 from handrail.datasets.comparison.finding import Finding
 from handrail.datasets.comparison.outcome_findings import outcome_findings
-from handrail.datasets.learnability.tables import learnability_words
 from handrail.datasets.presentation.wording import (
     duration,
     number,
@@ -33,7 +32,6 @@ def findings(comparison: Comparison) -> list[Finding]:
     found = [Finding("caution", unlike, short=unlike)] if unlike else []
     found += outcome_findings(comparison.outcomes) if comparison.outcomes else []
     found += [*_collection(comparison), *_quality(comparison)]
-    found.append(Finding("quality", learnability_words(comparison.learnability)))
     return found + [Finding("caution", text) for text in cautions(comparison)]
 
 

@@ -88,7 +88,6 @@ COLLECTED = {
     "reasons": {"timeout": 1},
     "digest": "d1ce",
     "quality": {"length": 3.0, "sparc": -2.5},
-    "learnability": {"learnability": 0.7},
 }
 LEARNT = {
     "steps": 10,

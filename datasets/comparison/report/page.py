@@ -19,7 +19,6 @@ from handrail.datasets.comparison.report.figures import (
 )
 from handrail.datasets.comparison.report.pictures import first_pictures
 from handrail.datasets.comparison.report.worst import worst_folds
-from handrail.datasets.learnability.tables import learnability_tables, learnability_words
 from handrail.datasets.presentation.drawing import Panel, svg
 from handrail.datasets.presentation.markup import (
     card,
@@ -84,7 +83,6 @@ def report_page(comparison: Comparison, found: list[Finding]) -> str:
     parts += [
         section("What was collected", tables.collection_table(comparison.everything.collected)),
         section("Quality", *_quality(comparison)),
-        section("Learnability", *_learnability(comparison)),
         section("Trajectories", _drawn(trajectory_panels(comparison)), _pictures(comparison)),
     ]
     missing = tables.not_applicable_table(comparison)
@@ -175,11 +173,6 @@ def _quality(comparison: Comparison) -> list[str | Table]:
     parts += [tables.metrics_table(comparison, label) for label in comparison.success]
     parts += [paragraph(_QUALITY, "quiet"), _matched(comparison)]
     return [*parts, _drawn(metrics_panels(comparison), "small")]
-
-
-def _learnability(comparison: Comparison) -> list[str | Table]:
-    found = comparison.learnability
-    return [paragraph(learnability_words(found)), *learnability_tables(found)]
 
 
 def _matched(comparison: Comparison) -> str:

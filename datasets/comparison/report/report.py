@@ -69,10 +69,6 @@ def as_json(comparison: Comparison, found: list[Finding]) -> dict[str, Any]:
             },
             "views": {view.title: _view(view) for view in comparison.views},
             "outcomes": asdict(comparison.outcomes) if comparison.outcomes else None,
-            "learnability": {
-                label: {"does_not_apply": each} if isinstance(each, str) else asdict(each)
-                for label, each in comparison.learnability.items()
-            },
         }
     )
 

@@ -6,8 +6,6 @@ from pathlib import Path
 from typing import Any
 
 from handrail.controllers.versions import SIMULATION, versions
-from handrail.datasets.comparison.prediction import MetricPrediction
-from handrail.datasets.comparison.report.prediction import prediction_table, prediction_words
 from handrail.datasets.comparison.report.report import json_text
 from handrail.datasets.presentation import markup
 from handrail.datasets.presentation.drawing import png, svg
@@ -20,7 +18,6 @@ from handrail.policies.study.design.progress import StudyProgress
 from handrail.policies.study.report import tables
 from handrail.policies.study.report.contrasts import DECLARED, EXPLORATORY, SYSTEM, Contrast, contrasts
 from handrail.policies.study.report.figures import figures
-from handrail.policies.study.report.prediction import predicted
 from handrail.policies.study.report.results import Condition, Results, gather
 from handrail.policies.study.report.words import answer, cautions, how
 
@@ -33,7 +30,6 @@ _CAPTIONS = {
     "robustness": "Success disturbed and undisturbed.",
     "sweep": "How human the operator is, and what that does to policies and to the operator's time.",
 }
-_PREDICTION = "Which metric of the demonstrations predicts success"
 _FORMAT = "handrail.study/2"
 _OF_TASK = (
     tables.conditions_table,
@@ -53,14 +49,12 @@ class _Findings:
         config: how the study was called.
         results: of its jobs.
         contrasts: of its policies.
-        predictions: which metric of the demonstrations goes with success.
         figures: by name.
     """
 
     config: StudyConfig
     results: Results
     contrasts: Sequence[Contrast]
-    predictions: Sequence[MetricPrediction]
     figures: Mapping[str, Any]
 
     @property
@@ -89,7 +83,7 @@ def write_study(config: StudyConfig, progress: StudyProgress) -> list[Path]:
     """
     root, results = progress.layout.root, gather(progress)
     found = contrasts(results)
-    findings = _Findings(config, results, found, predicted(results), figures(results, found))
+    findings = _Findings(config, results, found, figures(results, found))
     files = {root / "report.html": _html(findings), root / "study.json": _json(findings)}
     with explained("study: expected a folder that can be written"):
         for path, text in files.items():
@@ -111,9 +105,6 @@ def _html(findings: _Findings) -> str:
     if findings.of_all:
         parts.append(markup.section("Contrasts", *findings.of_all))
     parts += [markup.section(_title(task), *findings.of_task(task)) for task in design.tasks]
-    if findings.predictions:
-        words = markup.paragraph(prediction_words(findings.predictions))
-        parts.append(markup.section(_PREDICTION, words, prediction_table(findings.predictions)))
     parts.append(markup.section("How to read this", markup.paragraph(how(results, findings.contrasts))))
     again = tables.times_table(results), tables.cells_table(results, findings.config.preset)
     parts.append(markup.section("Again", *(table for table in again if table.rows)))
@@ -137,7 +128,6 @@ def _json(findings: _Findings) -> str:
         "answer": findings.answer,
         "contrasts": [asdict(each) for each in findings.contrasts],
         "conditions": [_numbers(noise, each) for (noise, *_), each in findings.results.conditions.items()],
-        "predictions": [asdict(each) for each in findings.predictions],
         "jobs": {name: {"result": note["result"], "took": note.get("took")} for name, note in done.items()},
         "seconds": sum(each.get("seconds", 0.0) for each in took),
         "processor_seconds": sum(each.get("processor_seconds", 0.0) for each in took),
@@ -179,10 +169,6 @@ def _write_page(findings: _Findings) -> list[Path]:
     for task in design.tasks:
         if of_task := findings.of_task(task):
             parts += [f"### {_title(task)}", *map(markdown_table, of_task)]
-    if findings.predictions:
-        table = prediction_table(findings.predictions)
-        parts += [f"### {_PREDICTION}", prediction_words(findings.predictions)]
-        parts += [markdown_table(table), table.caption]
     parts += ["### How to read this", how(results, findings.contrasts)]
     times = tables.times_table(results)
     parts += [markdown_table(times)] if times.rows else []

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from handrail.datasets.comparison.outcomes import compare_rollouts
-from handrail.datasets.learnability.learnability import TITLES
 from handrail.datasets.presentation.table import Cell, Table
 from handrail.datasets.presentation.wording import (
     DASH,
@@ -152,11 +151,9 @@ def quality_table(task: str, results: Results) -> Table:
 
 
 def _described(result: dict[str, Any]) -> dict[str, float]:
-    """Return the metrics of a draw by title, then how much of its actions can be told."""
+    """Return the metrics of a draw by title."""
     known = {metric.title: result["quality"].get(metric.name) for metric in METRICS}
-    scores: dict[str, float] = result["learnability"]
-    told = {TITLES.get(name, name): score for name, score in scores.items()}
-    return {title: value for title, value in known.items() if value is not None} | told
+    return {title: value for title, value in known.items() if value is not None}
 
 
 def treatments_table(task: str, results: Results) -> Table:

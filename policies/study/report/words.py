@@ -3,7 +3,6 @@
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from handrail.datasets.learnability.learnability import CAVEAT
 from handrail.datasets.presentation.wording import p_value, percent, points, points_span
 from handrail.policies.imitation.training.plateau import Plateau
 from handrail.policies.study.design.design import StudyDesign
@@ -166,7 +165,6 @@ def _how(design: StudyDesign, results: Results, found: Sequence[Contrast]) -> It
             " best of the unprotected ones in this very measure, chosen afterwards, which is in its favour."
             " It does not tell whether the intent or the MPC does it."
         )
-    yield f"“Learnability” is the R² of the actions from what policies see, on held-out episodes. {CAVEAT}"
     yield plan(design)
 
 

@@ -91,9 +91,6 @@ def test_report_says_what_is_in_the_files(tmp_path, preset):
     assert f"| {100 * arms['direct']['successes'] / 80:.0f} % |" in text, row
     assert (tmp_path / "page_small_answer.png").read_bytes().startswith(b"\x89PNG")
     html = (tmp_path / "study/report.html").read_text()
-    assert {"length", "learnability"} <= {each["metric"] for each in content["predictions"]}
-    assert "Which metric of the demonstrations predicts success" in html
-    assert "Which metric of the demonstrations predicts success" in text
     assert f"{100 * arms['ee intent']['successes'] / 80:.0f} %" in html
     for cell in ("reach/ee/0", "reach/direct@0/0"):
         assert f"handrail-study --preset {preset} --only {cell} --output outputs/again" in html
