@@ -28,16 +28,14 @@ _CAPTIONS = {
     " squares: the same number of demonstrations.",
     "training": "Loss on held-out episodes while the policies learnt; a dot is where the training ended.",
     "robustness": "Success disturbed and undisturbed.",
-    "sweep": "How human the operator is, and what that does to policies and to the operator's time.",
 }
-_FORMAT = "handrail.study/2"
+_FORMAT = "handrail.study/3"
 _OF_TASK = (
     tables.conditions_table,
     tables.failures_table,
     tables.collection_table,
     tables.quality_table,
     tables.treatments_table,
-    tables.sweep_table,
 )
 
 
@@ -59,7 +57,7 @@ class _Findings:
 
     @property
     def answer(self) -> list[str]:
-        return answer(self.contrasts, self.results)
+        return answer(self.contrasts, self.results.progress.design)
 
     @property
     def of_all(self) -> list[Table]:
@@ -105,7 +103,7 @@ def _html(findings: _Findings) -> str:
     if findings.of_all:
         parts.append(markup.section("Contrasts", *findings.of_all))
     parts += [markup.section(_title(task), *findings.of_task(task)) for task in design.tasks]
-    parts.append(markup.section("How to read this", markup.paragraph(how(results, findings.contrasts))))
+    parts.append(markup.section("How to read this", markup.paragraph(how(design))))
     again = tables.times_table(results), tables.cells_table(results, findings.config.preset)
     parts.append(markup.section("Again", *(table for table in again if table.rows)))
     return markup.page(f"Study {design.name}: {', '.join(design.modes)}", *parts)
@@ -127,7 +125,7 @@ def _json(findings: _Findings) -> str:
         "versions": versions(*SIMULATION, "torch"),
         "answer": findings.answer,
         "contrasts": [asdict(each) for each in findings.contrasts],
-        "conditions": [_numbers(noise, each) for (noise, *_), each in findings.results.conditions.items()],
+        "conditions": [_numbers(each) for each in findings.results.conditions.values()],
         "jobs": {name: {"result": note["result"], "took": note.get("took")} for name, note in done.items()},
         "seconds": sum(each.get("seconds", 0.0) for each in took),
         "processor_seconds": sum(each.get("processor_seconds", 0.0) for each in took),
@@ -136,12 +134,11 @@ def _json(findings: _Findings) -> str:
     return json_text(content)
 
 
-def _numbers(noise: float, condition: Condition) -> dict[str, Any]:
+def _numbers(condition: Condition) -> dict[str, Any]:
     return {
         "task": condition.task,
         "label": condition.label,
         "treatment": condition.treatment,
-        "noise": noise,
         "success": asdict(condition.success),
         "interval": condition.interval,
         "draws": {str(draw): share for draw, share in condition.shares.items()},
@@ -169,7 +166,7 @@ def _write_page(findings: _Findings) -> list[Path]:
     for task in design.tasks:
         if of_task := findings.of_task(task):
             parts += [f"### {_title(task)}", *map(markdown_table, of_task)]
-    parts += ["### How to read this", how(results, findings.contrasts)]
+    parts += ["### How to read this", how(design)]
     times = tables.times_table(results)
     parts += [markdown_table(times)] if times.rows else []
     again = tables.cell_command(preset, "TASK/MODE/DRAW")

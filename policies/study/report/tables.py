@@ -196,34 +196,6 @@ def _same(whole: Condition, treated: Condition, measure: str = "success") -> lis
     return found
 
 
-def sweep_table(task: str, results: Results) -> Table:
-    """Return how success and the operator's time depend on how human the operator is."""
-    rows = [
-        (each.label, f"{noise:g}", percent(each.success.value), percent_span(each.interval), number(seconds))
-        for noise, each, seconds in sweep(task, results)
-    ]
-    headings = ("policy", "operator's noise", "success", "95 %", "s a demonstration")
-    return Table(headings, rows, "Operators from perfect to clumsy")
-
-
-def sweep(task: str, results: Results) -> list[tuple[float, Condition, float]]:
-    """Return noise, condition and seconds a successful demonstration, policy by policy, noise rising."""
-    design = results.progress.design
-    if not design.sweep or task not in design.sweep.tasks:
-        return []
-    found = []
-    for mode in design.modes:
-        for noise in sorted({1.0, *design.sweep.noises}):
-            condition, data = results.find(task, mode, "", noise), results.collected(task, mode, noise)
-            successes = sum(each["successes"] for each in data)
-            draws = condition.draws.items() if condition else ()
-            kept = {draw: each for draw, each in draws if draw < design.sweep.draws}
-            if kept and successes:
-                seconds = 60.0 * sum(each["minutes"] for each in data) / successes
-                found.append((noise, Condition(task, mode, "", kept), seconds))
-    return found
-
-
 def times_table(results: Results) -> Table:
     """Return what the jobs took."""
     took: dict[tuple[str, str], list[dict[str, Any]]] = {}
