@@ -8,7 +8,7 @@ from handrail.datasets.comparison.compare import Comparison
 from handrail.datasets.comparison.outcomes import ConditionOutcome, Outcomes
 from handrail.datasets.presentation.wording import number, percent, percent_span, points_span, span
 
-UNLIKE = "The {} differ: what follows describes each group and ranks nothing."
+_UNLIKE = "The {} differ: what follows describes each group and ranks nothing."
 _UNKNOWN = "Whether episodes succeeded was not recorded for all of them."
 _MOST = 3  # differences that are named; the tables have all
 
@@ -16,9 +16,10 @@ _MOST = 3  # differences that are named; the tables have all
 def headline(comparison: Comparison) -> str:
     """Return the answer: of the policies if they were evaluated, else of what was collected."""
     if comparison.unlike:
-        return UNLIKE.format(" and the ".join(comparison.unlike))
+        return _UNLIKE.format(" and the ".join(comparison.unlike))
     outcomes = comparison.outcomes
-    return " ".join(islice(_of_policies(outcomes) if outcomes else _of_collecting(comparison), _MOST))
+    said = _of_policies(outcomes) if outcomes else _of_collecting(comparison)
+    return " ".join(islice(dict.fromkeys(said), _MOST))
 
 
 def _of_policies(outcomes: Outcomes) -> Iterator[str]:
