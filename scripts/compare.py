@@ -18,21 +18,21 @@ def main(config: CompareConfig) -> int:
     console = Terminal()
     if config.study:
         return _people(config, console)
+    from handrail.datasets.comparison.cautions import cautions
     from handrail.datasets.comparison.compare import compare
-    from handrail.datasets.comparison.findings import findings
+    from handrail.datasets.comparison.headline import headline
     from handrail.datasets.comparison.report.report import write_report
-    from handrail.datasets.learnability.tables import learnability_tables
-    from handrail.policies.imitation.interface.policy_rows import policy_rows
+    from handrail.datasets.comparison.report.tables import answer_tables
 
-    comparison = compare(config, policy_rows)
+    comparison = compare(config)
     files = write_report(comparison)
-    for finding in findings(comparison):
-        console.print(
-            f"{'!' if finding.kind == 'caution' else '●' if finding.detected else '·'} {finding.text}"
-        )
+    console.print(headline(comparison))
     console.print()
-    for table in learnability_tables(comparison.learnability):
+    for table in answer_tables(comparison):
         console.print(table)
+    for text in cautions(comparison):
+        console.print(f"! {text}")
+    console.print()
     console.print("Written: " + ", ".join(map(str, files)))
     return 0
 

@@ -1,13 +1,7 @@
 """`handrail-inspect`: print a dataset's episodes as a table."""
 
-from pathlib import Path
-from typing import TYPE_CHECKING
-
 from handrail.collect.commands.config import InspectConfig
 from handrail.scripts import cli
-
-if TYPE_CHECKING:
-    from handrail.datasets.presentation.terminal import Terminal
 
 
 @cli.command("handrail-inspect", InspectConfig)
@@ -40,30 +34,9 @@ def main(config: InspectConfig) -> int:
         leave_out = deletion(read_info(config.dataset.folder), [each.episode.number for each in worst])
         console.print(f"Without them: {leave_out}")
         return 0
-    if config.learnability:
-        return _learnability(config.dataset.folder, console)
     console.print(summary_table(config.dataset.folder))
     if config.quality:
         console.print(quality_table(config.dataset.folder))
-    return 0
-
-
-def _learnability(folder: Path, console: "Terminal") -> int:
-    import numpy as np
-
-    from handrail.datasets.demonstrations.demonstration import DoesNotApply
-    from handrail.datasets.demonstrations.load import recorded_episodes
-    from handrail.datasets.learnability.learnability import learnability
-    from handrail.datasets.learnability.tables import learnability_tables, learnability_words
-    from handrail.policies.imitation.interface.policy_rows import policy_rows
-
-    try:
-        found = learnability(recorded_episodes(folder), np.random.default_rng(0), policy_rows)
-    except DoesNotApply as error:
-        found = str(error)
-    for table in learnability_tables({folder.name: found}):
-        console.print(table)
-    console.print(learnability_words({folder.name: found}))
     return 0
 
 

@@ -77,8 +77,6 @@ class InspectConfig:
     """Print the worst episodes by this quality metric instead, and the command that leaves them out."""
     count: int = 5
     """How many of the worst."""
-    learnability: bool = False
-    """Print instead how much of the actions can be told from what a policy sees."""
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,13 @@ import numpy as np
 from handrail.controllers.arrays import FloatArray, IntArray
 from handrail.datasets.comparison.groups import Group
 from handrail.datasets.statistics.paired import wilson
-from handrail.datasets.statistics.proportions import ShareDifference, paired_shares, unpaired_shares
+from handrail.datasets.statistics.proportions import (
+    LEVEL,
+    ShareDifference,
+    holm,
+    paired_shares,
+    unpaired_shares,
+)
 from handrail.datasets.statistics.resampling import FEWEST, Interval, bootstrap, permutation_p
 
 
@@ -126,12 +132,6 @@ class RateRatio:
     interval: Interval
     p: float
 
-    @property
-    def inverse(self) -> "RateRatio":
-        """Those of the baseline over those of the group."""
-        low, high = self.interval
-        return RateRatio(_over(self.estimate), (_over(high), _over(low)), self.p)
-
 
 def rate_interval(group: Group, rng: np.random.Generator) -> Interval | None:
     """Return the 95 % bootstrap interval of successes an hour; None where it cannot be told."""
@@ -175,6 +175,17 @@ def rate_ratio(group: Group, baseline: Group, rng: np.random.Generator) -> RateR
     one, other = rates(places, -1)
     interval = low * _over(1.0 - low), high * _over(1.0 - high)
     return RateRatio(float(one / other), interval, permutation_p(places, difference, bool(pairs), rng))
+
+
+def adjusted(found: Mapping[str, ShareDifference | RateRatio | None]) -> dict[str, float]:
+    """Return p after Holm over the groups that have one, by label."""
+    known = {label: each.p for label, each in found.items() if each}
+    return dict(zip(known, holm(list(known.values())), strict=True))
+
+
+def detected(interval: Interval, p: float, none: float = 0.0) -> bool:
+    """Return whether an interval leaves `none` out and an adjusted p is below 0.05."""
+    return p < LEVEL and not interval[0] <= none <= interval[1]
 
 
 def _numbers(group: Group) -> tuple[FloatArray, FloatArray]:

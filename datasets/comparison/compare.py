@@ -21,10 +21,6 @@ from handrail.datasets.comparison.differences import Difference, differences
 from handrail.datasets.comparison.evaluations import Condition, read_evaluations
 from handrail.datasets.comparison.groups import Group, baseline_of, group_of, load_groups, unlike
 from handrail.datasets.comparison.outcomes import LIKE_FOR_LIKE, Outcomes, Pair, judge_pairs
-from handrail.datasets.demonstrations.demonstration import DoesNotApply
-from handrail.datasets.learnability.learnability import Learnability, learnability
-from handrail.datasets.learnability.policy_rows import PolicyView, recorded_view
-from handrail.datasets.learnability.sample import shared_budget
 from handrail.datasets.quality.group_reading import Reading
 from handrail.datasets.quality.measure import Measurements, measured, read
 from handrail.datasets.reading.check import check_whole
@@ -66,7 +62,6 @@ class Comparison:
         rates: Each group's interval of successes an hour, None where it cannot be told.
         ratios: Successes an hour of each group over those of the baseline.
         outcomes: Of trained policies, if evaluations were given.
-        learnability: Of as many episodes and frames of each group, or why it does not apply.
     """
 
     config: CompareConfig
@@ -76,7 +71,6 @@ class Comparison:
     rates: Mapping[str, Interval | None]
     ratios: Mapping[str, RateRatio | None]
     outcomes: Outcomes | None
-    learnability: Mapping[str, Learnability | str]
 
     @property
     def everything(self) -> View:
@@ -99,12 +93,8 @@ class Comparison:
         return unlike(self.everything.groups)
 
 
-def compare(config: CompareConfig, view: PolicyView = recorded_view) -> Comparison:
+def compare(config: CompareConfig) -> Comparison:
     """Compare as configured.
-
-    Args:
-        config: What is compared.
-        view: What policies read and write, for what they could learn.
 
     Raises:
         HandrailError: A setting is wrong, or a dataset or an evaluation cannot be read.
@@ -136,19 +126,7 @@ def compare(config: CompareConfig, view: PolicyView = recorded_view) -> Comparis
     rates = {group.label: rate_interval(group, rng) for group in groups}
     ratios = {group.label: rate_ratio(group, base, rng) for group in others}
     outcomes = judge_pairs(conditions, pairs, rng) if conditions else None
-    learned = _learnability(views[1].groups, view, config.seed)
-    return Comparison(config, baseline, views, success, rates, ratios, outcomes, learned)
-
-
-def _learnability(groups: Sequence[Group], view: PolicyView, seed: int) -> dict[str, Learnability | str]:
-    budget, found = shared_budget([group.episodes for group in groups]), {}
-    for group in groups:
-        try:
-            rng = np.random.default_rng(seed)
-            found[group.label] = learnability(group.episodes, rng, view, budget)
-        except DoesNotApply as error:
-            found[group.label] = str(error)
-    return found
+    return Comparison(config, baseline, views, success, rates, ratios, outcomes)
 
 
 def _counted(title: str, groups: Sequence[Group], config: CompareConfig) -> list[Group]:

@@ -1,7 +1,7 @@
 """What is compared: whole datasets, or the episodes of datasets by a column of their metadata."""
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,7 +13,6 @@ from handrail.datasets.demonstrations.load import each_opened, recorded_episodes
 from handrail.datasets.reading.reader import DatasetInfo, read_info
 
 FEWEST, MOST = 2, 8
-_SHOWN = 2  # task sentences of a group
 
 
 @dataclass(frozen=True)
@@ -29,6 +28,11 @@ class Group:
     label: str
     info: DatasetInfo
     episodes: tuple[Episode, ...]
+
+    @property
+    def tasks(self) -> tuple[str, ...]:
+        """Task sentences of the episodes, in order of the alphabet."""
+        return tuple(sorted({task for episode in self.episodes for task in episode.meta["tasks"]}))
 
     def first(self, count: int) -> "Group":
         """Return the first episodes only."""
@@ -140,26 +144,6 @@ def _value(episode: Episode, by: str, root: str) -> str:
 
 
 def unlike(groups: Sequence[Group]) -> tuple[str, ...]:
-    """Return what differs between groups so that no difference can be laid to how they were recorded."""
-    return tuple(filter(None, (_differs("tasks", _tasks, groups), _differs("robots", _robot, groups))))
-
-
-def _differs(what: str, read: Callable[[Group], tuple[str, ...]], groups: Sequence[Group]) -> str:
-    found = {group.label: read(group) for group in groups}
-    if len(set(found.values())) == 1:
-        return ""
-    told = "; ".join(f"{label}: {_told(names)}" for label, names in found.items())
-    return f"The {what} differ ({told})"
-
-
-def _told(names: Sequence[str]) -> str:
-    more = f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else ""
-    return ", ".join(f"“{name}”" for name in names[:_SHOWN]) + more or "not recorded"
-
-
-def _tasks(group: Group) -> tuple[str, ...]:
-    return tuple(sorted({task for episode in group.episodes for task in episode.meta["tasks"]}))
-
-
-def _robot(group: Group) -> tuple[str, ...]:
-    return (group.info.robot_type,) if group.info.robot_type else ()
+    """Return which of tasks and robots differ: then no difference can be laid to how they were recorded."""
+    read = {"tasks": [each.tasks for each in groups], "robots": [each.info.robot_type for each in groups]}
+    return tuple(name for name, found in read.items() if len(set(found)) > 1)

@@ -87,16 +87,6 @@ class Demonstration(Episode):
             raise DoesNotApply("no column 'observation.…' with numbers")
         return np.hstack(found)
 
-    @property
-    def observation_names(self) -> tuple[str, ...]:
-        """Names of the entries of `observation`, `(s,)`; an entry without one is called after its column."""
-        found: list[str] = []
-        for name, values in self.frames.items():
-            if name.startswith("observation") and values.dtype.kind in "fiub":
-                size = _rows(values).shape[1]
-                found += self.info.features[name].names or [f"{name}.{place}" for place in range(size)]
-        return tuple(found)
-
     @cached_property
     def pairs(self) -> tuple[tuple[int, int], ...]:
         """Entries of action and state that mean the same in the same unit."""

@@ -1,10 +1,6 @@
 """Numbers as people read them."""
 
 import math
-from collections import Counter
-from collections.abc import Iterable
-
-from handrail.datasets.quality.metric import Metric
 
 DASH = "–"
 THESE_POLICIES = "these policies 95 %"  # in other scenes
@@ -63,24 +59,8 @@ def p_alone(p: float | None) -> str:
     return DASH if p is None else p_value(p).removeprefix("p = ").removeprefix("p ")
 
 
-def counted(number_: int, family: str) -> str:
-    """Return how many differences a family of comparisons has."""
-    return f"{number_} {family} difference{'' if number_ == 1 else 's'}"
-
-
-def families(names: Iterable[str]) -> str:
-    """Return over what Holm's correction is, from the family of each difference."""
-    *first, last = [counted(number_, family) for family, number_ in Counter(names).items()]
-    return f"{', '.join(first)} and {last}, each family for itself," if first else last
-
-
 def duration(seconds: float) -> str:
     """Return a time in the unit that suits it."""
     if seconds < 120:
         return f"{seconds:.0f} s"
     return f"{seconds / 60:.1f} min" if seconds < 7200 else f"{seconds / 3600:.1f} h"
-
-
-def unit(metric: Metric) -> str:
-    """Return a metric's unit after a space, or nothing."""
-    return f" {metric.unit}" if metric.unit else ""

@@ -35,10 +35,6 @@ perturbations = ["push"]
 protections = ["filter"]
 rollouts = 20
 draws = 2
-[sweep]
-tasks = ["reach"]
-noises = [0.0]
-draws = 1
 """
 
 SMALLEST = """
@@ -52,7 +48,6 @@ minutes = 0.6
 episodes = 7
 rollout_limit = 1.5
 steps = 20
-policy_options = ["dim_model=16", "n_heads=2", "dim_feedforward=16", "n_encoder_layers=1"]
 [flat]
 every = 5
 patience = 1
@@ -88,7 +83,6 @@ COLLECTED = {
     "reasons": {"timeout": 1},
     "digest": "d1ce",
     "quality": {"length": 3.0, "sparc": -2.5},
-    "learnability": {"learnability": 0.7},
 }
 LEARNT = {
     "steps": 10,

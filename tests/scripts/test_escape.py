@@ -93,7 +93,6 @@ COMMANDS = {
     "inspect": ("inspect", "{}"),
     "quality": ("inspect", "{}", "--quality"),
     "worst": ("inspect", "{}", "--worst", "smoothness"),
-    "learnability": ("inspect", "{}", "--learnability"),
     "check": ("inspect", "{}", "--check"),
     "inspect and repair": ("inspect", "{}", "--repair"),
     "repair": ("repair", "{}"),

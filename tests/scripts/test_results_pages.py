@@ -6,14 +6,11 @@ import tarfile
 from collections import Counter
 
 import numpy as np
-import pytest
 from places import ROOT
 from results_helpers import RESULTS, words
 
 from handrail.controllers.ocp.settings import MpcSettings
 from handrail.controllers.robot.model import load_model
-from handrail.datasets.statistics.proportions import holm
-from handrail.datasets.statistics.student import student, variance_of_share
 
 
 def contrast(name, kind):
@@ -41,18 +38,6 @@ def points(*values):
 
 def told(estimate):
     return points(estimate["value"], *estimate["interval"])
-
-
-def floor_of(condition):
-    """Return the variance of a draw's share if only its rollouts were drawn anew."""
-    rollouts, draws = condition["rollouts"], len(condition["draws"])
-    return variance_of_share(condition["successes"], rollouts, rollouts // draws)
-
-
-def over_draws(*parts):
-    """Return a weighted sum of conditions' successes over draws, with the floor that the report has."""
-    values = [sum(weight * one["draws"][draw] for weight, one in parts) for draw in parts[0][1]["draws"]]
-    return student(values, sum(weight**2 * floor_of(one) for weight, one in parts))
 
 
 def test_the_answer_begins_with_the_interaction():
@@ -174,47 +159,6 @@ def test_failures_with_and_without_contact_are_told_as_they_came_out():
     assert f"successes took ({' and '.join(took)} s)" in page
 
 
-def test_what_the_same_number_takes_off_the_interaction_has_the_floor_of_the_report():
-    """Computed from the conditions: the report has both interactions, not their difference."""
-    page = words((RESULTS / "teleop_modes_beside.md").read_text())
-    study = json.loads((RESULTS / "teleop_modes_beside_number.json").read_text())
-    found = {each["label"]: each for each in study["conditions"]}
-    signs = {"ee": 1.0, "ee_dls": -1.0, "joints": -1.0, "direct": 1.0}
-    parts = [(sign, found[mode]) for mode, sign in signs.items()]
-    parts += [(-sign, found[f"{mode} same number"]) for mode, sign in signs.items()]
-    less = over_draws(*parts)
-    assert (100 * np.array(less.interval)).round(1).tolist() == [-0.7, 31.7]
-    low, high = (points(end) for end in less.interval or ())
-    assert f"{100 * less.value:.0f} points less ({low} to {high})" in page
-
-
-@pytest.mark.parametrize(
-    ("study", "ending"), [("number", ""), ("number", " (same number)"), ("learner", ""), ("early", "")]
-)
-def test_what_is_beside_the_study_is_told_as_it_came_out(study, ending):
-    page = words((RESULTS / "teleop_modes_beside.md").read_text())
-    study = json.loads((RESULTS / f"teleop_modes_beside_{study}.json").read_text())
-    assert study["missing"] == []
-    names = [
-        "ee − ee_dls",
-        "joints − direct",
-        "interaction: what the MPC adds with the hand − with the joints",
-        "ee − direct",
-    ]
-    names += ["ee − joints"] if ending else []
-    found = {each["name"]: each["estimate"] for each in study["contrasts"] if each["measure"] == "success"}
-    for name in names:
-        estimate = found[name + ending]
-        value, low, high = (
-            f"{100 * each:+.0f}".replace("-", "−") for each in (estimate["value"], *estimate["interval"])
-        )
-        assert f"{value} ({low} to {high})" in page, name
-    label = ending.replace(" (", " ").replace(")", "")
-    shares = {each["label"]: each["success"]["value"] for each in study["conditions"]}
-    told = ", ".join(f"{100 * shares[mode + label]:.0f}" for mode in ("ee", "ee_dls", "joints", "direct"))
-    assert f"{told} %" in page
-
-
 def test_what_came_of_pictures_is_told_as_it_came_out():
     page = words((RESULTS / "teleop_modes_beside.md").read_text())
     study = json.loads((RESULTS / "teleop_modes_beside_pictures.json").read_text())
@@ -229,53 +173,3 @@ def test_what_came_of_pictures_is_told_as_it_came_out():
     assert f"| hand was at the goal, but not turned | {' | '.join(turned)} |" in page
     losses = study["jobs"]["policy/reach/ee/0/realised-time"]["result"]["validation"]
     assert f"its loss on held-out episodes is {list(losses.values())[-1]:.3f} in the end" in page
-
-
-def test_what_was_tried_of_direct_is_told_as_it_came_out():
-    page = words((RESULTS / "diagnosis_direct.md").read_text())
-    study = json.loads((RESULTS / "diagnosis_direct_diagnosis.json").read_text())
-    assert study["missing"] == []
-    for each in study["conditions"]:
-        mode, actions = (*each["label"].split(), "")[:2]
-        what = ", joint positions" if actions else "" if each["noise"] else ", `--noise 0`"
-        low, high = (f"{100 * end:.0f}" for end in each["interval"])
-        grasp, lift = (
-            sum(count for way, count in each["failures"].items() if way.startswith(stage))
-            for stage in ("grasp", "lift")
-        )
-        assert (
-            f"| `{mode}`{what} | {100 * each['success']['value']:.0f} % ({low} to {high}) |"
-            f" {grasp} | {lift} | {each['failures']['carry, dropped']} |"
-        ) in page
-    found = {(each["label"], each["noise"]): each for each in study["conditions"]}
-    for mode in ("ee", "direct"):
-        lost = over_draws((1.0, found[mode, 1.0]), (-1.0, found[mode, 0.0]))
-        low, high = (f"{100 * end:.0f}" for end in lost.interval or ())
-        said = re.search(rf"`{mode}` (?:loses )?(\d+) (?:points )?\({low} to {high}\)", page)
-        assert said
-        assert int(said[1]) == pytest.approx(100 * lost.value, abs=0.51)
-    (worse,) = [each for each in study["contrasts"] if each["name"] == "direct targets − direct"]
-    low, high = (f"{100 * end:.0f}".replace("-", "−") for end in worse["estimate"]["interval"])
-    assert f"{100 * worse['estimate']['value']:.0f} points ({low} to {high})".replace("-", "−") in page
-
-
-def test_the_families_of_p_values_follow_from_the_study_s_json():
-    """Holm over all nine, the six like for like, the three of `ee` and `direct`: the table in the page."""
-    tasks = json.loads((RESULTS / "teleop_modes_full.json").read_text())["tasks"]
-    raw = {
-        (task, each["label"]): each["p"] for task in tasks for each in tasks[task]["policies"]["differences"]
-    }
-    shown = [
-        ("reach", "ee"),
-        ("tray", "ee"),
-        ("pick_place", "ee"),
-        ("reach", "leader"),
-        ("pick_place", "leader"),
-    ]
-    page = (RESULTS / "teleop_modes.md").read_text().replace("**", "")
-    for kept in (("ee", "leader", "ee intent"), ("ee", "leader"), ("ee",)):
-        family = [key for key in raw if key[1] in kept]
-        adjusted = dict(zip(family, holm([raw[key] for key in family]), strict=True))
-        cells = [f"{adjusted[key]:.2g}" if key in adjusted else "–" for key in shown]
-        assert f" {len(family)} " in page
-        assert f"| {' | '.join(cells)} |" in page

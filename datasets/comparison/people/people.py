@@ -28,6 +28,16 @@ from handrail.datasets.reading.check import check_whole
 from handrail.datasets.statistics.resampling import FEWEST
 
 FORMS = "workload and usability"
+_TOO_FEW = f"Participants: {{}}. Intervals and tests need {FEWEST} or more, so there are none."
+_BLIND = "Participants: {}. Too few to detect any difference in some tables; the intervals describe it."
+_SCRIPTED = (
+    "Scripted operators stand beside the people, over their own episodes: they are not paired with them, and"
+    " nothing is tested between the two."
+)
+_ALONE = "In some tasks people drove no other condition beside the baseline: there is nothing to compare."
+_NO_SCORES = "No scores yet: exports/scores.csv is not there."
+_STRANGERS = "Participants with scores and without an episode: {}."
+_LEFT_OUT = "Episodes that name neither a participant nor a script, and are left out: {}."
 
 
 @dataclass(frozen=True)
@@ -97,7 +107,7 @@ def compare_people(config: CompareConfig) -> PeopleComparison:
         participants=participants,
         trials=tuple(trials),
         parts=tuple(parts),
-        cautions=tuple(_cautions(study.scores, participants, parts, baseline, left_out)),
+        cautions=_cautions(study.scores, participants, parts, left_out),
     )
 
 
@@ -162,38 +172,17 @@ def _forms(
 
 
 def _cautions(
-    scores: Sequence[Score],
-    participants: Sequence[str],
-    parts: Sequence[Part],
-    baseline: str,
-    left_out: int,
-) -> list[str]:
-    found = []
-    count = len(participants)
-    people = f"{count} participant{'' if count == 1 else 's'}"
-    if count < FEWEST:
-        found.append(f"{people}: intervals and tests need {FEWEST} or more, so there are none.")
-    blind = [part.title for part in parts if not within_reach(part.contrasts)]
-    if count >= FEWEST and blind:
-        found.append(
-            f"{people}: too few to detect a difference in {', '.join(blind)}, however large, after Holm over"
-            " all that is tested there; the intervals describe it."
-        )
-    if any(mean.scripted for part in parts for means in part.means.values() for mean in means):
-        found.append(
-            "Scripted operators stand beside the people, over their own episodes: they are not paired with"
-            " them, and nothing is tested between the two."
-        )
-    missing = [part.title for part in parts if not part.contrasts and part.title != FORMS]
-    if missing:
-        found.append(
-            f"Nothing to compare in {', '.join(missing)}: people drove no other condition beside {baseline}."
-        )
-    if not scores:
-        found.append("No scores yet: exports/scores.csv is not there.")
-    strangers = sorted({each.participant for each in scores} - set(participants))
-    if strangers:
-        found.append(f"Scores of who has no episode: {', '.join(strangers)}.")
-    if left_out:
-        found.append(f"{left_out} episodes name neither a participant nor a script: left out.")
-    return found
+    scores: Sequence[Score], participants: Sequence[str], parts: Sequence[Part], left_out: int
+) -> tuple[str, ...]:
+    count, strangers = len(participants), {each.participant for each in scores} - set(participants)
+    means = [mean for part in parts for means in part.means.values() for mean in means]
+    known = {
+        _TOO_FEW.format(count): count < FEWEST,
+        _BLIND.format(count): count >= FEWEST and not all(within_reach(part.contrasts) for part in parts),
+        _SCRIPTED: any(mean.scripted for mean in means),
+        _ALONE: any(not part.contrasts and part.title != FORMS for part in parts),
+        _NO_SCORES: not scores,
+        _STRANGERS.format(len(strangers)): bool(strangers),
+        _LEFT_OUT.format(left_out): left_out > 0,
+    }
+    return tuple(text for text, holds in known.items() if holds)

@@ -2,11 +2,11 @@
 
 from collections.abc import Iterable, Sequence
 
+from handrail.datasets.comparison.cautions import cautions
 from handrail.datasets.comparison.collection import Collected
-from handrail.datasets.comparison.compare import MIXED, Comparison
-from handrail.datasets.comparison.finding import Finding
-from handrail.datasets.comparison.findings import headline
+from handrail.datasets.comparison.compare import Comparison
 from handrail.datasets.comparison.groups import group_of
+from handrail.datasets.comparison.headline import headline
 from handrail.datasets.comparison.outcomes import Outcomes
 from handrail.datasets.comparison.report import tables
 from handrail.datasets.comparison.report.figures import (
@@ -19,7 +19,6 @@ from handrail.datasets.comparison.report.figures import (
 )
 from handrail.datasets.comparison.report.pictures import first_pictures
 from handrail.datasets.comparison.report.worst import worst_folds
-from handrail.datasets.learnability.tables import learnability_tables, learnability_words
 from handrail.datasets.presentation.drawing import Panel, svg
 from handrail.datasets.presentation.markup import (
     card,
@@ -37,7 +36,6 @@ from handrail.datasets.presentation.table import Table
 from handrail.datasets.presentation.wording import (
     DASH,
     duration,
-    families,
     number,
     percent,
     percent_span,
@@ -55,13 +53,17 @@ _HOW = (
     " one that began alike. What needs all episodes of a group at once (action variance, state coverage,"
     " mutual information) depends on their number: it is described at the same number and not tested."
     " A difference counts as detected if its intervals leave zero out and p stays below 0.05 after"
-    " Holm's correction over its family. “Detectable” is the difference that would be"
-    " detected in 80 % of such experiments. ↔ marks metrics that follow the length of the episodes"
+    " Holm's correction over its family: success while collecting, successes an hour, all metrics that are"
+    " tested in a view, or the policies' differences of one kind (mixed: their labels say that they differ in"
+    " more than their data). “Not detected” does not mean “equal”: “detectable” is the difference that would"
+    " be detected in 80 % of such experiments. ↔ marks metrics that follow the length of the episodes"
     " (Spearman's |ρ| ≥ 0.5); “same length” is the difference with that taken off by analysis of covariance."
 )
 _QUALITY = (
     "Each with its 95 % interval; bold: detected. These numbers describe data; they do not rank it. Point at"
-    " a name for what it means, and at a dash for why there is nothing."
+    " a name for what it means, and at a dash for why there is nothing. “Same number” and “same time” are of"
+    " the first episodes of each group, as many as the smallest has, or as fit into the shortest operator"
+    " time: where persons took turns, the last of them may be missing."
 )
 _WORST = (
     "The three of each group at the wrong end of each metric, and the command that writes the dataset without"
@@ -73,26 +75,23 @@ _EFFECTS = (
 _TURNED = f" {TURNED}: less is better, so the metric is drawn the other way round."
 
 
-def report_page(comparison: Comparison, found: list[Finding]) -> str:
+def report_page(comparison: Comparison) -> str:
     """Return the page."""
-    looks = ("caution" if f.kind == "caution" else "detected" if f.detected else "quiet" for f in found)
-    said = items(zip(looks, (f.text for f in found), strict=True))
-    parts = [*_first_screen(comparison, found), section("Findings", said)]
+    said = items(("caution", text) for text in cautions(comparison))
+    parts = [*_first_screen(comparison), section("Read this first", said) if said else ""]
     if comparison.outcomes:
         differences = tables.outcome_differences_table(comparison.outcomes)
         parts.append(section("Policies", tables.conditions_table(comparison.outcomes), differences))
     parts += [
-        section("What was collected", tables.collection_table(comparison.everything.collected)),
+        section("What was collected", *_collected(comparison)),
         section("Quality", *_quality(comparison)),
-        section("Learnability", *_learnability(comparison)),
         section("Trajectories", _drawn(trajectory_panels(comparison)), _pictures(comparison)),
     ]
     missing = tables.not_applicable_table(comparison)
     parts.append(section("Episodes to look at first", paragraph(_WORST, "quiet"), worst_folds(comparison)))
     parts += [section("What does not apply, or is not comparable", missing)] if missing else []
     meanings = items(("quiet", f"{metric.title}: {metric.meaning}.") for metric in METRICS)
-    how = paragraph(_HOW), paragraph(_families(comparison))
-    parts.append(section("How to read this", *how, folded("What every metric means", meanings)))
+    parts.append(section("How to read this", paragraph(_HOW), folded("What every metric means", meanings)))
     *first, last = comparison.labels
     return page(f"{', '.join(first)} and {last}, compared", *parts, what=_what(comparison))
 
@@ -106,33 +105,20 @@ def _legend(comparison: Comparison) -> str:
     return legend((label, known[label]) for label in comparison.labels)
 
 
-def _families(comparison: Comparison) -> str:
-    """Return over which comparisons Holm's correction is, by name and number."""
-    others = len(comparison.success)
-    tested = len([each for each in comparison.everything.differences if each.tested and not each.reason])
-    told = [
-        f"success while collecting ({others})",
-        f"successes an hour ({others})",
-        f"all metrics that are tested ({tested}; as many in each other view)",
-    ]
-    if comparison.outcomes and comparison.outcomes.differences:
-        names = families(each.family for each in comparison.outcomes.differences)
-        told.insert(0, f"the success of policies ({names.removesuffix(',')})")
-    mixed = " Mixed: the policies' labels say that they differ in more than their data."
-    return f"Families of Holm's correction: {'; '.join(told)}.{mixed if MIXED in told[0] else ''}"
+def _collected(comparison: Comparison) -> list[Table]:
+    return [tables.collection_table(comparison.everything), tables.collection_differences_table(comparison)]
 
 
 def _what(comparison: Comparison) -> str:
-    sources = sorted({str(group.info.root.name) for group in comparison.everything.groups})
-    tasks = {
-        task for group in comparison.everything.groups for e in group.episodes for task in e.meta["tasks"]
-    }
-    return f"{', '.join(sources)} – {'; '.join(sorted(tasks)[:2])}{' …' if len(tasks) > 2 else ''}"
+    groups = comparison.everything.groups
+    sources = sorted({group.info.root.name for group in groups})
+    tasks = sorted({task for group in groups for task in group.tasks})
+    return f"{', '.join(sources)} – {tables.shown_tasks(tasks)}"
 
 
-def _first_screen(comparison: Comparison, found: list[Finding]) -> list[str]:
+def _first_screen(comparison: Comparison) -> list[str]:
     shown = [_card(comparison, each) for each in comparison.everything.collected]
-    answer = paragraph(headline(found), "headline")
+    answer = paragraph(headline(comparison), "headline")
     figure = section("", _legend(comparison), _drawn(answer_panels(comparison)))
     return [answer, cards(shown), figure]
 
@@ -173,27 +159,8 @@ def _quality(comparison: Comparison) -> list[str | Table]:
         paragraph(_EFFECTS + turned, "quiet"),
     ]
     parts += [tables.metrics_table(comparison, label) for label in comparison.success]
-    parts += [paragraph(_QUALITY, "quiet"), _matched(comparison)]
+    parts += [paragraph(_QUALITY, "quiet"), tables.views_table(comparison)]
     return [*parts, _drawn(metrics_panels(comparison), "small")]
-
-
-def _learnability(comparison: Comparison) -> list[str | Table]:
-    found = comparison.learnability
-    return [paragraph(learnability_words(found)), *learnability_tables(found)]
-
-
-def _matched(comparison: Comparison) -> str:
-    """Return how much of each group the views take."""
-    told = [
-        f"{view.title}: " + ", ".join(f"{each.label} {each.episodes}" for each in view.collected)
-        for view in comparison.views[1:]
-    ]
-    return paragraph(
-        "“Same number” and “same time” are of the first episodes of each, as many as the smallest has, or as"
-        " fit into the shortest operator time: where persons took turns, the last of them may be missing."
-        f" Episodes of {'; of '.join(told)}.",
-        "quiet",
-    )
 
 
 def _pictures(comparison: Comparison) -> str:

@@ -7,10 +7,10 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from handrail.datasets.comparison.cautions import cautions
 from handrail.datasets.comparison.compare import Comparison, View
 from handrail.datasets.comparison.differences import Difference
-from handrail.datasets.comparison.finding import Finding
-from handrail.datasets.comparison.findings import findings
+from handrail.datasets.comparison.headline import headline
 from handrail.datasets.comparison.report.page import report_page
 from handrail.datasets.quality.catalogue import METRICS
 from handrail.datasets.quality.measure import Measured
@@ -35,26 +35,25 @@ def write_report(comparison: Comparison) -> list[Path]:
     Raises:
         HandrailError: The folder cannot be written.
     """
-    found = findings(comparison)
-    numbers = as_json(comparison, found)
     texts = {
-        "report.html": report_page(comparison, found),
-        "report.json": json_text(numbers),
+        "report.html": report_page(comparison),
+        "report.json": json_text(as_json(comparison)),
         "episodes.csv": csv_text([plain(row) for row in _episode_rows(comparison)]),
         "differences.csv": csv_text([plain(row) for row in _difference_rows(comparison)]),
     }
     return write_texts(comparison.config.folder, texts)
 
 
-def as_json(comparison: Comparison, found: list[Finding]) -> dict[str, Any]:
+def as_json(comparison: Comparison) -> dict[str, Any]:
     """Return everything as plain values; what is no number is null."""
     return plain(
         {
-            "format": "handrail.comparison/1",
+            "format": "handrail.comparison/2",
             "baseline": comparison.baseline,
             "unlike": comparison.unlike,
             "config": asdict(comparison.config),
-            "findings": [asdict(finding) for finding in found],
+            "headline": headline(comparison),
+            "cautions": cautions(comparison),
             "collection_differences": {
                 label: asdict(each) | {"detectable": each.detectable(len(comparison.success))}
                 if each
@@ -69,10 +68,6 @@ def as_json(comparison: Comparison, found: list[Finding]) -> dict[str, Any]:
             },
             "views": {view.title: _view(view) for view in comparison.views},
             "outcomes": asdict(comparison.outcomes) if comparison.outcomes else None,
-            "learnability": {
-                label: {"does_not_apply": each} if isinstance(each, str) else asdict(each)
-                for label, each in comparison.learnability.items()
-            },
         }
     )
 

@@ -2,16 +2,16 @@
 
 from collections.abc import Sequence
 
-from handrail.datasets.comparison.collection import Collected
+from handrail.datasets.comparison.collection import Collected, adjusted, detected
 from handrail.datasets.comparison.compare import Comparison, View
 from handrail.datasets.comparison.differences import FOLLOWS, Difference
+from handrail.datasets.comparison.groups import Group
 from handrail.datasets.comparison.outcomes import ConditionOutcome, Outcomes
 from handrail.datasets.presentation.table import Cell, Table
 from handrail.datasets.presentation.wording import (
     DASH,
     THESE_POLICIES,
     WITH_TRAINING,
-    counted,
     duration,
     number,
     p_alone,
@@ -27,16 +27,46 @@ from handrail.datasets.quality.catalogue import METRICS
 from handrail.datasets.quality.measure import Measured
 from handrail.datasets.quality.metric import Metric
 
+_TASKS = 2  # sentences that are shown
+_REST = "The report has every metric, also where no difference was detected: that does not mean equal."
 _UNTESTED = "described, not tested: episodes share neighbours"
 
 
-def collection_table(collected: Sequence[Collected]) -> Table:
+def answer_tables(comparison: Comparison) -> list[Table]:
+    """Return what a terminal shows: the policies if they were evaluated, what was collected, what differs."""
+    outcomes = comparison.outcomes
+    policies = [conditions_table(outcomes), outcome_differences_table(outcomes)] if outcomes else []
+    collecting = collection_table(comparison.everything), collection_differences_table(comparison)
+    return [*policies, *collecting, _detected_table(comparison)]
+
+
+def _detected_table(comparison: Comparison) -> Table:
+    """Return the metrics in which a difference was detected."""
+    view, base = comparison.everything, comparison.baseline
+    means = view.measurements.values
+    rows = [
+        [
+            Cell(each.metric.title, below=_below(each.metric, ranked=not comparison.unlike)),
+            _mean(means[each.metric.name][base]),
+            each.label,
+            _mean(means[each.metric.name][each.label]),
+            p_alone(each.p_adjusted),
+        ]
+        for each in view.differences
+        if each.detected
+    ]
+    return Table(("differs", base, "", "mean, 95 %", "p, Holm"), rows, caption=_REST)
+
+
+def collection_table(view: View) -> Table:
     """Return what each group consists of."""
     headings = ("", "episodes", "success", "95 %", "operator time", "successes / h", "why not")
-    return Table(headings, [_collected(each) for each in collected])
+    headings += ("task", "robot")
+    rows = [_collected(*each) for each in zip(view.groups, view.collected, strict=True)]
+    return Table(headings, rows)
 
 
-def _collected(each: Collected) -> list[str]:
+def _collected(group: Group, each: Collected) -> list[str]:
     reasons = ", ".join(f"{reason} ({count})" for reason, count in each.reasons.items())
     return [
         each.label,
@@ -46,7 +76,44 @@ def _collected(each: Collected) -> list[str]:
         duration(each.operator_time),
         number(each.successes_an_hour),
         reasons or DASH,
+        shown_tasks(group.tasks),
+        group.info.robot_type or DASH,
     ]
+
+
+def shown_tasks(tasks: Sequence[str]) -> str:
+    """Return the first two task sentences."""
+    return "; ".join(tasks[:_TASKS]) + (" …" if len(tasks) > _TASKS else "")
+
+
+def collection_differences_table(comparison: Comparison) -> Table:
+    """Return how each group differs from the baseline in success and in successes an hour."""
+    headings = ("while collecting", "success", "95 %", "p, Holm", "detectable")
+    headings += ("successes / h", "95 %", "p, Holm")
+    rows = [_collection_difference(comparison, label) for label in comparison.success]
+    return Table(headings, rows)
+
+
+def _collection_difference(comparison: Comparison, label: str) -> list[Cell | str]:
+    success, ratio = comparison.success[label], comparison.ratios[label]
+    row: list[Cell | str] = [f"{label} against {comparison.baseline}", *[DASH] * 7]
+    if success:
+        p = adjusted(comparison.success)[label]
+        look = "detected" if detected(success.interval, p) else ""
+        seen = f"{100 * success.detectable(len(comparison.success)):.0f} points"
+        estimate = Cell(f"{points(success.estimate)} points", look)
+        row[1:5] = estimate, points_span(success.interval), p_alone(p), seen
+    if ratio:
+        p = adjusted(comparison.ratios)[label]
+        look = "detected" if detected(ratio.interval, p, 1.0) else ""
+        row[5:] = Cell(f"× {number(ratio.estimate)}", look), span(ratio.interval), p_alone(p)
+    return row
+
+
+def views_table(comparison: Comparison) -> Table:
+    """Return how many episodes of each group the views take."""
+    rows = [[view.title, *(str(each.episodes) for each in view.collected)] for view in comparison.views]
+    return Table(("", *comparison.labels), rows)
 
 
 def conditions_table(outcomes: Outcomes) -> Table:
@@ -99,7 +166,7 @@ def outcome_differences_table(outcomes: Outcomes) -> Table:
             points_span(each.nested) if each.nested else DASH,
             ("McNemar" if each.rollouts.paired else "Boschloo")
             + (" by scene, bootstrap, Welch" if each.nested else ""),
-            Cell(p_value(each.p_adjusted), below=f"over {counted(each.tests, each.family)}"),
+            Cell(p_value(each.p_adjusted), below=f"over {each.tests} {each.family}"),
             f"{100 * each.detectable:.0f} points",
         ]
         for each in outcomes.differences
@@ -112,7 +179,7 @@ def metrics_table(comparison: Comparison, label: str) -> Table:
     headings = ("metric", comparison.baseline, label)
     headings += ("difference", "same number", "same time", "same length", "p, Holm")
     rows = [row for metric in METRICS if (row := _metric(comparison, metric, label))]
-    return Table(headings, rows)
+    return Table(headings, rows, f"{label} against {comparison.baseline}")
 
 
 def _metric(comparison: Comparison, metric: Metric, label: str) -> list[Cell | str]:

@@ -14,8 +14,6 @@ minutes = 10.0                  of the operator's time in each mode, failed atte
 episodes = 50                   successful demonstrations in each mode, at least
 steps = 4000                    updates of each policy; the most there may be where there is a [flat]
 batch_size = 0                  samples an update; 0 for the preset's
-policy_options = ["dropout=0.1"]        more of LeRobot's settings of the policy
-time_limit = {direct_single = 60.0}     of an episode by mode [s]; the task's own where none is named
 rollout_limit = 20.0            after which a policy's rollout has failed [s]; the task's own without it
 
 [flat]                          optional: train until the loss on held-out episodes is flat, one rule for all
@@ -46,16 +44,11 @@ perturbations = ["push", "shift", "delay"]      each a condition of its own; [] 
 protections = ["mpc", "filter"] of policies that command joint velocities; "none": of intents, without the MPC
 rollouts = 50                   under each condition
 draws = 1                       the first so many
-
-[sweep]                         optional, exploratory: how human the operator is
-tasks = ["reach"]
-noises = [0.0, 2.0]             besides 1, which the study itself has
-draws = 1
 """
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 from handrail.collect.operators.modes import MODES
@@ -74,9 +67,7 @@ class TaskDesign:
     episodes: int = 2
     steps: int = 4000
     batch_size: int = 0
-    time_limit: Mapping[str, float] = field(default_factory=dict)
     rollout_limit: float = 0.0
-    policy_options: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -150,15 +141,6 @@ class Robustness:
 
 
 @dataclass(frozen=True)
-class Sweep:
-    """How the ranking depends on how human the operator is; explained above."""
-
-    tasks: tuple[str, ...]
-    noises: tuple[float, ...] = (0.0, 2.0)
-    draws: int = 1
-
-
-@dataclass(frozen=True)
 class StudyDesign:
     """A whole study, called after its file; its settings are explained above.
 
@@ -180,7 +162,6 @@ class StudyDesign:
     beside: Beside | None = None
     pictures: Pictures | None = None
     robustness: Robustness | None = None
-    sweep: Sweep | None = None
     digest: str = ""
 
     def check(self) -> None:
@@ -203,8 +184,6 @@ class StudyDesign:
         if self.beside:
             completed = [mode for mode in self.modes if MODES[mode].controller == "mpc"]
             _known("mode of intents, which the MPC completes", self.beside.intents, completed)
-        if self.sweep:
-            _known("task of the sweep", self.sweep.tasks, tuple(self.tasks))
         for name, chosen in self._chosen():
             if not chosen or len(set(chosen)) < len(chosen):
                 raise HandrailError(f"study {self.name}: {name} expected some, each once, got {chosen}")
@@ -226,8 +205,6 @@ class StudyDesign:
             )
         if self.robustness:
             yield "robustness", (*self.robustness.perturbations, *self.robustness.protections)
-        if self.sweep:
-            yield from (("sweep.tasks", self.sweep.tasks), ("sweep.noises", self.sweep.noises))
 
     def _counts(self) -> Iterator[tuple[str, int, int, int]]:
         """Yield how many there are of something, by name, with the least and the most there may be."""
@@ -238,12 +215,9 @@ class StudyDesign:
             yield "beside.same_number", self.beside.same_number, 0, self.draws
         if self.robustness:
             yield "robustness.draws", self.robustness.draws, 0, self.draws
-        if self.sweep:
-            yield "sweep.draws", self.sweep.draws, 1, self.draws
 
     def _check_task(self, name: str, task: TaskDesign) -> None:
         """Check what only a study asks of a task; its jobs check the rest."""
-        _known(f"mode in time_limit of {name}", tuple(task.time_limit), self.modes)
         if task.episodes < 2 or task.steps < 1 or not 0.0 < task.minutes < math.inf:
             raise HandrailError(
                 f"study {self.name}, task {name}: expected episodes ≥ 2, steps ≥ 1, minutes above 0, "

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import product
 from pathlib import Path
 from typing import Literal
 
@@ -15,17 +14,16 @@ CONDITIONS = ("nominal", "disturbed", "protected")
 
 @dataclass(frozen=True)
 class Cell:
-    """What is collected as one dataset: a task in a mode, one draw, by operators as human as `noise` says."""
+    """What is collected as one dataset: a task in a mode, one draw."""
 
     task: str
     mode: str
     draw: int
-    noise: float = 1.0
 
     @property
     def name(self) -> str:
-        """A name for files and logs: `reach/ee/3`, or `reach/ee@0.5/3` where the noise is not 1."""
-        return f"{self.task}/{self.mode}{f'@{self.noise:g}' if self.noise != 1.0 else ''}/{self.draw}"
+        """A name for files and logs: `reach/ee/3`."""
+        return f"{self.task}/{self.mode}/{self.draw}"
 
 
 @dataclass(frozen=True)
@@ -93,11 +91,6 @@ def _draw(design: StudyDesign, draw: int) -> Iterator[Job]:
             yield _policy(StudyPolicy(cell, "intent"), robust)
         if design.beside and draw < design.beside.same_number:
             yield _policy(StudyPolicy(cell, budget="number"), robust=False)
-    if design.sweep and draw < design.sweep.draws:
-        swept = product(design.sweep.noises, design.sweep.tasks, design.modes)
-        others = [Cell(task, mode, draw, noise) for noise, task, mode in swept if noise != 1.0]
-        yield from map(_collect, others)
-        yield from (_policy(StudyPolicy(cell), robust=False) for cell in others)
 
 
 def _collect(cell: Cell) -> Job:

@@ -19,7 +19,6 @@ from handrail.policies.study.design.design import (
     Pictures,
     Robustness,
     StudyDesign,
-    Sweep,
     TaskDesign,
 )
 from handrail.policies.study.design.settings import check_jobs
@@ -34,7 +33,6 @@ _PARTS = {
     "beside": Beside,
     "pictures": Pictures,
     "robustness": Robustness,
-    "sweep": Sweep,
 }
 
 

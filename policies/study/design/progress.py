@@ -17,8 +17,6 @@ from handrail.policies.study.design.design import StudyDesign
 from handrail.policies.study.design.jobs import Job, Layout, jobs
 from handrail.policies.study.design.settings import evaluations, fingerprint
 
-_NAMED = 3  # jobs that are not done, in words
-
 
 @dataclass(frozen=True)
 class StudyProgress:
@@ -41,16 +39,6 @@ class StudyProgress:
     def missing(self) -> list[str]:
         """Names of the jobs that are not."""
         return [job.name for job in self.jobs if job.name not in self.done]
-
-    @property
-    def words(self) -> str:
-        """How many jobs are not done, and which; empty if there is none."""
-        missing = self.missing
-        if not missing:
-            return ""
-        named = ", ".join(missing[:_NAMED]) + (", …" if len(missing) > _NAMED else "")
-        verb = "is" if len(missing) == 1 else "are"
-        return f"{len(missing)} of {len(self.jobs)} jobs {verb} not done yet: {named}"
 
     def todo(self, only: str = "") -> list[Job]:
         """Return the jobs to be done: those that are missing, and recordings anew that they need.

@@ -1,18 +1,14 @@
 """What is to be known of a dataset of a study when the dataset is gone."""
 
 from collections import Counter
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from handrail.datasets.demonstrations.demonstration import DoesNotApply
-from handrail.datasets.demonstrations.load import Recorded, recorded_episodes
-from handrail.datasets.learnability.learnability import learnability
+from handrail.datasets.demonstrations.load import recorded_episodes
 from handrail.datasets.quality.measure import measure
 from handrail.datasets.reading.digest import digest_of_dataset
-from handrail.policies.imitation.interface.policy_rows import policy_rows
 
 
 def summary(root: Path, seed: int) -> dict[str, Any]:
@@ -36,13 +32,4 @@ def summary(root: Path, seed: int) -> dict[str, Any]:
         "reasons": dict(Counter(str(reason or "not recorded") for reason in failed).most_common()),
         "digest": digest_of_dataset(root),
         "quality": {name: each["all"].mean for name, each in measured.items() if each["all"].applies},
-        "learnability": _learnability(episodes, seed),
     }
-
-
-def _learnability(episodes: Sequence[Recorded], seed: int) -> dict[str, float]:
-    """Return how much of the actions can be told from what a policy sees; nothing of too few episodes."""
-    try:
-        return learnability(episodes, np.random.default_rng(seed), policy_rows).metrics
-    except DoesNotApply:
-        return {}

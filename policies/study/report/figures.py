@@ -1,4 +1,4 @@
-"""The figures of a study: contrasts, the policies by task, their training, what disturbs, the sweep."""
+"""The figures of a study: contrasts, the policies by task, their training, what disturbs."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -8,7 +8,6 @@ import numpy as np
 from handrail.datasets.presentation.drawing import COLOURS, GREY, INK, new_figure, tidy
 from handrail.policies.study.report.contrasts import DECLARED, Contrast
 from handrail.policies.study.report.results import Condition, Results
-from handrail.policies.study.report.tables import sweep
 
 _WIDTH = 10.4  # [inch]
 
@@ -27,9 +26,6 @@ def figures(results: Results, found: Sequence[Contrast]) -> dict[str, Any]:
     disturbed = [task for task in tasks if results.of_task(task, treated=True)]
     if disturbed:
         made["robustness"] = _robustness(disturbed, results)
-    swept = [task for task in tasks if sweep(task, results)]
-    if swept:
-        made["sweep"] = _sweep(swept, results)
     return made
 
 
@@ -144,28 +140,4 @@ def _robustness(tasks: Sequence[str], results: Results) -> Any:
     known = dict(pair[::-1] for axes in grid for pair in zip(*axes.get_legend_handles_labels(), strict=True))
     place = {"loc": "center left", "bbox_to_anchor": (1.0, 0.5)}
     grid[-1].legend(known.values(), known.keys(), fontsize=8, frameon=False, **place)
-    return figure
-
-
-def _sweep(tasks: Sequence[str], results: Results) -> Any:
-    """Success of the policies, and the operator's time for a demonstration, over the operator's noise."""
-    figure = new_figure(_WIDTH, 3.0 * len(tasks))
-    grid = figure.subplots(len(tasks), 2, squeeze=False)
-    for (left, right), task in zip(grid, tasks, strict=True):
-        found = sweep(task, results)
-        for label in dict.fromkeys(each.label for _, each, _ in found):
-            mine = [point for point in found if point[1].label == label]
-            noises, conditions, seconds = zip(*mine, strict=True)
-            shares = np.array([each.success.value for each in conditions])
-            spans = np.array([each.interval for each in conditions])
-            style = _style(conditions[0], results) | {"lw": 1.4, "ms": 5}
-            left.errorbar(noises, 100 * shares, yerr=100 * np.abs(spans.T - shares), **style)
-            right.plot(noises, seconds, **style)
-        left.set(title=task.replace("_", " "), ylabel="policy success [%], 95 %", ylim=(-3, 103))
-        highest = max(seconds for *_, seconds in found)
-        right.set(title="operator's time", ylabel="s a successful demonstration", ylim=(0, 1.1 * highest))
-        for axes in (left, right):
-            axes.set(xlabel="operator's noise: 0 perfect, 1 the default")
-            tidy(axes)
-        right.legend(fontsize=8, frameon=False, loc="center left", bbox_to_anchor=(1.0, 0.5))
     return figure

@@ -6,8 +6,6 @@ from pathlib import Path
 from typing import Any
 
 from handrail.controllers.versions import SIMULATION, versions
-from handrail.datasets.comparison.prediction import MetricPrediction
-from handrail.datasets.comparison.report.prediction import prediction_table, prediction_words
 from handrail.datasets.comparison.report.report import json_text
 from handrail.datasets.presentation import markup
 from handrail.datasets.presentation.drawing import png, svg
@@ -20,7 +18,6 @@ from handrail.policies.study.design.progress import StudyProgress
 from handrail.policies.study.report import tables
 from handrail.policies.study.report.contrasts import DECLARED, EXPLORATORY, SYSTEM, Contrast, contrasts
 from handrail.policies.study.report.figures import figures
-from handrail.policies.study.report.prediction import predicted
 from handrail.policies.study.report.results import Condition, Results, gather
 from handrail.policies.study.report.words import answer, cautions, how
 
@@ -31,17 +28,14 @@ _CAPTIONS = {
     " squares: the same number of demonstrations.",
     "training": "Loss on held-out episodes while the policies learnt; a dot is where the training ended.",
     "robustness": "Success disturbed and undisturbed.",
-    "sweep": "How human the operator is, and what that does to policies and to the operator's time.",
 }
-_PREDICTION = "Which metric of the demonstrations predicts success"
-_FORMAT = "handrail.study/2"
+_FORMAT = "handrail.study/3"
 _OF_TASK = (
     tables.conditions_table,
     tables.failures_table,
     tables.collection_table,
     tables.quality_table,
     tables.treatments_table,
-    tables.sweep_table,
 )
 
 
@@ -53,19 +47,17 @@ class _Findings:
         config: how the study was called.
         results: of its jobs.
         contrasts: of its policies.
-        predictions: which metric of the demonstrations goes with success.
         figures: by name.
     """
 
     config: StudyConfig
     results: Results
     contrasts: Sequence[Contrast]
-    predictions: Sequence[MetricPrediction]
     figures: Mapping[str, Any]
 
     @property
     def answer(self) -> list[str]:
-        return answer(self.contrasts, self.results)
+        return answer(self.contrasts, self.results.progress.design)
 
     @property
     def of_all(self) -> list[Table]:
@@ -89,7 +81,7 @@ def write_study(config: StudyConfig, progress: StudyProgress) -> list[Path]:
     """
     root, results = progress.layout.root, gather(progress)
     found = contrasts(results)
-    findings = _Findings(config, results, found, predicted(results), figures(results, found))
+    findings = _Findings(config, results, found, figures(results, found))
     files = {root / "report.html": _html(findings), root / "study.json": _json(findings)}
     with explained("study: expected a folder that can be written"):
         for path, text in files.items():
@@ -111,10 +103,7 @@ def _html(findings: _Findings) -> str:
     if findings.of_all:
         parts.append(markup.section("Contrasts", *findings.of_all))
     parts += [markup.section(_title(task), *findings.of_task(task)) for task in design.tasks]
-    if findings.predictions:
-        words = markup.paragraph(prediction_words(findings.predictions))
-        parts.append(markup.section(_PREDICTION, words, prediction_table(findings.predictions)))
-    parts.append(markup.section("How to read this", markup.paragraph(how(results, findings.contrasts))))
+    parts.append(markup.section("How to read this", markup.paragraph(how(design))))
     again = tables.times_table(results), tables.cells_table(results, findings.config.preset)
     parts.append(markup.section("Again", *(table for table in again if table.rows)))
     return markup.page(f"Study {design.name}: {', '.join(design.modes)}", *parts)
@@ -136,8 +125,7 @@ def _json(findings: _Findings) -> str:
         "versions": versions(*SIMULATION, "torch"),
         "answer": findings.answer,
         "contrasts": [asdict(each) for each in findings.contrasts],
-        "conditions": [_numbers(noise, each) for (noise, *_), each in findings.results.conditions.items()],
-        "predictions": [asdict(each) for each in findings.predictions],
+        "conditions": [_numbers(each) for each in findings.results.conditions.values()],
         "jobs": {name: {"result": note["result"], "took": note.get("took")} for name, note in done.items()},
         "seconds": sum(each.get("seconds", 0.0) for each in took),
         "processor_seconds": sum(each.get("processor_seconds", 0.0) for each in took),
@@ -146,12 +134,11 @@ def _json(findings: _Findings) -> str:
     return json_text(content)
 
 
-def _numbers(noise: float, condition: Condition) -> dict[str, Any]:
+def _numbers(condition: Condition) -> dict[str, Any]:
     return {
         "task": condition.task,
         "label": condition.label,
         "treatment": condition.treatment,
-        "noise": noise,
         "success": asdict(condition.success),
         "interval": condition.interval,
         "draws": {str(draw): share for draw, share in condition.shares.items()},
@@ -179,11 +166,7 @@ def _write_page(findings: _Findings) -> list[Path]:
     for task in design.tasks:
         if of_task := findings.of_task(task):
             parts += [f"### {_title(task)}", *map(markdown_table, of_task)]
-    if findings.predictions:
-        table = prediction_table(findings.predictions)
-        parts += [f"### {_PREDICTION}", prediction_words(findings.predictions)]
-        parts += [markdown_table(table), table.caption]
-    parts += ["### How to read this", how(results, findings.contrasts)]
+    parts += ["### How to read this", how(design)]
     times = tables.times_table(results)
     parts += [markdown_table(times)] if times.rows else []
     again = tables.cell_command(preset, "TASK/MODE/DRAW")

@@ -12,7 +12,7 @@ from handrail.controllers.arrays import FloatArray
 from handrail.datasets.statistics.paired import wilson
 from handrail.datasets.statistics.resampling import Interval
 from handrail.datasets.statistics.student import Estimate, student, variance_of_share
-from handrail.policies.study.design.jobs import Cell, Job, StudyPolicy
+from handrail.policies.study.design.jobs import Job, StudyPolicy
 from handrail.policies.study.design.progress import StudyProgress, read_json
 
 MEASURES = {
@@ -119,28 +119,30 @@ class Results:
 
     Attributes:
         progress: of the study.
-        conditions: by noise of the operator, task, label and treatment.
+        conditions: by task, label and treatment.
     """
 
     progress: StudyProgress
-    conditions: Mapping[tuple[float, str, str, str], Condition]
+    conditions: Mapping[tuple[str, str, str], Condition]
 
-    def find(self, task: str, label: str, treatment: str = "", noise: float = 1.0) -> Condition | None:
+    def find(self, task: str, label: str, treatment: str = "") -> Condition | None:
         """Return a condition; None where nothing of it is done."""
-        return self.conditions.get((noise, task, label, treatment))
+        return self.conditions.get((task, label, treatment))
 
     def of_task(self, task: str, treated: bool = False) -> list[Condition]:
         """Return the conditions of a task, disturbed and protected ones or the others."""
         return [
             each
-            for (noise, name, _, treatment), each in self.conditions.items()
-            if (noise, name, bool(treatment)) == (1.0, task, treated)
+            for (name, _, treatment), each in self.conditions.items()
+            if (name, bool(treatment)) == (task, treated)
         ]
 
-    def collected(self, task: str, mode: str, noise: float = 1.0) -> list[dict[str, Any]]:
+    def collected(self, task: str, mode: str) -> list[dict[str, Any]]:
         """Return what was collected in a mode, draw by draw."""
         jobs = [
-            job for job in self.progress.jobs if job.policy is None and _kind(job.cell) == (task, mode, noise)
+            job
+            for job in self.progress.jobs
+            if job.policy is None and (job.cell.task, job.cell.mode) == (task, mode)
         ]
         return [note["result"] for job in jobs if (note := self.progress.note(job))]
 
@@ -151,20 +153,16 @@ class Results:
         return [note["result"] for job in jobs if (note := self.progress.note(job))]
 
 
-def _kind(cell: Cell) -> tuple[str, str, float]:
-    return cell.task, cell.mode, cell.noise
-
-
 def gather(progress: StudyProgress) -> Results:
     """Return what is done of a study: the main design first, in the order of its modes."""
-    found: dict[tuple[float, str, str, str], dict[int, Driven]] = {}
+    found: dict[tuple[str, str, str], dict[int, Driven]] = {}
     for job in progress.jobs:
         for each in _driven(job, progress):
             cell = each.policy.cell
-            key = (cell.noise, cell.task, each.policy.label, each.treatment)
+            key = (cell.task, each.policy.label, each.treatment)
             found.setdefault(key, {})[cell.draw] = each
     ordered = sorted(found.items(), key=lambda item: _place(item[1]))
-    return Results(progress, {key: Condition(key[1], key[2], key[3], draws) for key, draws in ordered})
+    return Results(progress, {key: Condition(*key, draws) for key, draws in ordered})
 
 
 def _place(draws: Mapping[int, Driven]) -> tuple[bool, bool]:

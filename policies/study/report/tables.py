@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from handrail.datasets.comparison.outcomes import compare_rollouts
-from handrail.datasets.learnability.learnability import TITLES
 from handrail.datasets.presentation.table import Cell, Table
 from handrail.datasets.presentation.wording import (
     DASH,
@@ -152,11 +151,9 @@ def quality_table(task: str, results: Results) -> Table:
 
 
 def _described(result: dict[str, Any]) -> dict[str, float]:
-    """Return the metrics of a draw by title, then how much of its actions can be told."""
+    """Return the metrics of a draw by title."""
     known = {metric.title: result["quality"].get(metric.name) for metric in METRICS}
-    scores: dict[str, float] = result["learnability"]
-    told = {TITLES.get(name, name): score for name, score in scores.items()}
-    return {title: value for title, value in known.items() if value is not None} | told
+    return {title: value for title, value in known.items() if value is not None}
 
 
 def treatments_table(task: str, results: Results) -> Table:
@@ -196,34 +193,6 @@ def _same(whole: Condition, treated: Condition, measure: str = "success") -> lis
             return []
         kept = replace(driven, rollouts={seed: driven.rollouts[seed] for seed in sorted(run.seeds)})
         found.append(Run(run.draw, run.draw, run.seeds, kept.values(measure)))
-    return found
-
-
-def sweep_table(task: str, results: Results) -> Table:
-    """Return how success and the operator's time depend on how human the operator is."""
-    rows = [
-        (each.label, f"{noise:g}", percent(each.success.value), percent_span(each.interval), number(seconds))
-        for noise, each, seconds in sweep(task, results)
-    ]
-    headings = ("policy", "operator's noise", "success", "95 %", "s a demonstration")
-    return Table(headings, rows, "Operators from perfect to clumsy")
-
-
-def sweep(task: str, results: Results) -> list[tuple[float, Condition, float]]:
-    """Return noise, condition and seconds a successful demonstration, policy by policy, noise rising."""
-    design = results.progress.design
-    if not design.sweep or task not in design.sweep.tasks:
-        return []
-    found = []
-    for mode in design.modes:
-        for noise in sorted({1.0, *design.sweep.noises}):
-            condition, data = results.find(task, mode, "", noise), results.collected(task, mode, noise)
-            successes = sum(each["successes"] for each in data)
-            draws = condition.draws.items() if condition else ()
-            kept = {draw: each for draw, each in draws if draw < design.sweep.draws}
-            if kept and successes:
-                seconds = 60.0 * sum(each["minutes"] for each in data) / successes
-                found.append((noise, Condition(task, mode, "", kept), seconds))
     return found
 
 

@@ -7,6 +7,5 @@ import pytest
 def few_resamples():
     """Few resamples: what is tested with them does not hang on the third digit of p."""
     with pytest.MonkeyPatch.context() as patch:
-        for module in ("resampling", "ranks"):
-            patch.setattr(f"handrail.datasets.statistics.{module}.RESAMPLES", 500)
+        patch.setattr("handrail.datasets.statistics.resampling.RESAMPLES", 500)
         yield

@@ -12,9 +12,9 @@ from handrail.datasets.comparison.collection import collected, success_differenc
 from handrail.datasets.comparison.config import CompareConfig
 from handrail.datasets.comparison.differences import differences
 from handrail.datasets.comparison.evaluations import Condition, Policy
-from handrail.datasets.comparison.findings import findings
 from handrail.datasets.comparison.groups import Group
 from handrail.datasets.comparison.outcomes import LIKE_FOR_LIKE, Pair, in_families, judge_pairs
+from handrail.datasets.comparison.report.tables import metrics_table
 from handrail.datasets.demonstrations.demonstration import Demonstration
 from handrail.datasets.format.schema import Feature
 from handrail.datasets.quality.catalogue import METRICS
@@ -118,13 +118,13 @@ def test_frames_of_episodes(most):
         assert set(frames) <= set(range(length))
 
 
-def test_words_describe_a_group_and_claim_nothing(tmp_path):
-    found = findings(comparing.compare(CompareConfig(tuple(quick_and_slow(tmp_path)))))
-    titles = [metric.title for metric in OF_GROUP]
-    (said,) = [each for each in found if all(title in each.text for title in titles)]
-    assert "described, not tested" in said.text
-    assert not said.detected
-    assert not any(title in each.text for each in found if each.detected for title in titles)
+def test_a_table_describes_a_group_and_claims_nothing(tmp_path):
+    comparison = comparing.compare(CompareConfig(tuple(quick_and_slow(tmp_path))))
+    rows = {str(row[0]): row for row in metrics_table(comparison, "slow").rows}
+    for metric in OF_GROUP:
+        (row,) = [row for name, row in rows.items() if name.startswith(metric.title)]
+        assert {getattr(each, "look", "") for each in row} <= {"", "quiet"}
+        assert getattr(row[-1], "note", "").startswith("described, not tested")
 
 
 def test_the_success_that_is_shown_is_the_one_that_is_tested():

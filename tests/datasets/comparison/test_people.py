@@ -64,7 +64,7 @@ def test_p_is_that_of_all_swaps_of_signs(six):
 
 
 def test_what_cannot_be_detected_is_said(six):
-    assert any("too few to detect a difference in reach" in text for text in six[1].cautions)
+    assert any("Too few to detect any difference" in text for text in six[1].cautions)
     assert not any(each.detected for each in six[1].parts[0].contrasts)
     nine = {f"P{n}": {None: [float(n)]} for n in range(9)}
     more = {name: {None: [50.0 + value[None][0] ** 2]} for name, value in nine.items()}
@@ -96,7 +96,7 @@ def test_two_participants_have_no_interval_and_a_sentence(tmp_path):
     numbers = [mean.interval for part in comparison.parts for means in part.means.values() for mean in means]
     assert not any(numbers)
     assert all(each.interval is each.p is each.p_adjusted is None for each in comparison.parts[0].contrasts)
-    assert "2 participants: intervals and tests need 5 or more, so there are none." in comparison.cautions
+    assert "Participants: 2. Intervals and tests need 5 or more, so there are none." in comparison.cautions
 
 
 def test_a_missing_score_is_missing_and_counted(six):

@@ -14,7 +14,7 @@ from handrail.datasets.comparison.compare import compare
 from handrail.datasets.comparison.config import CompareConfig
 from handrail.datasets.comparison.differences import Difference
 from handrail.datasets.comparison.evaluations import FORMAT
-from handrail.datasets.comparison.findings import findings, headline
+from handrail.datasets.comparison.headline import headline
 from handrail.datasets.comparison.report.figures import (
     answer_panels,
     draw_effect,
@@ -24,6 +24,7 @@ from handrail.datasets.comparison.report.figures import (
     turned,
 )
 from handrail.datasets.comparison.report.page import report_page
+from handrail.datasets.comparison.report.tables import collection_differences_table
 from handrail.datasets.presentation.drawing import new_figure, short
 from handrail.datasets.quality.catalogue import METRICS
 
@@ -47,7 +48,7 @@ def alike(ours, few_resamples):
 
 @pytest.fixture(scope="module")
 def page(alike):
-    return report_page(alike, findings(alike))
+    return report_page(alike)
 
 
 @pytest.fixture(scope="module")
@@ -174,31 +175,32 @@ def test_a_long_label_keeps_both_ends():
     assert short("reach_ee_of_monday", 9) == "reac…nday"
 
 
-def test_headline_and_finding_name_the_same_ratio(ours):
-    for base in ("quick", "slow"):
-        found = findings(compare(CompareConfig(tuple(ours), baseline=base)))
-        (said,) = [each for each in found if "operator hour" in each.text]
-        assert said.detected
-        assert said.short in headline(found)
-        assert said.text.lower().startswith(said.short.lower())
-        assert float(re.search(r"gives ([\d.]+) times .* with quick", said.text)[1]) > 1.0
+def test_the_headline_has_the_numbers_of_the_tables(ours):
+    for base, other, share, rate in (("quick", "slow", -50, 0.2), ("slow", "quick", 50, 5.0)):
+        comparison = compare(CompareConfig(tuple(ours), baseline=base))
+        said = headline(comparison)
+        success, hourly = said.split(". ")
+        assert success.startswith("Success while collecting: ")
+        (row,) = collection_differences_table(comparison).rows
+        name, difference, interval, _, _, ratio, ratios, _ = row
+        assert (name, str(difference)) == (f"{other} against {base}", f"{share:+d} points".replace("-", "−"))
+        assert f"difference {interval} points" in success
+        assert f"ratio {ratios}" in hourly
+        for cell, said in ((difference, success), (ratio, hourly)):
+            assert getattr(cell, "look", "") == ("detected" if ", a difference detected" in said else "")
+        low, high = comparison.ratios[other].interval
+        assert low < rate < high
 
 
-def test_headline_and_finding_name_the_same_difference_of_policies(ours, tmp_path):
+def test_policies_come_first_and_the_page_names_their_family(ours, tmp_path):
     given = evaluated(tmp_path, quick=0.95, slow=0.3)
-    for base in ("quick", "slow"):
+    for base, sign in (("quick", "−"), ("slow", "+")):
         comparison = compare(CompareConfig(tuple(ours), baseline=base, evaluations=(given,)))
-        found = findings(comparison)
-        start = "Policies trained on quick succeeded more often"
-        assert headline(found).startswith(start)
-        assert found[0].text.startswith(start)
-        spans = [
-            re.search(r"difference (\S+ to \S+) points", text)[1] for text in (found[0].text, found[0].short)
-        ]
-        assert spans[0] == spans[1]
-        assert spans[0].startswith("+")
-        assert "over 1 like-for-like difference" in found[0].text
-    assert "1 like-for-like difference" in report_page(comparison, found).split("Families of Holm")[1]
+        said = headline(comparison)
+        assert re.match(rf"Success of policies: .*; difference \{sign}\d+ to \{sign}\d+ points", said)
+        assert said.endswith("detected.")
+    page = report_page(comparison)
+    assert page.index(said) < page.index("over 1 like-for-like")
 
 
 def evaluated(folder: Path, **shares) -> str:
@@ -222,11 +224,9 @@ def evaluated(folder: Path, **shares) -> str:
 def test_policies_come_first_also_with_one_arm(ours, tmp_path, base, label):
     given = evaluated(tmp_path, **{label: 0.9})
     comparison = compare(CompareConfig(tuple(ours), baseline=base, evaluations=(given,)))
-    found, name = findings(comparison), label.replace("__", " ")
-    assert found[0].kind == "outcome"
-    assert re.match(rf"Policies trained on {name} succeeded in \d+ % of 240 rollouts", headline(found))
-    assert "compared with no other" in found[0].text
-    page = report_page(comparison, found)
+    said, name = headline(comparison), label.replace("__", " ")
+    assert re.fullmatch(rf"Success of policies: {name} \d+ % \(95 % .*\), compared with no other\.", said)
+    page = report_page(comparison)
     cards = re.findall(r'<h3>(\w+)</h3><div class="big">(.*?)</div><small>(.*?)</small>', page)
     assert cards[0][1].endswith("%")
     assert cards[0][2].startswith("policy success")
@@ -234,11 +234,10 @@ def test_policies_come_first_also_with_one_arm(ours, tmp_path, base, label):
 
 
 def test_where_tasks_or_robots_differ_that_comes_first_and_nothing_is_better(unlike, page):
-    found = findings(unlike)
-    first = found[0].text
-    assert first.startswith("The tasks differ (quick: “go”; slow: “stay”). The robots differ (quick: ")
-    assert headline(found) == first
-    said = re.sub(r"<style>.*?</style>|data:[^\"]*", "", report_page(unlike, found))
+    first = headline(unlike)
+    assert first.startswith("The tasks and the robots differ: ")
+    said = re.sub(r"<style>.*?</style>|data:[^\"]*", "", report_page(unlike))
+    assert said.index(first) < said.index("<h2>")
     assert not JUDGED.search(said), JUDGED.findall(said)
     assert JUDGED.search(page)
     (panel,) = effects_panels(unlike)
@@ -249,9 +248,7 @@ def test_where_tasks_or_robots_differ_that_comes_first_and_nothing_is_better(unl
 def test_policies_of_unlike_tasks_do_not_come_before_that(ours, unlike, tmp_path):
     given = evaluated(tmp_path, quick=0.95, slow=0.3)
     outcomes = compare(CompareConfig(tuple(ours), evaluations=(given,))).outcomes
-    found = findings(replace(unlike, outcomes=outcomes))
-    assert [each.kind for each in found[:2]] == ["caution", "outcome"]
-    assert "more often" not in headline(found)
+    assert headline(replace(unlike, outcomes=outcomes)) == headline(unlike)
 
 
 def test_the_same_tasks_in_another_order_are_the_same(tmp_path):

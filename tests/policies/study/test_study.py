@@ -66,7 +66,7 @@ def test_report_says_what_is_in_the_files(tmp_path, preset):
     assert run_here(config, Starter()) == 0
     content = json.loads((tmp_path / "study/study.json").read_text())
     found = content["conditions"]
-    arms = {each["label"]: each for each in found if (each["treatment"], each["noise"]) == ("", 1.0)}
+    arms = {each["label"]: each for each in found if not each["treatment"]}
     assert set(arms) == {"ee", "ee intent", "direct"}
     assert all(arm["rollouts"] == 80 for arm in arms.values())
     (ee,) = [each for each in content["contrasts"] if each["name"] == "ee − direct"]
@@ -76,7 +76,6 @@ def test_report_says_what_is_in_the_files(tmp_path, preset):
     pushed = {each["label"]: each for each in found if each["treatment"] == "pushed"}
     assert set(pushed) == set(arms)
     assert pushed["ee"]["touched"] == pytest.approx(0.5)
-    assert {each["noise"] for each in found if each["label"] == "ee"} == {0.0, 1.0}
     failed = arms["direct"]["rollouts"] - arms["direct"]["successes"]
     assert arms["direct"]["failures"] == {"lift": failed}
     policies = [each for name, each in content["jobs"].items() if name.startswith("policy/")]
@@ -91,11 +90,8 @@ def test_report_says_what_is_in_the_files(tmp_path, preset):
     assert f"| {100 * arms['direct']['successes'] / 80:.0f} % |" in text, row
     assert (tmp_path / "page_small_answer.png").read_bytes().startswith(b"\x89PNG")
     html = (tmp_path / "study/report.html").read_text()
-    assert {"length", "learnability"} <= {each["metric"] for each in content["predictions"]}
-    assert "Which metric of the demonstrations predicts success" in html
-    assert "Which metric of the demonstrations predicts success" in text
     assert f"{100 * arms['ee intent']['successes'] / 80:.0f} %" in html
-    for cell in ("reach/ee/0", "reach/direct@0/0"):
+    for cell in ("reach/ee/0", "reach/direct/1"):
         assert f"handrail-study --preset {preset} --only {cell} --output outputs/again" in html
 
 

@@ -17,7 +17,6 @@ from handrail.policies.study.design.design import (
     Flat,
     Robustness,
     StudyDesign,
-    Sweep,
     TaskDesign,
 )
 from handrail.policies.study.design.load import load_design
@@ -52,14 +51,9 @@ def preset(tmp_path):
         (("minutes = 0.1", "minutes = nan"), "minutes: expected a finite number, got nan"),
         (("minutes = 0.1", "minutes = 0.1\nrollout_limit = -1.0"), "time_limit -1.0: expected 0"),
         (
-            ("minutes = 0.1", "minutes = 0.1\ntime_limit = {ee = -3.0}"),
-            "time_limit: expected numbers by name",
-        ),
-        (
             ("minutes = 0.1", "minutes = 0.1\nbatch_size = -4"),
             "batch_size: expected a whole number, 0 or more, got -4",
         ),
-        (("minutes = 0.1", 'minutes = 0.1\npolicy_options = ["nonsense"]'), "expected key=value"),
         (("rollouts = 40", "seed = -1\nrollouts = 40"), "seed: expected a whole number, 0 or more, got -1"),
         (("draws = 2", "draws = -1"), "draws: expected a whole number, 0 or more, got -1"),
         (('intents = ["ee"]', 'intents = ["direct"]'), "unknown mode of intents, which the MPC completes"),
@@ -75,10 +69,6 @@ def preset(tmp_path):
         (('["push"]\nprotections = ["filter"]', "[]\nprotections = []"), "robustness expected some"),
         (('["filter"]', '["fltr"]'), "unknown protection 'fltr'"),
         (("rollouts = 20\ndraws = 2", "draws = 3"), "robustness.draws expected a whole number from 0 to 2"),
-        (("noises = [0.0]\ndraws = 1", "noises = [0.0]\ndraws = 9"), "sweep.draws expected"),
-        (("noises = [0.0]", "noises = [-1.0]"), "--noise -1"),
-        (("noises = [0.0]", "noises = []"), "sweep.noises expected some"),
-        (("noises = [0.0]", "noises = [0.3, 0.30000000001]"), "expected every job once"),
         (("[tasks.reach]", "[tasks.reach"), "not valid TOML"),
     ],
 )
@@ -90,24 +80,17 @@ def test_a_wrong_design_is_one_line(tmp_path, change, words):
     assert "\n" not in str(raised.value)
 
 
-@pytest.mark.parametrize(
-    ("change", "words"),
-    [
-        (('baseline = "direct"', 'baseline = "direct"\npolicy = "atc"'), "expected one of act"),
-        (("minutes = 0.1", 'minutes = 0.1\npolicy_options = ["dim_model=130"]'), "policy act: embed_dim"),
-    ],
-)
-def test_a_policy_that_cannot_be_built_is_known_before_anything_begins(change, words, tmp_path, preset):
-    Path(preset).write_text(DESIGN.replace(*change))
+def test_a_policy_that_cannot_be_built_is_known_before_anything_begins(tmp_path, preset):
+    Path(preset).write_text(DESIGN.replace('baseline = "direct"', 'baseline = "direct"\npolicy = "atc"'))
     starter = Starter()
-    with pytest.raises(HandrailError, match=words):
+    with pytest.raises(HandrailError, match="expected one of act"):
         run_here(StudyConfig(preset, str(tmp_path / "study")), starter)
     assert starter.begun == []
 
 
 def test_every_setting_of_a_design_is_explained_where_people_look():
     written = design_module.__doc__ or ""
-    for kind in (StudyDesign, TaskDesign, Flat, Factors, Beside, Robustness, Sweep):
+    for kind in (StudyDesign, TaskDesign, Flat, Factors, Beside, Robustness):
         for entry in dataclasses.fields(kind):
             described = f"\n{entry.name} = " in written or f"[{entry.name}" in written
             assert described or entry.name in ("name", "digest"), entry.name

@@ -15,7 +15,7 @@ from handrail.policies.study.design.power import detectable, plan, weights
 from handrail.policies.study.report import tables
 from handrail.policies.study.report.contrasts import DECLARED, EXPLORATORY, SYSTEM, WORDS, contrasts
 from handrail.policies.study.report.results import MEASURES
-from handrail.policies.study.report.words import answer, cautions, how
+from handrail.policies.study.report.words import answer, cautions
 
 
 def shares_of(results, task, label):
@@ -85,8 +85,7 @@ def test_only_draws_that_are_whole_count(gathered):
     assert found[WORDS["input"], ("reach", "tray")].estimate.replicates == 3
     assert found[WORDS["input"], ("reach",)].estimate.replicates == 4
     assert all(each.p_adjusted is None for each in found.values())  # nobody stops where it suits
-    assert "not tested before all draws are done" in answer(contrasts(results), results)[0]
-    assert "3 of 4 draws so far" in answer(contrasts(results), results)[-1]
+    assert "not tested before all draws are done" in answer(contrasts(results), DESIGN)[0]
     assert any("jobs are not done yet" in text for text in cautions(results))
 
 
@@ -148,34 +147,16 @@ def test_a_system_is_compared_with_the_best_policy_alone_and_named_so(gathered):
 
 def test_the_answer_is_what_was_declared_and_claims_no_more_than_was_detected(gathered):
     with_mpc = {label: (0.95 if label in ("ee", "joints") else 0.3,) * 4 for label in SHARES}
-    results = gathered(shares=with_mpc)
-    found = contrasts(results)
-    said = answer(found, results)
-    assert len(said) == 6
+    found = contrasts(gathered(shares=with_mpc))
+    said = answer(found, DESIGN)
     assert [each.name for each in found if each.detected] == [WORDS["controller"]]
-    shares = {label: shares_of(results, "reach", label).mean() for label in MODES}
-    shares |= {label: (shares[label] + shares_of(results, "tray", label).mean()) / 2 for label in MODES}
-    with_it, without = (shares["ee"] + shares["joints"]) / 2, (shares["decoupled"] + shares["direct"]) / 2
-    assert f"with the MPC succeeded in {100 * with_it:.0f} %, without in {100 * without:.0f} %" in said[2]
-    assert "a difference of +" in said[2]
-    for sentence in (said[0], said[3]):
-        assert "no difference detected" in sentence
-        assert "would often go unseen" in sentence
-    for mpc, none, name in (("ee", "decoupled", "hand"), ("joints", "direct", "joints")):
-        assert f"{100 * (shares[mpc] - shares[none]):+.0f} with the {name} (95 %" in said[1]
-    for hand, joints, words in (("ee", "joints", "with the MPC"), ("decoupled", "direct", "without it")):
-        less = f"{100 * (shares[hand] - shares[joints]):+.0f} {words} (95 %".replace("-", "−")
-        assert less in said[1]
-    assert all(sentence.startswith("Explored") for sentence in (said[1], said[4]))
-    clean = {
-        each.name: each.estimate.value for each in found if each.measure == "clean" and len(each.tasks) == 2
-    }
-    assert f"controller {100 * clean[WORDS['controller']]:+.0f} (95 %" in said[4]
-    assert "scripted operators" in said[-1]
-    assert "2 draws" not in said[-1]
-    nothing = gathered(shares=dict.fromkeys(SHARES, (0.5,) * 4))
-    said = answer(contrasts(nothing), nothing)
-    assert "a difference of" not in " ".join(said)
+    assert [sentence.split(":")[0] for sentence in said] == ["Interaction", "Controller", "Input"]
+    assert [", a difference detected." in sentence for sentence in said] == [False, True, False]
+    assert [", no difference detected." in sentence for sentence in said] == [True, False, True]
+    values = {each.name: each.estimate.value for each in found if each.kind == DECLARED}
+    assert f"{100 * values[WORDS['controller']]:+.0f} points (95 %" in said[1]
+    nothing = answer(contrasts(gathered(shares=dict.fromkeys(SHARES, (0.5,) * 4))), DESIGN)
+    assert all("no difference detected" in sentence for sentence in nothing)
 
 
 def test_without_factors_or_with_one_draw_nothing_is_claimed(gathered):
@@ -183,7 +164,7 @@ def test_without_factors_or_with_one_draw_nothing_is_claimed(gathered):
     found = contrasts(plain)
     assert not [each for each in found if each.kind == DECLARED]
     assert "ee − direct" in {each.name for each in found}
-    assert "No contrast was declared" in answer(found, plain)[0]
+    assert "No contrast was declared" in answer(found, plain.progress.design)[0]
     open_ended = gathered(replace(DESIGN, factors=replace(FACTORS, primary=())))
     found = contrasts(open_ended)
     assert {each.kind for each in found} == {EXPLORATORY, SYSTEM}
@@ -191,13 +172,13 @@ def test_without_factors_or_with_one_draw_nothing_is_claimed(gathered):
         (each.name, each.tasks, each.measure) for each in found
     }
     assert all(each.p_adjusted is None for each in found)
-    assert "No contrast was declared" in answer(found, open_ended)[0]
+    assert "No contrast was declared" in answer(found, open_ended.progress.design)[0]
     assert "Nothing is declared" in plan(open_ended.progress.design)
     single = gathered(replace(DESIGN, draws=1, beside=None))
     found = contrasts(single)
     assert all(each.estimate.interval is None and each.p_adjusted is None for each in found)
-    assert "one draw tests nothing" in answer(found, single)[0]
-    assert "There is one draw" in how(single, found)
+    assert "one draw tests nothing" in answer(found, single.progress.design)[0]
+    assert any("One draw" in text for text in cautions(single))
     assert tables.contrasts_table(found, DECLARED, single).rows
 
 
