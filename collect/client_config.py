@@ -30,9 +30,6 @@ class ClientConfig:
         Args:
             robot: which one; empty where a simulation is driven.
             operator: who steers.
-
-        Raises:
-            HandrailError: one is wrong.
         """
         if not robot:
             if self != ClientConfig():

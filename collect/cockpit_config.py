@@ -38,11 +38,7 @@ class CockpitConfig:
         return self.open and not self.asks
 
     def check(self) -> None:
-        """Check the settings.
-
-        Raises:
-            HandrailError: one is wrong.
-        """
+        """Check the settings."""
         if self.host != "localhost":
             try:
                 ipaddress.ip_address(self.host)

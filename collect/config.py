@@ -89,11 +89,7 @@ class SessionConfig:
         return f"mask:{self.mask}" if self.mask else self.mode
 
     def check(self) -> None:
-        """Check what can be checked without loading anything heavy.
-
-        Raises:
-            HandrailError: one setting is wrong; the message says what may be chosen.
-        """
+        """Check what can be checked without loading anything heavy."""
         TASKS.check(self.task)
         MODES.check(self.mode)
         OPERATORS.check(self.operator)
@@ -134,11 +130,7 @@ class StoredConfig:
 
     @property
     def folder(self) -> Path:
-        """The folder of the dataset: as given, or where LeRobot keeps its own.
-
-        Raises:
-            HandrailError: it is given twice, or neither it nor a name.
-        """
+        """The folder of the dataset: as given, or where LeRobot keeps its own."""
         given = only_one(self.place, self.root, "--dataset.root")
         if given:
             return Path(given).expanduser()
@@ -162,11 +154,7 @@ class DatasetConfig(StoredConfig):
     """What is done, in words; the task's own sentence when empty."""
 
     def check(self) -> None:
-        """Check the settings.
-
-        Raises:
-            HandrailError: one is wrong.
-        """
+        """Check the settings."""
         _ = self.folder
         check_fps(self.fps)
         if self.num_episodes < 1:
@@ -222,11 +210,7 @@ class RecordConfig(SessionConfig, ExecutionConfig):
     """Save what rerun would show to this .rrd file."""
 
     def check(self) -> None:
-        """Check what can be checked without loading anything heavy.
-
-        Raises:
-            HandrailError: one setting is wrong.
-        """
+        """Check what can be checked without loading anything heavy."""
         super().check()
         self.dataset.check()
         self.cockpit.check()
@@ -291,11 +275,7 @@ class DriveConfig(RecordConfig):
 
 
 def check_fps(fps: int) -> None:
-    """Check a control and recording rate [Hz].
-
-    Raises:
-        HandrailError: it is out of range.
-    """
+    """Check a control and recording rate [Hz]."""
     low, high = FPS_RANGE
     if not low <= fps <= high:
         raise HandrailError(f"--dataset.fps {fps}: expected {low} to {high}")

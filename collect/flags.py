@@ -11,11 +11,7 @@ from handrail.controllers.registry import Registry
 
 
 def only_one[Given](place: Given, flagged: Given, flag: str) -> Given:
-    """Return what was given: without a flag, or with it, which says the same.
-
-    Raises:
-        HandrailError: both were given.
-    """
+    """Return what was given: without a flag, or with it, which says the same."""
     if place and flagged:
         raise HandrailError(f"{_shown(place)} and {flag} {_shown(flagged)}: expected one of them, got both")
     return place or flagged
@@ -42,11 +38,7 @@ def names(given: str, everything: Collection[str]) -> tuple[str, ...]:
 
 
 def check_names(thing: str, flag: str, chosen: tuple[str, ...], choices: Collection[str]) -> None:
-    """Check that names were chosen, that each may be, and each is there once.
-
-    Raises:
-        HandrailError: it is not so.
-    """
+    """Check that names were chosen, that each may be, and each is there once."""
     if not chosen:
         raise HandrailError(f"{flag}: expected all, or some of {', '.join(choices)}; got none")
     for name in chosen:
@@ -58,32 +50,20 @@ def check_names(thing: str, flag: str, chosen: tuple[str, ...], choices: Collect
 
 
 def check_page(page: str) -> None:
-    """Check that a Markdown page can be written, if one is asked for.
-
-    Raises:
-        HandrailError: it cannot.
-    """
+    """Check that a Markdown page can be written, if one is asked for."""
     path = Path(page).expanduser()
     if page and not (path.suffix == ".md" and path.absolute().parent.is_dir()):
         raise HandrailError(f"--page {page}: expected a .md file in an existing folder")
 
 
 def check_json(path: str) -> None:
-    """Check that a file of JSON can be written, if one is asked for.
-
-    Raises:
-        HandrailError: it cannot.
-    """
+    """Check that a file of JSON can be written, if one is asked for."""
     if path and not Path(path).expanduser().absolute().parent.is_dir():
         raise HandrailError(f"--json {path}: expected a file in an existing folder")
 
 
 def check_whole(config: Any, **least: int) -> None:
-    """Check that settings are no smaller than they may be, by their names.
-
-    Raises:
-        HandrailError: one is.
-    """
+    """Check that settings are no smaller than they may be, by their names."""
     for name, smallest in least.items():
         if getattr(config, name) < smallest:
             raise HandrailError(f"--{name} {getattr(config, name)}: expected a whole number >= {smallest}")

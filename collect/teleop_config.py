@@ -28,11 +28,7 @@ class LeaderConfig:
     """Other settings of that type, as use_degrees=true, with commas between."""
 
     def check_type(self, wanted_by: str) -> None:
-        """Check that it is said which one.
-
-        Raises:
-            HandrailError: it is not.
-        """
+        """Check that it is said which one."""
         if not self.type:
             raise HandrailError(f"{wanted_by}: expected --teleop.type, such as {_EXAMPLE}")
 
@@ -55,9 +51,6 @@ class TeleopConfig(LeaderConfig):
 
         Args:
             operator: whose device it is.
-
-        Raises:
-            HandrailError: one is wrong.
         """
         if operator == LEADER:
             self.check_type(f"--operator {LEADER}")
@@ -87,11 +80,7 @@ class CalibrateConfig:
     """Of the leader's joints: degrees, radians, or other (measured from the quarter turns that you make)."""
 
     def check(self) -> None:
-        """Check the settings.
-
-        Raises:
-            HandrailError: one is wrong.
-        """
+        """Check the settings."""
         self.teleop.check_type("handrail-calibrate")
         if self.unit not in UNITS:
             raise HandrailError(f"--unit {self.unit}: expected {', '.join(UNITS[:-1])} or {UNITS[-1]}")

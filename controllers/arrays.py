@@ -23,10 +23,6 @@ def frozen(values: ArrayLike, dtype: Any = np.float64, what: str = "an array") -
         values: numbers; truth values where `dtype` is bool.
         dtype: of the copy.
         what: they are, for the message.
-
-    Raises:
-        HandrailError: they are something else: text, complex numbers, rows of unequal length, or integers
-            that are too large.
     """
     if type(values) is np.ndarray and values.dtype is _FLOAT and dtype is np.float64:
         array = values.copy()  # what nearly all are, and many in an update
@@ -39,11 +35,7 @@ def frozen(values: ArrayLike, dtype: Any = np.float64, what: str = "an array") -
 
 
 def real(value: Any, what: str) -> float:
-    """Return a number as a float.
-
-    Raises:
-        HandrailError: it is none: text, a complex number, or an integer that is too large.
-    """
+    """Return a number as a float."""
     if isinstance(value, float):
         return float(value)
     array = _checked(value, "f", what)

@@ -35,9 +35,6 @@ def check_entries(content: Any, entries: Mapping[str, Entry], where: str) -> Non
         content: the table.
         entries: what it may have, by name.
         where: it is, for the error.
-
-    Raises:
-        HandrailError: an entry is missing, unknown, or not what it should be.
     """
     if not isinstance(content, Mapping):
         raise HandrailError(f"{where}: expected a table of {', '.join(entries)}, got {shown(content)}")

@@ -44,9 +44,6 @@ def check_fields(content: Any, kind: Any, where: str, **special: Entry) -> None:
         kind: the dataclass.
         where: the table is, for the error.
         special: what fields have to be of which the type does not say enough, by name.
-
-    Raises:
-        HandrailError: an entry is missing, unknown, or not what it should be.
     """
     types = get_type_hints(kind)
     entries = {

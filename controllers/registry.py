@@ -73,11 +73,7 @@ class Registry[Spec: Named](Mapping[str, Spec]):
         return name in self or _REFERENCE.fullmatch(name) is not None
 
     def check(self, name: str) -> None:
-        """Check a name of the command line, without importing anything.
-
-        Raises:
-            HandrailError: there is none of that name, and it is no `module:name`.
-        """
+        """Check a name of the command line, without importing anything."""
         if not self.accepts(name):
             raise unknown_name(self._thing, name, self)
 
@@ -87,9 +83,6 @@ class Registry[Spec: Named](Mapping[str, Spec]):
         Args:
             name: in the file.
             said: the names on the command line, which may be imported.
-
-        Raises:
-            HandrailError: it is a `module:name` that the command line does not say too.
         """
         if _REFERENCE.fullmatch(name) and name not in self and name not in said:
             raise HandrailError(
@@ -98,11 +91,7 @@ class Registry[Spec: Named](Mapping[str, Spec]):
             )
 
     def find(self, name: str) -> Spec:
-        """Return a spec by its name, or by `module:name`, which is imported and becomes its name.
-
-        Raises:
-            HandrailError: there is none, it cannot be imported, or it is of another kind.
-        """
+        """Return a spec by its name, or by `module:name`, which is imported and becomes its name."""
         self.check(name)
         return self[name] if name in self else self._spec(name, name)
 
@@ -120,11 +109,7 @@ class Registry[Spec: Named](Mapping[str, Spec]):
 
 
 def resolved(value: Callable[..., Any] | str, where: str = "") -> Any:
-    """Return what is meant: `module:name` is imported now, anything else is itself.
-
-    Raises:
-        HandrailError: it cannot be imported.
-    """
+    """Return what is meant: `module:name` is imported now, anything else is itself."""
     if not isinstance(value, str):
         return value
     module, _, name = value.partition(":")

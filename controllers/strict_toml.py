@@ -16,9 +16,6 @@ def read_toml(path: Path, what: str) -> dict[str, Any]:
     Args:
         path: of the file.
         what: it is, for the error: `robot description`.
-
-    Raises:
-        HandrailError: it cannot be read, is too large or too deep, or no TOML.
     """
     try:
         with open_regular(path) as file:

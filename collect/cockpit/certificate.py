@@ -25,9 +25,6 @@ def certificate(host: str, folder: Path) -> tuple[Path, Path]:
     Args:
         host: address that it is for.
         folder: where it is kept.
-
-    Raises:
-        HandrailError: it cannot be written.
     """
     cert, key = folder / f"{host}.pem", folder / f"{host}.key.pem"
     if not (_is_secret(key) and _is_valid(cert, _addresses(host))):

@@ -178,11 +178,7 @@ class Cockpit:
         return self._dropped | {why: count for why, count in room.items() if count}
 
     def _listen(self) -> None:
-        """Take what the server has passed on.
-
-        Raises:
-            HandrailError: it has died too often.
-        """
+        """Take what the server has passed on."""
         for kind, data in self._server.receive():
             if kind == LOST:
                 self._person.lose()
@@ -253,9 +249,6 @@ def open_cockpit(config: RecordConfig, env: HandrailEnv, say: Callable[[str], No
         config: of the recording.
         env: of the recording.
         say: is told the address.
-
-    Raises:
-        HandrailError: what the server needs is not installed, or it does not start.
     """
     check_installed()
     modes = build_modes(config, env)
@@ -276,11 +269,7 @@ def open_cockpit(config: RecordConfig, env: HandrailEnv, say: Callable[[str], No
 
 
 def check_installed() -> None:
-    """Check that what the page's server needs is there.
-
-    Raises:
-        HandrailError: it is not.
-    """
+    """Check that what the page's server needs is there."""
     for module in _NEEDED:
         if find_spec(module) is None:
             raise not_installed("the cockpit", module, "cockpit")

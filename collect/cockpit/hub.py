@@ -63,11 +63,7 @@ class Hub:
         return self._is_over and bool(self._pages)
 
     def hear(self) -> None:
-        """Pass on what the recording has sent.
-
-        Raises:
-            HandrailError: the recording is gone.
-        """
+        """Pass on what the recording has sent."""
         newest: dict[Any, bytes] = {}
         for kind, data in self._pipe.receive():
             newest[kind if kind != PICTURE else (PICTURE, data[:1])] = data
@@ -97,22 +93,14 @@ class Hub:
         self._strain.note(lag)
 
     def keep_up(self) -> None:
-        """Send what waits for the recording; tell the pages when the lease has become free.
-
-        Raises:
-            HandrailError: the recording is gone.
-        """
+        """Send what waits for the recording; tell the pages when the lease has become free."""
         self._pipe.flush()
         if self._lease.is_free_for("") != self._was_free:
             self._was_free = not self._was_free
             self._tell_all()
 
     def report(self, refused: int) -> None:
-        """Tell the recording what was dropped, and how many were turned away.
-
-        Raises:
-            HandrailError: the recording is gone.
-        """
+        """Tell the recording what was dropped, and how many were turned away."""
         self.counts["refused at the door"] = refused
         self.counts["input without room"] = self._pipe.dropped[DRIVE] + self._pipe.dropped[ASK]
         self._pipe.send(DROPPED, json.dumps({why: n for why, n in self.counts.items() if n}).encode())

@@ -80,11 +80,7 @@ def stills(said: Said) -> bool:
 
 
 def parse(text: str | bytes) -> Said:
-    """Return what a page said.
-
-    Raises:
-        HandrailError: it is no message.
-    """
+    """Return what a page said."""
     if len(text) > LARGEST:
         raise HandrailError(f"message: expected at most {LARGEST} bytes, got {len(text)}")
     try:

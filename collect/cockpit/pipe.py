@@ -68,11 +68,7 @@ class Pipe:
         return self._socket.fileno()
 
     def send(self, kind: bytes, data: bytes) -> bool:
-        """Send a message if there is room for it now; return whether there was.
-
-        Raises:
-            HandrailError: the other end is gone.
-        """
+        """Send a message if there is room for it now; return whether there was."""
         went = self.flush() and len(data) <= LARGEST and self._begin(kind, data)
         self.dropped[kind] += not went
         return went
@@ -86,9 +82,6 @@ class Pipe:
             kind: of the message.
             data: what it says.
             instead_of: kinds that are out of date with it: what waits of them is dropped.
-
-        Raises:
-            HandrailError: the other end is gone.
         """
         stale = [each for each in self._waiting if each[0] in instead_of or each == (kind, data)]
         for each in stale:
@@ -101,11 +94,7 @@ class Pipe:
         self.flush()
 
     def flush(self) -> bool:
-        """Send what waits, as far as there is room; return whether nothing waits any more.
-
-        Raises:
-            HandrailError: the other end is gone.
-        """
+        """Send what waits, as far as there is room; return whether nothing waits any more."""
         while self._begun:
             if not self._push(self._begun[0]):
                 return False
@@ -119,11 +108,7 @@ class Pipe:
         return True
 
     def receive(self) -> list[tuple[bytes, bytes]]:
-        """Return all messages that have come, the oldest first.
-
-        Raises:
-            HandrailError: the other end is gone.
-        """
+        """Return all messages that have come, the oldest first."""
         messages: list[tuple[bytes, bytes]] = []
         try:
             while packet := self._socket.recv(2 * _PACKET):

@@ -36,9 +36,6 @@ class ServerProcess:
         pipe: to it.
         unread: what it has passed on, and nobody has obeyed yet.
         address: of the page; with the token after `#` where one is asked for.
-
-    Raises:
-        HandrailError: it does not start.
     """
 
     def __init__(self, config: CockpitConfig, say: Callable[[str], None] = lambda words: None) -> None:
@@ -75,11 +72,7 @@ class ServerProcess:
             return
 
     def receive(self) -> list[tuple[bytes, bytes]]:
-        """Return what the server has passed on: `LOST` when it died, `NOTE` when another one has begun.
-
-        Raises:
-            HandrailError: it has died too often.
-        """
+        """Return what the server has passed on: `LOST` when it died, `NOTE` when another one has begun."""
         try:
             messages = self.unread + self.pipe.receive()
             self.unread = []
@@ -123,11 +116,7 @@ class ServerProcess:
         self.pipe.send_surely(SETTINGS, json.dumps(self._settings).encode())
 
     def _start_again(self) -> None:
-        """Start another server instead of one that has died.
-
-        Raises:
-            HandrailError: that has happened too often.
-        """
+        """Start another server instead of one that has died."""
         self.pipe.close()
         how = self._ended()
         now = time.monotonic()
@@ -150,11 +139,7 @@ class ServerProcess:
         return signal.Signals(-code).name if code < 0 else f"exit code {code}"
 
     def _take(self, note: bytes) -> None:
-        """Take where the server listens.
-
-        Raises:
-            HandrailError: it cannot.
-        """
+        """Take where the server listens."""
         said = json.loads(note)
         if "error" in said:
             raise HandrailError(said["error"])

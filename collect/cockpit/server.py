@@ -151,11 +151,7 @@ def _refused() -> Response:
 
 
 def _listening(host: str, port: int) -> socket.socket:
-    """Return a socket that listens at a port, or one of the next ones.
-
-    Raises:
-        HandrailError: none can be had.
-    """
+    """Return a socket that listens at a port, or one of the next ones."""
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     trouble: OSError | None = None
     for trial in range(port, port + _TRIES if port else 1):
@@ -277,11 +273,7 @@ def main() -> None:
 
 
 def _settings(pipe: Pipe) -> dict[str, Any]:
-    """Return what the recording says first.
-
-    Raises:
-        HandrailError: it says nothing.
-    """
+    """Return what the recording says first."""
     select.select([pipe], [], [], _PATIENCE)
     for kind, data in pipe.receive():
         if kind == SETTINGS:

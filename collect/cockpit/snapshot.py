@@ -1,5 +1,6 @@
 """What the page shows of a moment: one small value, many times a second."""
 
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
@@ -7,20 +8,122 @@ import numpy as np
 
 from handrail.collect.cockpit import stage
 from handrail.collect.cockpit.lead import Lead, Leads
-from handrail.collect.cockpit.nearest import NearestPair
-from handrail.collect.cockpit.reasons import reason
 from handrail.collect.envs.env import HandrailEnv
 from handrail.collect.operators.operator import View
 from handrail.collect.operators.person.person import Person, Phase
 from handrail.collect.session.outcome import Outcome
+from handrail.collect.simulation.geometry import ROBOT_BIT
+from handrail.collect.simulation.gl import MjData, MjModel, mujoco
 from handrail.collect.tasks.task import Aimed, TaskState
 from handrail.controllers.arrays import FloatArray
+from handrail.controllers.interface.command import Status
 from handrail.controllers.interface.trajectory import Trajectory
 from handrail.controllers.numerics.rotation import quaternion_from_matrix
+from handrail.controllers.robot.description import RobotDescription
 from handrail.controllers.robot.model import Pose
 from handrail.datasets.recording.frames import Frame
 
 _PATH_STEPS = 8  # of a plan that is drawn
+
+
+_FAR = 0.5  # farther is not looked for [m]
+
+
+STATUS: Mapping[Status, str] = {
+    Status.OK: "",
+    Status.CLIPPED: "limited: faster than the robot may",
+    Status.INVALID_STATE: "braking: the robot's state makes no sense",
+    Status.INVALID_INTENT: "braking: the command makes no sense",
+    Status.INVALID_SCENE: "braking: the list of things around the robot makes no sense",
+    Status.STALE_INTENT: "braking: no command",
+    Status.SOLVER_FAILED: "braking: no plan was found",
+    Status.BACKUP: "braking: no safe way on",
+}
+_CLOSE = 0.02  # to a limit [rad, m]
+_MOST = 2  # contacts, and joints, that are named
+
+
+def reason(status: Status, contacts: Iterable[str], q: FloatArray, robot: RobotDescription) -> str:
+    """Return what is in the way, the gravest first; empty where nothing is.
+
+    Args:
+        status: of the controller.
+        contacts: forbidden ones, as pairs of names.
+        q: of the robot, (n,) [m, rad].
+        robot: it.
+    """
+    touching = [f"touching: {_plain(pair)}" for pair in list(contacts)[:_MOST]]
+    return " · ".join(filter(None, [STATUS[status], *touching, *_at_limits(q, robot)[:_MOST]]))
+
+
+def _at_limits(q: FloatArray, robot: RobotDescription) -> list[str]:
+    limits, base = robot.limits, len(robot.base_joints)
+    at = np.flatnonzero((q < limits.position_lower + _CLOSE) | (q > limits.position_upper - _CLOSE))
+    names = [_plain(robot.joints[index].removesuffix("_joint")) for index in at if index >= base]
+    edge = ["base at the edge of its area"] if np.any(at < base) else []
+    return edge + [f"joint {name} at its limit" for name in names]
+
+
+def _plain(name: str) -> str:
+    return name.replace("_", " ")
+
+
+@dataclass(frozen=True)
+class Nearest:
+    """Two points, one on each, (2, 3), how far apart their surfaces are [m], and of what they are."""
+
+    points: tuple[float, ...]
+    distance: float
+    names: tuple[str, str]
+
+
+class NearestPair:
+    """Measures the robot against itself and what stands around; what it may carry or pull is left out.
+
+    Args:
+        model: the compiled model.
+    """
+
+    def __init__(self, model: MjModel) -> None:
+        self._model = model
+        robot = [g for g in range(model.ngeom) if model.geom_contype[g] & ROBOT_BIT]
+        solid = np.flatnonzero((model.geom_contype | model.geom_conaffinity) > 0).tolist()
+        scene = [g for g in solid if g not in robot and model.geom_bodyid[g] and self._is_apart(g, robot)]
+        own = zip(model.pair_geom1.tolist(), model.pair_geom2.tolist(), strict=True)
+        pairs = [*own, *((first, second) for first in robot for second in scene)]
+        self._first, self._second = np.array(pairs, dtype=np.intp).reshape(-1, 2).T
+        self._radii = model.geom_rbound[self._first] + model.geom_rbound[self._second]
+
+    def _is_apart(self, geom: int, robot: list[int]) -> bool:
+        """Whether a geom is no part of the robot, as a finger is, and nothing that can be moved."""
+        if self._model.body_dofnum[self._model.geom_bodyid[geom]]:
+            return False
+        bodies = {int(self._model.body_rootid[self._model.geom_bodyid[each]]) for each in robot}
+        return int(self._model.body_rootid[self._model.geom_bodyid[geom]]) not in bodies
+
+    def find(self, data: MjData) -> Nearest | None:
+        """Return the nearest pair now; None where nothing is near.
+
+        Pairs are looked at in the order of their bounding spheres' distances, until no other can be nearer.
+        """
+        between = data.geom_xpos[self._first] - data.geom_xpos[self._second]
+        bounds = np.sqrt(np.einsum("ij,ij->i", between, between)) - self._radii
+        best, line, found = _FAR, np.zeros(6), None
+        for index in np.argsort(bounds).tolist():
+            if bounds[index] >= best:
+                break
+            first, second = int(self._first[index]), int(self._second[index])
+            distance = mujoco.mj_geomDistance(self._model, data, first, second, best, line)
+            if distance < best:
+                best, found = distance, (first, second, tuple(np.round(line, 3).tolist()))
+        if found is None:
+            return None
+        first, second, points = found
+        return Nearest(points, round(best, 4), (self._name(first), self._name(second)))
+
+    def _name(self, geom: int) -> str:
+        name = self._model.geom(geom).name or self._model.body(self._model.geom_bodyid[geom]).name
+        return name.replace("_", " ")
 
 
 @dataclass

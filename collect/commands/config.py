@@ -38,11 +38,7 @@ class ReplayConfig:
         return (self.task, self.mode, self.operator, self.robot)
 
     def check(self) -> None:
-        """Check the settings.
-
-        Raises:
-            HandrailError: one is wrong.
-        """
+        """Check the settings."""
         for flag, file, ending in (("--sheet", self.sheet, ".png"), ("--video", self.video, ".mp4")):
             if file and not (file.endswith(ending) and Path(file).expanduser().absolute().parent.is_dir()):
                 raise HandrailError(f"{flag} {file}: expected a {ending} file in an existing folder")
@@ -96,11 +92,7 @@ class PushConfig:
     """Read every file anew, not only those that have changed since they were checked."""
 
     def check(self) -> None:
-        """Check the settings.
-
-        Raises:
-            HandrailError: one is wrong.
-        """
+        """Check the settings."""
         if not re.fullmatch(r"[\w-][\w.-]*/[\w-][\w.-]*", self.dataset.repo_id):
             got = self.dataset.repo_id or "none"
             raise HandrailError(f"--dataset.repo_id: expected its name on the hub, owner/name; got {got}")
@@ -125,9 +117,5 @@ class DemoConfig:
 
     @property
     def folder(self) -> Path:
-        """The folder of the demo.
-
-        Raises:
-            HandrailError: it is given twice.
-        """
+        """The folder of the demo."""
         return Path(only_one(self.place, self.root, "--root") or "outputs/demo").expanduser()

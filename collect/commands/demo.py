@@ -23,11 +23,7 @@ NEXT = """Next:
 
 
 def demo(config: DemoConfig) -> int:
-    """Record, then print a table, the dataset's path, a picture's path, and commands to try.
-
-    Raises:
-        HandrailError: a setting is wrong, or the folder is taken.
-    """
+    """Record, then print a table, the dataset's path, a picture's path, and commands to try."""
     console = Terminal()
     if config.episodes < 1:
         raise HandrailError(f"--episodes {config.episodes}: expected 1 or more")

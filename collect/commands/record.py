@@ -1,9 +1,21 @@
 """Records episodes into a dataset, with a progress bar, and says what came of it."""
 
+from collections.abc import Iterable, Sequence
 from typing import Any
 
+from rich.console import RenderableType
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    ProgressColumn,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
+from rich.protocol import is_renderable
+
 from handrail.collect.commands.account import RecordingLog, report
-from handrail.collect.commands.progress import recording_bar
 from handrail.collect.commands.recording import Recording, come_first, episode_seed, session_writer
 from handrail.collect.commands.shards import Shards
 from handrail.collect.commands.shared import record_shared
@@ -23,14 +35,44 @@ from handrail.datasets.recording.folder import check_target
 from handrail.datasets.recording.writer import EpisodeWriter
 
 
+class _Progress(Progress):
+    """The bar of a recording, below what the people who steer have to show."""
+
+    def __init__(self, *columns: ProgressColumn, console: Terminal, shown: Sequence[Any]) -> None:
+        self._shown = shown  # the bar draws itself once while it is made
+        super().__init__(*columns, console=console)
+
+    def get_renderables(self) -> Iterable[RenderableType]:
+        """Return what is shown."""
+        yield from self._shown
+        yield from super().get_renderables()
+
+
+def recording_bar(console: Terminal, people: Sequence[Any]) -> Progress:
+    """Return the bar of a recording, not started.
+
+    Args:
+        console: to draw on.
+        people: who steer now; what rich can draw of them is shown above the bar.
+    """
+    return _Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("{task.fields[success]}"),
+        TimeElapsedColumn(),
+        TextColumn("left"),
+        TimeRemainingColumn(),
+        console=console,
+        shown=[each for each in people if is_renderable(each)],
+    )
+
+
 def record(config: RecordConfig) -> int:
     """Record as configured; return the exit code: 0, 1 after a failure, 130 after Ctrl-C.
 
     Args:
         config: of the recording.
-
-    Raises:
-        HandrailError: a setting is wrong; nothing has been written then.
     """
     console = Terminal(stderr=True)
     if config.is_shared or Shards(config).begun:
@@ -76,7 +118,7 @@ def _opened(config: RecordConfig, interactive: bool) -> tuple[HandrailEnv, Any]:
     """Return the environment; and the link to a robot, if it is no simulation."""
     if not config.robot_client:
         return build_env(config, config.dataset.fps, render=interactive), None
-    from handrail.collect.lekiwi.client_env import open_client  # loads LeRobot
+    from handrail.collect.lekiwi.client_plant import open_client  # loads LeRobot
 
     return open_client(config)
 

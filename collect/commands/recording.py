@@ -104,9 +104,6 @@ class Recording:
             interrupts: that wait until it is saved.
             tell_paused: is told when the operator pauses, and when they go on.
             note: is told how it went, before an interrupt takes effect.
-
-        Raises:
-            HandrailError: the disk or an encoder failed; the saved episodes are whole.
         """
         outcome = self._session.run(seed, tell_paused)
         outcome = replace(outcome, practice=any(each.practises for each in self.people))
@@ -148,11 +145,7 @@ def _client(config: RecordConfig) -> str:
 
 
 def open_writer(config: RecordConfig, env: HandrailEnv) -> EpisodeWriter:
-    """Return the writer of a recording's dataset, new or resumed.
-
-    Raises:
-        HandrailError: the folder is taken, cannot be written, or holds another recording.
-    """
+    """Return the writer of a recording's dataset, new or resumed."""
     dataset, manifest = config.dataset, manifest_of(config, env)
     if config.resume:
         return EpisodeWriter.resume(dataset.folder, manifest, config.verify)
@@ -161,11 +154,7 @@ def open_writer(config: RecordConfig, env: HandrailEnv) -> EpisodeWriter:
 
 @contextmanager
 def session_writer(config: RecordConfig, env: HandrailEnv) -> Iterator[EpisodeWriter]:
-    """Open the writer of a recording's dataset; a session without episodes leaves nothing behind.
-
-    Raises:
-        HandrailError: the folder is taken, cannot be written, or holds another recording.
-    """
+    """Open the writer of a recording's dataset; a session without episodes leaves nothing behind."""
     root = config.dataset.folder.absolute()
     made = [folder for folder in (root, *root.parents) if not folder.exists()]
     try:

@@ -74,9 +74,6 @@ def replay_episode(root: Path, episode: int, pictures: int = 0) -> tuple[Replay,
 
     Returns:
         What came out, and the pictures, (height, width, 3) each.
-
-    Raises:
-        HandrailError: no such dataset or episode, or one that Handrail did not record.
     """
     with open_dataset(root) as dataset:
         return replay_one_of(dataset, episode, pictures)

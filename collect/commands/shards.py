@@ -90,11 +90,7 @@ class Shards:
             write_whole(self._plan, (json.dumps(content, indent=1) + "\n").encode())
 
     def check(self) -> None:
-        """Check that they are of this recording; finish a merge that was cut short.
-
-        Raises:
-            HandrailError: they are of another one.
-        """
+        """Check that they are of this recording; finish a merge that was cut short."""
         with explained(f"cannot go on with dataset {str(self.root)!r}"):
             settle(self.root)
         before = self._content["settings"]
@@ -112,11 +108,7 @@ class Shards:
         return int(self._content["first"])
 
     def are_in(self, episodes: int) -> bool:
-        """Return whether a dataset with so many episodes has them, and not only what was there before.
-
-        Raises:
-            HandrailError: it is neither.
-        """
+        """Return whether a dataset with so many episodes has them, and not only what was there before."""
         if episodes not in (self.first, self.first + self._episodes):
             raise HandrailError(
                 f"dataset {str(self.root)!r}: expected {self.first} episodes, as when {str(self.folder)!r}"
@@ -145,9 +137,6 @@ class Shards:
 
         Args:
             lines: returns the episodes of a shard when it is whole, once; what it raises ends the merge.
-
-        Raises:
-            HandrailError: a shard cannot be read, or the disk does not take it; nothing has changed then.
         """
         with explained(f"cannot write dataset {str(self.root)!r}"):
             shards = self.all

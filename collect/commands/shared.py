@@ -42,9 +42,6 @@ def record_shared(config: RecordConfig, console: Terminal) -> int:
     Args:
         config: of the recording.
         console: to say how far it is, and what came of it.
-
-    Raises:
-        HandrailError: a setting is wrong; nothing has been written then.
     """
     shards, log, start = Shards(config), RecordingLog(), time.monotonic()
     going_on = shards.begun
@@ -100,11 +97,7 @@ def _record_all(config: RecordConfig, shards: Shards, log: RecordingLog, executi
 
 @contextmanager
 def _merging(shards: Shards) -> Iterator[Callable[[str, Sequence[EpisodeRecord]], None]]:
-    """Merge shards while others are still recorded; provide what takes the name and the lines of a whole one.
-
-    Raises:
-        HandrailError: the disk does not take it; nothing has changed then.
-    """
+    """Merge shards while others are recorded; yield a function that takes a whole one by name and lines."""
     whole = {each.name: Future[Sequence[EpisodeRecord]]() for each in shards.all}
     stopped = Event()
 
@@ -154,9 +147,6 @@ def record_shard(
 
     Returns:
         How those went that were not there yet, and the lines of metadata of all.
-
-    Raises:
-        HandrailError: the disk or an encoder failed; the saved episodes are whole.
     """
     own = replace(config, dataset=replace(config.dataset, place=str(folder), root=""))
     env, outcomes = _env(config), list[Outcome]()

@@ -13,11 +13,7 @@ _QUALITY = ("episode", "mode", "length [s]", "smoothness", *CHATTERING)
 
 
 def summary_table(root: Path) -> Table:
-    """Return a table with one line an episode of any LeRobot v3.0 dataset.
-
-    Raises:
-        HandrailError: there is no dataset, or it cannot be read.
-    """
+    """Return a table with one line an episode of any LeRobot v3.0 dataset."""
     rows = summarize(root)
     known = [row.success for row in rows if row.success is not None]
     caption = f"{len(rows)} episodes" + (f", {sum(known)} succeeded" if known else "")
@@ -32,11 +28,7 @@ def summary_table(root: Path) -> Table:
 
 
 def quality_table(root: Path) -> Table:
-    """Return a table with the measures of quality of every episode of any LeRobot v3.0 dataset.
-
-    Raises:
-        HandrailError: there is no dataset, or it cannot be read.
-    """
+    """Return a table with the measures of quality of every episode of any LeRobot v3.0 dataset."""
     caption = (
         "rate of change and high-frequency content of the commanded velocities; "
         "corrections of joints that were commanded one by one, switched on or off"

@@ -21,11 +21,7 @@ _NEXT = """Next:
 
 
 def located(config: RecordConfig, env: HandrailEnv) -> RecordConfig:
-    """Return the settings of a recording with its folder, and whether it adds to a dataset that is there.
-
-    Raises:
-        HandrailError: these episodes cannot be added to it.
-    """
+    """Return the settings of a recording with its folder, and whether it adds to a dataset that is there."""
     if config.dataset.is_found:
         return _found(config, env)
     goes_on = isinstance(config.dataset, FoundDatasetConfig) and not (config.resume or config.overwrite)
@@ -35,11 +31,7 @@ def located(config: RecordConfig, env: HandrailEnv) -> RecordConfig:
 
 
 def _resumed(config: RecordConfig, env: HandrailEnv) -> RecordConfig:
-    """Return the settings that add to the dataset that is there.
-
-    Raises:
-        HandrailError: these episodes cannot be added to it.
-    """
+    """Return the settings that add to the dataset that is there."""
     resumed = replace(config, resume=True)
     open_writer(resumed, env).close()
     return resumed
@@ -50,9 +42,6 @@ def _found(config: RecordConfig, env: HandrailEnv) -> RecordConfig:
 
     That is `outputs/cockpit/TASK` or the next one with a number: one that is free, or to which these episodes
     can be added.
-
-    Raises:
-        HandrailError: there is none.
     """
     first = config.dataset.folder / config.task.replace(":", "_")
     for folder in (first, *(first.with_name(f"{first.name}-{number}") for number in range(2, _TRIES))):

@@ -120,9 +120,6 @@ def load_map(device: str, controls: Iterable[str], changes: str = "") -> Control
         device: its name.
         controls: that it has.
         changes: a .toml file of the same form, with the sections and controls that differ, or an empty path.
-
-    Raises:
-        HandrailError: the file is not such a table.
     """
     table = _read(_FOLDER / f"{device}.toml")
     if changes:
@@ -151,11 +148,7 @@ def _axis(value: str) -> tuple[str, int]:
 
 
 def _check(table: dict[str, Any], controls: frozenset[str], where: str) -> None:
-    """Check a person's table.
-
-    Raises:
-        HandrailError: a section, a control, an axis or an action is unknown.
-    """
+    """Check a person's table."""
     for name, section in table.items():
         if name not in (*SECTIONS, "actions") or not isinstance(section, dict):
             raise HandrailError(

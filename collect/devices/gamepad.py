@@ -86,11 +86,7 @@ class Gamepad:
 
 
 def _sdl() -> tuple[Any, Any]:
-    """Return pygame and its gamepads, without a window.
-
-    Raises:
-        HandrailError: pygame is not installed.
-    """
+    """Return pygame and its gamepads, without a window."""
     for name, value in _HEADLESS.items():
         os.environ.setdefault(name, value)
     try:

@@ -30,11 +30,7 @@ class Poller:
         self._thread = threading.Thread(target=self._run, name=f"reads {device.name}", daemon=True)
 
     def start(self) -> Self:
-        """Open the device.
-
-        Raises:
-            HandrailError: it is not there, or may not be used.
-        """
+        """Open the device."""
         self._thread.start()
         opened = self._opened.wait(_PATIENCE)
         if isinstance(self._refusal, HandrailError):

@@ -53,9 +53,6 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         fps: steps a second.
         agent_names: names of the numbers in `agent_pos`.
         state_names: names of the numbers in `environment_state`.
-
-    Raises:
-        HandrailError: fps, cameras or render mode are none of those.
     """
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 20}  # noqa: RUF012  (Gymnasium's name)
@@ -125,29 +122,17 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
 
     @property
     def robot(self) -> Robot:
-        """The robot of this episode.
-
-        Raises:
-            HandrailError: `reset` was not called.
-        """
+        """The robot of this episode."""
         return self._present
 
     @property
     def world(self) -> World:
-        """What is around it, and the truth by which the task judges.
-
-        Raises:
-            HandrailError: `reset` was not called.
-        """
+        """What is around it, and the truth by which the task judges."""
         return self._present
 
     @property
     def simulation(self) -> Simulation:
-        """The physics of this episode, to be drawn or pushed.
-
-        Raises:
-            HandrailError: `reset` was not called, or there are no physics.
-        """
+        """The physics of this episode, to be drawn or pushed."""
         if not isinstance(self._present, Simulation):
             raise HandrailError(
                 f"environment {type(self.task).__name__}: expected physics, got an ideal robot"
@@ -166,11 +151,7 @@ class HandrailEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
 
     @property
     def start(self) -> Start:
-        """How this episode began.
-
-        Raises:
-            HandrailError: `reset` was not called.
-        """
+        """How this episode began."""
         return self._now[0]
 
     def state(self) -> State:

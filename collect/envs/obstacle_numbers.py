@@ -13,11 +13,7 @@ _LENGTHS = {"box": 3, "capsule": 2, "sphere": 1, "cylinder": 2}
 
 
 def to_numbers(obstacles: tuple[Obstacle, ...]) -> NDArray[np.float32]:
-    """Return obstacles as rows of numbers, (32, 21) float32, filled up with zeros.
-
-    Raises:
-        HandrailError: there are more than 32.
-    """
+    """Return obstacles as rows of numbers, (32, 21) float32, filled up with zeros."""
     if len(obstacles) > MOST:
         raise HandrailError(f"obstacles: expected {MOST} at most, got {len(obstacles)}")
     rows = np.zeros((MOST, WIDTH), np.float32)
@@ -35,9 +31,6 @@ def from_numbers(rows: ArrayLike) -> tuple[Obstacle, ...]:
 
     Args:
         rows: (…, 21).
-
-    Raises:
-        HandrailError: a row is none of `to_numbers`.
     """
     table = np.asarray(rows, np.float64)
     kinds = table[:, 0] if table.ndim == 2 and table.shape[1] == WIDTH else [np.nan]

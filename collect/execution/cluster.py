@@ -28,9 +28,6 @@ class Cluster:
     Args:
         address: of the cluster, or auto: the one that runs on this computer.
         fresh: whether every job gets a process of its own.
-
-    Raises:
-        HandrailError: there is none.
     """
 
     def __init__(self, address: str, fresh: bool = False) -> None:

@@ -33,11 +33,7 @@ class ExecutionConfig:
         return bool(self.ray) or self.processes > 1
 
     def check_execution(self) -> None:
-        """Check the settings.
-
-        Raises:
-            HandrailError: one is wrong, or Ray is not installed.
-        """
+        """Check the settings."""
         if not 0 <= self.workers <= MOST_WORKERS:
             raise HandrailError(
                 f"--workers {self.workers}: expected a whole number from 1 to {MOST_WORKERS},"

@@ -35,9 +35,6 @@ class Execution:
         console: to show how far it is; nothing without one.
         preload: modules that every process needs; they are loaded once.
         fresh: whether every job gets a process of its own, that ends with it.
-
-    Raises:
-        HandrailError: there is no such cluster.
     """
 
     def __init__(

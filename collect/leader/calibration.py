@@ -115,9 +115,6 @@ def load_calibration(path: Path, arm: tuple[str, ...], advice: str) -> LeaderCal
         path: of the file.
         arm: names of the arm's joints.
         advice: how to make the file.
-
-    Raises:
-        HandrailError: there is none, or it is no calibration of this arm.
     """
     if not path.is_file():
         raise HandrailError(f"leader arm: no calibration for this robot yet; make it once: {advice}")
@@ -141,11 +138,7 @@ def load_calibration(path: Path, arm: tuple[str, ...], advice: str) -> LeaderCal
 
 
 def save_calibration(calibration: LeaderCalibration, path: Path) -> None:
-    """Write a calibration; a crash leaves the one before.
-
-    Raises:
-        HandrailError: it cannot be written.
-    """
+    """Write a calibration; a crash leaves the one before."""
     with explained(f"calibration {path}"):
         make_folder(path.parent)
         write_whole(path, (json.dumps(asdict(calibration), indent=2) + "\n").encode())

@@ -36,9 +36,6 @@ def calibrate(config: CalibrateConfig, ask: Callable[[str], str] = input) -> int
     Args:
         config: which leader, for which robot.
         ask: shows a person some words and returns what they typed.
-
-    Raises:
-        HandrailError: the leader cannot be read, or nothing was calibrated.
     """
     description = load_model(config.robot).description
     teleoperator = connected(make_teleoperator(config.teleop), config.teleop.type, calibrate=True)
@@ -123,11 +120,7 @@ class _Guide:
         return order[0], changes[order[0]]
 
     def _positions(self) -> Positions:
-        """Return what the leader says now.
-
-        Raises:
-            HandrailError: it says nothing, or no finite numbers.
-        """
+        """Return what the leader says now."""
         try:
             positions = {name: float(value) for name, value in self._read().items()}
         except Exception as error:  # whatever a driver's code raises

@@ -16,9 +16,6 @@ def make_teleoperator(config: LeaderConfig) -> "Teleoperator":
     """Return LeRobot's teleoperator of the settings, not connected.
 
     Also of installed packages whose names begin with `lerobot_teleoperator_`.
-
-    Raises:
-        HandrailError: there is none of that type, a setting is wrong, or what drives it is not installed.
     """
     import draccus
     from lerobot.teleoperators.config import TeleoperatorConfig
@@ -47,11 +44,7 @@ def _import_all() -> None:
 
 
 def _settings(config: LeaderConfig) -> dict[str, Any]:
-    """Return what LeRobot's settings are made of.
-
-    Raises:
-        HandrailError: the options are not `name=value` with commas between.
-    """
+    """Return what LeRobot's settings are made of."""
     given = {name: value for name in ("port", "id") if (value := getattr(config, name))}
     for option in filter(None, (part.strip() for part in config.options.split(","))):
         name, equals, value = option.partition("=")

@@ -8,17 +8,70 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from handrail.collect.lekiwi.homing import bring_home
-from handrail.collect.lekiwi.link import Link
+from handrail.collect.config import RecordConfig
+from handrail.collect.envs.env import HandrailEnv
+from handrail.collect.lekiwi.link import Link, connect
+from handrail.collect.session.build import build_env
 from handrail.collect.simulation.scene import Scene
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.errors import HandrailError
+from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import State
-from handrail.controllers.robot.model import Pose, RobotModel
+from handrail.controllers.interface.intent import Intent
+from handrail.controllers.mpc.masked_mpc import MaskedMpc
+from handrail.controllers.robot.model import Pose, RobotModel, load_model
 from handrail.controllers.robot.shape import Obstacle
 
 _MOST_BRAKING = 200  # periods
+
+
+_GAIN = 2.0  # of a joint towards its place [1/s]
+_SPEED = 0.5  # of a joint, at most [rad/s, m/s]
+_NEAR = 0.04  # that is there [rad, m]
+_ENOUGH = 0.25  # that is near enough where the arm comes no nearer: its own limits come first [rad, m]
+_CALM = 5  # periods there in a row
+_STUCK = 40  # periods without coming nearer
+_PATIENCE = 20.0  # [s]
+
+
+def bring_home(link: Link, q: FloatArray, obstacles: tuple[Obstacle, ...] = ()) -> None:
+    """Move the arm to its part of q, or as near as it may come to itself; the base stands."""
+    description = link.model.description
+    base, channels = len(description.base_joints), Channels.of(description)
+    mpc = MaskedMpc(link.model)
+    mpc.reset(() if base else obstacles)  # where a base stands is not known yet
+    mask, values = channels.mask("joint"), np.zeros(channels.size)
+    calm = stuck = 0
+    nearest = np.inf
+    for _ in range(round(_PATIENCE / link.period)):
+        away = (q - link.state.q)[base:]
+        farthest = np.abs(away).max()
+        calm = calm + 1 if farthest < _NEAR else 0
+        stuck = 0 if farthest < nearest - 0.25 * _NEAR else stuck + 1
+        nearest = min(nearest, farthest)
+        if calm >= _CALM or (stuck >= _STUCK and farthest < _ENOUGH):
+            return
+        values[channels.joint_slice.start + base :] = np.clip(_GAIN * away, -_SPEED, _SPEED)
+        command = mpc.update(link.state, Intent(values, mask, time=link.state.time))
+        link.exchange(np.append(command.velocity(link.period), 0.0))
+    worst = int(np.argmax(np.abs((q - link.state.q)[base:])))
+    raise HandrailError(
+        f"robot {description.name}: joint {description.arm_joints[worst]} does not come to where the episode "
+        f"begins: {link.state.q[base + worst]:.2f} instead of {q[base + worst]:.2f} rad; put the arm near it"
+    )
+
+
+def open_client(config: RecordConfig) -> tuple[HandrailEnv, Link]:
+    """Return the environment of a recording's robot, and the link to it."""
+    fps = config.robot_fps or config.dataset.fps
+    link = connect(config.robot_client, config.client, config.camera_names, load_model(config.robot), fps)
+    try:
+        env = build_env(config, config.dataset.fps, plant=plant_of(link, lambda: env.np_random_seed))
+    except BaseException:
+        link.close()
+        raise
+    return env, link
 
 
 class ClientPlant:
@@ -33,9 +86,6 @@ class ClientPlant:
         q: where it begins, (n,).
         link: to it.
         seed: of the episode.
-
-    Raises:
-        HandrailError: the arm does not come to where the episode begins.
     """
 
     is_stable = True
@@ -71,11 +121,7 @@ class ClientPlant:
         return None
 
     def restore(self, checkpoint: Any) -> None:
-        """Refuse.
-
-        Raises:
-            HandrailError: always.
-        """
+        """Refuse."""
         raise HandrailError("a robot that is no simulation cannot be put back to where it was")
 
     def pictures(self, cameras: tuple[str, ...], size: tuple[int, int]) -> Mapping[str, NDArray[np.uint8]]:

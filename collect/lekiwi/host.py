@@ -29,9 +29,6 @@ class HostSockets:
 
     Args:
         config: says where they are.
-
-    Raises:
-        HandrailError: pyzmq is not installed, or a port is taken.
     """
 
     def __init__(self, config: HostConfig) -> None:
@@ -74,11 +71,7 @@ class HostSockets:
 
 
 def serve(config: HostConfig, say: Callable[[str], None] = print) -> int:
-    """Run the host until its time is over or Ctrl-C; return the exit code.
-
-    Raises:
-        HandrailError: a port is taken, or the robot is no LeKiwi.
-    """
+    """Run the host until its time is over or Ctrl-C; return the exit code."""
     model = load_model(config.robot)
     units = robot_units("lekiwi", model.description)
     task = resolved(TASKS.find(config.task).task)()
@@ -113,11 +106,7 @@ def _run(loop: LeKiwiLoop, sockets: HostSockets, config: HostConfig) -> None:
 
 
 def import_zmq(wanted_by: str) -> Any:
-    """Return pyzmq.
-
-    Raises:
-        HandrailError: it is not installed.
-    """
+    """Return pyzmq."""
     try:
         import zmq
     except ImportError as error:

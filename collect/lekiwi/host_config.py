@@ -53,11 +53,7 @@ class HostConfig:
         return names(self.cameras, _CAMERAS)
 
     def check(self) -> None:
-        """Check the settings.
-
-        Raises:
-            HandrailError: one is wrong.
-        """
+        """Check the settings."""
         TASKS.check(self.task)
         for camera in filter(None, (*self.camera_names, self.lost_camera)):
             if camera not in _CAMERAS:

@@ -67,9 +67,6 @@ class Link:
         clock: [s].
         sleep: waits [s].
 
-    Raises:
-        HandrailError: it does not answer, or is another robot.
-
     Attributes:
         body: what is known of the robot.
         state: of the robot; its time stands still while nothing usable is heard.
@@ -123,11 +120,7 @@ class Link:
         self._deadline = self._heard = self._clock()
 
     def exchange(self, command: ArrayLike) -> NDArray[np.floating]:
-        """Send a command, wait for the end of the period, and listen; return what was sent, (n + 1,).
-
-        Raises:
-            HandrailError: the robot cannot be reached, or has said nothing usable for two seconds.
-        """
+        """Send a command, wait for the end of the period, and listen; return what was sent, (n + 1,)."""
         try:
             with self._lock:
                 self._send(command)
@@ -146,11 +139,7 @@ class Link:
                 self.late += 1
 
     def pictures(self, cameras: tuple[str, ...], size: tuple[int, int]) -> dict[str, NDArray[np.uint8]]:
-        """Return what cameras of ours see, (height, width, 3), in a size (height, width).
-
-        Raises:
-            HandrailError: a camera says nothing.
-        """
+        """Return what cameras of ours see, (height, width, 3), in a size (height, width)."""
         import cv2
 
         names = {camera: CLIENTS[self._name][camera] for camera in cameras}
@@ -231,9 +220,6 @@ def connect(
         cameras: of ours, that it shall show.
         model: of the robot.
         fps: commands a second.
-
-    Raises:
-        HandrailError: it cannot be reached, or pyzmq is missing.
     """
     import_zmq(f"--robot_client {robot}")
     from lerobot.robots.lekiwi import LeKiwiClient, LeKiwiClientConfig

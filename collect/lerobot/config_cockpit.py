@@ -27,11 +27,7 @@ class HandrailCockpitConfig(TeleoperatorConfig):
     certificate: str = ""
 
     def cockpit(self) -> CockpitConfig:
-        """Return where the cockpit listens.
-
-        Raises:
-            HandrailError: a setting is wrong.
-        """
+        """Return where the cockpit listens."""
         config = CockpitConfig(self.host, self.token, self.port, self.open, self.certificate)
         config.check()
         return config

@@ -63,11 +63,7 @@ class HandrailEnvConfig(EnvConfig):
     )
 
     def __post_init__(self) -> None:
-        """Say what a policy reads and writes.
-
-        Raises:
-            HandrailError: a setting is wrong.
-        """
+        """Say what a policy reads and writes."""
         config = self.session()
         model = load_model(self.robot)
         size = self.image_size
@@ -93,11 +89,7 @@ class HandrailEnvConfig(EnvConfig):
         )
 
     def session(self) -> SessionConfig:
-        """Return the settings of the session behind it.
-
-        Raises:
-            HandrailError: one is wrong; the message says what may be chosen.
-        """
+        """Return the settings of the session behind it."""
         check_fps(self.fps)
         if not self.task:
             raise HandrailError("--env.task: expected a task, got none")

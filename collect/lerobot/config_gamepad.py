@@ -23,11 +23,7 @@ class HandrailGamepadConfig(TeleoperatorConfig):
     exponent: float = TeleopConfig.exponent
 
     def teleop(self) -> TeleopConfig:
-        """Return the settings of the device.
-
-        Raises:
-            HandrailError: one is wrong.
-        """
+        """Return the settings of the device."""
         config = TeleopConfig(map=self.map, dead_zone=self.dead_zone, exponent=self.exponent)
         config.check("gamepad")
         return config

@@ -25,11 +25,7 @@ class HandrailScriptedConfig(TeleoperatorConfig):
     reset_time_s: float = 1.0
 
     def check(self) -> None:
-        """Check the settings.
-
-        Raises:
-            HandrailError: one is wrong.
-        """
+        """Check the settings."""
         if not 0.0 <= self.episode_time_s < float("inf"):
             raise HandrailError(f"--teleop.episode_time_s {self.episode_time_s}: expected 0 s or more")
         if not 0.5 <= self.reset_time_s < float("inf"):

@@ -44,11 +44,7 @@ class HandrailSimConfig(RobotConfig):
     diagnostics: bool = True
 
     def session(self) -> SessionConfig:
-        """Return the settings of the session behind it.
-
-        Raises:
-            HandrailError: one is wrong; the message says what may be chosen.
-        """
+        """Return the settings of the session behind it."""
         check_fps(self.fps)
         if self.episode < 0:
             raise HandrailError(f"--robot.episode {self.episode}: expected 0 or more")

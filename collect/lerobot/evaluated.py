@@ -89,11 +89,7 @@ class EvaluatedEnv(gymnasium.Wrapper[Observation, NDArray[np.float32], Observati
         return self._shown(self._loop.observation), _plain(self._loop.info)
 
     def step(self, action: ArrayLike) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
-        """Do what an action asks for, for one period.
-
-        Raises:
-            HandrailError: it has another size.
-        """
+        """Do what an action asks for, for one period."""
         numbers = np.asarray(action, np.float64)
         whole = numbers.shape == (self._env.model.size + 1,)
         if not whole and numbers.shape != self.action_space.shape:

@@ -40,9 +40,6 @@ def simulated_robot(wanted_by: str) -> Steered:
 
     Args:
         wanted_by: name of the teleoperator.
-
-    Raises:
-        HandrailError: there is none.
     """
     robot = _newest[0]() if _newest else None
     if robot is None:

@@ -45,9 +45,6 @@ class ModeAction:
         Args:
             action: by name, LeRobot's or Handrail's own.
             time: on the robot's clock [s].
-
-        Raises:
-            HandrailError: one of the names is missing.
         """
         numbers = self.numbers(action)
         values = np.zeros(self._channels.size)
@@ -64,11 +61,7 @@ class ModeAction:
         return any(named(name, action) is not None for name in self._own[:-1])
 
     def numbers(self, action: Mapping[str, float]) -> FloatArray:
-        """Return the numbers of an action in the order of `names`.
-
-        Raises:
-            HandrailError: one is missing.
-        """
+        """Return the numbers of an action in the order of `names`."""
         found = [named(name, action) for name in self._own]
         missing = [name for name, number in zip(self.names, found, strict=True) if number is None]
         if missing:

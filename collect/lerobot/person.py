@@ -70,9 +70,6 @@ class HandrailCockpit(_PersonTeleoperator):
 
     Args:
         config: its settings.
-
-    Raises:
-        HandrailError: one is wrong.
     """
 
     config_class = HandrailCockpitConfig
@@ -104,9 +101,6 @@ class HandrailGamepad(_PersonTeleoperator):
 
     Args:
         config: its settings.
-
-    Raises:
-        HandrailError: one is wrong.
     """
 
     config_class = HandrailGamepadConfig

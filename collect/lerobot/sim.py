@@ -1,7 +1,8 @@
 """The simulated robot as LeRobot's `Robot`: an action is a part of the motion, a controller completes it."""
 
 import logging
-from collections.abc import Mapping
+import time
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from functools import cached_property
 from typing import Any
@@ -13,13 +14,39 @@ from handrail.collect.lerobot.config_sim import HandrailSimConfig
 from handrail.collect.lerobot.link import announce
 from handrail.collect.lerobot.mode_action import AGAIN, HOLD, NEXT, pressed
 from handrail.collect.lerobot.names import POSITION
-from handrail.collect.lerobot.pace import Pace
 from handrail.collect.lerobot.stepwise import Stepwise
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.numerics.threads import single_threaded
 
 _REHEARSED = 3  # periods before the first, in which what is compiled at first use is compiled
+
+
+class Pace:
+    """Waits so that periods do not come more often than they last; one that keeps time itself never waits.
+
+    Args:
+        period: [s].
+        clock: [s].
+        sleep: waits so long [s].
+    """
+
+    def __init__(
+        self,
+        period: float,
+        clock: Callable[[], float] = time.perf_counter,
+        sleep: Callable[[float], None] = time.sleep,
+    ) -> None:
+        self._period, self._clock, self._sleep = period, clock, sleep
+        self._due = -float("inf")
+
+    def wait(self) -> None:
+        """Wait until another period may begin; half a period early is in time."""
+        now = self._clock()
+        ahead = self._due - now
+        if ahead > self._period / 2:
+            self._sleep(ahead)
+        self._due = max(self._due, now) + self._period if ahead > -self._period else now + self._period
 
 
 class HandrailSim(Robot):
@@ -30,9 +57,6 @@ class HandrailSim(Robot):
 
     Args:
         config: its settings.
-
-    Raises:
-        HandrailError: one is wrong.
 
     Attributes:
         stepwise: the session behind it.
@@ -79,11 +103,7 @@ class HandrailSim(Robot):
         """Do nothing."""
 
     def connect(self, calibrate: bool = True) -> None:
-        """Begin the first episode, everything compiled.
-
-        Raises:
-            HandrailError: it is connected, or cameras are asked for and GL is missing.
-        """
+        """Begin the first episode, everything compiled."""
         if self._connected:
             raise HandrailError("handrail_sim: expected to be connected once, is connected already")
         self._open.enter_context(single_threaded())
@@ -110,9 +130,6 @@ class HandrailSim(Robot):
         A button beside the channels begins another episode (`handrail.next`), the same one again
         (`handrail.again`), or brakes and lets time stand still (`handrail.hold`). Positions of all joints
         (`x.pos`, …) without any channel lead the joints there.
-
-        Raises:
-            HandrailError: it is not connected, or the action lacks a channel.
         """
         self._check_connected()
         session, steered = self.stepwise, self.stepwise.action.is_in(action)

@@ -19,11 +19,7 @@ class SimTeleoperator(Teleoperator):
 
     @property
     def session(self) -> Stepwise:
-        """The session of the robot that it steers.
-
-        Raises:
-            HandrailError: there is no such robot in this process.
-        """
+        """The session of the robot that it steers."""
         return simulated_robot(self.name).stepwise
 
     @property
@@ -56,11 +52,7 @@ class SimTeleoperator(Teleoperator):
         """Take no note of anything."""
 
     def connect(self, calibrate: bool = True) -> None:
-        """Begin to steer.
-
-        Raises:
-            HandrailError: there is no robot to steer, or no device to steer with.
-        """
+        """Begin to steer."""
         self._open(self.session)
         self._connected = True
 
@@ -70,11 +62,7 @@ class SimTeleoperator(Teleoperator):
         self._close()
 
     def get_action(self) -> dict[str, Any]:
-        """Return what the robot shall do now: the mode's channels, and a button if one is pressed.
-
-        Raises:
-            HandrailError: it is not connected.
-        """
+        """Return what the robot shall do now: the mode's channels, and a button if one is pressed."""
         if not self._connected:
             raise HandrailError(f"{self.name}: expected connect() before anything else")
         return self._act(self.session)

@@ -59,12 +59,7 @@ def open_keyboard(config: RecordConfig, env: HandrailEnv, say: Say) -> LocalPers
 
 
 def open_leader_arm(config: RecordConfig, env: HandrailEnv, say: Say) -> LocalPerson:
-    """Return a person with a leader arm in one hand, and keys or a gamepad in the other.
-
-    Raises:
-        HandrailError: a device is not there, the leader is not calibrated for this robot, or the mode does
-            not steer the arm's joints.
-    """
+    """Return a person with a leader arm in one hand, and keys or a gamepad in the other."""
     teleop, description = config.teleop, env.model.description
     modes = _led(build_modes(config, env), env, config.mode_name)
     arm = description.arm_joints
@@ -114,11 +109,7 @@ def _person(
 
 
 def _opened(pollers: list[Poller], tables: "list[ControlMap] | tuple[ControlMap, ...]") -> list[Source]:
-    """Return devices that are open; where one is not, those before are given back.
-
-    Raises:
-        HandrailError: one is not there.
-    """
+    """Return devices that are open; where one is not, those before are given back."""
     try:
         return [Source(poller.start(), table) for poller, table in zip(pollers, tables, strict=True)]
     except BaseException:
@@ -144,11 +135,7 @@ def _keyboard(teleop: TeleopConfig) -> tuple[Device, ControlMap]:
 
 
 def _led(modes: Mapping[str, TeleopMode], env: HandrailEnv, first: str) -> dict[str, TeleopMode]:
-    """Return the modes in which the arm's joints can follow a leader.
-
-    Raises:
-        HandrailError: the one that was asked for is none of them.
-    """
+    """Return the modes in which the arm's joints can follow a leader."""
     channels = Channels.of(env.model.description)
     arm = channels.mask("arm")
     fit = {

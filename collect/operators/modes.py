@@ -73,9 +73,6 @@ def mode_of_mask(mask: str, channels: Channels, controller: str = "mpc") -> Tele
         mask: 0 or 1 for each channel.
         channels: of the robot.
         controller: what becomes of the command.
-
-    Raises:
-        HandrailError: the mask has the wrong size or other characters than 0 and 1.
     """
     if set(mask) - {"0", "1"} or len(mask) != channels.size:
         raise HandrailError(

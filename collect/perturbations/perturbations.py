@@ -31,11 +31,7 @@ class Perturbation:
 
     @classmethod
     def parse(cls, text: str) -> "Perturbation":
-        """Return what `none`, `push`, `push:2` or `push+delay:5` says.
-
-        Raises:
-            HandrailError: it says something else.
-        """
+        """Return what `none`, `push`, `push:2` or `push+delay:5` says."""
         sizes: dict[str, float] = {}
         for part in text.strip().split("+") if text.strip() != NONE else ():
             name, _, number = part.strip().partition(":")

@@ -25,20 +25,22 @@ from lerobot.processor.converters import (
     transition_to_robot_action,
 )
 
-from handrail.collect.processor.obstacles import parsed_obstacles
 from handrail.collect.processor.partial_intent import PartialIntent
 from handrail.collect.processor.units import robot_units
 from handrail.collect.processor.whole_body import WholeBody
+from handrail.controllers.entries import Entry, check_entries, is_number, is_positive, is_text, lists
 from handrail.controllers.errors import HandrailError, message_of, shown
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.command import Diagnostics
 from handrail.controllers.interface.frames import Frames
 from handrail.controllers.interface.intent import DEAD_MAN_TIME, LONG_AGO
 from handrail.controllers.mpc.masked_mpc import MaskedMpc
+from handrail.controllers.numerics.rotation import matrix_from_rpy
 from handrail.controllers.objectives.regularisation import narrow_joint_centring
 from handrail.controllers.ocp.settings import MpcSettings
 from handrail.controllers.robot.catalogue import ROBOTS
 from handrail.controllers.robot.model import load_model
+from handrail.controllers.robot.shape import Obstacle, Shape
 from handrail.datasets.storage.strict_json import load_json
 
 NAME = "handrail_masked_mpc"
@@ -48,6 +50,37 @@ _KEPT = (
     *("obstacles", "start", "settings", "timeout"),
 )
 _log = logging.getLogger(__name__)
+
+
+_ENTRIES = {
+    "name": Entry("a name", is_text),
+    "kind": Entry("box, capsule, sphere or cylinder", is_text),
+    "size": Entry("lengths [m]", lists(is_positive)),
+    "position": Entry("three numbers [m]", lists(is_number, 3)),
+    "rpy": Entry("three angles [rad]", lists(is_number, 3), needed=False),
+    "work_surface": Entry("true or false", lambda value: isinstance(value, bool), needed=False),
+}
+
+
+def parsed_obstacles(tables: Any) -> tuple[Obstacle, ...]:
+    """Return obstacles from their tables."""
+    if not isinstance(tables, list):
+        raise HandrailError(f"obstacles: expected a list of tables, got {shown(tables)}")
+    for table in tables:
+        check_entries(table, _ENTRIES, "obstacle")
+    names = [table["name"] for table in tables]
+    if len(set(names)) != len(names):
+        raise HandrailError(f"obstacles: expected each name once, got {', '.join(names)}")
+    return tuple(
+        Obstacle(
+            table["name"],
+            Shape(table["kind"], np.array(table["size"], dtype=float)),
+            np.array(table["position"], dtype=float),
+            matrix_from_rpy(table.get("rpy", (0.0, 0.0, 0.0))),
+            work_surface=table.get("work_surface", False),
+        )
+        for table in tables
+    )
 
 
 @ProcessorStepRegistry.register(NAME)
@@ -91,11 +124,7 @@ class MaskedMpcStep(RobotActionProcessorStep):
     diagnostics: Diagnostics | None = field(default=None, init=False, repr=False)
 
     def __post_init__(self) -> None:
-        """Build the controller.
-
-        Raises:
-            HandrailError: a setting is wrong.
-        """
+        """Build the controller."""
         self._check()
         model = load_model(self.robot)
         frames, channels = Frames(self.base_frame, self.tool_frame), Channels.of(model.description)
@@ -123,11 +152,7 @@ class MaskedMpcStep(RobotActionProcessorStep):
         self._braking, self._before = "", math.inf
 
     def action(self, action: RobotAction) -> RobotAction:
-        """Return the whole robot's action.
-
-        Raises:
-            HandrailError: no observation so far has the numbers that the robot's units name.
-        """
+        """Return the whole robot's action."""
         now = float(self.clock())
         self._note_lateness(now)
         state = self._body.observe(self.transition.get(TransitionKey.OBSERVATION), now)
@@ -209,9 +234,6 @@ def load_pipeline(folder: str | Path, clock: Callable[[], float] = time.monotoni
     """Return a pipeline of the step that `save_pretrained` wrote into a folder.
 
     LeRobot's loader imports whatever a file names: what is not this step is refused before.
-
-    Raises:
-        HandrailError: there is none, it has other steps, or a setting is wrong.
     """
     file = Path(folder) / f"{NAME}.json"
     content = load_json(file, "a processor that save_pretrained wrote")

@@ -36,9 +36,6 @@ class PartialIntent:
         inputs: by name of an entry, the channel and how much of it one unit is.
         frames: in which twists are meant.
         gripper: what `gripper` is: share or actions.
-
-    Raises:
-        HandrailError: an input's channel is none, or it is unknown what `gripper` is.
     """
 
     def __init__(

@@ -84,9 +84,6 @@ class RobotUnits:
         base: of the base; None on a fixed one.
         gripper: None where there is none.
 
-    Raises:
-        HandrailError: a joint of the arm is missing or unknown, or a unit is none.
-
     Attributes:
         action_names: of the action's entries, in order.
         sends_position: which joints of the arm are sent positions, (n − b,).
@@ -235,11 +232,7 @@ _TABLE = {
 
 
 def robot_units(said: str | Mapping[str, Any], description: RobotDescription) -> RobotUnits:
-    """Return names and units: those of a known robot, or as a table says.
-
-    Raises:
-        HandrailError: there is none of that name, or the table does not fit the robot.
-    """
+    """Return names and units: those of a known robot, or as a table says."""
     if isinstance(said, str):
         if said not in UNITS:
             raise unknown_name("units", said, UNITS)

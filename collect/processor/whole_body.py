@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from handrail.collect.processor.odometry import moved
 from handrail.collect.processor.units import Reading, RobotUnits
 from handrail.collect.simulation.gate import Gate
 from handrail.controllers.arrays import FloatArray
@@ -19,6 +18,19 @@ from handrail.controllers.robot.model import RobotModel
 _LEAD = 0.2  # how far a joint's target may be ahead of where the joint is [rad, m]
 _HOLD = 0.5  # for how long a base may go on as it was sent: LeKiwi's watchdog [s]
 _STROKES = 1.5  # of a gripper whose speed nobody knows [1/s]
+
+
+def moved(pose: FloatArray, twist: FloatArray, seconds: float) -> FloatArray:
+    """Return the base's pose after a constant twist, (3,): `p + h R(θ + ½ h ω) v`, `θ + h ω`.
+
+    The midpoint rule, with an error of `h³ ω² v / 24`: 1 µm a step at 30 Hz, 1.5 rad/s and 0.3 m/s.
+
+    Args:
+        pose: x, y, heading in the world [m, rad], (3,).
+        twist: in the base's frame [m/s, rad/s], (3,).
+        seconds: h [s].
+    """
+    return pose + seconds * turned(twist, pose[2] + 0.5 * seconds * twist[2])
 
 
 class WholeBody:
@@ -89,9 +101,6 @@ class WholeBody:
         Args:
             observation: LeRobot's.
             now: on any clock that advances [s].
-
-        Raises:
-            HandrailError: there never was one that makes sense: its names are others.
         """
         reading = self._units.read(observation)
         nonsense = "malformed_observation" if reading is None else ""

@@ -47,9 +47,6 @@ def build_env(
         render: whether `env.render()` shall give good-looking pictures; or their height and width [px].
         shift: how far from the demonstrations' start the robot begins at most [m, rad].
         plant: makes a robot that is no simulation.
-
-    Raises:
-        HandrailError: a setting is wrong, or cameras are asked for and GL is missing.
     """
     config.check()
     check_fps(fps)
@@ -134,9 +131,6 @@ def build_mode(config: SessionConfig, model: RobotModel) -> TeleopMode:
     """Return the teleop mode, without what the task's objectives look after under the masked MPC.
 
     With the mask of the command line if there is one, on velocity sticks.
-
-    Raises:
-        HandrailError: the mask has the wrong size or other characters than 0 and 1.
     """
     mode, task = MODES.find(config.mode), TASKS.find(config.task)
     if config.mask:

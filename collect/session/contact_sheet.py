@@ -27,11 +27,7 @@ def contact_sheet(pictures: Sequence[NDArray[np.uint8]], columns: int = 4) -> ND
 
 
 def save_sheet(pictures: Sequence[NDArray[np.uint8]], path: Path) -> None:
-    """Write a contact sheet as a .png file.
-
-    Raises:
-        HandrailError: it cannot be written.
-    """
+    """Write a contact sheet as a .png file."""
     stream = io.BytesIO()
     Image.fromarray(contact_sheet(pictures)).save(stream, format="png")
     with explained(str(path)):

@@ -52,9 +52,6 @@ def recorded_settings(row: Mapping[str, Any], said: Collection[str] = ()) -> Ses
         row: the episode's line of metadata. An older one says only its task, its robot and a few more: the
             rest is as by default.
         said: the names of the command line; others that are `module:name` are refused.
-
-    Raises:
-        HandrailError: it says no settings of a session, wrong ones, or what is to be imported.
     """
     settings = _parsed(row[COLUMN]) if row.get(COLUMN) else _older(row)
     check_entries(settings, _ENTRIES, _WHERE)

@@ -41,11 +41,7 @@ class Recorder:
             self.writer.add_frame(frame_row(self._undoable.pop(0)), self._task)
 
     def end(self, outcome: Outcome) -> None:
-        """Save the episode with how it went; or forget it, if the operator threw it away or begins it again.
-
-        Raises:
-            HandrailError: the disk or an encoder failed; the saved episodes are whole.
-        """
+        """Save the episode with its outcome; forget it if the operator threw it away or begins it again."""
         if not outcome.kept:
             self.writer.discard_episode()
             return

@@ -20,9 +20,6 @@ class VideoFile:
         path: of the file, .mp4.
         size: height and width of the pictures [px]; both even, as h264 wants.
         fps: pictures a second.
-
-    Raises:
-        HandrailError: it cannot be written, at any time.
     """
 
     def __init__(self, path: Path, size: tuple[int, int], fps: int | Fraction) -> None:

@@ -36,9 +36,6 @@ class Viewer:
     Attributes:
         address: of the web viewer's page; empty for a window.
         process: rerun's.
-
-    Raises:
-        HandrailError: it does not start.
     """
 
     def __init__(self, first: bytes, web: bool) -> None:
@@ -66,11 +63,7 @@ class Viewer:
             raise
 
     def send(self, data: bytes) -> None:
-        """Pass data on, as much as the viewer takes now; the rest waits.
-
-        Raises:
-            HandrailError: it has ended, or is too far behind.
-        """
+        """Pass data on, as much as the viewer takes now; the rest waits."""
         self._waiting += data
         try:
             while self._waiting:

@@ -29,9 +29,6 @@ class IdealRobot:
         meshes: taken for the sake of MuJoCo's robot; there is nothing to draw.
         grip: None, for nothing can be held.
         gate: what every command passes; by default one that sends a dataset's numbers.
-
-    Raises:
-        HandrailError: something in the scene can be moved, or is held: that takes physics.
     """
 
     is_stable = True

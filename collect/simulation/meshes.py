@@ -43,11 +43,7 @@ class PlacedMesh:
 
 
 def placed_meshes(model: RobotModel) -> Iterator[PlacedMesh]:
-    """Yield the collision meshes that the URDF names, in the colour of a visual one of the same file.
-
-    Raises:
-        HandrailError: one lies outside the robot's folder, or is no mesh.
-    """
+    """Yield the collision meshes that the URDF names, in the colour of a visual one of the same file."""
     description = model.description
     for path in mesh_files(description.urdf, description.mesh_root):
         if path.suffix.lower() == ".stl":

@@ -34,9 +34,6 @@ class MinkController:
         model: of the robot.
         period: of the control loop [s].
         activation_distance: beyond the margin, at which a pair enters the problem [m].
-
-    Raises:
-        HandrailError: mink is not installed.
     """
 
     def __init__(

@@ -23,11 +23,7 @@ class Patrol:
     speed: float
 
     def __post_init__(self) -> None:
-        """Copy the arrays and make them read-only.
-
-        Raises:
-            HandrailError: the points are one and the same, or the speed is not positive.
-        """
+        """Copy the arrays and make them read-only."""
         for name in ("start", "end"):
             object.__setattr__(self, name, frozen(getattr(self, name)))
         if not self.length > 0 or not 0 < self.speed < np.inf:

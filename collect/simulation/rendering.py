@@ -43,9 +43,6 @@ class Painter:
             model: of the simulation; its visual settings become those of the pictures.
             data: its state.
             camera: name of the camera.
-
-        Raises:
-            HandrailError: there is no such camera, or no OpenGL on this machine.
         """
         cameras = [model.camera(index).name for index in range(model.ncam)]
         if camera not in cameras:

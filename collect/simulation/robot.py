@@ -62,9 +62,6 @@ def build_robot(model: RobotModel, meshes: bool = True, grips: bool = True) -> R
         model: of the robot.
         meshes: whether to draw it as it looks.
         grips: whether its fingers move; else they stay open.
-
-    Raises:
-        HandrailError: a joint is neither a hinge nor a slide.
     """
     spec = mujoco.MjSpec()
     spec.modelname = model.description.name
@@ -92,11 +89,7 @@ def build_robot(model: RobotModel, meshes: bool = True, grips: bool = True) -> R
 def _add_hand(
     spec: MjSpec, model: RobotModel, gripper: Gripper, mounts: Mounts, grips: bool
 ) -> tuple[str, MjsBody, pin.SE3] | None:
-    """Add the gripper; return the URDF's link that turns, its body, and where its zero is on the hand's body.
-
-    Raises:
-        HandrailError: the jaw is not on the body that carries the gripper.
-    """
+    """Add the gripper; return the URDF's link that turns, its body, and its zero on the hand's body."""
     body, frame = mounts.place(gripper.frame, gripper.placement)
     if gripper.jaw is None:
         add_gripper(spec, gripper, body, frame, None, grips)

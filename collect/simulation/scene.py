@@ -158,22 +158,14 @@ class Scene:
     view: Viewpoint = field(default_factory=Viewpoint)
 
     def __post_init__(self) -> None:
-        """Check the names.
-
-        Raises:
-            HandrailError: two objects share a name.
-        """
+        """Check the names."""
         names = [item.name for item in self.objects]
         for name in names:
             if names.count(name) > 1:
                 raise HandrailError(f"scene: expected unique object names, got {name!r} more than once")
 
     def find(self, name: str) -> SceneObject:
-        """Return an object by name.
-
-        Raises:
-            HandrailError: there is none.
-        """
+        """Return an object by name."""
         for item in self.objects:
             if item.name == name:
                 return item

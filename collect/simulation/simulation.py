@@ -40,9 +40,6 @@ class Simulation:
         timestep: longest step of the integrator [s].
         gate: what every command passes; by default one that sends a dataset's numbers.
 
-    Raises:
-        HandrailError: the gripper is closed around something, and cannot move.
-
     Attributes:
         mujoco_model: the compiled model.
         data: its state.
@@ -269,11 +266,7 @@ def _span(places: list[int]) -> slice | IntArray:
 
 @contextmanager
 def _understood(model: RobotModel) -> Iterator[None]:
-    """Say in one line what MuJoCo says of a robot or its scene that it does not take, as two of one name.
-
-    Raises:
-        HandrailError: for every ValueError, which is what MuJoCo raises.
-    """
+    """Say in one line what MuJoCo says of a robot or its scene that it does not take, as two of one name."""
     try:
         yield
     except ValueError as error:

@@ -43,9 +43,6 @@ def sample_obstacles(
         q: where it starts, (n,).
         rng: drawn from.
         clearance: between the robot's start and an obstacle, and between obstacles, at scale 1 [m].
-
-    Raises:
-        HandrailError: there is no room for them.
     """
     wanted = int(rng.integers(2, MOST_OBSTACLES + 1))
     start, reach = _start_circle(model, q)

@@ -37,11 +37,7 @@ class Drawer:
         return (*names, "inward.nx", "inward.ny", "drawer.opening", *(f"cabinet.{axis}" for axis in "xyz"))
 
     def sample(self, model: RobotModel, rng: np.random.Generator) -> Start:
-        """Draw the cabinet, then the robot's start.
-
-        Raises:
-            HandrailError: the robot is too small for the cabinet.
-        """
+        """Draw the cabinet, then the robot's start."""
         check_large(model, "Drawer")
         x, y = 0.95 + rng.uniform(-0.1, 0.1), rng.uniform(-0.6, 0.6)
         body = cabinet("cabinet", x, y, rng.uniform(-0.3, 0.3), rng.uniform(0.76, 0.95))

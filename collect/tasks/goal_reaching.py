@@ -89,9 +89,6 @@ class StraightPlanner:
             start_rotation: world from tool, (3, 3).
             goal: where to go.
             speed: how many times faster than the paper's.
-
-        Raises:
-            HandrailError: the speed is not a positive number.
         """
         if not 0.0 < speed < np.inf:
             raise HandrailError(f"speed of a planner: expected a positive number, got {speed}")

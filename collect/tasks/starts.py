@@ -24,11 +24,7 @@ def reach_share(model: RobotModel) -> float:
 
 
 def check_large(model: RobotModel, task: str) -> None:
-    """Check that a robot is as large as a task's furniture, which comes in one size.
-
-    Raises:
-        HandrailError: its world is smaller.
-    """
+    """Check that a robot is as large as a task's furniture, which comes in one size."""
     if model.description.world.scale < 1.0:
         raise HandrailError(
             f"task {task}: expected a robot whose world has scale 1, got {model.description.name} "

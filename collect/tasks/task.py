@@ -76,21 +76,13 @@ class TaskState:
         return away >= _AWAY * self.scale and self.opening > 0.8
 
     def pose(self, name: str) -> Pose:
-        """Return where an object is.
-
-        Raises:
-            HandrailError: the scene has no such object.
-        """
+        """Return where an object is."""
         if name not in self.poses:
             raise unknown_name("scene object", name, self.poses)
         return self.poses[name]
 
     def object(self, name: str) -> SceneObject:
-        """Return an object as it was at the beginning, with its shape.
-
-        Raises:
-            HandrailError: the scene has no such object.
-        """
+        """Return an object as it was at the beginning, with its shape."""
         return self.start.scene.find(name)
 
 

@@ -52,11 +52,7 @@ class Tray:
         return (*names, *(f"table.{axis}" for axis in "xyz"), *obstacle_names())
 
     def sample(self, model: RobotModel, rng: np.random.Generator) -> Start:
-        """Draw the table, the robot's start with the tray in hand, the can on it, and obstacles.
-
-        Raises:
-            HandrailError: the robot is too small for the tray, or cannot hold it.
-        """
+        """Draw the table, the robot's start with the tray in hand, the can on it, and obstacles."""
         check_large(model, "Tray")
         side = rng.choice([-1.0, 1.0])
         x, y = 1.05 + rng.uniform(-0.05, 0.05), side * 1.30 + rng.uniform(-0.10, 0.10)
@@ -103,11 +99,7 @@ def _stands_on(held: Pose, thing: Pose) -> bool:
 
 
 def _sample_start(model: RobotModel, side: float, rng: np.random.Generator) -> FloatArray:
-    """Return a start on the far side, the hand pointing down ahead of the base.
-
-    Raises:
-        HandrailError: the arm can hold the tray at none of the places that were tried.
-    """
+    """Return a start on the far side, the hand pointing down ahead of the base."""
     place = np.zeros(3)
     for _ in range(_MOST_TRIES):
         q, place, rotation = _draw_start(model, side, rng)

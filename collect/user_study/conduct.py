@@ -94,11 +94,7 @@ class Conductor:
         self._ready, self._pauses = ("", ""), 0
 
     def run(self) -> Ending:
-        """Do what is left; return how it ended.
-
-        Raises:
-            HandrailError: the disk or the page's server failed; what was answered and recorded is kept.
-        """
+        """Do what is left; return how it ended."""
         who, study = self._who, self._study
         steps, left = plan(study, who.slot), self._folder.left(study, who)
         who.note(f"begun with {len(steps) - len(left)} of {len(steps)} steps done")

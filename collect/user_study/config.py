@@ -32,11 +32,7 @@ class StudySessionConfig:
         return Path(self.place).expanduser()
 
     def check(self) -> None:
-        """Check the settings.
-
-        Raises:
-            HandrailError: one is wrong.
-        """
+        """Check the settings."""
         self.cockpit.check()
         if self.verb in _OF_SOMEBODY and not self.participant:
             raise HandrailError(f"{self.verb}: expected a participant, such as P001, after the folder")

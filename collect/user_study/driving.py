@@ -45,11 +45,7 @@ class Driving:
         self.close()
 
     def prepare(self, mode: str, task: str) -> None:
-        """Make a task in a mode ready: the scene, the controller, the dataset.
-
-        Raises:
-            HandrailError: the dataset is damaged or cannot be written.
-        """
+        """Make a task in a mode ready: the scene, the controller, the dataset."""
         self.close()
         come_first()
         config = self._study.recording(mode, task, self._folder.dataset(mode, task))
@@ -81,11 +77,7 @@ class Driving:
         return _owned(self._mode, Channels.of(self._env.model.description))
 
     def run(self, step: Step, seed: int) -> Outcome:
-        """Run a trial, or one of practice, and return how it went.
-
-        Raises:
-            HandrailError: the disk or an encoder failed; the saved trials are whole.
-        """
+        """Run a trial, or one of practice, and return how it went."""
         self._cockpit.practise(step.kind == "practice")
         self._recording.columns |= {"participant": self._name, "trial": step.trial}
         return self._recording.episode(seed, self._interrupts)

@@ -71,11 +71,7 @@ _MEASURED = ("wall_time", "contact_onsets", "brakes", "late", "undos")  # that a
 
 
 def export(folder: StudyFolder, study: UserStudy) -> list[Path]:
-    """Write all tables anew and return their files.
-
-    Raises:
-        HandrailError: a file or a dataset is damaged, or the disk does not take it.
-    """
+    """Write all tables anew and return their files."""
     people = [who for who in folder.participants() if not who.erasing]
     tables = {
         "answers": [row for who in people for row in _answers(who)],

@@ -56,11 +56,7 @@ class StudyFolder:
         return self.root / "exports"
 
     def write_example(self) -> Path:
-        """Write a study's file to begin with, and return its path.
-
-        Raises:
-            HandrailError: there is one already, or it cannot be written.
-        """
+        """Write a study's file to begin with, and return its path."""
         if self._written.exists() or self._frozen.exists():
             raise HandrailError(f"{str(self.root)!r}: expected a new folder, found a study; it is left alone")
         with explained(f"cannot write {str(self._written)!r}"):
@@ -68,11 +64,7 @@ class StudyFolder:
         return self._written
 
     def study(self) -> UserStudy:
-        """Return the study: as it is frozen, or else as it is written.
-
-        Raises:
-            HandrailError: there is none, something in it is wrong, or it was changed since it was frozen.
-        """
+        """Return the study: as it is frozen, or else as it is written."""
         if not self._frozen.exists():
             return parse_study(self._content(), f"study {self._written}")
         content = load_json(self._frozen, "a study of handrail-study-session")
@@ -85,11 +77,7 @@ class StudyFolder:
         return parse_study(content["study"], f"study {self._frozen}")
 
     def freeze(self) -> UserStudy:
-        """Return the study, which stays as it is from now on.
-
-        Raises:
-            HandrailError: as `study`, or it cannot be written.
-        """
+        """Return the study, which stays as it is from now on."""
         study = self.study()
         if not self._frozen.exists():
             content = {"study": self._content(), "demo": study.demo, "versions": versions(*SIMULATION)}
@@ -98,11 +86,7 @@ class StudyFolder:
         return study
 
     def lock(self) -> DatasetLock:
-        """Return the right to change the study.
-
-        Raises:
-            HandrailError: a session, an export or an erasure is going on.
-        """
+        """Return the right to change the study."""
         with explained(f"cannot write {str(self.root)!r}"):
             return DatasetLock(self.root / ".handrail", "study", "handrail-study-session")
 
@@ -112,11 +96,7 @@ class StudyFolder:
         return [Participant(path.parent) for path in files]
 
     def participant(self, name: str) -> Participant:
-        """Return somebody who has begun.
-
-        Raises:
-            HandrailError: they have not.
-        """
+        """Return somebody who has begun."""
         check_id(name)
         known = [each.name for each in self.participants()]
         if name not in known:
@@ -127,9 +107,6 @@ class StudyFolder:
         """Return a participant; a newcomer gets the first free row of the design.
 
         That of somebody who was erased is free again, so that the rows stay balanced.
-
-        Raises:
-            HandrailError: the id is none, or is being erased.
         """
         check_id(name)
         there = {each.name: each for each in self.participants()}
@@ -151,11 +128,7 @@ class StudyFolder:
         return self._data / task / mode
 
     def episodes(self, mode: str, task: str) -> list[dict[str, Any]]:
-        """Return the metadata of all trials of a task in a mode.
-
-        Raises:
-            HandrailError: the dataset is damaged, or of something else.
-        """
+        """Return the metadata of all trials of a task in a mode."""
         root = self.dataset(mode, task)
         rows = read_episodes(root) if (root / "meta" / "episodes").is_dir() else []  # else none was saved
         if any(not {"participant", "trial"} <= set(row) for row in rows):
@@ -163,22 +136,14 @@ class StudyFolder:
         return rows
 
     def forget(self, name: str) -> None:
-        """Remove the files of a participant, all at once.
-
-        Raises:
-            HandrailError: the disk does not take it.
-        """
+        """Remove the files of a participant, all at once."""
         with explained(f"cannot remove {str(self.place(name))!r}"):
             os.replace(self.place(name), self._forgotten)
             sync_folder(self._participants)
             remove(self._forgotten)
 
     def settle(self, study: UserStudy) -> None:
-        """Finish what an erasure that was cut short has left behind; whoever holds the lock may.
-
-        Raises:
-            HandrailError: the disk does not take it.
-        """
+        """Finish what an erasure that was cut short has left behind; whoever holds the lock may."""
         with explained(f"cannot write {str(self.root)!r}"):
             remove(self._forgotten)
             for mode in study.modes:

@@ -46,11 +46,7 @@ class Item:
     declines: bool = True
 
     def check(self, value: Any) -> Answer:
-        """Return an answer, if it is one.
-
-        Raises:
-            HandrailError: it is none.
-        """
+        """Return an answer, if it is one."""
         if (value is None and self.declines) or self._fits(value):
             return value
         raise HandrailError(f"answer to {self.name}: expected {self._expected}, got {shown(value)}")
@@ -114,11 +110,7 @@ class Form:
     items: tuple[Item, ...]
 
     def item(self, name: str) -> Item:
-        """Return the question of a name.
-
-        Raises:
-            HandrailError: there is none.
-        """
+        """Return the question of a name."""
         for item in self.items:
             if item.name == name:
                 return item

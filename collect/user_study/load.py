@@ -79,9 +79,6 @@ def parse_study(content: Any, where: str) -> UserStudy:
     Args:
         content: the table.
         where: it is, for the error.
-
-    Raises:
-        HandrailError: something in it is wrong; one line.
     """
     check_fields(content, UserStudy, where, **_STUDY)
     practice = content.get("practice", {})

@@ -39,11 +39,7 @@ _ANSWERS: Mapping[str, Entry] = {
 
 
 def check_id(name: str) -> None:
-    """Check a participant's id.
-
-    Raises:
-        HandrailError: it is none: a name of a person, say.
-    """
+    """Check a participant's id."""
     if not _ID.fullmatch(name):
         raise HandrailError(
             f"participant {shown(name)}: expected an id that says nothing of the person, a capital letter and"
@@ -56,9 +52,6 @@ class Participant:
 
     Args:
         folder: of the files; called after the id.
-
-    Raises:
-        HandrailError: there is no such participant, or a file of theirs is damaged.
     """
 
     def __init__(self, folder: Path) -> None:

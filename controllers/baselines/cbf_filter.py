@@ -41,11 +41,7 @@ class CbfFilter(ReactiveController):
         super().__init__(model, self._filtered, period, margins=(scale * MARGIN, scale * _WORK_MARGIN))
 
     def _filtered(self, state: State, intent: Intent, previous: FloatArray) -> FloatArray:
-        """Return the nearest velocity that is allowed, (n,).
-
-        Raises:
-            HandrailError: the QP has no solution.
-        """
+        """Return the nearest velocity that is allowed, (n,)."""
         joints, fastest = self.channels.joint_slice, self._model.description.limits.velocity
         asked = np.clip(np.where(intent.mask[joints], intent.values[joints], 0.0), -fastest, fastest)
         gradients, allowed = self._barriers(state.q)

@@ -196,11 +196,7 @@ class CollisionModel:
                 jacobians[k] = pin.computeJointJacobians(model, kinematics)
 
     def update_scene(self, obstacles: tuple[Obstacle, ...]) -> None:
-        """Take where the obstacles are now and how fast they move.
-
-        Raises:
-            HandrailError: they are not the obstacles that the model was built with.
-        """
+        """Take where the obstacles are now and how fast they move."""
         if (kept := _kept(obstacles)) != self._kept:
             expected, got = (", ".join(str(name) for name, *_ in things) for things in (self._kept, kept))
             raise HandrailError(f"obstacles: expected {expected} as they were, got {got}")
@@ -222,11 +218,7 @@ class CollisionModel:
         self.kinds[: len(self._robot.description.self_pairs)] = OWN
 
     def among(self, obstacles: tuple[Obstacle, ...]) -> "CollisionModel":
-        """Return the model as the obstacles are now: this one; another one when some came, went or changed.
-
-        Raises:
-            HandrailError: two things share a name, or one is held by a frame that the robot lacks.
-        """
+        """Return the model as the obstacles are now: this one, or another when some came, went or changed."""
         if _kept(obstacles) != self._kept:
             return CollisionModel(self._robot, obstacles)
         self.update_scene(obstacles)

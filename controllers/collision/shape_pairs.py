@@ -38,9 +38,6 @@ class ShapePairs:
         held: rows of the pairs with something that is held, (H,).
         moves: which coordinates move the two shapes of a pair: 1 or 0, (P, 2, n).
         motion_bounds: how far a unit of each coordinate can bring a pair together at most, (n, P) [m].
-
-    Raises:
-        HandrailError: two things share a name, or one is held by a frame that the robot lacks.
     """
 
     def __init__(self, model: RobotModel, obstacles: tuple[Obstacle, ...]) -> None:

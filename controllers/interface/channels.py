@@ -68,9 +68,6 @@ class Channels:
         """Return the mask of some channels, by name or by group (`base`, `ee`, `joint`, `arm`), (m,).
 
         `arm` are the joints that are not the base's.
-
-        Raises:
-            HandrailError: a name is no channel and no group.
         """
         mask = np.zeros(self.size, dtype=bool)
         for name in names:

@@ -35,11 +35,7 @@ class State:
     expected: FloatArray = None  # type: ignore[assignment]
 
     def __post_init__(self) -> None:
-        """Copy the arrays and make them read-only.
-
-        Raises:
-            HandrailError: one of them is not made of real numbers.
-        """
+        """Copy the arrays and make them read-only."""
         if self.commanded is None:
             object.__setattr__(self, "commanded", self.v)
         for name in ("q", "v", "commanded"):

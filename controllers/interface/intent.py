@@ -68,11 +68,7 @@ class Intent:
     raw: RawInput = RawInput()
 
     def __post_init__(self) -> None:
-        """Copy the arrays and make them read-only.
-
-        Raises:
-            HandrailError: values, gripper or time are no real numbers, or the mask is not bool.
-        """
+        """Copy the arrays and make them read-only."""
         object.__setattr__(self, "values", frozen(self.values, what="values of an intent"))
         object.__setattr__(self, "mask", frozen(self.mask, bool, "mask of an intent"))
         for name in ("gripper", "time"):

@@ -49,11 +49,7 @@ class ProblemBuilder:
         self._weights_of = lru_cache(_MASKS)(self._weights)
 
     def build(self, loop: LoopState, state: State, intent: Intent) -> Problem:
-        """Return the optimal control problem of a state and an intent, which a loop is facing.
-
-        Raises:
-            HandrailError: the prediction does not say one value a channel and stage.
-        """
+        """Return the optimal control problem of a state and an intent, which a loop is facing."""
         settings = self._settings
         parameters = loop.parameters.copy()
         predicted = np.asarray(loop.predict(intent, self._times), dtype=np.float64)

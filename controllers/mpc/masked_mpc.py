@@ -81,11 +81,7 @@ class MaskedMpc:
         self.loop = self.loop.among(obstacles)
 
     def set_parameters(self, objective: str, values: FloatArray) -> None:
-        """Change an objective's parameters from the next update on.
-
-        Raises:
-            HandrailError: there is no such objective.
-        """
+        """Change an objective's parameters from the next update on."""
         parameters = self.loop.parameters.copy()
         parameters[self.residuals.parameter_slice(objective)] = values
         self.loop = self.loop._replace(parameters=parameters)

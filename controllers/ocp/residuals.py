@@ -64,11 +64,7 @@ class StageResiduals:
         return np.concatenate([objective.parameters for objective in self.objectives])
 
     def parameter_slice(self, name: str) -> slice:
-        """Return where an objective's parameters lie.
-
-        Raises:
-            HandrailError: there is no such objective.
-        """
+        """Return where an objective's parameters lie."""
         if name not in self._slices:
             raise unknown_name("objective", name, self._slices)
         return self._slices[name]

@@ -78,11 +78,7 @@ class MpcSettings:
         return cls(**lengths, **values)  # type: ignore[arg-type]
 
     def __post_init__(self) -> None:
-        """Check the numbers.
-
-        Raises:
-            HandrailError: one is negative or not finite, or the horizon is empty.
-        """
+        """Check the numbers."""
         for entry in fields(self):
             value = getattr(self, entry.name)
             if not np.isfinite(value) or value < 0:
@@ -101,9 +97,6 @@ class MpcSettings:
         Args:
             period: from one update to the next [s].
             name: of the setting that says so.
-
-        Raises:
-            HandrailError: it is longer than a stage.
         """
         if period > self.dt * (1.0 + 1e-9):
             raise HandrailError(

@@ -180,11 +180,7 @@ def robot_names() -> list[str]:
 
 
 def load_description(robot: str | Path) -> RobotDescription:
-    """Read a robot by name, by `module:name`, or from a description file.
-
-    Raises:
-        HandrailError: no such robot, or the file cannot be one's.
-    """
+    """Read a robot by name, by `module:name`, or from a description file."""
     path = Path(robot) if str(robot).endswith(".toml") else ROBOTS.find(str(robot)).file
     if not path.is_file():
         raise HandrailError(
@@ -262,11 +258,7 @@ def _capsule(data: dict[str, Any]) -> tuple[Shape, Placement]:
 
 
 def _find_urdf(urdf: str, folder: Path) -> tuple[Path, Path]:
-    """Return the URDF and the folder that its `package://` paths start from.
-
-    Raises:
-        HandrailError: it is nowhere, or neither in the description's folder nor in a package.
-    """
+    """Return the URDF and the folder that its `package://` paths start from."""
     name = PurePosixPath(urdf)
     beside = folder / name
     if not name.parts or name.is_absolute() or ".." in name.parts or not is_inside(beside, folder):

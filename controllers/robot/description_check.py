@@ -131,9 +131,6 @@ def check_description(content: Mapping[str, Any], where: str) -> None:
     Args:
         content: of the file.
         where: it is, for the error.
-
-    Raises:
-        HandrailError: an entry is missing, unknown or wrong, or two of them do not fit together.
     """
     check_entries(content, _WHOLE, where)
     for name, entries in _TABLES.items():

@@ -48,11 +48,7 @@ class RobotModel:
         return self.description.joints
 
     def frame_id(self, frame: str) -> int:
-        """Return pinocchio's index of a frame.
-
-        Raises:
-            HandrailError: the robot has no such frame.
-        """
+        """Return pinocchio's index of a frame."""
         if not self.pinocchio.existFrame(frame):
             names = ", ".join(f.name for f in self.pinocchio.frames)
             raise HandrailError(f"frame {frame!r} of robot {self.description.name}: expected one of {names}")

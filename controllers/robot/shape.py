@@ -28,11 +28,7 @@ class Shape:
     size: FloatArray
 
     def __post_init__(self) -> None:
-        """Check the size.
-
-        Raises:
-            HandrailError: unknown kind, wrong number of sizes, or a size that is not positive and finite.
-        """
+        """Check the size."""
         if self.kind not in _SIZES:
             raise HandrailError(f"shape {self.kind!r}: expected one of {', '.join(_SIZES)}")
         object.__setattr__(self, "size", frozen(self.size, what=f"size of a {self.kind}"))
@@ -66,11 +62,7 @@ class Obstacle:
     frame: str = ""
 
     def __post_init__(self) -> None:
-        """Copy the arrays and make them read-only.
-
-        Raises:
-            HandrailError: position or velocity are not three finite numbers, or the rotation is none.
-        """
+        """Copy the arrays and make them read-only."""
         for name in ("position", "velocity"):
             values = frozen(getattr(self, name), what=f"{name} of obstacle {self.name!r}")
             if values.shape != (3,) or not np.isfinite(values).all():

@@ -36,9 +36,6 @@ def symbolic_pose(model: RobotModel, q: ca.SX, frame: str = "tool") -> SymbolicP
 
     `p = p_j + R_j p_frame` along the chain of joints; a revolute column is `(z × (p - p_j), z)`, a
     prismatic one `(z, 0)`.
-
-    Raises:
-        HandrailError: unknown frame, or a joint that is neither revolute nor prismatic.
     """
     target = model.pinocchio.frames[model.frame_id(frame)]
     joints = [_joint(model, index) for index in range(1, model.pinocchio.njoints)]

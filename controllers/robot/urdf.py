@@ -19,11 +19,7 @@ _INSIDE = ("package://", "model://")
 
 
 def check_urdf(urdf: Path) -> ET.Element:
-    """Return the root of a URDF that pinocchio can read.
-
-    Raises:
-        HandrailError: it cannot be read, has too many links, or a number that is none.
-    """
+    """Return the root of a URDF that pinocchio can read."""
     root = _parsed(urdf)
     for kind in ("link", "joint"):
         if (count := len(root.findall(kind))) > _MOST:
@@ -43,9 +39,6 @@ def mesh_files(urdf: Path, folder: Path) -> Iterator[Path]:
     Args:
         urdf: its file.
         folder: that `package://` paths start from.
-
-    Raises:
-        HandrailError: one lies elsewhere, or is no regular file.
     """
     names = [mesh.get("filename", "") for mesh in check_urdf(urdf).iter("mesh")]
     for name in dict.fromkeys(names):

@@ -106,11 +106,7 @@ class ConvergedSolver:
         self._program = lru_cache(lambda rows: _program(self._residuals, (horizon, size), self._matrix, rows))
 
     def solve(self, problem: Problem, guess: FloatArray) -> Plan:
-        """Return the minimum near the accelerations `guess`, (N, n); `solved` says whether it is one.
-
-        Raises:
-            HandrailError: CasADi fails; that the solver does not converge is no failure.
-        """
+        """Return the minimum near the accelerations `guess`, (N, n); `solved` says whether it is one."""
         start = perf_counter()
         limit = problem.limits.acceleration
         here = self._iterate(problem, guess)

@@ -94,11 +94,7 @@ class Comparison:
 
 
 def compare(config: CompareConfig) -> Comparison:
-    """Compare as configured.
-
-    Raises:
-        HandrailError: A setting is wrong, or a dataset or an evaluation cannot be read.
-    """
+    """Compare as configured."""
     config.check()
     for root in config.datasets:
         check_whole(root, config.verify)
@@ -172,9 +168,6 @@ def pairs_between(conditions: Sequence[str], baseline: str, labels: Sequence[str
     That is the one that shares most of the words after the label and has none of its own: `ee intent same
     number` is set against `direct same number`, not `direct`. Like for like are those with the same words. A
     single condition is compared with nothing.
-
-    Raises:
-        HandrailError: There is none.
     """
     words = {
         condition: set(condition.removeprefix(group_of(condition, labels)).strip(" /").split())

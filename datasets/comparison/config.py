@@ -48,11 +48,7 @@ class CompareConfig:
         return Path(self.output).expanduser()
 
     def check(self) -> None:
-        """Check what can be checked without reading anything.
-
-        Raises:
-            HandrailError: One setting is wrong.
-        """
+        """Check what can be checked without reading anything."""
         if self.study:
             self._check_study()
         elif not self.datasets:

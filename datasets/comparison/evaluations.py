@@ -86,11 +86,7 @@ class Condition:
 
 
 def read_evaluations(paths: Iterable[str | Path]) -> dict[str, Condition]:
-    """Return the conditions of evaluation files by label, in the order in which they come.
-
-    Raises:
-        HandrailError: A file is not there or is none of these, or a rollout comes twice.
-    """
+    """Return the conditions of evaluation files by label, in the order in which they come."""
     policies: dict[str, dict[tuple[int, int], Policy]] = {}
     for path in map(Path, paths):
         for label, entries in _content(path)["arms"].items():

@@ -64,9 +64,6 @@ def load_groups(
             `success`; "" compares whole datasets.
         labels: A name for each dataset; their folders' names when empty.
         columns: Which column plays which part.
-
-    Raises:
-        HandrailError: A dataset cannot be read, there is no such column, or there are fewer than two groups.
     """
     names = _names(roots, labels)
     groups: list[Group] = []
@@ -90,11 +87,7 @@ def load_groups(
 
 
 def baseline_of(groups: Sequence[Group], name: str) -> str:
-    """Return the label of the group that the others are compared with: the first when `name` is "".
-
-    Raises:
-        HandrailError: There is no such group.
-    """
+    """Return the label of the group that the others are compared with: the first when `name` is ""."""
     labels = [group.label for group in groups]
     if name and name not in labels:
         raise unknown_name("baseline", name, labels)

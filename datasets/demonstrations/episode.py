@@ -31,9 +31,6 @@ class Episode(ABC):
 
         Args:
             files: Opens the file that they are in.
-
-        Raises:
-            HandrailError: They cannot be read.
         """
 
     @property

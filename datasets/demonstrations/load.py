@@ -44,9 +44,6 @@ def recorded_episodes(root: str | Path, columns: ColumnNames | None = None) -> l
     Args:
         root: The dataset's folder.
         columns: Which column plays which part.
-
-    Raises:
-        HandrailError: There is no dataset, or a file of it cannot be read.
     """
     columns, info = columns or ColumnNames(), read_info(root)
     wanted, rows = _wanted(info, columns), with_success(info, read_episodes(root))

@@ -75,11 +75,7 @@ class EditConfig:
         return Path(self.output).expanduser().absolute() if self.output else self.roots[0]
 
     def check(self) -> None:
-        """Check what can be checked without reading anything.
-
-        Raises:
-            HandrailError: A setting is wrong, missing, or not one of this verb.
-        """
+        """Check what can be checked without reading anything."""
         self._check_folders()
         for name in _NEEDED[self.verb]:
             if not getattr(self, name):

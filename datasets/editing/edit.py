@@ -3,20 +3,23 @@
 A new dataset is written from episodes of old ones, in one pass; it has its name only when it is whole.
 """
 
-from collections.abc import Iterable, Iterator
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pyarrow as pa
 
-from handrail.controllers.errors import unknown_name
+from handrail.controllers.arrays import BoolArray, FloatArray
+from handrail.controllers.errors import HandrailError, unknown_name
 from handrail.datasets.demonstrations.demonstration import Demonstration
 from handrail.datasets.editing.config import EditConfig
-from handrail.datasets.editing.idle import STATE, SUCCESS, moving_stretch
 from handrail.datasets.editing.pack import Edited, check_free, merge_datasets, taken
-from handrail.datasets.editing.selection import chosen_episodes, split_parts
 from handrail.datasets.editing.source import Source
 from handrail.datasets.format.columns import ColumnTypes
+from handrail.datasets.format.video import GROUP
+from handrail.datasets.quality.motion import FLOOR
 from handrail.datasets.reading.reader import read_rows_of
 from handrail.datasets.recording.piece import TRIMMED, Piece
 from handrail.datasets.recording.rewrite import drafted, write_anew
@@ -25,13 +28,136 @@ from handrail.datasets.storage.atomic import explained
 _LABELS = {"success": pa.bool_(), "failure_reason": pa.string()}
 
 
-def edit(config: EditConfig) -> list[Edited]:
-    """Do what a config says and return the datasets that were written.
+_SHARE = 0.01  # of an entry's range in the episode
+STATE, SUCCESS = "observation.state", "next.success"
 
-    Raises:
-        HandrailError: A setting or a dataset is wrong, or the disk does not take it. Nothing has been changed
-            then.
+
+_RANGE = re.compile(r"(\d{1,9})(?:-(\d{1,9}))?")
+_WORDS = {"failed": False, "succeeded": True}
+_ROUNDING = 1e-9
+
+
+def chosen_episodes(flag: str, words: Sequence[str], successes: Sequence[bool | None]) -> list[int]:
+    """Return the episodes that are meant, in order, each once.
+
+    Args:
+        flag: That the words are of, for the error.
+        words: Numbers, ranges, `failed` or `succeeded`.
+        successes: Of every episode of the dataset; None where that is not known.
     """
+    found: set[int] = set()
+    for word in words:
+        match = _RANGE.fullmatch(word)
+        if word in _WORDS:
+            found |= {number for number, success in enumerate(successes) if success is _WORDS[word]}
+        elif match:
+            first, last = int(match[1]), int(match[2] or match[1])
+            if not first <= last < len(successes):
+                raise HandrailError(f"{flag} {word}: expected episodes from 0 to {len(successes) - 1}")
+            found |= set(range(first, last + 1))
+        else:
+            raise HandrailError(f"{flag} {word}: expected a number, a range such as 0-4, failed or succeeded")
+    return sorted(found)
+
+
+def split_parts(words: Sequence[str], successes: Sequence[bool | None]) -> Mapping[str, list[int]]:
+    """Return the episodes of each part.
+
+    Args:
+        words: `NAME=SHARE` each, or `NAME=EPISODE` with more episodes after it.
+        successes: As for `chosen_episodes`.
+    """
+    given = _by_name(words)
+    shares = {name: float(said[0]) for name, said in given.items() if _is_share(said)}
+    if shares and len(shares) < len(given):
+        raise HandrailError("--parts: expected shares or episodes for all of them, got both")
+    parts = _shared(shares, len(successes)) if shares else {}
+    for name, said in given.items():
+        if not shares:
+            parts[name] = chosen_episodes(f"--parts {name}", said, successes)
+        if not parts[name]:
+            raise HandrailError(f"--parts {name}: expected an episode or more of {len(successes)}, got none")
+    everything = [number for numbers in parts.values() for number in numbers]
+    twice = next((number for number in everything if everything.count(number) > 1), None)
+    if twice is not None:
+        raise HandrailError(f"--parts: expected each episode in one part, got episode {twice} in two")
+    return parts
+
+
+def _by_name(words: Sequence[str]) -> dict[str, list[str]]:
+    given: dict[str, list[str]] = {}
+    name = ""
+    for word in words:
+        before, equals, after = word.rpartition("=")
+        if equals:
+            name = before
+            if not re.fullmatch(r"\w[\w.-]*", name) or name in given:
+                raise HandrailError(
+                    f"--parts {word}: expected a name of its own, as in {name or 'train'}=0.8"
+                )
+            given[name] = [after]
+        elif name:
+            given[name].append(word)
+        else:
+            raise HandrailError(f"--parts {word}: expected NAME=SHARE or NAME=EPISODES")
+    return given
+
+
+def _is_share(said: Sequence[str]) -> bool:
+    return len(said) == 1 and re.fullmatch(r"[01]?\.\d{1,9}|1\.", said[0]) is not None
+
+
+def _shared(shares: Mapping[str, float], count: int) -> dict[str, list[int]]:
+    """Return the episodes of each part, one part after the other."""
+    if sum(shares.values()) > 1.0 + _ROUNDING:
+        raise HandrailError(f"--parts: expected shares up to 1 together, got {sum(shares.values()):g}")
+    parts, total = {}, 0.0
+    for name, share in shares.items():
+        begin, total = round(total * count), total + share
+        parts[name] = list(range(begin, round(total * count)))
+    return parts
+
+
+def moving_stretch(episode: Demonstration, margin: float) -> tuple[int, int]:
+    """Return the first frame and the number of frames between what is idle at both ends.
+
+    A frame is idle while |q(t) − q(end)| ≤ max(0.005, 1 % of the range) for every entry of the
+    configuration q, where the end is that of its side. The first frame with success is never cut off. Where
+    there are cameras, the first frame begins a group of pictures, so that videos need not be encoded anew.
+
+    Args:
+        episode: Which; its configuration in the units of its state.
+        margin: Time to leave on both sides [s].
+    """
+    positions, count = episode.configuration, episode.count
+    moved = np.flatnonzero(_away(positions, positions[0]))
+    if not moved.size:
+        return 0, count
+    spare = round(margin * episode.fps)
+    first = max(0, int(moved[0]) - spare)
+    last = int(np.flatnonzero(_away(positions, positions[-1]))[-1]) + 1
+    end = max(min(count, last + 1 + spare), _succeeded(episode))
+    pictured = any(feature.is_video for feature in episode.info.features.values())
+    first -= first % GROUP if pictured else 0
+    return first, end - first
+
+
+def _away(positions: FloatArray, place: FloatArray) -> BoolArray:
+    """Return at which frames anything is elsewhere, (N,)."""
+    still = np.maximum(FLOOR, _SHARE * np.ptp(positions, axis=0))
+    return (np.abs(positions - place) > still).any(axis=1)
+
+
+def _succeeded(episode: Demonstration) -> int:
+    """Return how many frames there are up to the first with success; 0 without one."""
+    if SUCCESS not in episode.frames:
+        return 0
+    done = np.flatnonzero(episode.frames[SUCCESS])
+    return int(done[0]) + 1 if done.size else 0
+
+
+def edit(config: EditConfig) -> list[Edited]:
+    """Do what a config says and return the datasets that were written."""
     config.check()
     with explained(f"{config.verb}: cannot write {str(config.target)!r}"):
         return [_in_place(config)] if config.in_place else _anew(config)

@@ -13,11 +13,7 @@ _NEEDED = ("video.codec", "video.pix_fmt")  # in which all videos of a camera ha
 
 
 def check_alike(first: Source, other: Source) -> None:
-    """Check that frames of one dataset fit into another.
-
-    Raises:
-        HandrailError: Rate, robot or a column differ; the message names the first difference.
-    """
+    """Check that frames of one dataset fit into another."""
     names = [source.layout.root for source in (other, first)]
     one, two = first.manifest, other.manifest
     for name in ("fps", "robot_type"):
@@ -32,11 +28,7 @@ def check_alike(first: Source, other: Source) -> None:
 
 
 def merged_types(sources: Sequence[Source]) -> ColumnTypes:
-    """Return the extra columns that any of them has.
-
-    Raises:
-        HandrailError: A column has values of another type in another one.
-    """
+    """Return the extra columns that any of them has."""
     found: ColumnTypes = {}
     for source in sources:
         for name, kind in source.types.items():
@@ -50,11 +42,7 @@ def merged_types(sources: Sequence[Source]) -> ColumnTypes:
 
 
 def merged_encodings(sources: Sequence[Source]) -> Encodings:
-    """Return how all videos are encoded: what they agree in; nothing where Handrail alone encoded them.
-
-    Raises:
-        HandrailError: A camera has videos that are encoded in different ways.
-    """
+    """Return how all videos are encoded: what they agree in; nothing where Handrail alone encoded them."""
     found = {key: dict(encoding) for key, encoding in sources[0].encodings.items()}
     for source in sources[1:]:
         for key, encoding in source.encodings.items():

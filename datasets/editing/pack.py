@@ -51,10 +51,6 @@ def merge_datasets(
             the new dataset is whole.
         name: Of the new dataset, `owner/name`; that of the first folder when empty.
         verify: Read every file of the datasets anew, also those that have not changed since the last check.
-
-    Raises:
-        HandrailError: A folder is given twice, robot, rate or columns differ, a dataset is not Handrail's, is
-            damaged or in use, or the disk does not take it. Nothing has been changed then.
     """
     target = Path(output).expanduser().absolute()
     given = [Path(root).expanduser().absolute() for root in roots]
@@ -77,22 +73,14 @@ def _is_empty(root: Path) -> bool:
 
 
 def check_free(target: Path) -> None:
-    """Check that nothing lies where a dataset is to be written.
-
-    Raises:
-        HandrailError: Something does.
-    """
+    """Check that nothing lies where a dataset is to be written."""
     if target.exists() and (not target.is_dir() or any(target.iterdir())):
         raise HandrailError(f"--output {target}: expected a missing or empty folder, found one in use")
 
 
 @contextmanager
 def taken(root: Path, verify: bool) -> Iterator[Source]:
-    """Provide a dataset that is to be replaced, with the sole right to write to it.
-
-    Raises:
-        HandrailError: It is not Handrail's, is damaged or in use, or an edit of it was cut short.
-    """
+    """Provide a dataset that is to be replaced, with the sole right to write to it."""
     if settle(root):
         raise HandrailError(
             f"dataset {str(root)!r}: an edit was cut short, and is finished now; look at it (handrail-inspect"

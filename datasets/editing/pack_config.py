@@ -34,11 +34,7 @@ class PackConfig:
 
     @property
     def target(self) -> Path:
-        """The folder of what is written.
-
-        Raises:
-            HandrailError: It lies in the dataset's folder, or around it.
-        """
+        """The folder of what is written."""
         return _apart(self.output, self.roots) if self.output else self.roots[0]
 
 
@@ -59,23 +55,14 @@ class MergeConfig:
 
     @property
     def roots(self) -> tuple[Path, ...]:
-        """The folders of the datasets.
-
-        Raises:
-            HandrailError: There are fewer than two.
-        """
+        """The folders of the datasets."""
         if len(self.folders) < 2:
             raise HandrailError(f"merge: expected two folders or more, got {len(self.folders)}")
         return tuple(Path(folder).expanduser().absolute() for folder in self.folders)
 
     @property
     def target(self) -> Path:
-        """The folder of what is written.
-
-        Raises:
-            HandrailError: There is none, it lies in a dataset's folder, or around it, or nobody said whether
-                it may replace one.
-        """
+        """The folder of what is written."""
         if not self.output:
             raise HandrailError("merge: expected --output FOLDER for the new dataset, got none")
         target = _apart(self.output, self.roots)

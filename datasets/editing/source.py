@@ -61,9 +61,6 @@ class Source:
         Args:
             root: Its folder.
             verify: Read every byte anew.
-
-        Raises:
-            HandrailError: There is none, it is damaged or empty, or another tool wrote it.
         """
         info, layout = read_info(root), Layout(root)
         if not info.from_handrail:
@@ -82,11 +79,7 @@ class Source:
         return cls(layout, manifest, types, encodings, info)
 
     def pieces(self, numbers: Sequence[int] | None = None) -> Iterator[Piece]:
-        """Yield episodes, one at a time; all of them without numbers.
-
-        Raises:
-            HandrailError: A line of metadata cannot be read.
-        """
+        """Yield episodes, one at a time; all of them without numbers."""
         files = rows_of_lines(self.layout)
         if numbers is None:
             for path in files:

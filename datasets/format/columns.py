@@ -25,11 +25,7 @@ def is_extra(column: str) -> bool:
 
 
 def plain_columns(columns: Mapping[str, Scalar | None]) -> dict[str, Scalar]:
-    """Return the columns with plain Python values.
-
-    Raises:
-        HandrailError: A name that LeRobot uses itself or that has a '/', or a value that is no scalar.
-    """
+    """Return the columns with plain Python values."""
     for name in columns:
         if not isinstance(name, str) or not name or not is_extra(name):
             raise HandrailError(
@@ -49,9 +45,6 @@ def fit_columns(columns: Mapping[str, Scalar], types: ColumnTypes) -> dict[str, 
     Args:
         columns: Plain values.
         types: What the first episode fixed.
-
-    Raises:
-        HandrailError: A column that earlier episodes do not have, or a value of another type.
     """
     unknown = [name for name in columns if name not in types]
     if unknown:

@@ -51,9 +51,6 @@ class Videos:
             first: The picture that it begins with.
             count: Number of pictures.
             camera: Whose last video stays open until the next.
-
-        Raises:
-            HandrailError: It is not a whole mp4, or has no such pictures.
         """
         try:
             container = self._opened(path, camera)

@@ -42,11 +42,7 @@ class Manifest:
         return replace(self, repo_id=repo_id)
 
     def check(self) -> None:
-        """Check everything that can be checked without a disk.
-
-        Raises:
-            HandrailError: The name, the rate, the robot or a feature is not valid.
-        """
+        """Check everything that can be checked without a disk."""
         if not isinstance(self.repo_id, str) or not self.repo_id or self.repo_id.count("/") > 1:
             raise HandrailError(f"--dataset.repo_id: expected 'owner/name' or 'name', got {self.repo_id!r}")
         if not isinstance(self.fps, int) or isinstance(self.fps, bool) or self.fps < 1:
@@ -56,11 +52,7 @@ class Manifest:
         check_features(self.features)
 
     def check_continues(self, existing: "Manifest", root: Path) -> None:
-        """Check that episodes of this schema may follow those of an existing dataset.
-
-        Raises:
-            HandrailError: The rate, the robot or the features differ; the message names the first difference.
-        """
+        """Check that episodes of this schema may follow those of an existing dataset."""
         for name in ("fps", "robot_type"):
             if getattr(self, name) != getattr(existing, name):
                 raise _differs(root, name, getattr(existing, name), getattr(self, name))
@@ -82,11 +74,7 @@ class Manifest:
 
 
 def read_manifest(layout: Layout) -> Manifest:
-    """Read the manifest of a dataset that Handrail wrote.
-
-    Raises:
-        HandrailError: There is no dataset, it is another tool's, or a newer Handrail wrote it.
-    """
+    """Read the manifest of a dataset that Handrail wrote."""
     try:
         content = _content(layout)
         fixed = {name: content[name] for name in ("repo_id", "fps", "robot_type")}

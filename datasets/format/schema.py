@@ -73,12 +73,7 @@ def video_keys(features: Mapping[str, Feature]) -> tuple[str, ...]:
 
 
 def check_features(features: Mapping[str, Feature]) -> None:
-    """Check a whole schema before anything is created.
-
-    Raises:
-        HandrailError: No feature at all, a key that LeRobot cannot hold, or a dtype, shape or list of
-            names that does not fit.
-    """
+    """Check a whole schema before anything is created."""
     if not features:
         raise HandrailError("features: expected at least one, got none")
     for key, feature in features.items():
@@ -93,10 +88,6 @@ def check_frame(frame: Mapping[str, Any], features: Mapping[str, Feature]) -> di
         frame: A value for every feature: arrays of the feature's shape, or scalars where the shape is
             `(1,)`; images are `(height, width, 3)` uint8; strings are `str`.
         features: The schema.
-
-    Raises:
-        HandrailError: A missing or unknown key, a wrong shape or dtype, or a value that is not finite under
-            a key that a policy reads.
     """
     missing = [key for key in features if key not in frame]
     extra = [key for key in frame if key not in features]

@@ -45,11 +45,7 @@ def video_info(feature: Feature, fps: int) -> dict[str, Any]:
 
 
 def count_frames(path: Path) -> int:
-    """Return how many pictures an mp4 really holds; every packet is read.
-
-    Raises:
-        HandrailError: The file is not there or not a whole mp4.
-    """
+    """Return how many pictures an mp4 really holds; every packet is read."""
     try:
         with av.open(str(regular(path))) as container:
             sizes = [packet.size for packet in container.demux(video=0)]
@@ -131,9 +127,6 @@ class VideoEncoder:
 
         Returns:
             The statistics of the pictures.
-
-        Raises:
-            HandrailError: The encoder failed, or the count is not the expected one.
         """
         self._stop()
         if self._error is not None:

@@ -47,11 +47,7 @@ def short(label: str, most: int) -> str:
 
 
 def new_figure(width: float, height: float) -> Any:
-    """Return an empty figure [inch].
-
-    Raises:
-        HandrailError: matplotlib is not installed.
-    """
+    """Return an empty figure [inch]."""
     try:
         from matplotlib.figure import Figure
     except ImportError as error:

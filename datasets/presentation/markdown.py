@@ -34,11 +34,7 @@ def markdown_text(text: str) -> str:
 
 
 def read_page(page: Path, heading: str = "") -> str:
-    """Return the text of a page; a heading if there is no page yet.
-
-    Raises:
-        HandrailError: it is no text.
-    """
+    """Return the text of a page; a heading if there is no page yet."""
     try:
         return page.read_text(encoding="utf-8") if page.exists() else f"# {heading}\n"
     except (OSError, UnicodeDecodeError) as error:
@@ -46,20 +42,12 @@ def read_page(page: Path, heading: str = "") -> str:
 
 
 def write_part(page: Path, heading: str, label: str, body: str) -> None:
-    """Write a part of a page, which is made if need be.
-
-    Raises:
-        HandrailError: it is no text, or nobody knows what of it may go.
-    """
+    """Write a part of a page, which is made if need be."""
     write_whole(page, with_part(read_page(page, heading), label, body).encode())
 
 
 def with_part(text: str, label: str, body: str) -> str:
-    """Return a page's text with the body between the label's marks; at its end where there are none.
-
-    Raises:
-        HandrailError: the marks are not a pair, so that nobody knows what may go.
-    """
+    """Return a page's text with the body between the label's marks; at its end where there are none."""
     begin, end = f"<!-- {label} -->", f"<!-- end of {label} -->"
     block = f"{begin}\n\n{body}\n\n{end}"
     name = re.escape(label)

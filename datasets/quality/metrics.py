@@ -26,9 +26,6 @@ def sparc(speed: np.ndarray, fs: float) -> float:
 
     Returns:
         The measure (minimum jerk: about −1.4), or NaN if nothing moves or there are fewer than two samples.
-
-    Raises:
-        HandrailError: `speed` is no vector, or `fs` is not positive.
     """
     speed = _checked("speed", speed, 1, fs)
     if not _moves(speed):
@@ -57,9 +54,6 @@ def ldlj(speed: np.ndarray, fs: float) -> float:
 
     Returns:
         The measure (minimum jerk: about −5.2), or NaN if nothing moves or there are fewer than three samples.
-
-    Raises:
-        HandrailError: `speed` is no vector, or `fs` is not positive.
     """
     speed = _checked("speed", speed, 1, fs)
     jerk = np.diff(speed, 2) * fs**2
@@ -93,9 +87,6 @@ def rate_of_change(command: np.ndarray, fs: float) -> float:
     Returns:
         The measure, a velocity's in [m/s², rad/s²], or NaN if there are fewer than two samples or one is not
         finite.
-
-    Raises:
-        HandrailError: `command` has another shape, or `fs` is not positive.
     """
     command = _checked("command", command, 2, fs)
     if len(command) < 2 or not np.isfinite(command).all():
@@ -117,9 +108,6 @@ def high_frequency_content(command: np.ndarray, fs: float) -> float:
 
     Returns:
         The measure [unit · Hz], or NaN if there are fewer than two samples or one is not finite.
-
-    Raises:
-        HandrailError: `command` has another shape, or `fs` is not positive.
     """
     command = _checked("command", command, 2, fs)
     size = len(command)
@@ -141,9 +129,6 @@ def corrections(
         commanded: What was sent on the same channels, `(N, d)`.
         owned: Where the operator owned a channel, `(N, d)`; elsewhere nothing was asked.
         tolerance: Largest difference that is no correction.
-
-    Raises:
-        HandrailError: The shapes differ.
     """
     asked, commanded, owned = np.asarray(asked, float), np.asarray(commanded, float), np.asarray(owned, bool)
     if asked.ndim != 2 or not asked.shape == commanded.shape == owned.shape:

@@ -85,9 +85,6 @@ def summarize(root: str | Path) -> list[EpisodeSummary]:
 
     Args:
         root: The folder of any LeRobot v3.0 dataset.
-
-    Raises:
-        HandrailError: There is no dataset, or a file of it cannot be read.
     """
     return [_summary(episode) for episode in each_demonstration(root)]
 

@@ -34,23 +34,14 @@ class Ranked:
 
 
 def ranking_metric(name: str) -> Metric:
-    """Return a metric by its name.
-
-    Raises:
-        HandrailError: There is none, or neither end of it is better.
-    """
+    """Return a metric by its name."""
     if name not in RANKING:
         raise unknown_name("metric", name, RANKING)
     return RANKING[name]
 
 
 def worst_episodes(root: str | Path, metric: Metric, count: int) -> list[Ranked]:
-    """Return the worst episodes of any LeRobot v3.0 dataset, the worst first.
-
-    Raises:
-        HandrailError: The count is not positive, there is no dataset, it cannot be read, or the metric
-            applies to none of its episodes.
-    """
+    """Return the worst episodes of any LeRobot v3.0 dataset, the worst first."""
     if count < 1:
         raise HandrailError(f"--count {count}: expected 1 or more")
     episodes = recorded_episodes(root)

@@ -27,9 +27,6 @@ def check_whole(root: str | Path, verify: bool = False) -> None:
     Args:
         root: Its folder; any LeRobot v3.0 dataset.
         verify: Read every byte anew.
-
-    Raises:
-        HandrailError: It was copied in part, is damaged, or is of a newer format.
     """
     info = read_info(root)
     _check_kinds(info.root)
@@ -55,11 +52,7 @@ def _check_kinds(root: Path) -> None:
 
 
 def check_report(root: str | Path) -> list[str]:
-    """Return everything that is wrong with a dataset, a line each; every byte is read.
-
-    Raises:
-        HandrailError: It cannot be read at all.
-    """
+    """Return everything that is wrong with a dataset, a line each; every byte is read."""
     info = read_info(root)
     _check_kinds(info.root)
     found = _surveyed(info, verify=True)
@@ -89,11 +82,7 @@ def _surveyed(info: DatasetInfo, verify: bool) -> Survey | None:
 
 
 def _files(info: DatasetInfo) -> Iterator[str]:
-    """Yield the paths of all data and video files that the episodes name.
-
-    Raises:
-        HandrailError: One of them leads out of the dataset.
-    """
+    """Yield the paths of all data and video files that the episodes name."""
     rows = read_episodes(info.root)
     try:
         for row in rows:

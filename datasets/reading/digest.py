@@ -15,11 +15,7 @@ CLOCKS = ("wall_clock", "controller.solve_time")  # columns that no two recordin
 
 
 def digest_of_dataset(root: Path) -> str:
-    """Return a digest of every value of every row without the clocks, then one of the pictures, if any.
-
-    Raises:
-        HandrailError: there is no dataset, or it cannot be read.
-    """
+    """Return a digest of every value of every row without the clocks, then one of the pictures, if any."""
     digest = hashlib.sha256()
     info, rows = read_info(root), read_episodes(root)
     names = [name for name, each in info.features.items() if name not in CLOCKS and each.dtype != "video"]
@@ -39,9 +35,6 @@ def digest_of_pictures(info: DatasetInfo, rows: Iterable[Mapping[str, Any]]) -> 
     Args:
         info: of the dataset.
         rows: the episodes' lines of metadata.
-
-    Raises:
-        HandrailError: a video cannot be read.
     """
     digest, cameras = hashlib.sha256(), video_keys(info.features)
     with videos(info.fps) as opened:

@@ -28,11 +28,7 @@ class OpenDataset:
     files: DataFiles
 
     def row(self, episode: int) -> dict[str, Any]:
-        """Return the line of metadata of an episode.
-
-        Raises:
-            HandrailError: There is no such episode.
-        """
+        """Return the line of metadata of an episode."""
         if not 0 <= episode < len(self.rows):
             raise HandrailError(
                 f"--episode {episode}: expected one of 0 to {len(self.rows) - 1} in {self.info.root}"
@@ -46,10 +42,6 @@ class OpenDataset:
 
 @contextmanager
 def open_dataset(root: str | Path) -> Iterator[OpenDataset]:
-    """Provide a dataset whose files are closed in the end.
-
-    Raises:
-        HandrailError: There is no dataset, or a file of it cannot be read.
-    """
+    """Provide a dataset whose files are closed in the end."""
     with data_files() as files:
         yield OpenDataset(read_info(root), read_episodes(root), files)

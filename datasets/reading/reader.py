@@ -58,11 +58,7 @@ class DatasetInfo:
 
 
 def read_info(root: str | Path) -> DatasetInfo:
-    """Read what a dataset is.
-
-    Raises:
-        HandrailError: There is no dataset, its `info.json` is torn or absurd, or it is of another version.
-    """
+    """Read what a dataset is."""
     layout = Layout(Path(root).expanduser().absolute())
     content = _info_content(layout)
     version = str(content.get("codebase_version"))
@@ -103,9 +99,6 @@ def read_episodes(root: str | Path) -> list[dict[str, Any]]:
     Returns:
         For each episode a dict: `episode_index`, `length` (frames), `tasks` (list of str),
         `dataset_from_index`, `data/chunk_index`, …, and extra columns such as `success`; no statistics.
-
-    Raises:
-        HandrailError: There is no dataset, or a file of it cannot be read.
     """
     info = read_info(root)
     rows: list[dict[str, Any]] = []
@@ -135,9 +128,6 @@ def read_frames(
     Returns:
         For each column `(N,)` values where the feature's shape is `(1,)`, else `(N, *shape)`; strings as
         an array of str.
-
-    Raises:
-        HandrailError: There is no such dataset, episode or column, or the file cannot be read.
     """
     info = read_info(root)
     rows = {row["episode_index"]: row for row in read_episodes(root)}
@@ -189,9 +179,6 @@ def with_success(info: DatasetInfo, rows: Sequence[dict[str, Any]]) -> list[dict
     Args:
         info: What the dataset is.
         rows: As `read_episodes` returns them.
-
-    Raises:
-        HandrailError: A file of the dataset cannot be read.
     """
     feature, places = info.features.get(SUCCESS), kept_in_state(info.robot_type, info.features)
     if feature is not None and feature.dtype in NUMBERS:

@@ -26,10 +26,6 @@ def drop_episodes(root: str | Path, dropped: Dropped) -> int:
     Args:
         root: Its folder; removed too if no episode is left.
         dropped: Says by an episode's extra columns whether it goes.
-
-    Raises:
-        HandrailError: The dataset is not Handrail's, is damaged, in use, or has episodes that were set aside.
-            Nothing has been removed then.
     """
     layout = Layout(Path(root).expanduser().absolute())
     with explained(f"cannot remove episodes from dataset {str(layout.root)!r}"):
@@ -45,11 +41,7 @@ def drop_episodes(root: str | Path, dropped: Dropped) -> int:
 
 
 def check_nothing_set_aside(layout: Layout) -> None:
-    """Check that a dataset that is written anew has no episodes in `.damaged/`.
-
-    Raises:
-        HandrailError: It has.
-    """
+    """Check that a dataset that is written anew has no episodes in `.damaged/`."""
     if layout.damaged.exists():
         raise HandrailError(
             f"dataset {str(layout.root)!r}: in {layout.damaged.name} are episodes that were set aside;"

@@ -43,11 +43,7 @@ class OpenEpisode:
         return self._staging / f"{key}.mp4"
 
     def add(self, frame: Mapping[str, Any], task: str) -> None:
-        """Add one frame.
-
-        Raises:
-            HandrailError: The frame does not fit the schema, or the task is no sentence; nothing is added.
-        """
+        """Add one frame."""
         if not isinstance(task, str) or not task:
             raise HandrailError(f"task: expected a sentence, got {task!r}")
         values = check_frame(frame, self._manifest.features)

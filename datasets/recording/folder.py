@@ -18,9 +18,6 @@ def check_target(layout: Layout, overwrite: bool) -> None:
     Args:
         layout: The dataset to be.
         overwrite: Whether a dataset that Handrail recorded there may go.
-
-    Raises:
-        HandrailError: The path is no folder or cannot be written, or something else is there.
     """
     root = layout.root
     _check_writable(root)
@@ -51,11 +48,7 @@ def check_target(layout: Layout, overwrite: bool) -> None:
 
 
 def check_folders(layout: Layout) -> None:
-    """Check that a dataset's folders are its own before anything in them is moved or removed.
-
-    Raises:
-        HandrailError: One is a link to another place.
-    """
+    """Check that a dataset's folders are its own before anything in them is moved or removed."""
     for name in (STAGING, DAMAGED, *FOLDERS):
         top = layout.root / name
         within = [Path(folder) / each for folder, folders, _ in os.walk(top) for each in folders]

@@ -117,11 +117,7 @@ class Piece:
         return new | ({"frame_index": frames, "timestamp": frames / fps} if self.is_cut else {})
 
     def _tasks(self, whole: pa.Table, table: pa.Table, totals: Totals) -> tuple[tuple[str, ...], np.ndarray]:
-        """Return the task sentences of rows, and which of the dataset's each row has, (N,).
-
-        Raises:
-            HandrailError: the rows have more tasks, or fewer, than the line of metadata.
-        """
+        """Return the task sentences of rows, and which of the dataset's each row has, (N,)."""
         numbers_of = dict.fromkeys(whole.column("task_index").to_pylist())
         known = self.record.tasks
         if len(known) != len(numbers_of):

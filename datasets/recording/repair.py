@@ -94,10 +94,6 @@ def repair(root: str | Path, set_aside_damaged: bool = False) -> RepairReport:
     Args:
         root: The dataset's folder.
         set_aside_damaged: Whether to set episodes aside that are not whole; without, they stay and are named.
-
-    Raises:
-        HandrailError: No dataset, another tool's, one that another tool has appended to, or one being
-            written. Nothing has been changed then.
     """
     layout = Layout(Path(root).expanduser().absolute())
     with explained(f"cannot repair dataset {str(layout.root)!r}"):
@@ -136,11 +132,7 @@ def _report(layout: Layout, found: Survey, totals: Totals, **done: Any) -> Repai
 
 
 def require_whole(layout: Layout, found: Survey) -> None:
-    """Check that no episode is damaged.
-
-    Raises:
-        HandrailError: One is; the line says which, why, and what to do.
-    """
+    """Check that no episode is damaged."""
     if found.whole:
         return
     faults, count = found.faults(), len(found.states) + found.absent

@@ -89,11 +89,7 @@ class Survey:
 
 
 def survey(layout: Layout, manifest: Manifest, seal_of: Seals) -> Survey:
-    """Look at everything, change nothing.
-
-    Raises:
-        HandrailError: Another tool has added episodes, or a file has the number of an absurd one.
-    """
+    """Look at everything, change nothing."""
     rows, found = rows_of_lines(layout), [p for pattern in _STREAMS for p in _found(layout, pattern)]
     within = _within_volumes(rows, found)
     streams = [path for path in found if path not in within]
@@ -207,9 +203,6 @@ def examine(
         slot: Of the volume.
         start: Index of its first frame; None if the episode before does not tell.
         seal_of: Gives the seal of a file.
-
-    Raises:
-        HandrailError: Another tool wrote its lines of metadata.
     """
     row = layout.row(slot)
     try:

@@ -88,9 +88,6 @@ class EpisodeWriter:
             root: Its folder; must be missing or empty.
             manifest: Its schema; LeRobot's own columns (timestamp, indices) are added.
             overwrite: Remove the dataset that Handrail recorded there. Anything else is never removed.
-
-        Raises:
-            HandrailError: A wrong argument, or a folder taken or not to be written; unchanged then.
         """
         layout = Layout(Path(root).expanduser().absolute())
         manifest.check()
@@ -113,9 +110,6 @@ class EpisodeWriter:
             manifest: The schema, which must be the dataset's but for its name; the versions are of this
                 session and are kept with each of its episodes.
             verify: Read every file anew, also those that have not changed since they were last checked.
-
-        Raises:
-            HandrailError: Not Handrail's, or one that differs, is damaged or being written; unchanged then.
         """
         layout = Layout(Path(root).expanduser().absolute())
         existing = read_manifest(layout)
@@ -160,9 +154,6 @@ class EpisodeWriter:
         Args:
             frame: A value for every feature, copied; see `schema.check_frame`.
             task: What is being done, in words.
-
-        Raises:
-            HandrailError: The frame does not fit the schema; it is not in then.
         """
         self._check_usable()
         self._episode.add(frame, task)
@@ -176,10 +167,6 @@ class EpisodeWriter:
 
         Args:
             columns: Of the episode's metadata, such as success; the first episode fixes which there are.
-
-        Raises:
-            HandrailError: There is no frame or a column does not fit (the episode stays open), or an encoder
-                or the disk failed (the episode is gone, the saved ones are whole).
         """
         self._check_usable()
         if not self._episode.length:
@@ -207,11 +194,7 @@ class EpisodeWriter:
         self._discard()
 
     def erase_if_empty(self) -> None:
-        """Remove the dataset if it has no episode; one whose saving was interrupted is left for `resume`.
-
-        Raises:
-            HandrailError: Something cannot be removed.
-        """
+        """Remove the dataset if it has no episode; one whose saving was interrupted is left for `resume`."""
         if self.num_episodes or self._unusable:
             return
         with explained(f"cannot remove the empty dataset {str(self.root)!r}"):

@@ -5,6 +5,7 @@ stay, and episodes of a user study's participants are not sent at all.
 """
 
 import os
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatch
@@ -15,10 +16,105 @@ import numpy as np
 from huggingface_hub.errors import HfHubHTTPError
 
 from handrail.controllers.errors import HandrailError, message_of
+from handrail.controllers.regular_file import regular
+from handrail.datasets.demonstrations.episode import Episode
+from handrail.datasets.demonstrations.load import recorded_episodes
 from handrail.datasets.format.data_file import DataFiles, data_files
+from handrail.datasets.presentation.markdown import markdown_table, markdown_text
+from handrail.datasets.presentation.table import Table
+from handrail.datasets.presentation.wording import DASH, number, percent
+from handrail.datasets.quality.catalogue import METRICS
+from handrail.datasets.quality.measure import measure
 from handrail.datasets.reading.check import check_whole
 from handrail.datasets.reading.reader import DatasetInfo, read_episodes, read_info, read_rows_of
-from handrail.datasets.sharing.card import CARD, TAGS, write_card
+from handrail.datasets.storage.atomic import explained, write_whole
+
+CARD = "README.md"
+TAGS = ("handrail", "teleoperation")
+_MARK = "<!-- written by handrail-push -->"
+_COUNTED = ("environment", "robot", "operator", "mode", "task")
+_NOTES = (
+    "The operator steered a part of the motion (`teleop.mode`, `teleop.mask`); a controller completed the"
+    " rest. `action` is what was sent to the robot. Handrail's `docs/recording.md` explains every column."
+)
+
+
+def description(root: Path) -> str:
+    """Return what was recorded, as Markdown: counts, modes, operators, success and metrics."""
+    episodes = recorded_episodes(root)
+    if not episodes:
+        raise HandrailError(f"dataset {str(root)!r}: expected an episode or more, found none")
+    info = episodes[0].info
+    frames = sum(episode.count for episode in episodes)
+    lines = (
+        f"{len(episodes)} episodes, {frames} frames at {info.fps} Hz, {frames / info.fps / 60:.1f} minutes",
+        f"robot {markdown_text(info.robot_type) or DASH}",
+        *(f"{name}: {said}" for name in _COUNTED if (said := _counted(episodes, name))),
+        *_outcome(episodes),
+    )
+    listed = "\n".join(f"- {line}" for line in lines)
+    table = markdown_table(Table(("metric", "mean", "unit", "meaning"), _metrics(episodes)))
+    return f"{_MARK}\n\n{listed}\n\n{_NOTES if info.from_handrail else ''}\n\n{table}"
+
+
+def write_card(root: Path, repo_id: str, license_id: str) -> str:
+    """Write the card with LeRobot's template and return the description in it."""
+    path = root / CARD
+    if path.exists() and _MARK not in regular(path).read_text(encoding="utf-8", errors="replace"):
+        raise HandrailError(
+            f"{str(path)!r}: expected none, or one that handrail-push wrote; found another, which LeRobot's"
+            " upload would replace: give it another name"
+        )
+    from lerobot.datasets.io_utils import load_info
+    from lerobot.datasets.utils import create_lerobot_dataset_card
+
+    said = description(root)
+    try:
+        info = load_info(root)
+    except (AttributeError, TypeError, ValueError) as error:
+        raise HandrailError(f"dataset {str(root)!r}: LeRobot cannot read meta/info.json: {error}") from error
+    card = create_lerobot_dataset_card(
+        tags=list(TAGS),
+        dataset_info=info,
+        license=license_id,
+        repo_id=repo_id,
+        dataset_description=said,
+    )
+    with explained(f"cannot write {str(path)!r}"):
+        write_whole(path, str(card).encode())
+    return said
+
+
+def _counted(episodes: Sequence[Episode], name: str) -> str:
+    """Return the values of a column of metadata and how many episodes have each."""
+    values = Counter(value for episode in episodes for value in _values(episode, name))
+    return ", ".join(f"{markdown_text(str(value))} ({count})" for value, count in values.most_common())
+
+
+def _values(episode: Episode, name: str) -> Sequence[Any]:
+    if name == "task":
+        return episode.meta["tasks"]
+    value = episode.meta.get(name)
+    return [value] if value else []
+
+
+def _outcome(episodes: Sequence[Episode]) -> list[str]:
+    known = [episode.success for episode in episodes if episode.success is not None]
+    reasons = _counted([episode for episode in episodes if episode.success is False], "failure_reason")
+    lines = [f"success: {sum(known)} of {len(known)} ({percent(sum(known) / len(known))})"] if known else []
+    return lines + ([f"failures: {reasons}"] if reasons else [])
+
+
+def _metrics(episodes: Sequence[Episode]) -> list[list[str]]:
+    """Return a row for each metric of single episodes that applies."""
+    metrics = [metric for metric in METRICS if not metric.of_group]
+    values = measure({"": episodes}, np.random.default_rng(0), metrics=metrics).values
+    return [
+        [metric.title, number(values[metric.name][""].mean), metric.unit or DASH, metric.meaning]
+        for metric in metrics
+        if values[metric.name][""].applies
+    ]
+
 
 SENT = (
     *("data/chunk-*/file-*.parquet", "videos/*/chunk-*/file-*.mp4", "meta/episodes/chunk-*/file-*.parquet"),
@@ -74,9 +170,6 @@ def prepare(
         private: Whether nobody else is to see it.
         verify: Read every byte anew.
         to: Where to, instead of the hub.
-
-    Raises:
-        HandrailError: It is damaged, or has episodes of participants or links to other places.
     """
     root = root.absolute()
     check_whole(root, verify)
@@ -97,11 +190,7 @@ def prepare(
 
 
 def upload(push: Push) -> None:
-    """Send a dataset with LeRobot's `push_to_hub`.
-
-    Raises:
-        HandrailError: The hub does not take it; one line says why.
-    """
+    """Send a dataset with LeRobot's `push_to_hub`."""
     from lerobot.datasets.lerobot_dataset import LeRobotDataset
 
     try:
@@ -123,11 +212,7 @@ def is_sent(name: str) -> bool:
 
 
 def check_nobody(root: Path) -> None:
-    """Check that no episode is a participant's: data of people do not leave by a flag.
-
-    Raises:
-        HandrailError: One is, or it is not known whether one is.
-    """
+    """Check that no episode is a participant's: data of people do not leave by a flag."""
     above = [folder for folder in root.parents[:4] if (folder / _PEOPLE).is_dir()]
     if above:
         raise HandrailError(f"dataset {str(root)!r}: part of the user study in {above[0]}; it is never sent")

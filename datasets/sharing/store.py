@@ -11,11 +11,7 @@ _LAST = "meta/info.json"  # without it nobody takes a folder for a dataset
 
 
 def copy(push: Push) -> None:
-    """Copy what is sent to an address that is empty, or has a copy of it that was cut short.
-
-    Raises:
-        HandrailError: Something else is there, or the store does not take it; one line says why.
-    """
+    """Copy what is sent to an address that is empty, or has a copy of it that was cut short."""
     try:
         system, place = fsspec.url_to_fs(push.to)
         _check_free(push, system, place)

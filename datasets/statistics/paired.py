@@ -56,9 +56,6 @@ def paired_difference(first: FloatArray, second: FloatArray, rng: np.random.Gene
         first: of every trial under one condition, (N,).
         second: of the same trials under the other, (N,).
         rng: of the resampling.
-
-    Raises:
-        HandrailError: the sizes differ, or fewer than two pairs are left.
     """
     differences = _differences(first, second)
     count, mean = len(differences), float(differences.mean())
@@ -69,11 +66,7 @@ def paired_difference(first: FloatArray, second: FloatArray, rng: np.random.Gene
 
 
 def paired_success(first: FloatArray, second: FloatArray) -> PairedSuccess:
-    """Compare success (0 or 1) of the same trials under two conditions, (N,) each.
-
-    Raises:
-        HandrailError: the sizes differ, or there are none.
-    """
+    """Compare success (0 or 1) of the same trials under two conditions, (N,) each."""
     one, other = np.asarray(first, dtype=bool), np.asarray(second, dtype=bool)
     if one.shape != other.shape or not len(one):
         raise HandrailError(f"paired success: expected two equal sizes, got {one.size} and {other.size}")
@@ -91,9 +84,6 @@ def wilson(successes: float, trials: float) -> tuple[float, float]:
     Args:
         successes: n p.
         trials: n; not whole where trials depend on each other and so count for less than one.
-
-    Raises:
-        HandrailError: no trials, or more successes than trials.
     """
     if not 0.0 <= successes <= trials or trials <= 0.0:
         raise HandrailError(f"share: expected 0 <= successes <= trials, got {successes} of {trials}")

@@ -90,9 +90,6 @@ def paired_shares(
         second: `(N,)`.
         scenes: What pairs may have in common, `(N,)`: for the interval and the error those of a scene count
             for as many as they are worth, and the test turns them together; None where each is for itself.
-
-    Raises:
-        HandrailError: The sizes differ, or there are none.
     """
     one, other = np.asarray(first, bool), np.asarray(second, bool)
     found, differences = paired_success(one, other), one.astype(int) - other
@@ -144,9 +141,6 @@ def unpaired_shares(
         first: `(N,)`.
         second: `(M,)`.
         scenes: What the trials of each may have in common, `(N,)` and `(M,)`, as for `paired_shares`.
-
-    Raises:
-        HandrailError: There are none.
     """
     one, other = (int(np.sum(first)), len(first)), (int(np.sum(second)), len(second))
     owners = scenes or (range(one[1]), range(other[1]))
@@ -179,9 +173,6 @@ def newcombe_paired(both: float, only_first: float, only_second: float, neither:
         only_first: That succeeded under the first condition only.
         only_second: Under the second only.
         neither: Under none.
-
-    Raises:
-        HandrailError: There are no pairs.
     """
     count = both + only_first + only_second + neither
     phi = _correlation(both, only_first, only_second, neither)
@@ -195,9 +186,6 @@ def newcombe(first: tuple[float, float], second: tuple[float, float], phi: float
         first: Successes and trials of the first.
         second: Of the second.
         phi: Correlation of the two; 0 where they are independent.
-
-    Raises:
-        HandrailError: No trials, or more successes than trials.
     """
     (low_1, high_1), (low_2, high_2) = wilson(*first), wilson(*second)
     share_1, share_2 = first[0] / first[1], second[0] / second[1]

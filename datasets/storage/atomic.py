@@ -14,11 +14,7 @@ from handrail.controllers.errors import HandrailError
 
 @contextlib.contextmanager
 def explained(what: str) -> Iterator[None]:
-    """Turn an error of the operating system into one line that says what failed.
-
-    Raises:
-        HandrailError: For every OSError.
-    """
+    """Turn an error of the operating system into one line that says what failed."""
     try:
         yield
     except OSError as error:
@@ -31,11 +27,7 @@ def reason(error: Exception) -> str:
 
 
 def beside(path: Path, ending: str) -> Path:
-    """Return the hidden name of what is not finished, beside a file or a folder.
-
-    Raises:
-        HandrailError: There is nothing beside it.
-    """
+    """Return the hidden name of what is not finished, beside a file or a folder."""
     if not path.name:
         raise HandrailError(f"{str(path)!r}: expected a folder with a name, got the top of all folders")
     return path.with_name(f".{path.name}.{ending}")

@@ -31,9 +31,6 @@ def load_json(path: Path, what: str) -> Any:
     Args:
         path: of the file.
         what: it is, for the error: `a policy of handrail-train`.
-
-    Raises:
-        HandrailError: It is not there, or no JSON that `parse_json` takes.
     """
     try:
         return read_json(path)

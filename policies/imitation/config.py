@@ -89,11 +89,7 @@ class TrainConfig:
         return Path(self.output).expanduser()
 
     def check(self) -> None:
-        """Check what can be checked without reading the dataset.
-
-        Raises:
-            HandrailError: a setting is wrong.
-        """
+        """Check what can be checked without reading the dataset."""
         for name in ("episodes", "minutes", "draw", "steps", "batch_size", "lr", "seed"):
             if not 0 <= getattr(self, name) < float("inf"):
                 raise HandrailError(f"--{name} {getattr(self, name)}: expected 0 or more")
@@ -115,11 +111,7 @@ class TrainConfig:
         _ = self.dataset.folder
 
     def options(self) -> dict[str, str]:
-        """Return `policy_options` by key.
-
-        Raises:
-            HandrailError: one is not `key=value`.
-        """
+        """Return `policy_options` by key."""
         pairs = [option.partition("=") for option in self.policy_options]
         for option, (key, sign, _) in zip(self.policy_options, pairs, strict=True):
             if not key.strip() or not sign:

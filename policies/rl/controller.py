@@ -37,9 +37,6 @@ class RlController:
         model: of the robot; its base must be planar and its arm must have six joints.
         period: of the control loop [s]; the actor was trained with 0.03 s.
         actor: the trained network; the one that comes with Handrail by default.
-
-    Raises:
-        HandrailError: the robot is another kind.
     """
 
     def __init__(self, model: RobotModel, period: float = STEP, actor: Actor | None = None) -> None:

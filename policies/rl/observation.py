@@ -40,11 +40,7 @@ class Situation:
 
 
 def check_robot(model: RobotModel) -> None:
-    """Check that a robot is of the kind that a policy drives.
-
-    Raises:
-        HandrailError: it is another kind.
-    """
+    """Check that a robot is of the kind that a policy drives."""
     if len(model.description.base_joints) != 3 or model.size != 9:
         raise HandrailError(
             f"robot {model.description.name} of the reinforcement-learning baseline: "

@@ -31,11 +31,7 @@ class Actor:
     biases: tuple[FloatArray, ...]
 
     def __post_init__(self) -> None:
-        """Copy the arrays, make them read-only, and check that they fit.
-
-        Raises:
-            HandrailError: the layers do not lead from an observation to an action.
-        """
+        """Copy the arrays, make them read-only, and check that they fit."""
         for name in ("weights", "biases"):
             arrays = tuple(frozen(array, np.float32) for array in getattr(self, name))
             object.__setattr__(self, name, arrays)
@@ -92,11 +88,7 @@ class Actor:
 
     @classmethod
     def load(cls, path: Path | None = None) -> "Actor":
-        """Read an actor from an .npz file; the one that comes with Handrail by default.
-
-        Raises:
-            HandrailError: there is none, or the file is something else.
-        """
+        """Read an actor from an .npz file; the one that comes with Handrail by default."""
         path = path or SHIPPED / "actor.npz"
         try:
             with open_regular(path) as file, np.load(file, allow_pickle=False) as arrays:

@@ -32,11 +32,7 @@ class StudyConfig(ExecutionConfig):
         return Path(self.output).expanduser().absolute()
 
     def check(self) -> None:
-        """Check the settings.
-
-        Raises:
-            HandrailError: one is wrong.
-        """
+        """Check the settings."""
         self.check_execution()
         if self.folder.exists() and not self.folder.is_dir():
             raise HandrailError(f"--output {self.output}: expected a folder, found a file")

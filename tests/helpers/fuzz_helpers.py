@@ -17,7 +17,7 @@ from handrail.collect.simulation.gl import mujoco
 from handrail.collect.simulation.robot import FINGERS
 from handrail.collect.simulation.scene import Scene, SceneObject, Viewpoint
 from handrail.collect.simulation.simulation import Simulation
-from handrail.collect.tasks.moving import sample_movers
+from handrail.collect.tasks.reach import sample_movers
 from handrail.controllers.arrays import FloatArray, IntArray
 from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.collision.slacks import MOVING

@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from handrail.collect.processor.mpc_step import MaskedMpcStep, mpc_pipeline
-from handrail.collect.processor.odometry import moved
 from handrail.collect.processor.units import RobotUnits, robot_units
+from handrail.collect.processor.whole_body import moved
 from handrail.controllers.robot.model import load_model
 
 PERIOD = 1.0 / 30.0

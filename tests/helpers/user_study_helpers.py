@@ -11,9 +11,9 @@ from handrail.collect.operators.operator import EpisodeEvent
 from handrail.collect.session.outcome import Outcome
 from handrail.collect.user_study.cards import NEXT, PAUSE
 from handrail.collect.user_study.conduct import Conductor
-from handrail.collect.user_study.erase import erase
 from handrail.collect.user_study.exports import export
 from handrail.collect.user_study.folder import StudyFolder
+from handrail.collect.user_study.run import erase
 from handrail.datasets.format.manifest import Manifest
 from handrail.datasets.format.schema import Feature
 from handrail.datasets.recording.writer import EpisodeWriter

@@ -45,11 +45,7 @@ class HumanSettings:
     briskness: float = 1.0
 
     def __post_init__(self) -> None:
-        """Check the numbers.
-
-        Raises:
-            HandrailError: one is negative or not finite, or nobody would ever move.
-        """
+        """Check the numbers."""
         for entry in fields(self):
             value = getattr(self, entry.name)
             if not np.isfinite(value) or value < 0:

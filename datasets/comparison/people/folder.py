@@ -36,11 +36,7 @@ class StudyFolder:
 
 
 def read_study(root: Path) -> StudyFolder:
-    """Read what a study's folder holds.
-
-    Raises:
-        HandrailError: it is no study, has no episodes yet, or a file of it is wrong.
-    """
+    """Read what a study's folder holds."""
     described = load_json(root / "study.json", "the study.json of a user study")
     demo = described.get("demo", False) if isinstance(described, dict) else None
     if not isinstance(demo, bool):

@@ -81,11 +81,7 @@ class PeopleComparison:
 
 
 def compare_people(config: CompareConfig) -> PeopleComparison:
-    """Compare the conditions of a study as configured.
-
-    Raises:
-        HandrailError: a setting or a file is wrong, or a dataset cannot be read.
-    """
+    """Compare the conditions of a study as configured."""
     config.check()
     study = read_study(Path(config.study).expanduser())
     beside = [Path(root).expanduser() for root in config.datasets]

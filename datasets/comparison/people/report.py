@@ -24,11 +24,7 @@ _HOW = (
 
 
 def write_people_report(comparison: PeopleComparison) -> list[Path]:
-    """Write the report into the folder of its config and return the files.
-
-    Raises:
-        HandrailError: the folder cannot be written.
-    """
+    """Write the report into the folder of its config and return the files."""
     texts = {
         "report.html": people_page(comparison),
         "report.json": json_text(as_json(comparison)),

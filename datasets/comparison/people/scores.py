@@ -48,11 +48,7 @@ class Score:
 
 
 def read_scores(path: Path) -> tuple[Score, ...]:
-    """Read all scores; none where there is no file.
-
-    Raises:
-        HandrailError: it cannot be read, has other columns, a score twice, or a value that is none.
-    """
+    """Read all scores; none where there is no file."""
     if not path.exists():
         return ()
     try:

@@ -51,9 +51,6 @@ def read_trials(study: StudyFolder, beside: Sequence[Path], columns: ColumnNames
 
     Returns:
         The trials, and how many episodes were left out since neither a participant nor a script is named.
-
-    Raises:
-        HandrailError: a dataset cannot be read, or one beside the study has a participant.
     """
     found: dict[str, list[tuple[str, Episode]]] = {}
     left_out = 0

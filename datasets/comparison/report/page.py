@@ -1,11 +1,14 @@
 """The report as one page that needs nothing else: the answer first, then how it came about."""
 
+import io
 from collections.abc import Iterable, Sequence
+from typing import Any
 
+from handrail.controllers.regular_file import regular
 from handrail.datasets.comparison.cautions import cautions
 from handrail.datasets.comparison.collection import Collected
 from handrail.datasets.comparison.compare import Comparison
-from handrail.datasets.comparison.groups import group_of
+from handrail.datasets.comparison.groups import Group, group_of
 from handrail.datasets.comparison.headline import headline
 from handrail.datasets.comparison.outcomes import Outcomes
 from handrail.datasets.comparison.report import tables
@@ -17,9 +20,10 @@ from handrail.datasets.comparison.report.figures import (
     metrics_panels,
     trajectory_panels,
 )
-from handrail.datasets.comparison.report.pictures import first_pictures
-from handrail.datasets.comparison.report.worst import worst_folds
-from handrail.datasets.presentation.drawing import Panel, svg
+from handrail.datasets.demonstrations.episode import Episode
+from handrail.datasets.format.path_pattern import fill
+from handrail.datasets.format.schema import video_keys
+from handrail.datasets.presentation.drawing import Panel, address, svg
 from handrail.datasets.presentation.markup import (
     card,
     cards,
@@ -31,8 +35,9 @@ from handrail.datasets.presentation.markup import (
     panels,
     paragraph,
     section,
+    table,
 )
-from handrail.datasets.presentation.table import Table
+from handrail.datasets.presentation.table import Cell, Table
 from handrail.datasets.presentation.wording import (
     DASH,
     duration,
@@ -42,6 +47,9 @@ from handrail.datasets.presentation.wording import (
     span,
 )
 from handrail.datasets.quality.catalogue import METRICS
+from handrail.datasets.quality.metric import Metric
+from handrail.datasets.quality.worst import RANKING, deletion, ranked
+from handrail.datasets.reading.reader import DatasetInfo
 
 _HOW = (
     "Every interval is 95 %. Shares: Wilson; their differences: Newcombe's method 10, exact McNemar test"
@@ -73,6 +81,81 @@ _EFFECTS = (
     "Filled: detected; hollow: not. An arrow: beyond what is shown, or a difference where nothing varies."
 )
 _TURNED = f" {TURNED}: less is better, so the metric is drawn the other way round."
+
+
+_EPISODES = 3  # shown of each group
+_WIDTH = 240  # [pixels]
+
+
+_SHOWN = 3  # episodes of a group
+
+
+def worst_folds(comparison: Comparison) -> str:
+    """Return a table for each group that opens when asked for."""
+    return "".join(
+        folded(group.label, table(worst_table(comparison, group))) for group in comparison.everything.groups
+    )
+
+
+def worst_table(comparison: Comparison, group: Group) -> Table:
+    """Return the worst episodes of a group by every metric of which one end is better."""
+    rows = [row for metric in RANKING.values() if (row := _row(comparison, group, metric))]
+    return Table(("metric", "episodes (value)", "without them"), rows)
+
+
+def _row(comparison: Comparison, group: Group, metric: Metric) -> list[Cell | str]:
+    values = comparison.everything.measurements.values[metric.name][group.label].values
+    worst = ranked(group.episodes, metric, values)[:_SHOWN]
+    if not worst or len({each.value for each in ranked(group.episodes, metric, values)}) < 2:
+        return []  # nothing is worse than anything else
+    said = ", ".join(f"{each.episode.number} ({number(each.value)})" for each in worst)
+    unit = f" [{metric.unit}]" if metric.unit else ""
+    return [
+        Cell(metric.title + unit, "", metric.meaning),
+        said,
+        deletion(group.info, [each.episode.number for each in worst]),
+    ]
+
+
+def first_pictures(group: Group) -> list[tuple[str, str]]:
+    """Return captions and pictures, as addresses that hold all of them; unreadable videos are left out."""
+    shown = []
+    for episode in group.episodes[:_EPISODES]:
+        for key in video_keys(group.info.features):
+            picture = _first_frame(group.info, key, episode)
+            if picture:
+                shown.append(
+                    (f"episode {episode.number}, {key.removeprefix('observation.images.')}", picture)
+                )
+    return shown
+
+
+def _first_frame(info: DatasetInfo, key: str, episode: Episode) -> str:
+    import av
+    from av.error import FFmpegError
+
+    chunk, file = (episode.meta.get(f"videos/{key}/{name}") for name in ("chunk_index", "file_index"))
+    if not (isinstance(chunk, int) and isinstance(file, int)):
+        return ""
+    try:
+        begin = float(episode.meta.get(f"videos/{key}/from_timestamp") or 0.0)
+        with av.open(str(regular(info.root / fill(info.video_path, chunk, file, key)))) as container:
+            stream = container.streams.video[0]
+            container.seek(int(begin * 1_000_000))
+            for frame in container.decode(stream):
+                if frame.time is None or frame.time >= begin - 0.5 / episode.fps:
+                    return _address(frame)
+    except (OSError, FFmpegError, ValueError, TypeError, OverflowError, IndexError):
+        return ""
+    return ""
+
+
+def _address(frame: Any) -> str:
+    picture = frame.to_image()
+    picture.thumbnail((_WIDTH, _WIDTH))
+    stream = io.BytesIO()
+    picture.save(stream, format="JPEG", quality=80)
+    return address(stream.getvalue(), "image/jpeg")
 
 
 def report_page(comparison: Comparison) -> str:

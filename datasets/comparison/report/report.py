@@ -30,11 +30,7 @@ _FIELDS = (
 
 
 def write_report(comparison: Comparison) -> list[Path]:
-    """Write the report into the folder of its config and return the files.
-
-    Raises:
-        HandrailError: The folder cannot be written.
-    """
+    """Write the report into the folder of its config and return the files."""
     texts = {
         "report.html": report_page(comparison),
         "report.json": json_text(as_json(comparison)),
@@ -131,11 +127,7 @@ def _difference_rows(comparison: Comparison) -> list[dict[str, Any]]:
 
 
 def write_texts(folder: Path, texts: Mapping[str, str]) -> list[Path]:
-    """Write files of a report by name, and return them.
-
-    Raises:
-        HandrailError: The folder cannot be written.
-    """
+    """Write files of a report by name, and return them."""
     with explained(f"--output {str(folder)!r}: expected a folder that can be written"):
         for name, text in texts.items():
             write_whole(folder / name, text.encode())

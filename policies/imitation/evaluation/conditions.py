@@ -95,9 +95,6 @@ def read_checkpoint(folder: Path, config: EvaluateConfig) -> Checkpoint:
     Args:
         folder: of the checkpoint.
         config: says what plain LeRobot's do not, their rate and perhaps their task.
-
-    Raises:
-        HandrailError: there is none, it could do harm, or Handrail has no task for it.
     """
     place = model_folder(folder)
     settings = check_policy_folder(place)
@@ -147,11 +144,7 @@ def _plain(place: Path, settings: Mapping[str, Any], config: EvaluateConfig) -> 
 
 
 def policy_conditions(config: EvaluateConfig) -> tuple[list[PolicyCondition], list[str]]:
-    """Return every checkpoint under every condition of the settings, and why some cannot be.
-
-    Raises:
-        HandrailError: there is none, they are for several tasks, or two are one and the same policy.
-    """
+    """Return every checkpoint under every condition of the settings, and why some cannot be."""
     refused: list[str] = []
     checkpoints = [
         each

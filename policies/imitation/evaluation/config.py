@@ -56,11 +56,7 @@ class EvaluateConfig(ExecutionConfig):
 
     @property
     def folders(self) -> tuple[Path, ...]:
-        """The checkpoint folders.
-
-        Raises:
-            HandrailError: they are given in two ways.
-        """
+        """The checkpoint folders."""
         given = only_one(self.checkpoints, self.policy, "--policy")
         return tuple(Path(folder).expanduser() for folder in given)
 
@@ -76,11 +72,7 @@ class EvaluateConfig(ExecutionConfig):
 
     @property
     def perturbations(self) -> tuple[Perturbation, ...]:
-        """The perturbations asked for, each a condition of its own.
-
-        Raises:
-            HandrailError: one is none of those that there are.
-        """
+        """The perturbations asked for, each a condition of its own."""
         return tuple(Perturbation.parse(text) for text in self.perturbation.split(",") if text.strip())
 
     @property
@@ -89,11 +81,7 @@ class EvaluateConfig(ExecutionConfig):
         return tuple(evaluation_seed(self.seed, episode) for episode in range(self.episodes))
 
     def check(self) -> None:
-        """Check what can be checked without loading anything heavy.
-
-        Raises:
-            HandrailError: one setting is wrong; the message says what may be chosen.
-        """
+        """Check what can be checked without loading anything heavy."""
         for name, least, most in (
             ("episodes", 1, MOST_ROLLOUTS),
             ("seed", 0, 10**9),

@@ -49,9 +49,6 @@ def pictures(settings: Mapping[str, Any], where: str) -> dict[str, tuple[int, in
     Args:
         settings: of the policy.
         where: it is, for the error.
-
-    Raises:
-        HandrailError: the features are none of LeRobot's.
     """
     shapes = _shapes(settings, "input_features", where)
     found = {name: shape for name, shape in shapes.items() if name.startswith(IMAGES)}
@@ -72,9 +69,6 @@ def place_of(
         robot: its robot, where that is known.
         task: its task, where that is known.
         mode: the teleop mode whose channels it writes; empty for joint velocities.
-
-    Raises:
-        HandrailError: Handrail has none such, or several.
     """
     given = _sizes(settings, where)
     known = list(_places((robot,) if robot else robot_names(), (task,) if task else TASKS, mode))

@@ -20,9 +20,6 @@ class EvaluationFile:
 
     Args:
         path: of the file; None keeps everything in memory.
-
-    Raises:
-        HandrailError: there is another kind of file, or it cannot be read.
     """
 
     def __init__(self, path: Path | None) -> None:
@@ -37,12 +34,7 @@ class EvaluationFile:
                 )
 
     def open(self, conditions: Sequence[PolicyCondition]) -> None:
-        """Check that conditions fit what is there.
-
-        Raises:
-            HandrailError: the file is of another task, a label stands for other conditions, or a policy is
-                another.
-        """
+        """Check that conditions fit what is there."""
         task = self.content.setdefault("task", conditions[0].checkpoint.meta.environment)
         for condition in conditions:
             label, checkpoint = condition.label, condition.checkpoint
@@ -78,11 +70,7 @@ class EvaluationFile:
         entry["rollouts"].sort(key=lambda rollout: rollout["seed"])
 
     def save(self) -> None:
-        """Write everything, so that a reader sees the old file or the new one, whole.
-
-        Raises:
-            HandrailError: the file cannot be written.
-        """
+        """Write everything, so that a reader sees the old file or the new one, whole."""
         if self._path is None or not self.content["arms"]:
             return
         with explained(f"--json {self._path}"):

@@ -1,5 +1,6 @@
 """One rollout of a trained policy through the one session loop."""
 
+from collections import deque
 from collections.abc import Callable, Sequence
 from functools import lru_cache
 from pathlib import Path
@@ -15,21 +16,66 @@ from handrail.collect.perturbations.push import Pusher
 from handrail.collect.session.build import build_controller, build_env
 from handrail.collect.session.outcome import Outcome
 from handrail.collect.session.session import Observer, Session
+from handrail.collect.tasks.task import Staged
+from handrail.controllers.arrays import FloatArray
 from handrail.controllers.baselines.direct import DirectController
 from handrail.controllers.baselines.unprotected import unprotected_controller
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import Controller
+from handrail.datasets.recording.frames import Frame
 from handrail.policies.imitation.evaluation.conditions import Checkpoint, PolicyCondition, own_protection
 from handrail.policies.imitation.evaluation.features import action_of
 from handrail.policies.imitation.evaluation.operator import AsRecorded, AsSteered, PolicyOperator
-from handrail.policies.imitation.evaluation.progress import RolloutProgress
 from handrail.policies.imitation.interface.checkpoint import TrainedPolicy
 from handrail.policies.imitation.interface.torch_state import repeatable, threads
 
 Load = Callable[[Path], TrainedPolicy]
 Row = dict[str, Any]
 _STAND_IN = {"mpc": "joints", "filter": "direct_filtered"}  # the mode whose controller it is
+
+
+_LATELY = 5.0  # [s]
+_STILL = 0.05  # extent of the tool's way in that time, at the scale of the robot's world [m]
+
+
+class RolloutProgress:
+    """Watches a rollout: the furthest stage of the task that it came to, and whether it stood still."""
+
+    def begin(self, env: HandrailEnv, seed: int) -> None:
+        """Take note that an episode begins."""
+        self._env = env
+        self._furthest, self._stage = -1, -1
+        self._tools: deque[FloatArray] = deque(maxlen=max(2, round(_LATELY * env.fps)))
+
+    def see(self, frame: Frame) -> None:
+        """Look at the truth of this moment."""
+        state, task = self._env.task_state(), self._env.task
+        self._tools.append(state.tool.position)
+        if isinstance(task, Staged):
+            self._stage = task.stages.index(task.stage(state))
+            self._furthest = max(self._furthest, self._stage)
+
+    def failed(self, outcome: Outcome) -> dict[str, str]:
+        """Return of a failure the furthest `stage`, if the task has stages, and how it `ended`.
+
+        `dropped`: what it had in hand; `stalled`: the tool stayed within 5 cm for the last 5 s; `moving`.
+        """
+        task = self._env.task
+        named = {"stage": task.stages[self._furthest]} if isinstance(task, Staged) else {}
+        if outcome.failure_reason == "dropped" or self._fell_back:
+            return named | {"ended": "dropped"}
+        extent = float(np.linalg.norm(np.ptp(np.array(self._tools), axis=0)))
+        still = extent < _STILL * self._env.model.description.world.scale
+        return named | {"ended": "stalled" if still else "moving"}
+
+    @property
+    def _fell_back(self) -> bool:
+        """Whether what had been lifted is in the hand no more."""
+        task = self._env.task
+        if not isinstance(task, Staged) or "carry" not in task.stages:
+            return False
+        return self._stage < task.stages.index("carry") <= self._furthest
 
 
 def run_rollout(

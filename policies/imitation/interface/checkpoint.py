@@ -150,9 +150,6 @@ def load_policy(folder: str | Path, device: str = "cpu") -> TrainedPolicy:
     """Load a policy from a `pretrained_model` folder, a checkpoint, or a training's folder (the last one).
 
     Whoever made it, loading it runs no code of theirs (`trust.py`).
-
-    Raises:
-        HandrailError: there is none, it is broken, or it could do harm.
     """
     place = model_folder(Path(folder).expanduser())
     interface, meta = read_meta(place) if (place / NAME).is_file() else (None, None)
@@ -191,11 +188,7 @@ def _interface_of(before: Any, said: PolicyInterface | None, place: Path) -> Pol
 
 
 def read_meta(folder: Path) -> tuple[PolicyInterface | None, PolicyMeta]:
-    """Return what `handrail.json` in a `pretrained_model` folder says.
-
-    Raises:
-        HandrailError: it is not there, not of this version, or says something that cannot be.
-    """
+    """Return what `handrail.json` in a `pretrained_model` folder says."""
     path = folder / NAME
     content = load_json(path, "a policy of handrail-train")
     if not isinstance(content, dict) or content.get("format") != FORMAT or "interface" not in content:
@@ -237,11 +230,7 @@ def last_checkpoint(training: Path) -> Path | None:
 
 
 def model_folder(folder: Path) -> Path:
-    """Return the `pretrained_model` folder there, in a checkpoint, or in a training's last one.
-
-    Raises:
-        HandrailError: there is none, neither Handrail's nor plain LeRobot's.
-    """
+    """Return the `pretrained_model` folder there, in a checkpoint, or in a training's last one."""
     last = last_checkpoint(folder)
     places = (folder, folder / MODEL, *([last / MODEL] if last else []))
     for name, place in itertools.product((NAME, CONFIG), places):

@@ -75,9 +75,6 @@ class PolicyCompletionStep(ProcessorStep):
     Attributes:
         interface: a `PolicyInterface`, as JSON.
         completion: a `Completion`, as JSON.
-
-    Raises:
-        HandrailError: they are none.
     """
 
     interface: dict[str, Any]
@@ -92,11 +89,7 @@ class PolicyCompletionStep(ProcessorStep):
         self.view = seen_by(self.interface)
 
     def __call__(self, transition: EnvTransition) -> EnvTransition:
-        """Return the action.
-
-        Raises:
-            HandrailError: nothing was seen before, or not what the environment `handrail` shows.
-        """
+        """Return the action."""
         if self.view is not None and not {TIME, SENT, OBSTACLES} & self.view.raw.keys():
             return asked(COMPLETE, transition, self.view, self.seen)
         rows, states = policy_rows(COMPLETE, transition, self.view, self.seen)

@@ -66,9 +66,6 @@ class PolicyInterface:
             episodes: `MASK` of each; read only where the operator's own commands are learnt.
             actions: one of `ACTIONS`.
             base_pose: whether it shall see where the base is.
-
-        Raises:
-            HandrailError: no such action space, or a dataset that does not say what is needed.
         """
         if actions not in ACTIONS:
             raise unknown_name("action space", actions, ACTIONS)
@@ -134,11 +131,7 @@ class PolicyInterface:
 
     @classmethod
     def from_dict(cls, content: Mapping[str, Any]) -> "PolicyInterface":
-        """Return the interface that JSON describes.
-
-        Raises:
-            HandrailError: it describes none.
-        """
+        """Return the interface that JSON describes."""
         check_fields(content, cls, "policy interface", channels=_CHANNELS, masks=_MASKS)
         if content["actions"] not in ACTIONS:
             raise unknown_name("action space", content["actions"], ACTIONS)

@@ -14,11 +14,7 @@ from handrail.policies.imitation.interface.trust import WEIGHTS
 
 
 def load_weights(policy: torch.nn.Module, place: Path) -> None:
-    """Load the weights of a checkpoint into a policy.
-
-    Raises:
-        HandrailError: one is missing, unknown, of another shape or not finite.
-    """
+    """Load the weights of a checkpoint into a policy."""
     try:
         load_model(policy, place / WEIGHTS, strict=True)
     except Exception as error:  # of PyTorch and safetensors: whatever the file holds, it is refused
@@ -27,11 +23,7 @@ def load_weights(policy: torch.nn.Module, place: Path) -> None:
 
 
 def check_weights(policy: torch.nn.Module, place: Path) -> None:
-    """Check the weights that a policy has.
-
-    Raises:
-        HandrailError: a weight is not finite, or a number beside the weights is NaN.
-    """
+    """Check the weights that a policy has."""
     wrong = [name for name, values in policy.named_parameters() if not values.isfinite().all()]
     wrong += [name for name, values in policy.named_buffers() if values.isnan().any()]
     if wrong:
@@ -41,11 +33,7 @@ def check_weights(policy: torch.nn.Module, place: Path) -> None:
 
 
 def check_statistics(pipeline: Any, place: Path) -> None:
-    """Check the statistics of a processor: of every feature that it normalises, or of none.
-
-    Raises:
-        HandrailError: they are missing, of another shape, or not finite.
-    """
+    """Check the statistics of a processor: of every feature that it normalises, or of none."""
     for step in pipeline.steps:
         if type(step) in (NormalizerProcessorStep, UnnormalizerProcessorStep) and step.stats:
             for trouble in _troubles(step):

@@ -116,11 +116,7 @@ class RelativeView:
     base_pose: bool = False
 
     def __post_init__(self) -> None:
-        """Check that what the view starts from is there.
-
-        Raises:
-            HandrailError: the state lacks the tool's pose or a joint.
-        """
+        """Check that what the view starts from is there."""
         needed = (*_TOOL, *(f"{joint}.{kind}" for joint in self.joints for kind in ("pos", "vel")))
         missing = [name for name in needed if name not in self.state_names]
         if missing:

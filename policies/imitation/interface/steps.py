@@ -40,9 +40,6 @@ class PolicyActionStep(ProcessorStep):
 
     Attributes:
         interface: a `PolicyInterface`, as JSON.
-
-    Raises:
-        HandrailError: the interface is none.
     """
 
     interface: dict[str, Any]
@@ -53,11 +50,7 @@ class PolicyActionStep(ProcessorStep):
         self.view = seen_by(self.interface)
 
     def __call__(self, transition: EnvTransition) -> EnvTransition:
-        """Return the action.
-
-        Raises:
-            HandrailError: nothing was seen before, or the action is not the policy's.
-        """
+        """Return the action."""
         return asked(ACT, transition, self.view, self.seen)
 
     def get_config(self) -> dict[str, Any]:

@@ -31,11 +31,7 @@ _NO_PLACE = ("type", "device", "registry_name", "state_file", "action_names", "a
 
 
 def check_links(folder: Path) -> None:
-    """Check that everything in a folder lies in it, and is a file or a folder.
-
-    Raises:
-        HandrailError: one is a link to somewhere else, a named pipe, a socket or a device.
-    """
+    """Check that everything in a folder lies in it, and is a file or a folder."""
     for path in sorted(folder.glob("*")):
         if not is_inside(path, folder):
             raise HandrailError(
@@ -67,9 +63,6 @@ def check_policy_folder(folder: Path, asked: Iterable[Any] = ()) -> dict[str, An
     Args:
         folder: `pretrained_model` of a checkpoint.
         asked: what the user gave themselves; it may name other places.
-
-    Raises:
-        HandrailError: loading it could run somebody's code, or lead somewhere else.
     """
     check_links(folder)
     settings = _settings(folder)

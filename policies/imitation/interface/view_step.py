@@ -32,9 +32,6 @@ class PolicyViewStep(ProcessorStep):
         interface: a `PolicyInterface`, as JSON.
         raw: the observation that was seen last, before it was changed.
         state: as recorded, of that moment, (B, s); None before any.
-
-    Raises:
-        HandrailError: the interface is none.
     """
 
     interface: dict[str, Any]
@@ -47,11 +44,7 @@ class PolicyViewStep(ProcessorStep):
         _made[_key(self.interface)] = self
 
     def __call__(self, transition: EnvTransition) -> EnvTransition:
-        """Return what the policy reads.
-
-        Raises:
-            HandrailError: the observation is not what is recorded.
-        """
+        """Return what the policy reads."""
         observation = dict(transition.get(TransitionKey.OBSERVATION) or {})
         sizes = len(self.seen.state_names), len(self.seen.environment_names)
         if ENVIRONMENT not in observation and _size(observation.get(STATE)) == sum(sizes):
@@ -106,9 +99,6 @@ def policy_rows(
         transition: with the policy's action.
         view: the step that sees.
         seen: what the policy reads and writes.
-
-    Raises:
-        HandrailError: nothing was seen before, or the action is not the policy's.
     """
     if view is None or view.state is None:
         raise HandrailError(
@@ -129,9 +119,6 @@ def asked(step: str, transition: EnvTransition, view: Any, seen: PolicyInterface
         transition: with the policy's action.
         view: the step that sees.
         seen: what the policy reads and writes.
-
-    Raises:
-        HandrailError: as `policy_rows`, or the simulated robot of this process takes other numbers.
     """
     rows, states = policy_rows(step, transition, view, seen)
     numbers = np.stack([seen.asked(row, state) for row, state in zip(rows, states, strict=True)])

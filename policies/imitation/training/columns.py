@@ -26,11 +26,7 @@ def pictured(info: DatasetInfo) -> dict[str, Feature]:
 
 
 def described_cameras(info: DatasetInfo) -> dict[str, dict[str, Any]]:
-    """Return the cameras as LeRobot describes them.
-
-    Raises:
-        HandrailError: there are none.
-    """
+    """Return the cameras as LeRobot describes them."""
     found = pictured(info)
     if not found:
         raise HandrailError(f"--images: expected cameras in {str(info.root)!r}, found none")
@@ -38,11 +34,7 @@ def described_cameras(info: DatasetInfo) -> dict[str, dict[str, Any]]:
 
 
 def picture_stats(pictures: "LeRobotDataset", key: str) -> dict[str, np.ndarray]:
-    """Return what LeRobot knows of a camera's pictures, brightness as ImageNet has it.
-
-    Raises:
-        HandrailError: they are distances, or the dataset says no finite numbers.
-    """
+    """Return what LeRobot knows of a camera's pictures, brightness as ImageNet has it."""
     from lerobot.datasets.factory import IMAGENET_STATS
 
     if key in pictures.meta.depth_keys:

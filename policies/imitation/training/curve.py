@@ -45,11 +45,7 @@ def write_sums(checkpoint: Path, sums: Mapping[str, tuple[float, float]]) -> Non
 
 
 def read_sums(checkpoint: Path | None) -> dict[str, tuple[float, float]]:
-    """Return sum and count of columns as a checkpoint has them; an older one has none.
-
-    Raises:
-        HandrailError: the file is something else.
-    """
+    """Return sum and count of columns as a checkpoint has them; an older one has none."""
     if checkpoint is None or not (path := checkpoint / _SUMS).exists():
         return {}
     content = load_json(path, "sums of a training's curve")

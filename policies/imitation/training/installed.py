@@ -15,9 +15,6 @@ def check_installed(command: str, modules: tuple[str, ...], policy: str = "", ex
         modules: that every policy needs.
         policy: its name in LeRobot.
         extra: of Handrail that brings them.
-
-    Raises:
-        HandrailError: one is not there.
     """
     for module in (*modules, *_OF_POLICY.get(policy, ())):
         if find_spec(module) is None:

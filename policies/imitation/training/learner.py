@@ -56,9 +56,6 @@ def build_learner(
         checkpoint: to go on from; None to begin.
         accelerator: of its processes.
         plateau: says how the learning rate goes; None for the settings' schedule.
-
-    Raises:
-        HandrailError: the checkpoint's weights or statistics are not the policy's, or not finite.
     """
     described = settings.policy
     assert described is not None
@@ -87,11 +84,7 @@ def build_learner(
 
 
 def build_accelerator(policy: Any) -> Accelerator:
-    """Return what spreads a training over the processes it was started in, at the policy's precision.
-
-    Raises:
-        HandrailError: it would split the model, whose parts a checkpoint does not gather.
-    """
+    """Return what spreads a training over the processes it was started in, at the policy's precision."""
     torch.backends.cudnn.benchmark = True
     torch.backends.cuda.matmul.allow_tf32 = True
     accelerator = Accelerator(

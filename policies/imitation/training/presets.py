@@ -77,11 +77,7 @@ def resolved(config: TrainConfig) -> Preset:
 
 
 def device_of(config: TrainConfig) -> str:
-    """Return where to train.
-
-    Raises:
-        HandrailError: that device is not here.
-    """
+    """Return where to train."""
     import torch
 
     device = config.device or ("cuda" if config.preset == "gpu" else "cpu")
@@ -96,9 +92,6 @@ def policy_config(config: TrainConfig) -> "PreTrainedConfig":
     """Return LeRobot's configuration of the policy: preset, then `lr`, then `policy_options`.
 
     The environment's state is normalised like the robot's, nothing is downloaded, nothing is sent anywhere.
-
-    Raises:
-        HandrailError: there is no such policy or setting, or a value does not fit.
     """
     import draccus
 
@@ -127,9 +120,6 @@ def check_policy(config: TrainConfig) -> None:
     """Build a policy once, for made-up inputs, so that what it refuses is known before there is data.
 
     Only its settings are checked where Handrail has no sizes for it: such a policy may load something.
-
-    Raises:
-        HandrailError: there is no such policy or setting, or the policy cannot be built with it.
     """
     described = policy_config(config)
     if (config.policy, config.preset) not in _PRESETS:

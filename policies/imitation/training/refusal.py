@@ -12,11 +12,7 @@ _REFUSALS = (ValueError, TypeError, AssertionError, ImportError, RuntimeError)
 
 @contextmanager
 def in_one_line(config: TrainConfig) -> Iterator[None]:
-    """Turn what is raised while a policy is built or trained into one line.
-
-    Raises:
-        HandrailError: for what arose in LeRobot or below it, and for every OSError.
-    """
+    """Turn what is raised while a policy is built or trained into one line."""
     try:
         yield
     except OSError as error:

@@ -17,11 +17,7 @@ _OLDER = {"base_pose": False, "scene": True}  # of a training before that could 
 
 
 def check_settings(config: TrainConfig, began: PolicyMeta) -> None:
-    """Check that settings are those of a checkpoint, and its sizes still those of the preset.
-
-    Raises:
-        HandrailError: one is another.
-    """
+    """Check that settings are those of a checkpoint, and its sizes still those of the preset."""
     now, then = as_json(config), _OLDER | dict(began.training)
     for entry in fields(config):
         if entry.name not in FREE_ON_RESUME and entry.name in then:
@@ -43,9 +39,6 @@ def check_data(source: "Source", began: PolicyMeta) -> None:
     """Check that what is read is what a checkpoint learnt from.
 
     A checkpoint of an earlier version says nothing of pictures, or only how many episodes and how long.
-
-    Raises:
-        HandrailError: it is something else.
     """
     same = source.digest.startswith(began.data) if began.data else source.trained_on == began.trained_on
     if not same:

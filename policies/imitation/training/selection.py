@@ -35,9 +35,6 @@ def select(rows: Sequence[Row], fps: float, config: TrainConfig) -> Selection:
 
     All attempts of the mode are put into a random order that depends on `draw` alone, and are taken from the
     front until there are enough: the operator would have had to make the failed ones too.
-
-    Raises:
-        HandrailError: there is no such episode, or there are fewer than asked for.
     """
     attempts = _attempts(rows, config)
     order = np.random.default_rng(config.draw).permutation(len(attempts))
@@ -69,9 +66,6 @@ def select_again(rows: Sequence[Row], numbers: Sequence[int], trained_on: Mappin
         rows: lines of metadata of the dataset as it is now.
         numbers: of the episodes.
         trained_on: `attempts` and `operator_time` [s], as they were when they were chosen.
-
-    Raises:
-        HandrailError: one of them is not there.
     """
     there = {row["episode_index"]: row for row in rows}
     missing = [number for number in numbers if number not in there]
@@ -85,11 +79,7 @@ def select_again(rows: Sequence[Row], numbers: Sequence[int], trained_on: Mappin
 
 
 def hold_out(rows: Sequence[Row], config: TrainConfig) -> tuple[list[Row], list[Row]]:
-    """Return the episodes to learn from, and those that are held out, drawn by `draw` alone.
-
-    Raises:
-        HandrailError: there would be none to learn from.
-    """
+    """Return the episodes to learn from, and those that are held out, drawn by `draw` alone."""
     if not config.eval_split:
         return list(rows), []
     count = max(_FEWEST_HELD_OUT, math.ceil(config.eval_split * len(rows)))

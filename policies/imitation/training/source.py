@@ -155,9 +155,6 @@ def read_source(config: TrainConfig, began: PolicyMeta | None = None) -> Source:
     Args:
         config: what to train on.
         began: what the checkpoint says that the training goes on from.
-
-    Raises:
-        HandrailError: there is no such dataset, it cannot be read, or it lacks what the policy needs.
     """
     root = config.dataset.folder
     check_whole(root, config.verify)

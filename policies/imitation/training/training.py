@@ -46,9 +46,6 @@ def train(config: TrainConfig, quiet: bool = False) -> Path:
     Args:
         config: what to train on what.
         quiet: show no progress.
-
-    Raises:
-        HandrailError: a setting is wrong, the dataset does not fit, or there is a training already.
     """
     config.check()
     checkpoint = _begin(config)

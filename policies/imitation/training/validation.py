@@ -32,11 +32,7 @@ class Validation:
     losses: dict[int, float] = field(default_factory=dict)
 
     def measure(self, step: int, learner: Learner, accelerator: Accelerator, batch_size: int) -> float:
-        """Measure the loss after an update, the same in every process; what is random goes on as before.
-
-        Raises:
-            HandrailError: it is not finite.
-        """
+        """Measure the loss after an update, the same in every process; what is random goes on as before."""
         policy = accelerator.unwrap_model(learner.policy)
         policy.eval()
         with torch.random.fork_rng(), torch.no_grad(), accelerator.autocast():

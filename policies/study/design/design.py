@@ -165,11 +165,7 @@ class StudyDesign:
     digest: str = ""
 
     def check(self) -> None:
-        """Check every name, and what only a study asks; `check_jobs` checks the settings of its jobs.
-
-        Raises:
-            HandrailError: one is wrong; the message says what may be chosen.
-        """
+        """Check every name, and what only a study asks; `check_jobs` checks the settings of its jobs."""
         if len(self.modes) < 2 or not self.tasks:
             raise HandrailError(
                 f"study {self.name}: expected two modes or more and a task, "

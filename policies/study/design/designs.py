@@ -29,11 +29,7 @@ def designs(layout: Layout) -> list[dict[str, str]]:
 
 
 def check_cell(name: str, jobs: Sequence[Job]) -> None:
-    """Check that a study has a cell of a name; none is all.
-
-    Raises:
-        HandrailError: it has not.
-    """
+    """Check that a study has a cell of a name; none is all."""
     cells = dict.fromkeys(job.cell.name for job in jobs)
     if name and name not in cells:
         raise unknown_name("cell of the study", name, cells)

@@ -42,11 +42,7 @@ def design_names() -> list[str]:
 
 
 def load_design(name: str) -> StudyDesign:
-    """Return a study by the name of a preset or the path of a TOML file.
-
-    Raises:
-        HandrailError: there is none, or something in it is wrong.
-    """
+    """Return a study by the name of a preset or the path of a TOML file."""
     path = Path(name).expanduser() if name.endswith(".toml") else PRESETS / f"{name}.toml"
     if not path.is_file():
         raise unknown_name("study", name, [*design_names(), "a file that ends in .toml"])

@@ -130,11 +130,7 @@ def fingerprint(job: Job, design: StudyDesign) -> dict[str, Any]:
 
 
 def check_jobs(design: StudyDesign) -> None:
-    """Check the settings of every job of a study before one begins.
-
-    Raises:
-        HandrailError: one is wrong.
-    """
+    """Check the settings of every job of a study before one begins."""
     for job in jobs(design):
         with _named(design, job):
             recording(job.cell, design, Path("dataset")).check()
@@ -145,11 +141,7 @@ def check_jobs(design: StudyDesign) -> None:
 
 
 def check_policies(design: StudyDesign) -> None:
-    """Build the policy of every task once, untrained; loads PyTorch.
-
-    Raises:
-        HandrailError: it cannot be built.
-    """
+    """Build the policy of every task once, untrained; loads PyTorch."""
     firsts = {job.cell.task: job for job in reversed(jobs(design)) if job.policy}
     for job in firsts.values():
         with _named(design, job):

@@ -34,9 +34,6 @@ def run_study(
         config: of the study.
         work: does a job.
         isolated: whether each job gets a process of its own even where there is one worker.
-
-    Raises:
-        HandrailError: a setting is wrong, or another process works in the folder.
     """
     config.check()
     design = load_design(config.preset)

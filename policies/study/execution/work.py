@@ -3,14 +3,20 @@
 import os
 import resource
 import time
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from handrail.controllers.errors import HandrailError
+from handrail.datasets.demonstrations.load import recorded_episodes
 from handrail.datasets.presentation.terminal import Terminal
+from handrail.datasets.quality.measure import measure
+from handrail.datasets.reading.digest import digest_of_dataset
 from handrail.datasets.reading.reader import read_episodes
 from handrail.datasets.storage.atomic import remove
 from handrail.policies.imitation.interface.checkpoint import last_checkpoint, read_meta
@@ -18,9 +24,29 @@ from handrail.policies.study.design.design import StudyDesign
 from handrail.policies.study.design.jobs import CONDITIONS, Cell, Job, Layout, StudyPolicy
 from handrail.policies.study.design.progress import note_of, read_json, write_json
 from handrail.policies.study.design.settings import evaluations, fingerprint, recording, training
-from handrail.policies.study.execution.summary import summary
 
 _MOST_ATTEMPTS = 6  # for each success that is wanted
+
+
+def summary(root: Path, seed: int) -> dict[str, Any]:
+    """Return how much was recorded, how it ended, how good it is, and a digest of it all.
+
+    Args:
+        root: of the dataset.
+        seed: of what the metrics draw.
+    """
+    episodes = recorded_episodes(root)
+    measured = measure({"all": episodes}, np.random.default_rng(seed)).values
+    failed = (episode.meta.get("failure_reason") for episode in episodes if not episode.success)
+    return {
+        "episodes": len(episodes),
+        "successes": sum(bool(episode.success) for episode in episodes),
+        "minutes": sum(episode.seconds for episode in episodes) / 60.0,
+        "frames": sum(episode.count for episode in episodes),
+        "reasons": dict(Counter(str(reason or "not recorded") for reason in failed).most_common()),
+        "digest": digest_of_dataset(root),
+        "quality": {name: each["all"].mean for name, each in measured.items() if each["all"].applies},
+    }
 
 
 def do(job: Job, design: StudyDesign, root: Path) -> None:
@@ -52,9 +78,6 @@ def begin(job: Job, design: StudyDesign, layout: Layout) -> None:
 
     A dataset may grow, but never mix two ways to record; rollouts of other conditions go, and those of a
     policy that is gone; a policy that learnt otherwise goes with all its rollouts.
-
-    Raises:
-        HandrailError: nobody knows with which settings something was made that is there.
     """
     settings, before = fingerprint(job, design), read_json(layout.begun(job))
     stale = [path for path in _stale(job, settings, before, layout) if path.exists()]
@@ -82,11 +105,7 @@ def _stale(job: Job, now: Mapping[str, Any], before: Mapping[str, Any], layout: 
 
 
 def work(job: Job, design: StudyDesign, layout: Layout) -> dict[str, Any]:
-    """Do a job and return what is to be known of it when what is large is gone.
-
-    Raises:
-        HandrailError: it cannot be done.
-    """
+    """Do a job and return what is to be known of it when what is large is gone."""
     if job.policy:
         return _train_and_evaluate(job, job.policy, design, layout)
     root, before = layout.dataset(job.cell), note_of(job, layout)

@@ -75,9 +75,6 @@ def write_study(config: StudyConfig, progress: StudyProgress) -> list[Path]:
     Args:
         config: says whether there is a page.
         progress: of the study: only what is done is reported, and it says how much is not.
-
-    Raises:
-        HandrailError: a file cannot be written.
     """
     root, results = progress.layout.root, gather(progress)
     found = contrasts(results)

@@ -29,11 +29,7 @@ class ShowcaseConfig:
         return Path(self.output).expanduser()
 
     def check(self) -> None:
-        """Check what can be checked without loading anything heavy.
-
-        Raises:
-            HandrailError: one setting is wrong; the message says what may be chosen.
-        """
+        """Check what can be checked without loading anything heavy."""
         if self.case not in CASES:
             raise unknown_name("case", self.case, CASES)
         if self.seconds != 0 and not 0.5 <= self.seconds <= 120.0:

@@ -22,9 +22,6 @@ def case_figure(trace: Trace, model: RobotModel, margin: float) -> Any:
         trace: of the run.
         model: of the robot.
         margin: of the controller [m].
-
-    Raises:
-        HandrailError: matplotlib is not installed.
     """
     places = np.vstack([trace.q[:, :2], trace.hand[:, :2]])
     length, width = np.ptp(places, axis=0) + model.description.base_size

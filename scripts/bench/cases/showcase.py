@@ -45,9 +45,6 @@ def showcase(config: ShowcaseConfig) -> dict[str, Any]:
     """Run a case and write `<case>.mp4`, `<case>.png` and `<case>.json`; return what the JSON says.
 
     Without OpenGL there is no video, and `video` says why.
-
-    Raises:
-        HandrailError: a setting is wrong, or the folder cannot be written.
     """
     config.check()
     case = cases()[config.case]

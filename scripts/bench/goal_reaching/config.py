@@ -65,11 +65,7 @@ class BenchmarkConfig(ExecutionConfig):
         return "_".join([*kinds, f"seed_{self.seed}"])
 
     def check(self) -> None:
-        """Check what can be checked without loading anything heavy.
-
-        Raises:
-            HandrailError: one setting is wrong; the message says what may be chosen.
-        """
+        """Check what can be checked without loading anything heavy."""
         check_names("controller", "--controllers", self.controller_names, BASELINES)
         check_names("profile", "--profile", self.profile_names, PROFILES)
         check_whole(self, goals=1, seed=0)

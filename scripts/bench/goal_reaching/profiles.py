@@ -52,9 +52,6 @@ def profile_commands(profile: str, planner: StraightPlanner, rng: np.random.Gene
         profile: one of `PROFILES`.
         planner: at the profile's speed, `SPEEDS`.
         rng: of noise, delays and dropouts.
-
-    Raises:
-        HandrailError: there is no such profile.
     """
     if profile not in PROFILES:
         raise unknown_name("profile", profile, PROFILES)

@@ -60,9 +60,6 @@ def available(
     Args:
         baselines: all that there are, by name.
         config: who was asked for.
-
-    Raises:
-        HandrailError: one that was asked for by name cannot take part, or nobody can.
     """
     present, skipped = [], {}
     for name in config.controller_names:
@@ -87,9 +84,6 @@ def run(
         config: what to run.
         baselines: who takes part.
         console: to show how far it is; nothing without one.
-
-    Raises:
-        HandrailError: an episode cannot be run.
     """
     jobs = [
         Job(f"goal {index} {profile}", run_goal, (config, baselines, index, profile), size=len(baselines))

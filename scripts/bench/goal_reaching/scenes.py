@@ -43,9 +43,6 @@ def cluttered_floor(model: RobotModel, goal: Pose, rng: np.random.Generator) -> 
         model: of the robot.
         goal: where the hand will go.
         rng: of places.
-
-    Raises:
-        HandrailError: there is no room.
     """
     hand = model.pose(model.description.home).position[:2]
     placed: list[SceneObject] = []

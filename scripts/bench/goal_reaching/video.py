@@ -44,11 +44,7 @@ class Example:
     runs: Sequence[tuple[str, Trace]]
 
     def film(self, path: Path) -> None:
-        """Write them as a video, side by side.
-
-        Raises:
-            HandrailError: there is no OpenGL on this machine.
-        """
+        """Write them as a video, side by side."""
         size = (_SIZE[0] + _BAR, _SIZE[1] * len(self.runs))
         rate = 1 / (EVERY * Fraction(STEP).limit_denominator(1000))
         steps = range(0, self._longest + _REST * EVERY, EVERY)
@@ -57,11 +53,7 @@ class Example:
                 video.add(np.hstack(pictures))
 
     def strip(self) -> bytes:
-        """Return them as one PNG: a row each, from left to right in step.
-
-        Raises:
-            HandrailError: there is no OpenGL on this machine.
-        """
+        """Return them as one PNG: a row each, from left to right in step."""
         steps = np.linspace(0, self._longest - 1, _MOMENTS).round().astype(int).tolist()
         rows = zip(*self._pictures(steps, _SMALL), strict=True)
         sheet = Image.fromarray(contact_sheet([each for row in rows for each in row], columns=_MOMENTS))

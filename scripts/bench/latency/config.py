@@ -30,11 +30,7 @@ class LatencyConfig:
     """Put the table into this Markdown page."""
 
     def check(self) -> None:
-        """Check the settings.
-
-        Raises:
-            HandrailError: one is wrong.
-        """
+        """Check the settings."""
         check_whole(self, seconds=5, spectators=0, slow_spectators=0, image_size=0, seed=0)
         if self.spectators + self.slow_spectators > 30:
             raise HandrailError("--spectators and --slow_spectators: expected at most 30 together")

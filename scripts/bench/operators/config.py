@@ -47,11 +47,7 @@ class TrialsConfig(ExecutionConfig):
         return names(self.modes, MODES)
 
     def check(self) -> None:
-        """Check what can be checked without loading anything heavy.
-
-        Raises:
-            HandrailError: one setting is wrong; the message says what may be chosen.
-        """
+        """Check what can be checked without loading anything heavy."""
         check_names("task", "--tasks", self.task_names, TASKS)
         check_names("mode", "--modes", self.mode_names, MODES)
         check_whole(self, episodes=1, persons=1, seed=0)

@@ -58,9 +58,6 @@ class TrialsFile:
     Args:
         path: of the file.
         config: what is asked for.
-
-    Raises:
-        HandrailError: the file is none of trials, or of other settings.
     """
 
     def __init__(self, path: Path, config: TrialsConfig) -> None:

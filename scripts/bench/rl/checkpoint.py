@@ -44,11 +44,7 @@ _OURS = {*_WRITTEN, *(f".{name}.partial" for name in _WRITTEN), "checkpoints", "
 
 
 def begin_run(config: TrainRlConfig) -> None:
-    """Make the folder of a new run and write its settings.
-
-    Raises:
-        HandrailError: something is there that must not be removed.
-    """
+    """Make the folder of a new run and write its settings."""
     folder, settings = config.folder, config.folder / "config.json"
     if folder.exists() and any(folder.iterdir()):
         if not config.overwrite:
@@ -63,11 +59,7 @@ def begin_run(config: TrainRlConfig) -> None:
 
 
 def check_resumes(config: TrainRlConfig) -> Path:
-    """Return the last checkpoint of a run that goes on with these settings.
-
-    Raises:
-        HandrailError: there is no checkpoint, or the settings differ from those that the run began with.
-    """
+    """Return the last checkpoint of a run that goes on with these settings."""
     last = _there(config.folder, "--resume")
     path = config.folder / "config.json"
     settings = load_json(path, "settings of a training run")
@@ -86,9 +78,6 @@ def resume_run(last: Path, model: SAC) -> tuple[Curve, float]:
     Args:
         last: checkpoint of the run.
         model: untrained, with the same settings.
-
-    Raises:
-        HandrailError: the checkpoint is broken, or of another version.
     """
     curve = _curve(last / _CURVE, int(last.name))
     parameters, variables = _tensors(last / _NETWORKS)
@@ -106,11 +95,7 @@ def resume_run(last: Path, model: SAC) -> tuple[Curve, float]:
 
 
 def start_from(folder: Path, model: SAC) -> None:
-    """Give a model actor, critics and target critics of a run's last checkpoint, not the optimisers' memory.
-
-    Raises:
-        HandrailError: there is no checkpoint, or it is broken.
-    """
+    """Give a model the actor and critics of a run's last checkpoint, not the optimisers' memory."""
     last = _there(folder, "--start_from")
     parameters, _ = _tensors(last / _NETWORKS)
     try:
@@ -158,11 +143,7 @@ def _last(folder: Path) -> Path | None:
 
 
 def _there(folder: Path, flag: str) -> Path:
-    """Return the last checkpoint of somebody's run.
-
-    Raises:
-        HandrailError: there is none, or a file of it is a link to somewhere else.
-    """
+    """Return the last checkpoint of somebody's run."""
     last = _last(folder)
     if last is None:
         raise HandrailError(f"{flag}: expected a run with a checkpoint in {folder}, found none")

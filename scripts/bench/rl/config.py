@@ -89,11 +89,7 @@ class TrainRlConfig:
         return Path(self.output_dir).expanduser()
 
     def check(self) -> None:
-        """Check the settings.
-
-        Raises:
-            HandrailError: one is wrong.
-        """
+        """Check the settings."""
         check_installed("bench rl", ("stable_baselines3", "tensorboard"), extra="rl")
         check_whole(self, **dict.fromkeys(_COUNTS, 1), seed=0, random_steps=0)
         for names, fits, expected in _RANGES:
@@ -106,11 +102,7 @@ class TrainRlConfig:
             raise HandrailError("--resume and --overwrite: expected one of them, got both")
 
     def check_continues(self, earlier: "TrainRlConfig") -> None:
-        """Check that a run can go on with these settings.
-
-        Raises:
-            HandrailError: one differs that must not.
-        """
+        """Check that a run can go on with these settings."""
         for entry in fields(self):
             now, then = getattr(self, entry.name), getattr(earlier, entry.name)
             if entry.name not in _FREE_ON_RESUME and now != then:

@@ -38,11 +38,7 @@ class ScalingConfig:
 
     @property
     def places(self) -> tuple[ExecutionConfig, ...]:
-        """Where it is recorded, one after the other.
-
-        Raises:
-            HandrailError: a number of workers is none.
-        """
+        """Where it is recorded, one after the other."""
         words = [word.strip() for word in self.workers.split(",")]
         if not all(word.isdecimal() and 1 <= int(word) <= MOST_WORKERS for word in words):
             raise HandrailError(
@@ -52,11 +48,7 @@ class ScalingConfig:
         return (*(ExecutionConfig(workers=int(word)) for word in words), *shared)
 
     def check(self) -> None:
-        """Check the settings.
-
-        Raises:
-            HandrailError: one is wrong.
-        """
+        """Check the settings."""
         check_names("task", "--task", (self.task,), TASKS)
         check_names("mode", "--mode", (self.mode,), MODES)
         check_whole(self, episodes=1, seed=0)

@@ -29,9 +29,6 @@ def measure(config: ScalingConfig) -> dict[str, Any]:
 
     Args:
         config: of the measurement.
-
-    Raises:
-        HandrailError: a setting is wrong, or a recording failed.
     """
     config.check()
     load = os.getloadavg()[0]
@@ -102,11 +99,7 @@ def _run(config: ScalingConfig, place: ExecutionConfig, root: Path) -> dict[str,
 
 
 def _cores(place: ExecutionConfig) -> int:
-    """Return how many cores share the work.
-
-    Raises:
-        HandrailError: there is no such cluster.
-    """
+    """Return how many cores share the work."""
     if not place.ray:
         return place.processes
     from handrail.collect.execution.cluster import Cluster

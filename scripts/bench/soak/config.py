@@ -36,11 +36,7 @@ class SoakConfig:
         return Path(self.output).expanduser().absolute()
 
     def check(self) -> None:
-        """Check the settings.
-
-        Raises:
-            HandrailError: one is wrong.
-        """
+        """Check the settings."""
         check_whole(self, rounds=0, seed=0)
         check_page(self.page)
         if not 0.0 <= self.hours <= 1000.0:

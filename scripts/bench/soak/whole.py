@@ -27,9 +27,6 @@ def saved_in(root: Path, first: int = 0) -> Saved:
     Args:
         root: of the dataset.
         first: number of its first episode in the whole recording.
-
-    Raises:
-        HandrailError: a saved episode cannot be read.
     """
     if not Layout(root).info.is_file():
         return {}
@@ -55,11 +52,7 @@ def saved_in(root: Path, first: int = 0) -> Saved:
 
 
 def saved_by(root: Path) -> Saved:
-    """Return what a recording has saved, in its dataset and in its shards.
-
-    Raises:
-        HandrailError: a saved episode cannot be read, also when asked again.
-    """
+    """Return what a recording has saved, in its dataset and in its shards."""
     for chance in range(_TRIES):
         try:
             shards = sorted(root.parent.glob(f".{root.name}.shards/shard-*/"))

@@ -80,9 +80,6 @@ def mink(loop: TimingLoop, activation_distance: float) -> Solve:
     Args:
         loop: whose robot, scenes and states.
         activation_distance: beyond the margin, at which a pair enters mink's problem [m].
-
-    Raises:
-        HandrailError: mink is not installed.
     """
     controller = MinkController(loop.model, PERIOD, activation_distance)
     hand = Channels.of(loop.model.description).mask("ee")

@@ -32,11 +32,7 @@ class ProfileConfig:
     """Write everything measured to this file."""
 
     def check(self) -> None:
-        """Check the settings.
-
-        Raises:
-            HandrailError: one is wrong.
-        """
+        """Check the settings."""
         check_whole(self, updates=10, solves=1, seed=0, qps=0)
         check_names("task", "--tasks", names(self.tasks, TASKS), TASKS)
         check_names("robot", "--robots", names(self.robots, ROBOTS), ROBOTS)

@@ -65,11 +65,7 @@ def _daqp() -> QpSolver:
 
 
 def _piqp() -> QpSolver:
-    """Return PIQP, a proximal interior-point method, on sparse matrices; it cannot begin with a guess.
-
-    Raises:
-        HandrailError: PIQP is not installed.
-    """
+    """Return PIQP, a proximal interior-point method, on sparse matrices; it cannot begin with a guess."""
     try:
         piqp: Any = import_module("piqp")
     except ImportError as error:

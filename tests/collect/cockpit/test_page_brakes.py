@@ -20,7 +20,7 @@ from cockpit_witness import Relay, Witness, closing, is_moving, is_still
 from page_driver import PageDriver
 
 from handrail.datasets.reading.reader import read_episodes, read_frames
-from handrail.scripts.bench.latency.machine import family
+from handrail.scripts.bench.latency.measure import family
 
 pytestmark = pytest.mark.slow
 WITHIN = 0.3  # [s]

@@ -11,9 +11,7 @@ import pytest
 from handrail.collect.cockpit import stage
 from handrail.collect.cockpit.disk import DiskWatch
 from handrail.collect.cockpit.lead import AHEAD, Leads
-from handrail.collect.cockpit.nearest import NearestPair
-from handrail.collect.cockpit.reasons import STATUS, reason
-from handrail.collect.cockpit.snapshot import Snapshots
+from handrail.collect.cockpit.snapshot import STATUS, NearestPair, Snapshots, reason
 from handrail.collect.config import DatasetConfig, RecordConfig
 from handrail.collect.operators.operator import View
 from handrail.collect.operators.person.inputs import Ask

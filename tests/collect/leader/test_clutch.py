@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from handrail.collect.leader.clutch import Clutch
+from handrail.collect.leader.follower import Clutch
 
 LIMIT = np.array([1.0, 2.0, 3.0])
 ANGLES = arrays(float, 3, elements=st.floats(-3.0, 3.0))

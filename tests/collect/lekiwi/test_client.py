@@ -11,7 +11,7 @@ from lekiwi_helpers import ZERO, PlayedClient
 
 from handrail.collect.commands.replay import replay_episode
 from handrail.collect.commands.tables import summary_table
-from handrail.collect.lekiwi import client_env
+from handrail.collect.lekiwi import client_plant
 from handrail.collect.lekiwi.client_plant import ClientPlant
 from handrail.collect.lekiwi.link import Link
 from handrail.collect.simulation.scene import Scene, Viewpoint
@@ -32,7 +32,7 @@ def recorded(client: PlayedClient, folder, *flags):
     def connect(*_) -> Link:
         return link(client)
 
-    with mock.patch.object(client_env, "connect", connect):
+    with mock.patch.object(client_plant, "connect", connect):
         return command(folder, *FLAGS, *flags)
 
 

@@ -11,8 +11,7 @@ from command_helpers import command
 from handrail.collect.envs.env import HandrailEnv
 from handrail.collect.lekiwi.body import LeKiwiBody
 from handrail.collect.lekiwi.host_config import HostConfig
-from handrail.collect.lekiwi.host_loop import EPISODE, SEED, SENT, LeKiwiLoop
-from handrail.collect.lekiwi.wire import Wire
+from handrail.collect.lekiwi.host_loop import EPISODE, SEED, SENT, LeKiwiLoop, Wire
 from handrail.collect.processor.units import robot_units
 from handrail.collect.tasks.reach import Reach
 

@@ -2,8 +2,8 @@
 
 import pytest
 
-from handrail.collect.lerobot.episode_clock import EpisodeClock, Phase
-from handrail.collect.lerobot.pace import Pace
+from handrail.collect.lerobot.scripted import EpisodeClock, Phase
+from handrail.collect.lerobot.sim import Pace
 
 PERIOD = 0.05
 

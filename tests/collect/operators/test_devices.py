@@ -8,7 +8,7 @@ from device_helpers import GOAL, HOME, MODEL, PERFECT, PERIOD, Wisher, drive, fi
 
 from handrail.collect.operators.devices.devices import DEVICES
 from handrail.collect.operators.devices.input_map import StickMap
-from handrail.collect.operators.devices.joint_order import clear_order, sweep_clearance
+from handrail.collect.operators.devices.single_axis import clear_order, sweep_clearance
 from handrail.collect.operators.human.human import HumanSettings
 from handrail.collect.operators.human.motion_goal import MotionGoal
 from handrail.collect.operators.human.steering import Gains

@@ -11,8 +11,8 @@ from places import ROOT
 from processor_helpers import PERIOD, Clock, Drive
 
 from handrail.collect.processor.mpc_step import NAME, MaskedMpcStep, load_pipeline
-from handrail.collect.processor.odometry import moved
 from handrail.collect.processor.units import robot_units
+from handrail.collect.processor.whole_body import moved
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.robot.model import load_model
 

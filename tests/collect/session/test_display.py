@@ -14,8 +14,7 @@ from command_helpers import command
 from handrail.collect.config import SessionConfig
 from handrail.collect.session import viewer
 from handrail.collect.session.build import build_env, build_session
-from handrail.collect.session.display import Display
-from handrail.collect.session.rerun_drawing import Drawing
+from handrail.collect.session.display import Display, Drawing
 from handrail.datasets.reading.reader import read_info
 
 pytest.importorskip("rerun")

@@ -12,8 +12,7 @@ from handrail.collect.simulation.scene import Scene
 from handrail.collect.simulation.simulation import Simulation
 from handrail.collect.tasks.drawer import Drawer
 from handrail.collect.tasks.furniture import cube
-from handrail.collect.tasks.goals import sample_goal_for
-from handrail.collect.tasks.reach import Reach
+from handrail.collect.tasks.reach import Reach, sample_goal_for
 from handrail.collect.tasks.tray import Tray
 from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.errors import HandrailError

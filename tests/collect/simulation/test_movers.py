@@ -12,8 +12,7 @@ from handrail.collect.session.build import build_env, build_session
 from handrail.collect.session.session import Session
 from handrail.collect.simulation.patrol import Patrol
 from handrail.collect.simulation.scene import Scene, SceneObject
-from handrail.collect.tasks.moving import FASTEST, sample_movers
-from handrail.collect.tasks.reach import Reach
+from handrail.collect.tasks.reach import FASTEST, Reach, sample_movers
 from handrail.collect.tasks.task import Start
 from handrail.controllers.baselines.direct import DirectController
 from handrail.controllers.collision.model import CollisionModel

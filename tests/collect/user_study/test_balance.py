@@ -6,9 +6,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from handrail.collect.user_study.balance import order, williams
 from handrail.collect.user_study.design import UserStudy
-from handrail.collect.user_study.plan import orders, plan, practice_seed, trial_seed
+from handrail.collect.user_study.plan import order, orders, plan, practice_seed, trial_seed, williams
 
 
 @pytest.mark.parametrize("n", range(2, 9))

@@ -11,7 +11,7 @@ from handrail.collect.tasks.reach import Reach
 from handrail.collect.tasks.task import TaskState
 from handrail.collect.tasks.tray import Tray
 from handrail.controllers.robot.model import Pose, load_model
-from handrail.policies.imitation.evaluation.progress import RolloutProgress
+from handrail.policies.imitation.evaluation.rollout import RolloutProgress
 
 MODEL = load_model()
 START = PickPlace().sample(MODEL, np.random.default_rng(0))

@@ -16,12 +16,11 @@ from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.robot.model import load_model
 from handrail.scripts.bench.goal_reaching import video
-from handrail.scripts.bench.goal_reaching.benchmark import benchmark
+from handrail.scripts.bench.goal_reaching.benchmark import benchmark, write_page
 from handrail.scripts.bench.goal_reaching.catalogue import BASELINES
 from handrail.scripts.bench.goal_reaching.config import BenchmarkConfig
 from handrail.scripts.bench.goal_reaching.figures import figures
 from handrail.scripts.bench.goal_reaching.metrics import METRICS
-from handrail.scripts.bench.goal_reaching.report import write_page
 from handrail.scripts.bench.goal_reaching.run import available, conditions, goals, run, trace_of
 from handrail.scripts.bench.goal_reaching.tables import benchmark_tables
 
