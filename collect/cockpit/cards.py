@@ -6,7 +6,7 @@ import time
 from collections.abc import Mapping
 from typing import Any
 
-from handrail.collect.cockpit.messages import Answer
+from handrail.collect.cockpit.messages import CardAnswer
 from handrail.collect.cockpit.pipe import ANSWER, CARD, STOP
 from handrail.collect.cockpit.process import ServerProcess
 
@@ -32,7 +32,7 @@ class Cards:
             self._server.send_surely(CARD, data, (CARD,))
             self._shown, self._at = data, time.monotonic()
 
-    def hear(self, patience: float = 0.1) -> list[Answer]:
+    def hear(self, patience: float = 0.1) -> list[CardAnswer]:
         """Return what was answered, waiting a little for it; a STOP is left for the next episode.
 
         Args:
@@ -41,4 +41,4 @@ class Cards:
         select.select([self._server.pipe], [], [], patience)
         messages = self._server.receive()
         self._server.unread = [each for each in messages if each[0] == STOP]
-        return [Answer(**json.loads(data)) for kind, data in messages if kind == ANSWER]
+        return [CardAnswer(**json.loads(data)) for kind, data in messages if kind == ANSWER]

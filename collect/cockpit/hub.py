@@ -11,7 +11,7 @@ from typing import Any
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from handrail.collect.cockpit.lease import Lease
-from handrail.collect.cockpit.messages import LEASE, Answer, Drive, Said, Stop, parse, stills
+from handrail.collect.cockpit.messages import LEASE, CardAnswer, Drive, Said, Stop, parse, stills
 from handrail.collect.cockpit.page_socket import REPLACED, PageSocket
 from handrail.collect.cockpit.pipe import (
     ANSWER,
@@ -215,7 +215,7 @@ class Hub:
             self._tell_all()
         elif not self._lease.drives(page.name):
             self.counts["input of who does not drive"] += 1
-        elif isinstance(said, Answer):
+        elif isinstance(said, CardAnswer):
             self._pipe.send_surely(ANSWER, json.dumps(asdict(said)).encode())
         elif isinstance(said, Drive):
             self._drive(page, said, now)

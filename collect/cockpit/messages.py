@@ -29,7 +29,7 @@ _LARGEST_ANGLE = 20.0  # [rad]
 
 
 @dataclass(frozen=True)
-class Answer:
+class CardAnswer:
     """What a person says to a question on a card.
 
     Attributes:
@@ -69,7 +69,7 @@ class Drive:
     inputs: Inputs
 
 
-Said = Drive | Ask | Answer | Stop
+Said = Drive | Ask | CardAnswer | Stop
 
 
 def stills(said: Said) -> bool:
@@ -117,7 +117,7 @@ def _drive(said: dict[str, Any]) -> Drive:
     return Drive(sequence, _number("echo", said["echo"], 0.0, 1e12), inputs)
 
 
-def _answer(said: dict[str, Any]) -> Answer:
+def _answer(said: dict[str, Any]) -> CardAnswer:
     _check_keys(said, ("card", "item", "value"))
     for name in ("card", "item"):
         if not isinstance(said[name], str) or len(said[name]) > _LONGEST_NAME:
@@ -129,7 +129,7 @@ def _answer(said: dict[str, Any]) -> Answer:
             if type(value) is int and abs(value) < _MOST_SEQUENCE
             else _number("value", value, -1e9, 1e9)
         )
-    return Answer(said["card"], said["item"], value)
+    return CardAnswer(said["card"], said["item"], value)
 
 
 def _numbers(name: str, value: object, largest: float) -> tuple[float, ...]:

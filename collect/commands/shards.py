@@ -18,7 +18,7 @@ from handrail.collect.config import RecordConfig
 from handrail.collect.session.recorded_settings import settings_json
 from handrail.controllers.errors import HandrailError, message_of
 from handrail.datasets.editing.merge import check_alike, merged_encodings, merged_types
-from handrail.datasets.editing.source import Source
+from handrail.datasets.editing.source import EditSource
 from handrail.datasets.format.layout import Layout
 from handrail.datasets.format.lines import rows_of_lines
 from handrail.datasets.format.manifest import Manifest
@@ -142,7 +142,7 @@ class Shards:
             shards = self.all
             begin = lines(shards[0])
             roots = [self.root] * bool(self.first) + [shards[0].folder]
-            sources = [Source.open(root) for root in roots]
+            sources = [EditSource.open(root) for root in roots]
             check_alike(sources[0], sources[-1])
             manifest, types = sources[0].manifest, merged_types(sources)
             found = chain([begin], map(lines, shards[1:]))

@@ -14,7 +14,7 @@ from handrail.collect.devices.key_bytes import (
     KeyBytes,
 )
 from handrail.collect.devices.reading import Reading
-from handrail.collect.devices.terminal import ARE_YOU_THERE, Terminal
+from handrail.collect.devices.terminal import ARE_YOU_THERE, KeyTerminal
 
 HELD = 0.2  # after its last character, a key of a terminal that does not tell releases counts as let go [s]
 _AGAIN = 0.7  # what comes earlier is a repetition, whose first one comes after 0.25 to 0.66 s [s]
@@ -38,8 +38,10 @@ class Keyboard:
 
     name = "keyboard"
 
-    def __init__(self, terminal: Terminal | None = None, clock: Callable[[], float] = time.monotonic) -> None:
-        self._terminal, self._clock = terminal or Terminal(), clock
+    def __init__(
+        self, terminal: KeyTerminal | None = None, clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        self._terminal, self._clock = terminal or KeyTerminal(), clock
         self._begin()
 
     def open(self) -> None:

@@ -32,7 +32,7 @@ class Heard:
     round_trip: float = 0.0
 
 
-class Source:
+class DeviceSource:
     """A device, its thread, and its map.
 
     Args:

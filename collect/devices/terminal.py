@@ -25,7 +25,7 @@ def has_terminal() -> bool:
         return False
 
 
-class Terminal:
+class KeyTerminal:
     """The terminal of standard input."""
 
     def __init__(self) -> None:

@@ -33,7 +33,7 @@ class _Worker:
         self.job: Job | None = None
 
 
-class Pool:
+class ProcessPool:
     """Runs jobs in processes that end with this one.
 
     Args:
@@ -163,7 +163,7 @@ def engine_of(config: ExecutionConfig, preload: Sequence[str] = (), fresh: bool 
 
         return Cluster(config.ray, fresh)
     if config.is_shared or fresh:
-        from handrail.collect.execution.engine import Pool
+        from handrail.collect.execution.engine import ProcessPool
 
-        return Pool(config.processes, preload, fresh)
+        return ProcessPool(config.processes, preload, fresh)
     return Here()

@@ -17,7 +17,7 @@ from handrail.collect.session.build import build_operator
 _MARGIN = 2.0  # periods by which LeRobot's clock may be behind ours
 
 
-class Phase(StrEnum):
+class ClockPhase(StrEnum):
     """What a teleoperator that runs by itself does now."""
 
     DRIVE = "drive"
@@ -51,7 +51,7 @@ class EpisodeClock:
         self._over: float | None = None
         self._changed = False
 
-    def phase(self, done: bool) -> Phase:
+    def phase(self, done: bool) -> ClockPhase:
         """Return what to do now.
 
         Args:
@@ -63,26 +63,26 @@ class EpisodeClock:
         if self._over is None and self._is_over(now, done):
             self._over = now
         if self._over is None:
-            return Phase.DRIVE
+            return ClockPhase.DRIVE
         return self._between(now)
 
     def _is_over(self, now: float, done: bool) -> bool:
         assert self._begun is not None
         return now - self._begun >= self._episode if self._episode else done
 
-    def _between(self, now: float) -> Phase:
+    def _between(self, now: float) -> ClockPhase:
         assert self._begun is not None
         assert self._over is not None
         start = self._begun + self._episode if self._episode else self._over
         if not self._changed:
             if now < start + self._reset / 2:
-                return Phase.WAIT
+                return ClockPhase.WAIT
             self._changed = True
-            return Phase.NEXT
+            return ClockPhase.NEXT
         if now < start + self._reset + self._margin:
-            return Phase.WAIT
+            return ClockPhase.WAIT
         self._begun, self._over, self._changed = now, None, False
-        return Phase.DRIVE
+        return ClockPhase.DRIVE
 
 
 class HandrailScripted(SimTeleoperator):
@@ -110,8 +110,8 @@ class HandrailScripted(SimTeleoperator):
 
     def _act(self, session: Stepwise) -> dict[str, float]:
         phase = self._clock.phase(session.loop.done)
-        if phase is not Phase.DRIVE:
-            return session.action.still(session.gripper) | {NEXT if phase is Phase.NEXT else HOLD: 1.0}
+        if phase is not ClockPhase.DRIVE:
+            return session.action.still(session.gripper) | {NEXT if phase is ClockPhase.NEXT else HOLD: 1.0}
         if session.episodes != self._begun:
             self._operator.reset(session.view, np.random.default_rng([session.seed, 1]))
             self._begun = session.episodes

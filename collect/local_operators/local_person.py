@@ -6,7 +6,7 @@ import numpy as np
 from rich.console import RenderableType
 
 from handrail.collect.devices.control_map import Moves
-from handrail.collect.devices.source import Heard, Source
+from handrail.collect.devices.source import DeviceSource, Heard
 from handrail.collect.envs.env import HandrailEnv
 from handrail.collect.leader.follower import Follower
 from handrail.collect.local_operators.card import Card
@@ -69,7 +69,12 @@ class LocalPerson:
     """
 
     def __init__(
-        self, person: Person, main: Source, beside: Source | None, follower: Follower | None, card: Card
+        self,
+        person: Person,
+        main: DeviceSource,
+        beside: DeviceSource | None,
+        follower: Follower | None,
+        card: Card,
     ) -> None:
         self._person, self._main, self._beside = person, main, beside
         self._follower, self._card = follower, card
@@ -120,10 +125,10 @@ class LocalPerson:
         for source in filter(None, (self._main, self._beside)):
             source.close()
 
-    def _hear(self, source: Source | None) -> Heard | None:
+    def _hear(self, source: DeviceSource | None) -> Heard | None:
         return source.listen(self._banks(source)) if source else None
 
-    def _banks(self, source: Source) -> list[Moves]:
+    def _banks(self, source: DeviceSource) -> list[Moves]:
         """Return the banks of a device for what is steered now."""
         meaning = self._person.meaning
         channels, mask = meaning.channels, meaning.mask(self._person.setting)

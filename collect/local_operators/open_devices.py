@@ -10,7 +10,7 @@ from handrail.collect.devices.key_bytes import NAMES
 from handrail.collect.devices.keyboard import Keyboard
 from handrail.collect.devices.poller import Poller
 from handrail.collect.devices.reading import Device
-from handrail.collect.devices.source import Source
+from handrail.collect.devices.source import DeviceSource
 from handrail.collect.devices.spacemouse import SpaceMouse
 from handrail.collect.devices.stick import StickShape
 from handrail.collect.devices.terminal import has_terminal
@@ -97,8 +97,8 @@ def _person(
     config: RecordConfig,
     env: HandrailEnv,
     modes: Mapping[str, TeleopMode],
-    main: Source,
-    beside: Source | None,
+    main: DeviceSource,
+    beside: DeviceSource | None,
     follower: Follower | None,
 ) -> LocalPerson:
     person = Person(env.model, modes, config.mode_name)
@@ -108,10 +108,10 @@ def _person(
     return LocalPerson(person, main, beside, follower, card)
 
 
-def _opened(pollers: list[Poller], tables: "list[ControlMap] | tuple[ControlMap, ...]") -> list[Source]:
+def _opened(pollers: list[Poller], tables: "list[ControlMap] | tuple[ControlMap, ...]") -> list[DeviceSource]:
     """Return devices that are open; where one is not, those before are given back."""
     try:
-        return [Source(poller.start(), table) for poller, table in zip(pollers, tables, strict=True)]
+        return [DeviceSource(poller.start(), table) for poller, table in zip(pollers, tables, strict=True)]
     except BaseException:
         for poller in pollers:
             poller.close()

@@ -66,7 +66,7 @@ class GripperUnits:
     closed: float
 
 
-class Reading(NamedTuple):
+class BodyReading(NamedTuple):
     """What an observation says [m, rad]: joints, (n − b,); the base's twist and pose, (3,); opening."""
 
     arm: FloatArray
@@ -125,7 +125,7 @@ class RobotUnits:
         base = (self.base.pose or (self.base.x, self.base.y, self.base.theta)) if self.base else ()
         return (*self.positions, *((self.gripper.name,) if self.gripper else ()), *base)
 
-    def read(self, observation: Any) -> Reading | None:
+    def read(self, observation: Any) -> BodyReading | None:
         """Return what an observation says; None where a number is missing or not finite."""
         values = {name: number(observation, name) for name in self.observation_names}
         if not all(map(math.isfinite, values.values())):
@@ -141,7 +141,7 @@ class RobotUnits:
                 twist = rad * [values[name] for name in named]
         grip = self.gripper
         opening = 1.0 - self.grip(values[grip.name]) if grip else 0.0
-        return Reading(arm, twist, pose, opening)
+        return BodyReading(arm, twist, pose, opening)
 
     def action(self, q: FloatArray, v: FloatArray, twist: FloatArray, gripper: float) -> dict[str, float]:
         """Return the robot's action.

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from handrail.collect.processor.units import Reading, RobotUnits
+from handrail.collect.processor.units import BodyReading, RobotUnits
 from handrail.collect.simulation.gate import Gate
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import HandrailError, shown
@@ -72,7 +72,7 @@ class WholeBody:
         """
         self._gate = Gate(self._model, self._period, precision=np.float64)
         self._base = np.array(base, dtype=np.float64)
-        self._reading: Reading | None = None
+        self._reading: BodyReading | None = None
         self._said: object = None
         self._heard, self._time, self._sent_at = -math.inf, -math.inf, -math.inf
         self._held = np.zeros(self._model.size, dtype=bool)
@@ -154,7 +154,7 @@ class WholeBody:
         most = _HOLD * self._model.description.limits.velocity[:3]
         self._under_way = np.zeros(3) if self._rested > _HOLD else np.clip(going, -most, most)
 
-    def _take(self, reading: Reading, now: float) -> None:
+    def _take(self, reading: BodyReading, now: float) -> None:
         """Take an observation that makes sense."""
         before, base = self._reading, self._base
         if before is None:

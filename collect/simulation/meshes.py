@@ -23,7 +23,7 @@ _TRIANGLE = np.dtype([("normal", "<3f4"), ("vertices", "<9f4"), ("attribute", "<
 
 
 @dataclass(frozen=True)
-class Piece:
+class MeshPiece:
     """A connected piece of a mesh: vertices, (k, 3) [m], faces of their indices, (f, 3), and its colour."""
 
     vertices: FloatArray
@@ -39,7 +39,7 @@ class PlacedMesh:
     link: str
     joint: int
     placement: pin.SE3
-    pieces: tuple[Piece, ...]
+    pieces: tuple[MeshPiece, ...]
 
 
 def placed_meshes(model: RobotModel) -> Iterator[PlacedMesh]:
@@ -69,7 +69,7 @@ def placed_meshes(model: RobotModel) -> Iterator[PlacedMesh]:
         yield PlacedMesh(item.name, link.name, frame.parentJoint, placement, pieces)
 
 
-def _whole(path: Path, scale: FloatArray, rgba: tuple[float, ...]) -> tuple[Piece, ...]:
+def _whole(path: Path, scale: FloatArray, rgba: tuple[float, ...]) -> tuple[MeshPiece, ...]:
     """Return a binary STL file as one piece of a colour, without details that nobody sees."""
     vertices, faces = _read_stl(path)
     vertices = vertices * scale
@@ -80,10 +80,10 @@ def _whole(path: Path, scale: FloatArray, rgba: tuple[float, ...]) -> tuple[Piec
         whole = (corners[:, 0] < corners[:, 1]) & (corners[:, 1] < corners[:, 2])
         faces = faces[np.unique(np.where(whole[:, None], corners, 0), axis=0, return_index=True)[1]]
         faces = faces[np.ptp(faces, axis=1) > 0]
-    return (Piece(vertices, faces, (rgba[0], rgba[1], rgba[2], rgba[3])),)
+    return (MeshPiece(vertices, faces, (rgba[0], rgba[1], rgba[2], rgba[3])),)
 
 
-def _pieces(path: Path, scale: FloatArray) -> tuple[Piece, ...]:
+def _pieces(path: Path, scale: FloatArray) -> tuple[MeshPiece, ...]:
     """Return the connected pieces of a binary STL file, without those that are flat."""
     vertices, faces = _read_stl(path)
     edges = np.vstack([faces[:, [0, 1]], faces[:, [1, 2]]])
@@ -93,7 +93,8 @@ def _pieces(path: Path, scale: FloatArray) -> tuple[Piece, ...]:
     solid = [part for part in parts if np.ptp(part[0], axis=0).min() > 1e-3]
     colours = [_colour(vertices) if len(solid) > 1 else _JOINT for vertices, _ in solid]
     return tuple(
-        Piece(vertices * scale, faces, rgba) for (vertices, faces), rgba in zip(solid, colours, strict=True)
+        MeshPiece(vertices * scale, faces, rgba)
+        for (vertices, faces), rgba in zip(solid, colours, strict=True)
     )
 
 

@@ -26,7 +26,7 @@ _DRIVE_TIME = 0.0025  # [s]
 
 
 @dataclass(frozen=True)
-class RobotSpec:
+class SimulatedRobot:
     """A robot in MuJoCo, to which a scene can be added.
 
     Attributes:
@@ -55,7 +55,7 @@ class Mounts:
         return self.bodies[mount.parentJoint], mount.placement * on_frame
 
 
-def build_robot(model: RobotModel, meshes: bool = True, grips: bool = True) -> RobotSpec:
+def build_robot(model: RobotModel, meshes: bool = True, grips: bool = True) -> SimulatedRobot:
     """Build the robot; without `meshes` it moves and collides alike, but is not for looking at.
 
     Args:
@@ -83,7 +83,7 @@ def build_robot(model: RobotModel, meshes: bool = True, grips: bool = True) -> R
         for index, shape in enumerate(model.description.visual):
             ghost = _ghost(geometry.VISIBLE_GROUP)
             _add_shape(mounts, shape, name=f"visual_{index}", rgba=shape.rgba, **ghost)
-    return RobotSpec(spec, contact, _grasp_geoms(model, contact), _finger_joints(gripper, grips))
+    return SimulatedRobot(spec, contact, _grasp_geoms(model, contact), _finger_joints(gripper, grips))
 
 
 def _add_hand(

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from handrail.collect.simulation.contacts import ContactMonitor, GraspMonitor
 from handrail.collect.simulation.gate import Gate
 from handrail.collect.simulation.gl import mujoco
-from handrail.collect.simulation.robot import BASE_BODY, FINGERS, RobotSpec, build_robot
+from handrail.collect.simulation.robot import BASE_BODY, FINGERS, SimulatedRobot, build_robot
 from handrail.collect.simulation.scene import Scene, add_scene
 from handrail.collect.simulation.world import set_stage
 from handrail.controllers.arrays import FloatArray, IntArray
@@ -275,7 +275,7 @@ def _understood(model: RobotModel) -> Iterator[None]:
 
 
 @lru_cache(maxsize=8)
-def _robot(model: RobotModel, meshes: bool, grips: bool, timestep: float) -> RobotSpec:
+def _robot(model: RobotModel, meshes: bool, grips: bool, timestep: float) -> SimulatedRobot:
     robot = build_robot(model, meshes, grips)
     robot.spec.compiler.usethread = meshes  # without any, waking a second thread takes longer than its work
     set_stage(robot.spec, timestep, meshes)

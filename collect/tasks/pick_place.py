@@ -11,7 +11,7 @@ from handrail.collect.tasks.starts import near_home
 from handrail.collect.tasks.task import Aim, Start, TaskState, Verdict
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.numerics.rotation import quaternion_from_matrix
-from handrail.controllers.robot.description import World
+from handrail.controllers.robot.description import WorldScale
 from handrail.controllers.robot.model import RobotModel
 
 _MASS = 0.1  # of a cube of 5 cm [kg]
@@ -119,20 +119,20 @@ def grasp_rotation(tool: FloatArray, cube: FloatArray) -> FloatArray:
     return max(candidates, key=lambda rotation: float(np.trace(rotation.T @ tool)))
 
 
-def _sample_table(name: str, side: float, world: World, rng: np.random.Generator) -> SceneObject:
+def _sample_table(name: str, side: float, world: WorldScale, rng: np.random.Generator) -> SceneObject:
     scale = world.scale
     x, y = 1.05 + rng.uniform(-0.05, 0.05), side * 1.35 + rng.uniform(-0.05, 0.05)
     return table(name, scale * x, scale * y, (scale * 0.6, scale * 0.7, rng.uniform(*world.tables)), scale)
 
 
-def _sample_cube(on: SceneObject, world: World, rng: np.random.Generator) -> SceneObject:
+def _sample_cube(on: SceneObject, world: WorldScale, rng: np.random.Generator) -> SceneObject:
     x = on.front + world.scale * rng.uniform(0.10, 0.20)
     y = on.position[1] + world.scale * rng.uniform(-0.15, 0.15)
     yaw = rng.uniform(-np.pi / 4, np.pi / 4)  # a cube looks the same every quarter turn
     return cube("cube", x, y, on.top, yaw, world.cube, _MASS * world.grip**3)
 
 
-def _sample_bin(on: SceneObject, world: World, rng: np.random.Generator) -> SceneObject:
+def _sample_bin(on: SceneObject, world: WorldScale, rng: np.random.Generator) -> SceneObject:
     scale = world.scale
     inner = scale * rng.uniform(0.24, 0.28)
     x = on.front + inner / 2 + scale * rng.uniform(0.04, 0.10)

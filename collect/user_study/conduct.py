@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from enum import StrEnum
 from typing import Any, Protocol
 
-from handrail.collect.cockpit.messages import Answer
+from handrail.collect.cockpit.messages import CardAnswer
 from handrail.collect.operators.operator import EpisodeEvent
 from handrail.collect.session.outcome import Outcome
 from handrail.collect.user_study import cards
@@ -31,7 +31,7 @@ class Desk(Protocol):
         """Show a card instead of the one before."""
         ...
 
-    def hear(self) -> list[Answer]:
+    def hear(self) -> list[CardAnswer]:
         """Return what was answered, waiting a little for it."""
         ...
 

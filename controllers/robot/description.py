@@ -112,7 +112,7 @@ class Gripper:
 
 
 @dataclass(frozen=True)
-class World:
+class WorldScale:
     """How large the world is that a robot works in: tasks, sticks and margins are made to its measure.
 
     Attributes:
@@ -161,7 +161,7 @@ class RobotDescription:
     self_pairs: tuple[tuple[str, str], ...]
     self_margins: FloatArray  # largest margin that each self pair can keep [m]
     visual: tuple[PlacedShape, ...]
-    world: World = World()
+    world: WorldScale = WorldScale()
 
     @property
     def base_joints(self) -> tuple[str, ...]:
@@ -214,7 +214,7 @@ def _parse(data: dict[str, Any], folder: Path) -> RobotDescription:
         self_pairs=tuple((first, second) for first, second, *_ in self_collision["pairs"]),
         self_margins=frozen([(*pair, np.inf)[2] for pair in self_collision["pairs"]]),
         visual=tuple(_placed_shape(entry) for entry in data.get("visual", [])),
-        world=World(**_frozen_lists(data.get("world", {}))),
+        world=WorldScale(**_frozen_lists(data.get("world", {}))),
     )
 
 

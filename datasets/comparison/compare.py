@@ -21,7 +21,7 @@ from handrail.datasets.comparison.differences import Difference, differences
 from handrail.datasets.comparison.evaluations import Condition, read_evaluations
 from handrail.datasets.comparison.groups import Group, baseline_of, group_of, load_groups, unlike
 from handrail.datasets.comparison.outcomes import LIKE_FOR_LIKE, Outcomes, Pair, judge_pairs
-from handrail.datasets.quality.group_reading import Reading
+from handrail.datasets.quality.group_reading import GroupReading
 from handrail.datasets.quality.measure import Measurements, measured, read
 from handrail.datasets.reading.check import check_whole
 from handrail.datasets.statistics.proportions import ShareDifference
@@ -32,7 +32,7 @@ _SAME_NUMBER = "the same number of episodes"
 
 
 @dataclass(frozen=True)
-class View:
+class EpisodeChoice:
     """One way to choose the episodes that are compared.
 
     Attributes:
@@ -66,19 +66,19 @@ class Comparison:
 
     config: CompareConfig
     baseline: str
-    views: Sequence[View]
+    views: Sequence[EpisodeChoice]
     success: Mapping[str, ShareDifference | None]
     rates: Mapping[str, Interval | None]
     ratios: Mapping[str, RateRatio | None]
     outcomes: Outcomes | None
 
     @property
-    def everything(self) -> View:
+    def everything(self) -> EpisodeChoice:
         """The view of all episodes."""
         return self.views[0]
 
     @property
-    def same_number(self) -> View:
+    def same_number(self) -> EpisodeChoice:
         """The view of as many episodes of each group."""
         return self.views[1]
 
@@ -140,13 +140,13 @@ def _view(
     title: str,
     groups: Sequence[Group],
     counted: Sequence[Group],
-    readings: Mapping[str, Reading],
+    readings: Mapping[str, GroupReading],
     baseline: str,
     rng: np.random.Generator,
-) -> View:
+) -> EpisodeChoice:
     measurements = measured(readings, rng)
     found = differences(counted, measurements, baseline, rng)
-    return View(title, counted, [collected(group) for group in groups], measurements, found)
+    return EpisodeChoice(title, counted, [collected(group) for group in groups], measurements, found)
 
 
 def _conditions(config: CompareConfig, groups: Sequence[Group]) -> dict[str, Condition]:

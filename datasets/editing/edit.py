@@ -16,7 +16,7 @@ from handrail.controllers.errors import HandrailError, unknown_name
 from handrail.datasets.demonstrations.demonstration import Demonstration
 from handrail.datasets.editing.config import EditConfig
 from handrail.datasets.editing.pack import Edited, check_free, merge_datasets, taken
-from handrail.datasets.editing.source import Source
+from handrail.datasets.editing.source import EditSource
 from handrail.datasets.format.columns import ColumnTypes
 from handrail.datasets.format.video import GROUP
 from handrail.datasets.quality.motion import FLOOR
@@ -172,13 +172,13 @@ def _anew(config: EditConfig) -> list[Edited]:
     if config.verb == "merge":
         return [merge_datasets(config.roots, config.target, config.name, config.verify)]
     check_free(config.target)
-    source = Source.open(config.roots[0], config.verify)
+    source = EditSource.open(config.roots[0], config.verify)
     if config.verb == "split":
         return _split(config, source)
     return [_write(config, config.target, source, _pieces(config, source))]
 
 
-def _split(config: EditConfig, source: Source) -> list[Edited]:
+def _split(config: EditConfig, source: EditSource) -> list[Edited]:
     """Write the parts, which are there all together or none of them."""
     with drafted(config.target) as draft:
         edited = [
@@ -189,7 +189,7 @@ def _split(config: EditConfig, source: Source) -> list[Edited]:
 
 
 def _write(
-    config: EditConfig, root: Path, source: Source, pieces: Iterable[Piece], suffix: str = ""
+    config: EditConfig, root: Path, source: EditSource, pieces: Iterable[Piece], suffix: str = ""
 ) -> Edited:
     manifest = source.manifest.named((config.name or source.manifest.repo_id) + suffix)
     manifest.check()
@@ -198,13 +198,13 @@ def _write(
     return Edited(root, totals.episodes, totals.frames, source.info.frames)
 
 
-def _types(config: EditConfig, source: Source) -> ColumnTypes:
+def _types(config: EditConfig, source: EditSource) -> ColumnTypes:
     if config.verb == "relabel":
         return {**_LABELS, **source.types}
     return {**source.types, **({TRIMMED: pa.int64()} if config.verb == "trim" else {})}
 
 
-def _pieces(config: EditConfig, source: Source) -> Iterator[Piece]:
+def _pieces(config: EditConfig, source: EditSource) -> Iterator[Piece]:
     """Yield what one dataset's episodes become."""
     count = len(source.rows)
     chosen = chosen_episodes("--episodes", config.episodes, source.successes)
@@ -221,7 +221,7 @@ def _pieces(config: EditConfig, source: Source) -> Iterator[Piece]:
     )
 
 
-def _trimmed(config: EditConfig, source: Source, piece: Piece) -> Piece:
+def _trimmed(config: EditConfig, source: EditSource, piece: Piece) -> Piece:
     number = piece.record.episode
     columns = [name for name in (STATE, SUCCESS) if name in source.info.features]
     frames = read_rows_of(source.info, source.rows[number], columns)
@@ -231,13 +231,13 @@ def _trimmed(config: EditConfig, source: Source, piece: Piece) -> Piece:
     return piece.stretch(first, length).saying(**{TRIMMED: int(before) + first})
 
 
-def _relabelled(config: EditConfig, source: Source, piece: Piece) -> Piece:
+def _relabelled(config: EditConfig, source: EditSource, piece: Piece) -> Piece:
     success = config.label == "success"
     said = piece.saying(success=success, failure_reason="" if success else config.reason or "relabelled")
     return said.ending(success)
 
 
-def _renamed(config: EditConfig, source: Source, piece: Piece) -> Piece:
+def _renamed(config: EditConfig, source: EditSource, piece: Piece) -> Piece:
     old = piece.record.tasks
     known = {task for task in old if not config.old_task or task == config.old_task}
     return piece.renamed(dict.fromkeys(known, config.task))

@@ -5,14 +5,14 @@ from collections.abc import Sequence
 import pyarrow as pa
 
 from handrail.controllers.errors import HandrailError
-from handrail.datasets.editing.source import Source
+from handrail.datasets.editing.source import EditSource
 from handrail.datasets.format.columns import ColumnTypes
 from handrail.datasets.recording.rewrite import Encodings
 
 _NEEDED = ("video.codec", "video.pix_fmt")  # in which all videos of a camera have to agree
 
 
-def check_alike(first: Source, other: Source) -> None:
+def check_alike(first: EditSource, other: EditSource) -> None:
     """Check that frames of one dataset fit into another."""
     names = [source.layout.root for source in (other, first)]
     one, two = first.manifest, other.manifest
@@ -27,7 +27,7 @@ def check_alike(first: Source, other: Source) -> None:
             )
 
 
-def merged_types(sources: Sequence[Source]) -> ColumnTypes:
+def merged_types(sources: Sequence[EditSource]) -> ColumnTypes:
     """Return the extra columns that any of them has."""
     found: ColumnTypes = {}
     for source in sources:
@@ -41,7 +41,7 @@ def merged_types(sources: Sequence[Source]) -> ColumnTypes:
     return found
 
 
-def merged_encodings(sources: Sequence[Source]) -> Encodings:
+def merged_encodings(sources: Sequence[EditSource]) -> Encodings:
     """Return how all videos are encoded: what they agree in; nothing where Handrail alone encoded them."""
     found = {key: dict(encoding) for key, encoding in sources[0].encodings.items()}
     for source in sources[1:]:

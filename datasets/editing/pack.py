@@ -9,7 +9,7 @@ from pathlib import Path
 
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.editing.merge import check_alike, merged_encodings, merged_types
-from handrail.datasets.editing.source import Source
+from handrail.datasets.editing.source import EditSource
 from handrail.datasets.format.layout import Layout
 from handrail.datasets.format.lines import rows_of_lines
 from handrail.datasets.recording.checksums import Checksums
@@ -61,9 +61,9 @@ def merge_datasets(
     with explained(f"cannot write {str(target)!r}"):
         if target not in places:
             check_free(target)
-            return _merged([Source.open(place, verify) for place in places], target, name, in_place=False)
+            return _merged([EditSource.open(place, verify) for place in places], target, name, in_place=False)
         with taken(target, verify) as own:
-            sources = [own if place == target else Source.open(place, verify) for place in places]
+            sources = [own if place == target else EditSource.open(place, verify) for place in places]
             return _merged(sources, target, name, in_place=True)
 
 
@@ -79,14 +79,14 @@ def check_free(target: Path) -> None:
 
 
 @contextmanager
-def taken(root: Path, verify: bool) -> Iterator[Source]:
+def taken(root: Path, verify: bool) -> Iterator[EditSource]:
     """Provide a dataset that is to be replaced, with the sole right to write to it."""
     if settle(root):
         raise HandrailError(
             f"dataset {str(root)!r}: an edit was cut short, and is finished now; look at it (handrail-inspect"
             f" {root}) before the next"
         )
-    source = Source.open(root)
+    source = EditSource.open(root)
     check_nothing_set_aside(source.layout)
     lock = DatasetLock(source.layout.staging)
     try:
@@ -96,7 +96,7 @@ def taken(root: Path, verify: bool) -> Iterator[Source]:
         lock.release()
 
 
-def _merged(sources: Sequence[Source], target: Path, name: str, in_place: bool) -> Edited:
+def _merged(sources: Sequence[EditSource], target: Path, name: str, in_place: bool) -> Edited:
     for other in sources[1:]:
         check_alike(sources[0], other)
     manifest = sources[0].manifest.named(name or sources[0].manifest.repo_id)

@@ -22,7 +22,7 @@ from handrail.datasets.recording.rewrite import Encodings
 
 
 @dataclass(frozen=True)
-class Source:
+class EditSource:
     """A dataset that was checked.
 
     Attributes:
@@ -55,7 +55,7 @@ class Source:
         return list(dict.fromkeys(task for row in self.rows for task in row["tasks"]))
 
     @classmethod
-    def open(cls, root: Path, verify: bool = False) -> "Source":
+    def open(cls, root: Path, verify: bool = False) -> "EditSource":
         """Check a dataset.
 
         Args:

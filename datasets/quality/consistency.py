@@ -10,7 +10,7 @@ from scipy.special import digamma, gammaln
 from handrail.controllers.arrays import FloatArray, IntArray
 from handrail.datasets.demonstrations.demonstration import DoesNotApply
 from handrail.datasets.quality.metric import Metric
-from handrail.datasets.quality.pool import Pool
+from handrail.datasets.quality.pool import ObservationPool
 from handrail.datasets.quality.sample import Sample
 
 RESOLUTION = 1e-3  # of the scale: states that are nearer are one state
@@ -19,17 +19,17 @@ _KS = (5, 6, 7)
 _BATCH = 1024
 
 
-def _action_variance(sample: Sample, pool: Pool, rng: np.random.Generator) -> FloatArray:
+def _action_variance(sample: Sample, pool: ObservationPool, rng: np.random.Generator) -> FloatArray:
     states = sample.points(lambda episode: pool.observations(episode.observation))
     actions = sample.points(lambda episode: pool.actions(episode.relative_action))
     return action_variance(states, actions, sample.owner)
 
 
-def _state_coverage(sample: Sample, pool: Pool, rng: np.random.Generator) -> FloatArray:
+def _state_coverage(sample: Sample, pool: ObservationPool, rng: np.random.Generator) -> FloatArray:
     return state_coverage(sample.points(lambda episode: pool.configurations(episode.configuration)))
 
 
-def _information(sample: Sample, pool: Pool, rng: np.random.Generator) -> FloatArray:
+def _information(sample: Sample, pool: ObservationPool, rng: np.random.Generator) -> FloatArray:
     states = sample.points(lambda episode: pool.observations(episode.observation))
     actions = sample.points(lambda episode: pool.action_components(episode.relative_action))
     return information(states, actions, rng)

@@ -5,13 +5,13 @@ import numpy as np
 from handrail.controllers.arrays import FloatArray
 from handrail.datasets.demonstrations.demonstration import Demonstration, DoesNotApply
 from handrail.datasets.quality.metric import metric
-from handrail.datasets.quality.pool import Pool
+from handrail.datasets.quality.pool import ObservationPool
 
 _LATE = 95.0  # percentile
 
 
 @metric("undos", "", "lower", "how often the operator went back to a checkpoint")
-def undos(episode: Demonstration, pool: Pool) -> float:
+def undos(episode: Demonstration, pool: ObservationPool) -> float:
     """Return how often they did in an episode that was kept."""
     return float(_of_person(episode, "undos").max())
 
@@ -23,7 +23,7 @@ def undos(episode: Demonstration, pool: Pool) -> float:
     "age of the input when it became a command, 95th percentile",
     title="age of the input",
 )
-def input_age(episode: Demonstration, pool: Pool) -> float:
+def input_age(episode: Demonstration, pool: ObservationPool) -> float:
     """Return the 95th percentile of `teleop.age` over the frames [s]."""
     return float(np.percentile(_of_person(episode, "age"), _LATE))
 
@@ -35,7 +35,7 @@ def input_age(episode: Demonstration, pool: Pool) -> float:
     "from the picture to the answer to it, 95th percentile",
     title="round trip",
 )
-def round_trip(episode: Demonstration, pool: Pool) -> float:
+def round_trip(episode: Demonstration, pool: ObservationPool) -> float:
     """Return the 95th percentile of `teleop.round_trip` over the frames that have one [s]."""
     known = _of_person(episode, "round_trip")
     known = known[known > 0.0]

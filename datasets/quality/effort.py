@@ -11,19 +11,19 @@ import numpy as np
 from handrail.controllers.arrays import FloatArray
 from handrail.datasets.demonstrations.demonstration import Demonstration, DoesNotApply
 from handrail.datasets.quality.metric import metric
-from handrail.datasets.quality.pool import Pool
+from handrail.datasets.quality.pool import ObservationPool
 
 DEAD_BAND = 0.05  # of full deflection: below it an axis is not in use
 
 
 @metric("input_effort", "s", "lower", "seconds of full deflection, input axes added up", "pool")
-def input_effort(episode: Demonstration, pool: Pool) -> float:
+def input_effort(episode: Demonstration, pool: ObservationPool) -> float:
     """Return Σ_i ∫ |u_i| / scale_i dt [s]."""
     return float(np.abs(_deflection(episode, pool)).sum()) / episode.fps
 
 
 @metric("input_reversals", "", "lower", "how often an input axis changed its sign", "pool")
-def input_reversals(episode: Demonstration, pool: Pool) -> float:
+def input_reversals(episode: Demonstration, pool: ObservationPool) -> float:
     """Return how often an axis changed its sign, axes added up; what is below 5 % of full is passed over."""
     deflection = _deflection(episode, pool)
     signs = np.where(np.abs(deflection) >= DEAD_BAND, np.sign(deflection), 0.0)
@@ -33,7 +33,7 @@ def input_reversals(episode: Demonstration, pool: Pool) -> float:
 @metric(
     "mode_switches", "", "lower", "how often the mode, or the set of axes that the operator owned, changed"
 )
-def mode_switches(episode: Demonstration, pool: Pool) -> float:
+def mode_switches(episode: Demonstration, pool: ObservationPool) -> float:
     """Return how often either changed; one of them is enough."""
     changed = [_changes(episode.column(part)) for part in ("mode", "owned") if episode.has(part)]
     if not changed:
@@ -49,7 +49,7 @@ def mode_switches(episode: Demonstration, pool: Pool) -> float:
     "pool",
     title="active input axes",
 )
-def active_axes(episode: Demonstration, pool: Pool) -> float:
+def active_axes(episode: Demonstration, pool: ObservationPool) -> float:
     """Return the mean number of axes that are above 5 % of full deflection at a time."""
     return float((np.abs(_deflection(episode, pool)) >= DEAD_BAND).sum(axis=1).mean())
 
@@ -57,7 +57,7 @@ def active_axes(episode: Demonstration, pool: Pool) -> float:
 @metric(
     "input_idle", "", "lower", "share of time with no input axis in use", "pool", title="hands off the input"
 )
-def input_idle(episode: Demonstration, pool: Pool) -> float:
+def input_idle(episode: Demonstration, pool: ObservationPool) -> float:
     """Return the share of frames in which no axis is above 5 % of full deflection, 0 to 1."""
     return float((np.abs(_deflection(episode, pool)) < DEAD_BAND).all(axis=1).mean())
 
@@ -67,7 +67,7 @@ def _changes(values: np.ndarray) -> np.ndarray:
     return (rows[1:] != rows[:-1]).any(axis=1)
 
 
-def _deflection(episode: Demonstration, pool: Pool) -> FloatArray:
+def _deflection(episode: Demonstration, pool: ObservationPool) -> FloatArray:
     used = pool.input_scale > 0
     if not used.any():
         raise DoesNotApply("no input axis was ever used")

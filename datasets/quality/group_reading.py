@@ -11,13 +11,13 @@ from handrail.datasets.demonstrations.demonstration import Demonstration
 from handrail.datasets.demonstrations.episode import Episode
 from handrail.datasets.demonstrations.load import each_opened
 from handrail.datasets.quality.metric import Metric
-from handrail.datasets.quality.pool import Pool
+from handrail.datasets.quality.pool import ObservationPool
 from handrail.datasets.quality.sample import Sample
 
 _SOME = 200  # episodes that stand for all of them where sizes are told apart
 
 
-class Reading:
+class GroupReading:
     """What is known of a group of episodes.
 
     Attributes:
@@ -33,7 +33,7 @@ class Reading:
     def __init__(self, episodes: Sequence[Episode], metrics: Sequence[Metric] = ()):
         """Begin with nothing read."""
         self.episodes = episodes
-        self.pool, self.number = Pool(), 0
+        self.pool, self.number = ObservationPool(), 0
         measured = [metric.name for metric in metrics if not metric.of_group]
         self.values = {name: np.full(len(episodes), np.nan) for name in measured}
         self.reasons: dict[str, Counter[str]] = {name: Counter() for name in measured}

@@ -10,9 +10,9 @@ from handrail.datasets.demonstrations.demonstration import Demonstration, DoesNo
 from handrail.datasets.demonstrations.episode import Episode
 from handrail.datasets.demonstrations.load import each_opened
 from handrail.datasets.quality.catalogue import METRICS
-from handrail.datasets.quality.group_reading import Reading
+from handrail.datasets.quality.group_reading import GroupReading
 from handrail.datasets.quality.metric import Metric
-from handrail.datasets.quality.pool import FRAMES, Pool
+from handrail.datasets.quality.pool import FRAMES, ObservationPool
 from handrail.datasets.quality.sample import frames_of
 from handrail.datasets.quality.units import why_not
 from handrail.datasets.statistics.resampling import FEWEST, Interval, bootstrap_mean
@@ -20,7 +20,7 @@ from handrail.datasets.statistics.resampling import FEWEST, Interval, bootstrap_
 Groups = Mapping[str, Sequence[Episode]]
 
 
-def read_views(views: Sequence[Mapping[str, Reading]], metrics: Sequence[Metric], margin: float) -> None:
+def read_views(views: Sequence[Mapping[str, GroupReading]], metrics: Sequence[Metric], margin: float) -> None:
     """Read the episodes of all groups of all views.
 
     Args:
@@ -47,10 +47,10 @@ def read_views(views: Sequence[Mapping[str, Reading]], metrics: Sequence[Metric]
             _measure(metric, episode, where)
 
 
-Where = list[tuple[Reading, int]]  # the groups that an episode is in, and at which place
+Where = list[tuple[GroupReading, int]]  # the groups that an episode is in, and at which place
 
 
-def _places(readings: Iterator[Reading]) -> list[tuple[Episode, Where]]:
+def _places(readings: Iterator[GroupReading]) -> list[tuple[Episode, Where]]:
     found: dict[int, tuple[Episode, Where]] = {}
     for reading in readings:
         for place, episode in enumerate(reading.episodes):
@@ -79,12 +79,12 @@ def _measure(metric: Metric, episode: Demonstration, where: Where) -> None:
             reading.reasons[metric.name][reason] += 1
 
 
-def _share_pools(readings: list[Reading], margin: float) -> None:
+def _share_pools(readings: list[GroupReading], margin: float) -> None:
     """Give groups that can be put on one scale the same pool.
 
     The smallest group says how many frames are taken of each for what compares them with each other.
     """
-    firsts: list[Reading] = []
+    firsts: list[GroupReading] = []
     for reading in readings:
         fitting = [n for n, known in enumerate(firsts) if not why_not("pool", known, reading)]
         firsts += [] if fitting else [reading]
@@ -92,12 +92,12 @@ def _share_pools(readings: list[Reading], margin: float) -> None:
     for number in range(len(firsts)):
         members = [reading for reading in readings if reading.number == number]
         fewest = min(sum(episode.count for episode in reading.episodes) for reading in members)
-        pool = Pool(margin, min(FRAMES, fewest))
+        pool = ObservationPool(margin, min(FRAMES, fewest))
         for reading in members:
             reading.pool = pool
 
 
-def _frames(views: Sequence[Mapping[str, Reading]]) -> dict[int, list[IntArray]]:
+def _frames(views: Sequence[Mapping[str, GroupReading]]) -> dict[int, list[IntArray]]:
     """Return which frames stand for each episode of a group."""
     readings = (reading for groups in views for reading in groups.values())
     return {id(each): frames_of([e.count for e in each.episodes], each.pool.frames) for each in readings}
@@ -144,7 +144,7 @@ class Measurements:
     """
 
     values: Mapping[str, Mapping[str, Measured]]
-    groups: Mapping[str, Reading]
+    groups: Mapping[str, GroupReading]
 
     def why_not(self, metric: Metric, one: str, other: str) -> str:
         """Return why a metric's values of two groups cannot be compared; "" if they can."""
@@ -172,15 +172,15 @@ def measure(
 
 def read(
     views: Sequence[Groups], margin: float = 0.1, metrics: Sequence[Metric] = METRICS
-) -> list[dict[str, Reading]]:
+) -> list[dict[str, GroupReading]]:
     """Read the episodes of several ways to choose them, those that are in several once for all."""
-    found = [{label: Reading(each, metrics) for label, each in groups.items()} for groups in views]
+    found = [{label: GroupReading(each, metrics) for label, each in groups.items()} for groups in views]
     read_views(found, metrics, margin)
     return found
 
 
 def measured(
-    readings: Mapping[str, Reading], rng: np.random.Generator, metrics: Sequence[Metric] = METRICS
+    readings: Mapping[str, GroupReading], rng: np.random.Generator, metrics: Sequence[Metric] = METRICS
 ) -> Measurements:
     """Return what was read as values with intervals."""
     values = {
@@ -190,7 +190,7 @@ def measured(
     return Measurements(values, readings)
 
 
-def _measured(metric: Metric, reading: Reading, rng: np.random.Generator) -> Measured:
+def _measured(metric: Metric, reading: GroupReading, rng: np.random.Generator) -> Measured:
     count = len(reading.episodes)
     if metric.measure_group is not None:
         try:

@@ -8,12 +8,12 @@ import numpy as np
 
 from handrail.controllers.arrays import FloatArray
 from handrail.datasets.demonstrations.demonstration import Demonstration
-from handrail.datasets.quality.pool import Pool
+from handrail.datasets.quality.pool import ObservationPool
 from handrail.datasets.quality.sample import Sample
 
 Needs = Literal["", "motion", "position", "action", "controller", "pool"]
-OfEpisode = Callable[[Demonstration, Pool], float]
-OfGroup = Callable[[Sample, Pool, np.random.Generator], FloatArray]
+OfEpisode = Callable[[Demonstration, ObservationPool], float]
+OfGroup = Callable[[Sample, ObservationPool, np.random.Generator], FloatArray]
 
 
 @dataclass(frozen=True)

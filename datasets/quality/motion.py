@@ -6,7 +6,7 @@ from handrail.controllers.arrays import BoolArray, FloatArray, IntArray
 from handrail.datasets.demonstrations.demonstration import Demonstration, DoesNotApply
 from handrail.datasets.quality.metric import metric
 from handrail.datasets.quality.metrics import ldlj, path_length, sparc
-from handrail.datasets.quality.pool import Pool
+from handrail.datasets.quality.pool import ObservationPool
 
 WINDOW = 0.5  # [s]
 FLOOR = 0.005  # net motion below which nothing moves: 5 mm where the motion is in metres
@@ -18,7 +18,7 @@ _STILL = 1e-9  # a path shorter than this is no path, in the unit of the motion
 @metric(
     "length", "s", "lower", "how long an episode took, which is the operator's time", title="episode length"
 )
-def length(episode: Demonstration, pool: Pool) -> float:
+def length(episode: Demonstration, pool: ObservationPool) -> float:
     """Return frames over frames a second [s]."""
     return episode.seconds
 
@@ -31,7 +31,7 @@ def length(episode: Demonstration, pool: Pool) -> float:
     "motion",
     title="smoothness (SPARC)",
 )
-def smoothness(episode: Demonstration, pool: Pool) -> float:
+def smoothness(episode: Demonstration, pool: ObservationPool) -> float:
     """Return the measure of `metrics.sparc`."""
     return _known(sparc(episode.speed, episode.fps))
 
@@ -44,7 +44,7 @@ def smoothness(episode: Demonstration, pool: Pool) -> float:
     "motion",
     title="smoothness (LDLJ)",
 )
-def jerkiness(episode: Demonstration, pool: Pool) -> float:
+def jerkiness(episode: Demonstration, pool: ObservationPool) -> float:
     """Return the measure of `metrics.ldlj`."""
     return _known(ldlj(episode.speed, episode.fps))
 
@@ -52,7 +52,7 @@ def jerkiness(episode: Demonstration, pool: Pool) -> float:
 @metric(
     "path_efficiency", "", "higher", "straight-line over travelled distance, each phase on its own", "motion"
 )
-def directness(episode: Demonstration, pool: Pool) -> float:
+def directness(episode: Demonstration, pool: ObservationPool) -> float:
     """Return the measure of `path_efficiency` of what moves."""
     return path_efficiency(episode.motion, phase_boundaries(episode))
 
@@ -65,7 +65,7 @@ def directness(episode: Demonstration, pool: Pool) -> float:
     "position",
     title="idle, whole episode",
 )
-def idle_raw(episode: Demonstration, pool: Pool) -> float:
+def idle_raw(episode: Demonstration, pool: ObservationPool) -> float:
     """Return the share of windows that are idle, see `idle_windows`."""
     return float(idle_windows(episode.motion, episode.fps).mean())
 
@@ -78,7 +78,7 @@ def idle_raw(episode: Demonstration, pool: Pool) -> float:
     "position",
     title="idle, before the final hold",
 )
-def idle_pruned(episode: Demonstration, pool: Pool) -> float:
+def idle_pruned(episode: Demonstration, pool: ObservationPool) -> float:
     """Return the share without the idle time at the very end.
 
     Source: the definition of Handrail's own reference, after the pruning of pauses that imitation learning

@@ -86,7 +86,7 @@ def embed(spread: Spread, most: int | None = None) -> Embedding:
     return lambda values: (values - mean) / scale @ directions
 
 
-class Pool:
+class ObservationPool:
     """All episodes of datasets with the same columns.
 
     Attributes:

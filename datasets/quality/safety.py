@@ -6,7 +6,7 @@ from numpy.typing import ArrayLike
 from handrail.controllers.arrays import FloatArray
 from handrail.datasets.demonstrations.demonstration import Demonstration, DoesNotApply
 from handrail.datasets.quality.metric import metric
-from handrail.datasets.quality.pool import Pool
+from handrail.datasets.quality.pool import ObservationPool
 
 _ROUNDING = 1e-6  # of the solver: below it, slack is zero
 
@@ -21,19 +21,19 @@ def contacts_begun(contacts: ArrayLike) -> float:
 
 
 @metric("smallest_distance", "m", "higher", "smallest signed distance to a collision")
-def smallest_distance(episode: Demonstration, pool: Pool) -> float:
+def smallest_distance(episode: Demonstration, pool: ObservationPool) -> float:
     """Return min_t d(t), signed: negative is penetration [m]."""
     return float(_finite(episode, "distance").min())
 
 
 @metric("contacts", "", "lower", "unwanted contacts that began")
-def contacts(episode: Demonstration, pool: Pool) -> float:
+def contacts(episode: Demonstration, pool: ObservationPool) -> float:
     """Return how many there were, see `contacts_begun`."""
     return contacts_begun(episode.numbers("contacts")[:, 0])
 
 
 @metric("impulse", "N s", "lower", "impulse of all unwanted contacts", title="contact impulse")
-def impulse(episode: Demonstration, pool: Pool) -> float:
+def impulse(episode: Demonstration, pool: ObservationPool) -> float:
     """Return Σ_t ∫ ‖F‖ dt [N s]."""
     return float(_finite(episode, "impulse").sum())
 
@@ -45,13 +45,13 @@ def impulse(episode: Demonstration, pool: Pool) -> float:
     "for how long something was nearer than the margin",
     title="time within the margin",
 )
-def time_within_margin(episode: Demonstration, pool: Pool) -> float:
+def time_within_margin(episode: Demonstration, pool: ObservationPool) -> float:
     """Return ∫ 1[d(t) < margin] dt [s]."""
     return float(np.count_nonzero(_finite(episode, "distance") < pool.margin)) / episode.fps
 
 
 @metric("slack_used", "unit of the limit", "lower", "how far a soft limit was given up at most", "controller")
-def slack_used(episode: Demonstration, pool: Pool) -> float:
+def slack_used(episode: Demonstration, pool: ObservationPool) -> float:
     """Return max_t of the largest violation in the plan, in the limit's unit."""
     most = float(_finite(episode, "slack").max())
     return most if most > _ROUNDING else 0.0

@@ -15,7 +15,7 @@ from handrail.datasets.format.columns import CLIENT
 from handrail.datasets.quality import motion, safety
 from handrail.datasets.quality.metric import Metric
 from handrail.datasets.quality.metrics import corrections, high_frequency_content, rate_of_change
-from handrail.datasets.quality.pool import Pool
+from handrail.datasets.quality.pool import ObservationPool
 
 UNKNOWN = "–"
 CHATTERING = (
@@ -110,7 +110,7 @@ def _summary(episode: Demonstration) -> EpisodeSummary:
 
 def _measured(metric: Metric, episode: Demonstration) -> float | None:
     try:
-        return metric.measure(episode, Pool()) if metric.measure else None
+        return metric.measure(episode, ObservationPool()) if metric.measure else None
     except DoesNotApply:
         return None
 

@@ -4,7 +4,7 @@ import numpy as np
 
 from handrail.datasets.demonstrations.demonstration import Demonstration, DoesNotApply
 from handrail.datasets.quality.metric import metric
-from handrail.datasets.quality.pool import Pool
+from handrail.datasets.quality.pool import ObservationPool
 
 TOLERANCE = 0.005  # of an entry's range: this close to its end is at the end
 
@@ -16,7 +16,7 @@ TOLERANCE = 0.005  # of an entry's range: this close to its end is at the end
     "distance of the next state from what was commanded",
     "action",
 )
-def tracking_error(episode: Demonstration, pool: Pool) -> float:
+def tracking_error(episode: Demonstration, pool: ObservationPool) -> float:
     """Return mean_t ‖a_t − s_{t+1}‖ over the entries that action and state share.
 
     In the unit of the entries (velocities of base and joints: [m/s] and [rad/s] together).
@@ -33,7 +33,7 @@ def tracking_error(episode: Demonstration, pool: Pool) -> float:
     "share of time in which an entry of the action stays at the end of its range",
     "pool",
 )
-def saturation(episode: Demonstration, pool: Pool) -> float:
+def saturation(episode: Demonstration, pool: ObservationPool) -> float:
     """Return the share of frames in which any entry of the action stays at an end of its range, 0 to 1.
 
     An entry is at an end where it and its neighbour in time are both within 0.5 % of the range of the lowest
@@ -60,7 +60,7 @@ def saturation(episode: Demonstration, pool: Pool) -> float:
     "action",
     title="action total-variation ratio",
 )
-def variation_ratio(episode: Demonstration, pool: Pool) -> float:
+def variation_ratio(episode: Demonstration, pool: ObservationPool) -> float:
     """Return Σ_t ‖a_{t+1} − a_t‖₁ / Σ_t ‖s_{t+1} − s_t‖₁: 1 is a robot that does it all."""
     changed = float(np.abs(np.diff(episode.reached, axis=0)).sum())
     if not changed:

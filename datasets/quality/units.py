@@ -12,7 +12,7 @@ import numpy as np
 from handrail.controllers.arrays import FloatArray
 from handrail.datasets.demonstrations.demonstration import Demonstration, DoesNotApply
 from handrail.datasets.demonstrations.naming import quantity
-from handrail.datasets.quality.group_reading import Reading
+from handrail.datasets.quality.group_reading import GroupReading
 from handrail.datasets.quality.metric import Needs
 
 _FACTOR = 10.0  # ranges that differ by more are of other units: degrees are 57 times radians
@@ -24,7 +24,7 @@ _PARTS = ("state", "action", "asked")
 _OTHER_MODES = "the modes differ, so the controllers and their soft limits may"
 
 
-def why_not(needs: Needs, one: Reading, other: Reading) -> str:
+def why_not(needs: Needs, one: GroupReading, other: GroupReading) -> str:
     """Return why a metric's values of two groups cannot be compared; "" if they can.
 
     Args:
@@ -50,7 +50,7 @@ def why_not(needs: Needs, one: Reading, other: Reading) -> str:
         return str(error)
 
 
-def _on_one_scale(one: Reading, other: Reading) -> str:
+def _on_one_scale(one: GroupReading, other: GroupReading) -> str:
     if _columns(one.first) != _columns(other.first):
         return "the datasets have different columns, so there is no common scale"
     parts = [part for part in _PARTS if one.first.has(part)]
@@ -64,7 +64,7 @@ def _columns(episode: Demonstration) -> tuple[object, ...]:
     return tuple((name, episode.frames[name].shape[1:], episode.info.features[name].names) for name in names)
 
 
-def _numbers(part: str, one: Reading, other: Reading) -> str:
+def _numbers(part: str, one: GroupReading, other: GroupReading) -> str:
     """Return why the numbers of a part are not known to be in the same unit."""
     first, second = one.first, other.first
     names = first.entries(part), second.entries(part)
@@ -89,7 +89,7 @@ def _numbers(part: str, one: Reading, other: Reading) -> str:
     return ""
 
 
-def _followed(one: Reading, other: Reading) -> str:
+def _followed(one: GroupReading, other: GroupReading) -> str:
     """Return why commands and what follows them are not the same thing, or not in the same unit."""
     if one.first.fps != other.first.fps:
         return "the frame rates differ, and what follows a command is measured a frame later"

@@ -126,7 +126,7 @@ _PEOPLE = "participants"  # the folder of a user study that has their answers
 
 
 @dataclass(frozen=True)
-class Push:
+class Upload:
     """What is sent, or would be.
 
     Attributes:
@@ -160,7 +160,7 @@ class Push:
 
 def prepare(
     root: Path, repo_id: str, license_id: str, private: bool, verify: bool = False, to: str = ""
-) -> Push:
+) -> Upload:
     """Check a dataset, write its card, and return what would be sent.
 
     Args:
@@ -186,10 +186,10 @@ def prepare(
     tops, sent = ({path.relative_to(root).parts[0] for path in some} for some in (found, files))
     names = tuple(path.relative_to(root).as_posix() for path in files)
     size = sum(path.stat().st_size for path in files)
-    return Push(repo_id, root, names, tuple(sorted(tops - sent)), size, private, license_id, said, to)
+    return Upload(repo_id, root, names, tuple(sorted(tops - sent)), size, private, license_id, said, to)
 
 
-def upload(push: Push) -> None:
+def upload(push: Upload) -> None:
     """Send a dataset with LeRobot's `push_to_hub`."""
     from lerobot.datasets.lerobot_dataset import LeRobotDataset
 

@@ -5,12 +5,12 @@ from typing import Any
 import fsspec
 
 from handrail.controllers.errors import HandrailError, message_of
-from handrail.datasets.sharing.push import Push
+from handrail.datasets.sharing.push import Upload
 
 _LAST = "meta/info.json"  # without it nobody takes a folder for a dataset
 
 
-def copy(push: Push) -> None:
+def copy(push: Upload) -> None:
     """Copy what is sent to an address that is empty, or has a copy of it that was cut short."""
     try:
         system, place = fsspec.url_to_fs(push.to)
@@ -29,7 +29,7 @@ def copy(push: Push) -> None:
         raise HandrailError(f"--to {push.to}: {said}") from error
 
 
-def _check_free(push: Push, system: Any, place: str) -> None:
+def _check_free(push: Upload, system: Any, place: str) -> None:
     system.invalidate_cache()
     found = system.find(place) if system.exists(place) else []
     names = {path.removeprefix(place.rstrip("/") + "/") for path in found}

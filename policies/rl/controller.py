@@ -16,7 +16,7 @@ from handrail.controllers.robot.shape import Obstacle
 from handrail.policies.rl.observation import (
     ACTION_SIZE,
     RigidPose,
-    Situation,
+    TrackingSituation,
     base_velocity,
     check_robot,
     observe,
@@ -78,7 +78,7 @@ class RlController:
         current = pose.position, pose.rotation
         self._start = q[:3].copy() if self._start is None else self._start
         desired = self._desired or current
-        situation = Situation(
+        situation = TrackingSituation(
             q=q,
             start=self._start,
             twist=clamp_twist(twist),

@@ -17,7 +17,7 @@ RigidPose = tuple[FloatArray, FloatArray]  # position (3,) [m], rotation (3, 3)
 
 
 @dataclass(frozen=True)
-class Situation:
+class TrackingSituation:
     """What an observation is made of; poses and twist in the world frame.
 
     Attributes:
@@ -48,7 +48,7 @@ def check_robot(model: RobotModel) -> None:
         )
 
 
-def observe(situation: Situation) -> FloatArray:
+def observe(situation: TrackingSituation) -> FloatArray:
     """Return the observation: twist 6, poses 3 × (3 + 9), base since the start 3, arm 6, previous action 3.
 
     Everything but the base coordinates is in the frame of the base, and these are relative to the base's

@@ -29,7 +29,7 @@ from handrail.datasets.comparison.compare import compare
 from handrail.datasets.comparison.config import CompareConfig
 from handrail.datasets.comparison.report.report import write_report
 from handrail.datasets.editing.pack import merge_datasets
-from handrail.datasets.editing.source import Source
+from handrail.datasets.editing.source import EditSource
 from handrail.datasets.format.data_file import data_files
 from handrail.datasets.format.layout import Layout
 from handrail.datasets.format.manifest import read_manifest
@@ -83,7 +83,7 @@ def items(root: Path):
 
 def first_episodes(root: Path, new: Path, first: int, end: int) -> Path:
     """Write some episodes of a dataset as another one."""
-    source = Source.open(root)
+    source = EditSource.open(root)
     end = min(end, len(source.rows))
     write_anew(new, source.manifest, source.pieces(range(first, end)), source.types, source.encodings)
     return new

@@ -11,7 +11,7 @@ from rich.console import Console
 from handrail.collect.devices import gamepad, spacemouse
 from handrail.collect.devices.control_map import ControlMap, load_map
 from handrail.collect.devices.key_bytes import NAMES
-from handrail.collect.devices.source import Source
+from handrail.collect.devices.source import DeviceSource
 from handrail.collect.leader.calibration import LeaderCalibration, LeaderGripper, LeaderJoint
 from handrail.collect.local_operators.card import Card
 from handrail.collect.local_operators.local_person import LocalPerson
@@ -46,11 +46,11 @@ class Driven:
         self.person.ask(Ask("frame", "base"))
         self.main = PlayedPoller(device, self.clock)
         controls = load_map(device, CONTROLS[device]) if device in CONTROLS else ControlMap({}, {})
-        sources = [Source(self.main, controls)]
+        sources = [DeviceSource(self.main, controls)]
         self.beside = PlayedPoller(beside, self.clock) if beside else None
         if beside:
             table = load_map(beside, CONTROLS[beside])
-            sources.append(Source(self.beside, table.only("base") if follower else table.only()))
+            sources.append(DeviceSource(self.beside, table.only("base") if follower else table.only()))
         self.card = Card(device, [source.controls for source in sources], 3)
         self.local = LocalPerson(self.person, sources[0], sources[1] if beside else None, follower, self.card)
         self.q, self.time = HOME.copy(), 0.0

@@ -12,7 +12,7 @@ from datasets_helpers import create, frame_of
 
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.comparison.evaluations import FORMAT
-from handrail.policies.study.design.jobs import Layout, jobs
+from handrail.policies.study.design.jobs import StudyLayout, jobs
 from handrail.policies.study.design.load import load_design
 from handrail.policies.study.design.progress import write_json
 from handrail.policies.study.design.settings import evaluations, fingerprint
@@ -136,7 +136,7 @@ class Starter:
         self.begun, self.failing = [], failing
 
     def __call__(self, job, design, root):
-        layout = Layout(root)
+        layout = StudyLayout(root)
         needed = [layout.root / "done" / f"{name}.json" for name in job.needs]
         assert all(path.is_file() for path in needed), f"{job.name} began before what it needs"
         self.begun.append(job.name)
@@ -152,7 +152,7 @@ def run_here(config, work):
 
 def everything(tmp_path, preset):
     """Return the design, layout and jobs of a study of which every job is done."""
-    design, layout = load_design(preset), Layout(tmp_path / "study")
+    design, layout = load_design(preset), StudyLayout(tmp_path / "study")
     for job in jobs(design):
         make(job, design, layout)
     return design, layout, jobs(design)

@@ -6,7 +6,7 @@ import zlib
 
 import numpy as np
 
-from handrail.collect.cockpit.messages import Answer
+from handrail.collect.cockpit.messages import CardAnswer
 from handrail.collect.operators.operator import EpisodeEvent
 from handrail.collect.session.outcome import Outcome
 from handrail.collect.user_study.cards import NEXT, PAUSE
@@ -88,12 +88,12 @@ class SyntheticDesk:
     def hear(self):
         card = self.card
         if card["id"] == self._pauses:
-            return [Answer(card["id"], PAUSE, True)]
+            return [CardAnswer(card["id"], PAUSE, True)]
         for item in card["items"]:
             if item["name"] not in card["answers"]:
                 value = self._own.get(item["name"], answer_of(self._who, card["id"], item))
-                return [Answer(card["id"], item["name"], value)]
-        return [Answer(card["id"], NEXT, True)]
+                return [CardAnswer(card["id"], item["name"], value)]
+        return [CardAnswer(card["id"], NEXT, True)]
 
     @property
     def titles(self):

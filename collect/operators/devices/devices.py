@@ -61,7 +61,7 @@ class LeaderArmMap(StickMap):
 
 
 @dataclass(frozen=True)
-class Device:
+class ScriptedDevice:
     """What an operator has in hand; the numbers are a scripted person's, tuned on the same seeds for each.
 
     Attributes:
@@ -83,17 +83,17 @@ class Device:
 
 DEVICES = Registry(
     "device",
-    Device,
+    ScriptedDevice,
     (
-        Device("sticks", "velocity sticks on all channels of a mode", StickMap),
-        Device(
+        ScriptedDevice("sticks", "velocity sticks on all channels of a mode", StickMap),
+        ScriptedDevice(
             "single_axis",
             "one stick, one axis at a time",
             SingleAxisMap,
             Gains(gain=1.8, hand_speed=0.7, joint_rate=1.2, patience=4.0),
             drives=True,
         ),
-        Device(
+        ScriptedDevice(
             "leader_arm",
             "a small copy of the arm, and a stick for the base",
             LeaderArmMap,

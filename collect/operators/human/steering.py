@@ -6,7 +6,7 @@ import numpy as np
 
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.numerics.rotation import rotation_vector, turned
-from handrail.controllers.robot.description import World
+from handrail.controllers.robot.description import WorldScale
 from handrail.controllers.robot.model import Pose
 
 FOLLOW = 6.0
@@ -39,7 +39,7 @@ class Gains:
     joint_rate: float = 0.8
     patience: float = 1.0
 
-    def within(self, world: World) -> "Gains":
+    def within(self, world: WorldScale) -> "Gains":
         """Return the gains in a robot's world: as brisk, full stick made to its measure."""
         speed, rate = world.scale * world.pace, world.pace
         return replace(

@@ -4,7 +4,7 @@ import numpy as np
 
 from handrail.collect.operators.operator import View
 from handrail.collect.operators.scripts.base_placement import standing_within_reach
-from handrail.collect.operators.scripts.phases import Phase, PhasedScript, from_phase
+from handrail.collect.operators.scripts.phases import PhasedScript, ScriptPhase, from_phase
 from handrail.collect.tasks.cabinet import inward
 from handrail.collect.tasks.drawer import handle, handle_rotation, opened
 from handrail.controllers.arrays import FloatArray
@@ -23,7 +23,7 @@ class DrawerScript(PhasedScript):
     Who drives the base by itself turns the hand first, where there is room, and drives up to the handle then.
     """
 
-    def replan(self, view: View, name: str) -> list[Phase] | None:
+    def replan(self, view: View, name: str) -> list[ScriptPhase] | None:
         """Begin again at the handle when the drawer did not come along; leave it as long as it is near."""
         if name == "release" and opened(view.task) <= _ENOUGH:
             return from_phase(self.plan(view), "stage")
@@ -32,14 +32,14 @@ class DrawerScript(PhasedScript):
             return [self._leave(view)]
         return None
 
-    def _leave(self, view: View) -> Phase:
+    def _leave(self, view: View) -> ScriptPhase:
         """Return the phase that backs off from where the handle is now, the base where it is."""
         into = inward(view.task.object("cabinet").rotation)
         back = Pose(handle(view.task) - _BACK * into, handle_rotation(view.tool.rotation, into))
         base = view.state.q[:3] if self._model.description.base_joints else np.zeros(3)
-        return Phase(back, base, name="leave", distance=0.03, angle=3.2, pace=0.5, patience=5.0)
+        return ScriptPhase(back, base, name="leave", distance=0.03, angle=3.2, pace=0.5, patience=5.0)
 
-    def plan(self, view: View) -> list[Phase]:
+    def plan(self, view: View) -> list[ScriptPhase]:
         """Return the way to the handle, how to pull it, and how to let go."""
         into = inward(view.task.object("cabinet").rotation)
         bar, grasp = handle(view.task), handle_rotation(view.tool.rotation, into)
@@ -47,9 +47,9 @@ class DrawerScript(PhasedScript):
         yaw = float(np.arctan2(into[1], into[0]))
         base = standing_within_reach(self._model, view.state.q, Pose(bar, grasp), yaw)
 
-        def phase(name: str, back: float, **options: float) -> Phase:
+        def phase(name: str, back: float, **options: float) -> ScriptPhase:
             stand = base - np.array([pull * into[0], pull * into[1], 0.0]) * (name in ("pull", "release"))
-            return Phase(Pose(bar - back * into, grasp), stand, name=name, **options)  # type: ignore[arg-type]
+            return ScriptPhase(Pose(bar - back * into, grasp), stand, name=name, **options)  # type: ignore[arg-type]
 
         phases = [
             phase("stage", _BACK, distance=0.02, angle=0.10),
@@ -60,10 +60,10 @@ class DrawerScript(PhasedScript):
         ]
         if self._drives:
             hand, now = phases[0].hand, view.state.q[:3]
-            ready = Phase(before_driving(hand, base, now), now, name="ready", distance=0.05, angle=0.15)
+            ready = ScriptPhase(before_driving(hand, base, now), now, name="ready", distance=0.05, angle=0.15)
             phases = [
                 ready,
-                Phase(hand, base, name="drive", focus="base", distance=0.08, angle=0.08),
+                ScriptPhase(hand, base, name="drive", focus="base", distance=0.08, angle=0.08),
                 *phases,
             ]
         return phases

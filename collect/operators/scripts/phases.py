@@ -13,7 +13,7 @@ from handrail.controllers.robot.model import RobotModel
 
 
 @dataclass(frozen=True)
-class Phase(Target):
+class ScriptPhase(Target):
     """One thing to do: get the hand, or the base, to a target.
 
     Attributes:
@@ -47,10 +47,10 @@ class PhasedScript(ABC):
         self._scale, self._grip = model.description.world.scale, model.description.world.grip
 
     @abstractmethod
-    def plan(self, view: View) -> list[Phase]:
+    def plan(self, view: View) -> list[ScriptPhase]:
         """Return what to do, from what is seen at the beginning."""
 
-    def replan(self, view: View, name: str) -> list[Phase] | None:
+    def replan(self, view: View, name: str) -> list[ScriptPhase] | None:
         """Return what to do instead of what comes after the phase that ends; None to go on."""
         return None
 
@@ -58,7 +58,7 @@ class PhasedScript(ABC):
         """Look at the scene and plan."""
         self._begin(self.plan(view), view.state.time)
 
-    def _begin(self, phases: list[Phase], time: float) -> None:
+    def _begin(self, phases: list[ScriptPhase], time: float) -> None:
         self._phases = phases
         self._enter(0, time)
 
@@ -92,7 +92,7 @@ class PhasedScript(ABC):
                 self._begin(instead, time)
 
 
-def _reached(phase: Phase, view: View) -> bool:
+def _reached(phase: ScriptPhase, view: View) -> bool:
     if phase.focus == "base":
         q = view.state.q
         turn = np.arctan2(np.sin(phase.base[2] - q[2]), np.cos(phase.base[2] - q[2]))
@@ -104,6 +104,6 @@ def _reached(phase: Phase, view: View) -> bool:
     return bool(distance < phase.distance and angle < phase.angle)
 
 
-def from_phase(phases: list[Phase], name: str) -> list[Phase]:
+def from_phase(phases: list[ScriptPhase], name: str) -> list[ScriptPhase]:
     """Return the phases from the one of a name on."""
     return phases[next(index for index, phase in enumerate(phases) if phase.name == name) :]

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from handrail.collect.operators.operator import View
-from handrail.collect.operators.scripts.phases import Phase, PhasedScript, from_phase
+from handrail.collect.operators.scripts.phases import PhasedScript, ScriptPhase, from_phase
 from handrail.collect.operators.scripts.route import Route
 from handrail.collect.simulation.scene import SceneObject
 from handrail.collect.tasks.pick_place import grasp_rotation
@@ -30,14 +30,14 @@ class _Place:
 class PickPlaceScript(PhasedScript):
     """Approach, grasp, lift, carry, place for `handrail/PickPlace-v0`; a script."""
 
-    def replan(self, view: View, name: str) -> list[Phase] | None:
+    def replan(self, view: View, name: str) -> list[ScriptPhase] | None:
         """Grasp again when the cube stayed behind."""
         cube = view.task.pose("cube").position
         if name != "lift" or np.linalg.norm(cube - view.tool.position) < _HELD * self._grip:
             return None
         return from_phase(self.plan(view), "above")
 
-    def plan(self, view: View) -> list[Phase]:
+    def plan(self, view: View) -> list[ScriptPhase]:
         """Return the way to the cube, over to the bin, and what is done at both."""
         task = view.task
         self._route = Route(self._model, task)
@@ -62,14 +62,16 @@ class PickPlaceScript(PhasedScript):
             height = cube.position[2] + 0.30 * self._scale
             around = Pose(np.array([lane + _AHEAD * self._scale, cube.position[1], height]), down)
             base = np.array([lane, cube.position[1], 0.0])
-            phases.insert(0, Phase(around, base, name="approach", distance=0.15 * self._scale, angle=0.5))
+            phases.insert(
+                0, ScriptPhase(around, base, name="approach", distance=0.15 * self._scale, angle=0.5)
+            )
         return phases
 
-    def _ready(self, base: FloatArray, pick: _Place, down: FloatArray) -> Phase:
+    def _ready(self, base: FloatArray, pick: _Place, down: FloatArray) -> ScriptPhase:
         """Return the phase that folds the arm before it is driven up to the table, from where the base is."""
         scale = self._scale
         hand = np.array([base[0] + _AHEAD * scale, base[1], pick.thing[2] + 0.30 * scale])
-        return Phase(Pose(hand, down), base, name="ready", distance=0.15 * scale, angle=0.5)
+        return ScriptPhase(Pose(hand, down), base, name="ready", distance=0.15 * scale, angle=0.5)
 
     def _room(self, cube: SceneObject) -> float:
         """Return how far beside the cube the hand may be for the open fingers to close around it [m].
@@ -81,15 +83,15 @@ class PickPlaceScript(PhasedScript):
         near = _NEAR * self._grip
         return near if gripper is None else max(near, (gripper.stroke - width) / 2)
 
-    def _pick(self, pick: _Place, down: FloatArray, room: float) -> list[Phase]:
+    def _pick(self, pick: _Place, down: FloatArray, room: float) -> list[ScriptPhase]:
         """Go above the cube, down until it is between the fingers, close them, lift."""
         cube, base, scale, grip = pick.thing, self._stand(pick), self._scale, self._grip
         stage = np.array([pick.edge - 0.15 * scale, cube[1], cube[2] + 0.30 * scale])
         grasp = _above(cube, round(tips_beyond_tool(self._model) - _BELOW * grip, 6))
         near = _NEAR * grip
 
-        def phase(name: str, position: FloatArray, **options: float) -> Phase:
-            return Phase(Pose(position, down), base, name=name, **options)  # type: ignore[arg-type]
+        def phase(name: str, position: FloatArray, **options: float) -> ScriptPhase:
+            return ScriptPhase(Pose(position, down), base, name=name, **options)  # type: ignore[arg-type]
 
         return [
             phase("stage", stage, distance=0.10 * scale, angle=0.30),
@@ -99,16 +101,16 @@ class PickPlaceScript(PhasedScript):
             phase("lift", _above(cube, 0.22 * grip), distance=0.04 * grip, angle=0.3, gripper=1.0, pace=0.6),
         ]
 
-    def _carry(self, pick: _Place, place: _Place, down: FloatArray) -> list[Phase]:
+    def _carry(self, pick: _Place, place: _Place, down: FloatArray) -> list[ScriptPhase]:
         """Pull back until the base is behind the floor obstacles, cross, and go up to the other table."""
         scale = self._scale
         height = max(pick.thing[2], place.thing[2]) + 0.30 * scale
         lane, ahead = self._route.lane, _AHEAD * scale
         hand_lane = lane + ahead
 
-        def phase(name: str, x: float, at: _Place, base: FloatArray) -> Phase:
+        def phase(name: str, x: float, at: _Place, base: FloatArray) -> ScriptPhase:
             hand = Pose(np.array([x, at.thing[1], height]), down)
-            return Phase(hand, base, name=name, gripper=1.0, distance=0.12 * scale, angle=0.4)
+            return ScriptPhase(hand, base, name=name, gripper=1.0, distance=0.12 * scale, angle=0.4)
 
         if self._drives:
             retreat = phase("retreat", self._stand(pick)[0] + ahead, pick, self._stand(pick))
@@ -120,12 +122,12 @@ class PickPlaceScript(PhasedScript):
             phase("front", place.edge - _RETREAT * scale, place, self._stand(place)),
         ]
 
-    def _place(self, place: _Place, down: FloatArray, height: float) -> list[Phase]:
+    def _place(self, place: _Place, down: FloatArray, height: float) -> list[ScriptPhase]:
         rim = _above(place.thing, height)
         base, grip = self._stand(place), self._grip
 
-        def phase(name: str, rise: float, **options: float) -> Phase:
-            return Phase(Pose(_above(rim, rise), down), base, name=name, **options)  # type: ignore[arg-type]
+        def phase(name: str, rise: float, **options: float) -> ScriptPhase:
+            return ScriptPhase(Pose(_above(rim, rise), down), base, name=name, **options)  # type: ignore[arg-type]
 
         return [
             phase("over", 0.18 * grip, gripper=1.0, distance=0.03 * grip, angle=0.3),

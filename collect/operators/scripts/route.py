@@ -3,7 +3,7 @@
 import numpy as np
 
 from handrail.collect.operators.scripts.base_placement import standing_point
-from handrail.collect.operators.scripts.phases import Phase
+from handrail.collect.operators.scripts.phases import ScriptPhase
 from handrail.collect.tasks.clutter import floor_obstacles
 from handrail.collect.tasks.task import TaskState
 from handrail.controllers.arrays import FloatArray
@@ -43,14 +43,14 @@ class Route:
         base[0] = min(base[0], edge - length / 2 - self._clearance)
         return base
 
-    def drive(self, start: FloatArray, goal: FloatArray, hand: Pose, gripper: float) -> list[Phase]:
+    def drive(self, start: FloatArray, goal: FloatArray, hand: Pose, gripper: float) -> list[ScriptPhase]:
         """Return the phases that drive in the lane, then up to the goal, (3,)."""
         points, near = [goal], 0.12 * self._scale
         if abs(goal[1] - start[1]) > 0.3 * self._scale:
             back, across = (np.array([min(self.lane, start[0]), y, 0.0]) for y in (start[1], goal[1]))
             points = [back, across, goal] if start[0] > self.lane else [across, goal]
         return [
-            Phase(hand, point, name="drive", focus="base", gripper=gripper, distance=near, angle=0.15)
+            ScriptPhase(hand, point, name="drive", focus="base", gripper=gripper, distance=near, angle=0.15)
             for point in points
         ]
 

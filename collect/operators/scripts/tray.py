@@ -3,7 +3,7 @@
 import numpy as np
 
 from handrail.collect.operators.operator import View
-from handrail.collect.operators.scripts.phases import Phase, PhasedScript
+from handrail.collect.operators.scripts.phases import PhasedScript, ScriptPhase
 from handrail.collect.operators.scripts.route import Route
 from handrail.collect.tasks.starts import reach_share
 from handrail.collect.tasks.tray import HANDLE
@@ -21,7 +21,7 @@ _AHEAD = 1.0  # hand before the base's centre while carrying, with an arm that r
 class TrayScript(PhasedScript):
     """Cross behind the obstacles, go up to the table, put down, let go for `handrail/Tray-v0`; a script."""
 
-    def plan(self, view: View) -> list[Phase]:
+    def plan(self, view: View) -> list[ScriptPhase]:
         """Return the way to the table, and what is done there."""
         task, route = view.task, Route(self._model, view.task)
         table = task.object("table")
@@ -29,8 +29,8 @@ class TrayScript(PhasedScript):
         stand = route.stand(place, table.front)
         height = max(view.tool.position[2], place[2] + _OVER)
 
-        def phase(name: str, hand: FloatArray, base: FloatArray, **options: float) -> Phase:
-            return Phase(Pose(hand, _DOWN), base, name=name, **({"gripper": 1.0} | options))  # type: ignore[arg-type]
+        def phase(name: str, hand: FloatArray, base: FloatArray, **options: float) -> ScriptPhase:
+            return ScriptPhase(Pose(hand, _DOWN), base, name=name, **({"gripper": 1.0} | options))  # type: ignore[arg-type]
 
         over, up = (place + np.array([0.0, 0.0, rise]) for rise in (_OVER, _OVER + 0.08))
         phases = [

@@ -9,7 +9,7 @@ from handrail.datasets.storage.strict_json import load_json
 
 
 @dataclass(frozen=True)
-class StudyFolder:
+class PeopleFolder:
     """What lies in the folder.
 
     Attributes:
@@ -35,7 +35,7 @@ class StudyFolder:
         return DEMO if self.demo else ""
 
 
-def read_study(root: Path) -> StudyFolder:
+def read_study(root: Path) -> PeopleFolder:
     """Read what a study's folder holds."""
     described = load_json(root / "study.json", "the study.json of a user study")
     demo = described.get("demo", False) if isinstance(described, dict) else None
@@ -54,4 +54,4 @@ def read_study(root: Path) -> StudyFolder:
                 f" expected one of {', '.join(sorted(conditions))}"
             )
     demo |= any(score.source == DEMO for score in scores)
-    return StudyFolder(root, demo, datasets, scores)
+    return PeopleFolder(root, demo, datasets, scores)

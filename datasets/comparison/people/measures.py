@@ -5,7 +5,7 @@ import math
 from handrail.datasets.demonstrations.demonstration import Demonstration, DoesNotApply
 from handrail.datasets.quality.catalogue import METRICS
 from handrail.datasets.quality.metric import metric
-from handrail.datasets.quality.pool import Pool
+from handrail.datasets.quality.pool import ObservationPool
 
 _CHOSEN = (
     "contacts",
@@ -21,7 +21,7 @@ _CHOSEN = (
 
 
 @metric("success", "", "higher", "share of the episodes that succeeded")
-def success(episode: Demonstration, pool: Pool) -> float:
+def success(episode: Demonstration, pool: ObservationPool) -> float:
     """Return 1 for an episode that succeeded, else 0."""
     if episode.success is None:
         raise DoesNotApply("success was not recorded")
@@ -29,7 +29,7 @@ def success(episode: Demonstration, pool: Pool) -> float:
 
 
 @metric("completion_time", "s", "lower", "how long the episodes that succeeded took")
-def completion_time(episode: Demonstration, pool: Pool) -> float:
+def completion_time(episode: Demonstration, pool: ObservationPool) -> float:
     """Return how long it took [s]; failures have none."""
     if not episode.success:
         raise DoesNotApply("it did not succeed")

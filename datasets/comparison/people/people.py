@@ -19,7 +19,7 @@ from handrail.datasets.comparison.people.contrasts import (
     of_people,
     within_reach,
 )
-from handrail.datasets.comparison.people.folder import StudyFolder, read_study
+from handrail.datasets.comparison.people.folder import PeopleFolder, read_study
 from handrail.datasets.comparison.people.measures import MEASURES
 from handrail.datasets.comparison.people.scores import SCORES, Score
 from handrail.datasets.comparison.people.trials import Trial, read_trials
@@ -41,7 +41,7 @@ _LEFT_OUT = "Episodes that name neither a participant nor a script, and are left
 
 
 @dataclass(frozen=True)
-class Part:
+class PeoplePart:
     """A task, or the forms.
 
     Attributes:
@@ -72,11 +72,11 @@ class PeopleComparison:
     """
 
     config: CompareConfig
-    study: StudyFolder
+    study: PeopleFolder
     baseline: str
     participants: tuple[str, ...]
     trials: tuple[Trial, ...]
-    parts: tuple[Part, ...]
+    parts: tuple[PeoplePart, ...]
     cautions: tuple[str, ...]
 
 
@@ -107,7 +107,7 @@ def compare_people(config: CompareConfig) -> PeopleComparison:
     )
 
 
-def _task(task: str, trials: Sequence[Trial], baseline: str, rng: np.random.Generator) -> Part:
+def _task(task: str, trials: Sequence[Trial], baseline: str, rng: np.random.Generator) -> PeoplePart:
     conditions = list(dict.fromkeys(each.condition for each in trials if each.participant))
     scripted = list(dict.fromkeys(each.condition for each in trials if not each.participant))
     total = len({each.participant for each in trials if each.participant})
@@ -135,7 +135,7 @@ def _task(task: str, trials: Sequence[Trial], baseline: str, rng: np.random.Gene
             for label in conditions
             if label != baseline and baseline in people
         ]
-    return Part(task, MEASURES, means, tuple(adjusted(contrasts)))
+    return PeoplePart(task, MEASURES, means, tuple(adjusted(contrasts)))
 
 
 def _forms(
@@ -144,7 +144,7 @@ def _forms(
     baseline: str,
     participants: Sequence[str],
     rng: np.random.Generator,
-) -> Part:
+) -> PeoplePart:
     means: dict[str, tuple[Mean, ...]] = {}
     contrasts: list[Contrast] = []
     for measure in SCORES:
@@ -164,11 +164,11 @@ def _forms(
             for label in conditions
             if label != baseline
         ]
-    return Part(FORMS, SCORES, means, tuple(adjusted(contrasts)))
+    return PeoplePart(FORMS, SCORES, means, tuple(adjusted(contrasts)))
 
 
 def _cautions(
-    scores: Sequence[Score], participants: Sequence[str], parts: Sequence[Part], left_out: int
+    scores: Sequence[Score], participants: Sequence[str], parts: Sequence[PeoplePart], left_out: int
 ) -> tuple[str, ...]:
     count, strangers = len(participants), {each.participant for each in scores} - set(participants)
     means = [mean for part in parts for means in part.means.values() for mean in means]

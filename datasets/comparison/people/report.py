@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from handrail.datasets.comparison.people.contrasts import Contrast
-from handrail.datasets.comparison.people.people import Part, PeopleComparison
+from handrail.datasets.comparison.people.people import PeopleComparison, PeoplePart
 from handrail.datasets.comparison.people.tables import people_tables
 from handrail.datasets.comparison.report.report import json_text, plain, write_texts
 from handrail.datasets.presentation.markup import folded, items, page, paragraph, section
@@ -65,7 +65,7 @@ def as_json(comparison: PeopleComparison) -> dict[str, Any]:
     )
 
 
-def _part(part: Part) -> dict[str, Any]:
+def _part(part: PeoplePart) -> dict[str, Any]:
     return {
         "means": {name: [asdict(mean) for mean in means] for name, means in part.means.items()},
         "differences": [_contrast(each) for each in part.contrasts],

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 from handrail.datasets.comparison.people.contrasts import Contrast, Mean
 from handrail.datasets.comparison.people.measures import SHARES
-from handrail.datasets.comparison.people.people import Part, PeopleComparison
+from handrail.datasets.comparison.people.people import PeopleComparison, PeoplePart
 from handrail.datasets.presentation.table import Cell, Table
 from handrail.datasets.presentation.wording import (
     DASH,
@@ -31,7 +31,7 @@ def people_tables(comparison: PeopleComparison) -> Iterator[Table]:
             yield contrasts_table(part, comparison)
 
 
-def means_table(part: Part, note: str) -> Table:
+def means_table(part: PeoplePart, note: str) -> Table:
     """Return every measure under every condition.
 
     Args:
@@ -44,7 +44,7 @@ def means_table(part: Part, note: str) -> Table:
     return Table(("", *labels), rows, _title(note, part.title), _MEANS)
 
 
-def contrasts_table(part: Part, comparison: PeopleComparison) -> Table:
+def contrasts_table(part: PeoplePart, comparison: PeopleComparison) -> Table:
     """Return every condition's difference to the baseline."""
     headings = ("", "condition", f"minus {comparison.baseline}", "95 %", "p, Holm", "n")
     rows = [

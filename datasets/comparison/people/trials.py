@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from handrail.controllers.errors import HandrailError
-from handrail.datasets.comparison.people.folder import StudyFolder
+from handrail.datasets.comparison.people.folder import PeopleFolder
 from handrail.datasets.comparison.people.measures import MEASURES
 from handrail.datasets.demonstrations.columns import ColumnNames
 from handrail.datasets.demonstrations.episode import Episode
@@ -41,7 +41,7 @@ class Trial:
     values: Mapping[str, float]
 
 
-def read_trials(study: StudyFolder, beside: Sequence[Path], columns: ColumnNames) -> tuple[list[Trial], int]:
+def read_trials(study: PeopleFolder, beside: Sequence[Path], columns: ColumnNames) -> tuple[list[Trial], int]:
     """Return all trials of a study, and of datasets of scripted operators beside it.
 
     Args:

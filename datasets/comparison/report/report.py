@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from handrail.datasets.comparison.cautions import cautions
-from handrail.datasets.comparison.compare import Comparison, View
+from handrail.datasets.comparison.compare import Comparison, EpisodeChoice
 from handrail.datasets.comparison.differences import Difference
 from handrail.datasets.comparison.headline import headline
 from handrail.datasets.comparison.report.page import report_page
@@ -68,7 +68,7 @@ def as_json(comparison: Comparison) -> dict[str, Any]:
     )
 
 
-def _view(view: View) -> dict[str, Any]:
+def _view(view: EpisodeChoice) -> dict[str, Any]:
     return {
         "collected": {
             each.label: asdict(each) | {"successes_an_hour": each.successes_an_hour}

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from handrail.datasets.comparison.collection import Collected, adjusted, detected
-from handrail.datasets.comparison.compare import Comparison, View
+from handrail.datasets.comparison.compare import Comparison, EpisodeChoice
 from handrail.datasets.comparison.differences import FOLLOWS, Difference
 from handrail.datasets.comparison.groups import Group
 from handrail.datasets.comparison.outcomes import ConditionOutcome, Outcomes
@@ -58,7 +58,7 @@ def _detected_table(comparison: Comparison) -> Table:
     return Table(("differs", base, "", "mean, 95 %", "p, Holm"), rows, caption=_REST)
 
 
-def collection_table(view: View) -> Table:
+def collection_table(view: EpisodeChoice) -> Table:
     """Return what each group consists of."""
     headings = ("", "episodes", "success", "95 %", "operator time", "successes / h", "why not")
     headings += ("task", "robot")
@@ -212,7 +212,7 @@ def _at_length(each: Difference) -> Cell:
     return Cell(signed(each.at_length), look, below=span(each.at_length_interval))
 
 
-def _of(view: View, metric: Metric, label: str) -> Difference:
+def _of(view: EpisodeChoice, metric: Metric, label: str) -> Difference:
     (found,) = [each for each in view.differences if each.metric is metric and each.label == label]
     return found
 

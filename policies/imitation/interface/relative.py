@@ -42,7 +42,7 @@ _BASE = ("base.x", "base.y", "base.cos", "base.sin")
 
 
 @dataclass(frozen=True)
-class Group:
+class RelativeGroup:
     """Numbers of the environment that belong together.
 
     Attributes:
@@ -178,27 +178,27 @@ class RelativeView:
         return (*(f"{joint}.pos" for joint in arm), *others)
 
     @cached_property
-    def _groups(self) -> tuple[Group, ...]:
+    def _groups(self) -> tuple[RelativeGroup, ...]:
         return grouped(self.environment_names)
 
     def _of(self, state: FloatArray, names: Sequence[str]) -> FloatArray:
         return state[:, [self.state_names.index(name) for name in names]]
 
 
-def grouped(names: Sequence[str]) -> tuple[Group, ...]:
+def grouped(names: Sequence[str]) -> tuple[RelativeGroup, ...]:
     """Return neighbouring names with the same beginning as groups."""
-    groups: list[Group] = []
+    groups: list[RelativeGroup] = []
     for index, name in enumerate(names):
         head, _, part = name.rpartition(".")
         if groups and groups[-1].name == head and part not in groups[-1].parts:
             last = groups[-1]
-            groups[-1] = Group(last.name, (*last.parts, part), last.start)
+            groups[-1] = RelativeGroup(last.name, (*last.parts, part), last.start)
         else:
-            groups.append(Group(head, (part,), index))
+            groups.append(RelativeGroup(head, (part,), index))
     return tuple(groups)
 
 
-def _parts(group: Group) -> tuple[str, ...]:
+def _parts(group: RelativeGroup) -> tuple[str, ...]:
     offset = ("dx", "dy", "dz", *(f"near_{r:g}.{axis}" for r in _NEAR for axis in _POSITION))
     if group.parts == _POSE:
         return (*offset, *_MATRIX)
@@ -207,7 +207,7 @@ def _parts(group: Group) -> tuple[str, ...]:
     return group.parts
 
 
-def _seen(group: Group, numbers: FloatArray, pose: RobotPose) -> FloatArray:
+def _seen(group: RelativeGroup, numbers: FloatArray, pose: RobotPose) -> FloatArray:
     """Return a group as seen from the robot, (T, k)."""
     if group.parts[:3] == _POSITION and group.parts in (_POSE, _POSITION):
         offset = _at_scales(pose.turned(numbers[:, :3] - pose.tool))

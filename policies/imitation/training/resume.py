@@ -11,7 +11,7 @@ from handrail.policies.imitation.interface.checkpoint import PolicyMeta
 from handrail.policies.imitation.training.presets import resolved
 
 if TYPE_CHECKING:
-    from handrail.policies.imitation.training.source import Source
+    from handrail.policies.imitation.training.source import TrainingSource
 
 _OLDER = {"base_pose": False, "scene": True}  # of a training before that could be said
 
@@ -35,7 +35,7 @@ def check_settings(config: TrainConfig, began: PolicyMeta) -> None:
         _check_same(f"the policy's {name}", sizes["options"].get(name), options.get(name))
 
 
-def check_data(source: "Source", began: PolicyMeta) -> None:
+def check_data(source: "TrainingSource", began: PolicyMeta) -> None:
     """Check that what is read is what a checkpoint learnt from.
 
     A checkpoint of an earlier version says nothing of pictures, or only how many episodes and how long.

@@ -39,7 +39,7 @@ _OVER_PROCESSES = {
 
 
 @dataclass(frozen=True)
-class Run:
+class TrainingRun:
     """One training, from its beginning or from a checkpoint.
 
     Attributes:

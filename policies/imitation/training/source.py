@@ -51,7 +51,7 @@ _READ_SCENE = ("act", "diffusion")  # what needs pictures or the environment's s
 
 
 @dataclass(frozen=True)
-class Source:
+class TrainingSource:
     """Chosen episodes of a dataset.
 
     Attributes:
@@ -96,7 +96,7 @@ class Source:
         """The episodes to learn from, and those that are held out."""
         return hold_out(self.selection.rows, self.config)
 
-    def only(self, rows: Sequence[Row]) -> "Source":
+    def only(self, rows: Sequence[Row]) -> "TrainingSource":
         """Return the source with some of its episodes, in their order."""
         numbers, all_rows = {row["episode_index"] for row in rows}, self.selection.rows
         inside = [row["episode_index"] in numbers for row in all_rows]
@@ -149,7 +149,7 @@ class Source:
             ) from error
 
 
-def read_source(config: TrainConfig, began: PolicyMeta | None = None) -> Source:
+def read_source(config: TrainConfig, began: PolicyMeta | None = None) -> TrainingSource:
     """Read what a config asks for, or what a training began with.
 
     Args:
@@ -176,7 +176,9 @@ def read_source(config: TrainConfig, began: PolicyMeta | None = None) -> Source:
     if not config.scene:
         features.pop(ENVIRONMENT, None)
         columns.pop(ENVIRONMENT, None)
-    return Source(config, info, selection, interface, features, columns | _counters(selection, info.fps))
+    return TrainingSource(
+        config, info, selection, interface, features, columns | _counters(selection, info.fps)
+    )
 
 
 def _check_one_mode(selection: Selection, said: str) -> None:

@@ -29,7 +29,7 @@ from handrail.policies.imitation.training.plateau import Plateau
 from handrail.policies.imitation.training.presets import policy_config, resolved
 from handrail.policies.imitation.training.refusal import in_one_line
 from handrail.policies.imitation.training.resume import as_json, check_data, check_settings
-from handrail.policies.imitation.training.source import Source, read_source
+from handrail.policies.imitation.training.source import TrainingSource, read_source
 
 if TYPE_CHECKING:
     from lerobot.configs.train import TrainPipelineConfig
@@ -87,21 +87,21 @@ def _warmup(steps: int) -> int:
 
 def _run(
     config: TrainConfig,
-    source: Source,
+    source: TrainingSource,
     steps: int,
     checkpoint: Path | None,
     quiet: bool,
     losses: dict[int, float],
     plateau: Plateau | None,
 ) -> None:
-    from handrail.policies.imitation.training.run import Run
+    from handrail.policies.imitation.training.run import TrainingRun
     from handrail.policies.imitation.training.validation import Validation
 
     settings = _settings(config, steps)
     assert settings.policy is not None
     learnt, held_out = (source.only(rows).dataset(settings.policy) if rows else None for rows in source.split)
     assert learnt is not None
-    Run(
+    TrainingRun(
         settings,
         learnt,
         checkpoint,
@@ -171,7 +171,7 @@ def _is_checkpoint(path: Path) -> bool:
     return path.name in ("last", ".last") or path.name.strip(".").removesuffix(".old").isdecimal()
 
 
-def _meta(source: Source, steps: int, losses: Mapping[int, float] | None = None) -> PolicyMeta:
+def _meta(source: TrainingSource, steps: int, losses: Mapping[int, float] | None = None) -> PolicyMeta:
     config, rows = source.config, source.selection.rows
     return PolicyMeta(
         environment=_common([str(row.get("environment") or "") for row in rows]),
@@ -211,7 +211,7 @@ def _completion(meta: PolicyMeta) -> "Completion":
     return Completion(meta.robot, meta.environment, meta.mode, meta.fps)
 
 
-def _robot(source: Source) -> str:
+def _robot(source: TrainingSource) -> str:
     """Return the name that finds the robot again, not the path of a file; else what the dataset calls it."""
     said = _common([str(row.get("robot") or "") for row in source.selection.rows])
     return said if said and is_name(said) else source.info.robot_type

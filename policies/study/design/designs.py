@@ -5,11 +5,11 @@ from datetime import UTC, datetime
 
 from handrail.controllers.errors import unknown_name
 from handrail.policies.study.design.design import StudyDesign
-from handrail.policies.study.design.jobs import Job, Layout
+from handrail.policies.study.design.jobs import StudyJob, StudyLayout
 from handrail.policies.study.design.progress import read_json, write_json
 
 
-def note_design(layout: Layout, design: StudyDesign) -> None:
+def note_design(layout: StudyLayout, design: StudyDesign) -> None:
     """Note that the folder is run with a design, unless it was the last one already.
 
     Raises:
@@ -21,14 +21,14 @@ def note_design(layout: Layout, design: StudyDesign) -> None:
         write_json(layout.designs, {"designs": [*known, entry]})
 
 
-def designs(layout: Layout) -> list[dict[str, str]]:
+def designs(layout: StudyLayout) -> list[dict[str, str]]:
     """Return the designs that the folder was run with, the first one first: `digest`, `since`."""
     found = read_json(layout.designs).get("designs", [])
     listed = found if isinstance(found, list) else []
     return [each for each in listed if isinstance(each, dict) and {"digest", "since"} <= each.keys()]
 
 
-def check_cell(name: str, jobs: Sequence[Job]) -> None:
+def check_cell(name: str, jobs: Sequence[StudyJob]) -> None:
     """Check that a study has a cell of a name; none is all."""
     cells = dict.fromkeys(job.cell.name for job in jobs)
     if name and name not in cells:

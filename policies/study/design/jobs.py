@@ -13,7 +13,7 @@ CONDITIONS = ("nominal", "disturbed", "protected")
 
 
 @dataclass(frozen=True)
-class Cell:
+class StudyCell:
     """What is collected as one dataset: a task in a mode, one draw."""
 
     task: str
@@ -36,7 +36,7 @@ class StudyPolicy:
         budget: how much of the dataset: the same operator's `time`, or the same `number` of demonstrations.
     """
 
-    cell: Cell
+    cell: StudyCell
     actions: Actions = "realised"
     budget: Budget = "time"
 
@@ -53,7 +53,7 @@ class StudyPolicy:
 
 
 @dataclass(frozen=True)
-class Job:
+class StudyJob:
     """One piece of work: collect a dataset, or train and evaluate a policy.
 
     Attributes:
@@ -64,7 +64,7 @@ class Job:
     """
 
     name: str
-    cell: Cell
+    cell: StudyCell
     policy: StudyPolicy | None = None
     robust: bool = False
 
@@ -74,15 +74,15 @@ class Job:
         return (f"collect/{self.cell.name}",) if self.policy else ()
 
 
-def jobs(design: StudyDesign) -> list[Job]:
+def jobs(design: StudyDesign) -> list[StudyJob]:
     """Return all jobs, what matters most first: draw by draw the main design, then what is beside it."""
     return [job for draw in range(design.draws) for job in _draw(design, draw)]
 
 
-def _draw(design: StudyDesign, draw: int) -> Iterator[Job]:
+def _draw(design: StudyDesign, draw: int) -> Iterator[StudyJob]:
     """Yield the jobs of a draw: after each draw what is done is balanced."""
     robust = design.robustness is not None and draw < design.robustness.draws
-    cells = {task: [Cell(task, mode, draw) for mode in design.modes] for task in design.tasks}
+    cells = {task: [StudyCell(task, mode, draw) for mode in design.modes] for task in design.tasks}
     for task in design.tasks:
         yield from map(_collect, cells[task])
         yield from (_policy(StudyPolicy(cell), robust) for cell in cells[task])
@@ -93,16 +93,16 @@ def _draw(design: StudyDesign, draw: int) -> Iterator[Job]:
             yield _policy(StudyPolicy(cell, budget="number"), robust=False)
 
 
-def _collect(cell: Cell) -> Job:
-    return Job(f"collect/{cell.name}", cell)
+def _collect(cell: StudyCell) -> StudyJob:
+    return StudyJob(f"collect/{cell.name}", cell)
 
 
-def _policy(policy: StudyPolicy, robust: bool) -> Job:
-    return Job(f"policy/{policy.name}", policy.cell, policy, robust)
+def _policy(policy: StudyPolicy, robust: bool) -> StudyJob:
+    return StudyJob(f"policy/{policy.name}", policy.cell, policy, robust)
 
 
 @dataclass(frozen=True)
-class Layout:
+class StudyLayout:
     """Where everything lies in a study's folder.
 
     What is large is in `datasets` and `policies`, and may go: what is done stays done without it.
@@ -115,7 +115,7 @@ class Layout:
         """Return the file of the designs with which the study was run."""
         return self.root / "designs.json"
 
-    def dataset(self, cell: Cell) -> Path:
+    def dataset(self, cell: StudyCell) -> Path:
         """Return the folder of a dataset."""
         return self.root / "datasets" / cell.name
 
@@ -127,14 +127,14 @@ class Layout:
         """Return the file of a policy's rollouts: `nominal`, `disturbed` or `protected`."""
         return self.root / "evaluations" / policy.cell.name / what / f"{policy.actions}-{policy.budget}.json"
 
-    def begun(self, job: Job) -> Path:
+    def begun(self, job: StudyJob) -> Path:
         """Return the file that says with which settings a job was begun."""
         return self.root / "begun" / f"{job.name}.json"
 
-    def done(self, job: Job) -> Path:
+    def done(self, job: StudyJob) -> Path:
         """Return the file that says that a job is done, with which settings, and what came of it."""
         return self.root / "done" / f"{job.name}.json"
 
-    def log(self, job: Job) -> Path:
+    def log(self, job: StudyJob) -> Path:
         """Return the file of what a job says."""
         return self.root / "logs" / f"{job.name}.log"

@@ -14,7 +14,7 @@ from handrail.datasets.storage import strict_json
 from handrail.datasets.storage.atomic import write_whole
 from handrail.policies.imitation.evaluation.config import EvaluateConfig
 from handrail.policies.study.design.design import StudyDesign
-from handrail.policies.study.design.jobs import Job, Layout, jobs
+from handrail.policies.study.design.jobs import StudyJob, StudyLayout, jobs
 from handrail.policies.study.design.settings import evaluations, fingerprint
 
 
@@ -28,7 +28,7 @@ class StudyProgress:
     """
 
     design: StudyDesign
-    layout: Layout
+    layout: StudyLayout
 
     @cached_property
     def done(self) -> frozenset[str]:
@@ -40,7 +40,7 @@ class StudyProgress:
         """Names of the jobs that are not."""
         return [job.name for job in self.jobs if job.name not in self.done]
 
-    def todo(self, only: str = "") -> list[Job]:
+    def todo(self, only: str = "") -> list[StudyJob]:
         """Return the jobs to be done: those that are missing, and recordings anew that they need.
 
         A dataset that is gone is recorded again only for a policy that is still to be trained on it.
@@ -54,7 +54,7 @@ class StudyProgress:
         gone = {job.name for job in chosen if job.policy is None and not self._has_dataset(job)}
         return [job for job in chosen if job.name in missing or job.name in needed & gone]
 
-    def _has_dataset(self, job: Job) -> bool:
+    def _has_dataset(self, job: StudyJob) -> bool:
         """Return whether the dataset that a job noted is still there, whole."""
         root, noted = self.layout.dataset(job.cell), self._notes[job.name].get("result", {})
         try:
@@ -62,11 +62,11 @@ class StudyProgress:
         except HandrailError:
             return False
 
-    def note(self, job: Job) -> dict[str, Any]:
+    def note(self, job: StudyJob) -> dict[str, Any]:
         """Return the note of a job: `settings`, `result`, what it `took`; nothing until it is done."""
         return self._notes[job.name] if job.name in self.done else {}
 
-    def rollouts(self, job: Job) -> list[Path]:
+    def rollouts(self, job: StudyJob) -> list[Path]:
         """Return the files of the rollouts of a job's policy; none until it is done."""
         if job.policy is None or job.name not in self.done:
             return []
@@ -77,12 +77,12 @@ class StudyProgress:
         return {job.name: note_of(job, self.layout) for job in self.jobs}
 
     @cached_property
-    def jobs(self) -> list[Job]:
+    def jobs(self) -> list[StudyJob]:
         """All jobs of the study."""
         return jobs(self.design)
 
 
-def is_done(job: Job, design: StudyDesign, layout: Layout) -> bool:
+def is_done(job: StudyJob, design: StudyDesign, layout: StudyLayout) -> bool:
     """Return whether a job was done with just these settings, and the small files it made are there.
 
     Datasets and policies may be gone: what is to be known of them is in the job's note and its rollouts.
@@ -98,7 +98,7 @@ def is_done(job: Job, design: StudyDesign, layout: Layout) -> bool:
         return False
 
 
-def note_of(job: Job, layout: Layout) -> dict[str, Any]:
+def note_of(job: StudyJob, layout: StudyLayout) -> dict[str, Any]:
     """Return the note of a job that was done at some time: its settings, its result, what it took."""
     return read_json(layout.done(job))
 

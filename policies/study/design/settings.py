@@ -12,7 +12,7 @@ from handrail.policies.imitation.evaluation.config import EvaluateConfig
 from handrail.policies.imitation.training.presets import check_policy, resolved
 from handrail.policies.imitation.training.resume import as_json
 from handrail.policies.study.design.design import MOST_DRAWS, StudyDesign
-from handrail.policies.study.design.jobs import Cell, Job, StudyPolicy, jobs
+from handrail.policies.study.design.jobs import StudyCell, StudyJob, StudyPolicy, jobs
 
 BATCH = 10  # episodes, until the next person has a turn
 _FPS = 20  # [Hz]
@@ -22,12 +22,12 @@ _ENDED = ("eval_split", "eval_steps", "patience", "improvement")
 _DRIVEN = ("episodes", "seed", "label", "protection", "perturbation", "time_limit")
 
 
-def seed_of(design: StudyDesign, cell: Cell) -> int:
+def seed_of(design: StudyDesign, cell: StudyCell) -> int:
     """Return the seed of a draw, of its recordings and of its rollouts: the same for every mode."""
     return MOST_DRAWS * design.seed + cell.draw
 
 
-def recording(cell: Cell, design: StudyDesign, root: Path, so_far: int = 0) -> RecordConfig:
+def recording(cell: StudyCell, design: StudyDesign, root: Path, so_far: int = 0) -> RecordConfig:
     """Return how the next turn of a dataset is recorded.
 
     Args:
@@ -87,7 +87,7 @@ def training(policy: StudyPolicy, design: StudyDesign, dataset: Path, output: Pa
     )
 
 
-def evaluations(job: Job, design: StudyDesign, folder: str = "policy") -> dict[str, EvaluateConfig]:
+def evaluations(job: StudyJob, design: StudyDesign, folder: str = "policy") -> dict[str, EvaluateConfig]:
     """Return how the policy of a job is driven, by condition.
 
     Args:
@@ -114,7 +114,7 @@ def evaluations(job: Job, design: StudyDesign, folder: str = "policy") -> dict[s
     return found
 
 
-def fingerprint(job: Job, design: StudyDesign) -> dict[str, Any]:
+def fingerprint(job: StudyJob, design: StudyDesign) -> dict[str, Any]:
     """Return all settings that a job's result depends on, as JSON has them, nothing left to a preset.
 
     Of a dataset `recording` says what it is; `wanted` may grow. A policy depends on both, on its `training`
@@ -149,7 +149,7 @@ def check_policies(design: StudyDesign) -> None:
             check_policy(training(job.policy, design, Path("dataset"), Path("policy")))
 
 
-def _of_cell(cell: Cell, design: StudyDesign) -> dict[str, Any]:
+def _of_cell(cell: StudyCell, design: StudyDesign) -> dict[str, Any]:
     task = design.tasks[cell.task]
     config, turns = recording(cell, design, Path("dataset")), {"persons": design.persons, "turn": BATCH}
     seen = ("cameras", "image_size") if design.pictures else ()
@@ -162,7 +162,7 @@ def _some(config: Any, names: tuple[str, ...]) -> dict[str, Any]:
 
 
 @contextmanager
-def _named(design: StudyDesign, job: Job) -> Iterator[None]:
+def _named(design: StudyDesign, job: StudyJob) -> Iterator[None]:
     try:
         yield
     except HandrailError as error:

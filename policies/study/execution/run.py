@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from handrail.collect.execution.execution import Execution
-from handrail.collect.execution.job import Job as Piece
+from handrail.collect.execution.job import Job
 from handrail.controllers.errors import FAILED
 from handrail.datasets.presentation.markdown import read_page, with_part
 from handrail.datasets.presentation.terminal import Terminal
@@ -15,7 +15,7 @@ from handrail.policies.imitation.training.installed import check_installed
 from handrail.policies.study.config import StudyConfig
 from handrail.policies.study.design.design import StudyDesign
 from handrail.policies.study.design.designs import check_cell, note_design
-from handrail.policies.study.design.jobs import Job, Layout
+from handrail.policies.study.design.jobs import StudyJob, StudyLayout
 from handrail.policies.study.design.load import load_design
 from handrail.policies.study.design.power import plan
 from handrail.policies.study.design.progress import StudyProgress
@@ -26,7 +26,7 @@ _PRELOAD = ("handrail.policies.study.execution.preload",)
 
 
 def run_study(
-    config: StudyConfig, work: Callable[[Job, StudyDesign, Path], None] = do, isolated: bool = True
+    config: StudyConfig, work: Callable[[StudyJob, StudyDesign, Path], None] = do, isolated: bool = True
 ) -> int:
     """Do what is not done yet, then write the report; return the exit code.
 
@@ -37,7 +37,7 @@ def run_study(
     """
     config.check()
     design = load_design(config.preset)
-    progress, console = StudyProgress(design, Layout(config.folder)), Terminal(stderr=True)
+    progress, console = StudyProgress(design, StudyLayout(config.folder)), Terminal(stderr=True)
     check_cell(config.only, progress.jobs)
     told = f"study {design.name}, design {design.digest}: {len(progress.jobs)} jobs. {plan(design)}"
     console.print(told)
@@ -65,14 +65,16 @@ def run_study(
     return FAILED if failed else 0
 
 
-def _todo(progress: StudyProgress, work: Callable[[Job, StudyDesign, Path], None], only: str) -> list[Piece]:
+def _todo(
+    progress: StudyProgress, work: Callable[[StudyJob, StudyDesign, Path], None], only: str
+) -> list[Job]:
     """Return the jobs that are to be done, what matters most first; their logs begin anew."""
     design, layout = progress.design, progress.layout
     todo = progress.todo(only)
     for job in todo:
         with explained(str(layout.log(job))):
             layout.log(job).unlink(missing_ok=True)  # of an earlier time
-    return [Piece(job.name, work, (job, design, layout.root), job.needs, log=layout.log(job)) for job in todo]
+    return [Job(job.name, work, (job, design, layout.root), job.needs, log=layout.log(job)) for job in todo]
 
 
 @contextlib.contextmanager

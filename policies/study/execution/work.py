@@ -21,7 +21,7 @@ from handrail.datasets.reading.reader import read_episodes
 from handrail.datasets.storage.atomic import remove
 from handrail.policies.imitation.interface.checkpoint import last_checkpoint, read_meta
 from handrail.policies.study.design.design import StudyDesign
-from handrail.policies.study.design.jobs import CONDITIONS, Cell, Job, Layout, StudyPolicy
+from handrail.policies.study.design.jobs import CONDITIONS, StudyCell, StudyJob, StudyLayout, StudyPolicy
 from handrail.policies.study.design.progress import note_of, read_json, write_json
 from handrail.policies.study.design.settings import evaluations, fingerprint, recording, training
 
@@ -49,13 +49,13 @@ def summary(root: Path, seed: int) -> dict[str, Any]:
     }
 
 
-def do(job: Job, design: StudyDesign, root: Path) -> None:
+def do(job: StudyJob, design: StudyDesign, root: Path) -> None:
     """Do a job of a study and write that it is done, what came of it, and what it took.
 
     Raises:
         HandrailError, OSError: it cannot be done.
     """
-    layout, start, spent = Layout(root), time.monotonic(), _processor_time()
+    layout, start, spent = StudyLayout(root), time.monotonic(), _processor_time()
     begin(job, design, layout)
     result = work(job, design, layout)
     took = {
@@ -73,7 +73,7 @@ def _processor_time() -> float:
     return sum(each.ru_utime + each.ru_stime for each in used)
 
 
-def begin(job: Job, design: StudyDesign, layout: Layout) -> None:
+def begin(job: StudyJob, design: StudyDesign, layout: StudyLayout) -> None:
     """Remove what a job made with other settings before, then note with which it begins.
 
     A dataset may grow, but never mix two ways to record; rollouts of other conditions go, and those of a
@@ -92,7 +92,9 @@ def begin(job: Job, design: StudyDesign, layout: Layout) -> None:
     write_json(layout.begun(job), settings)
 
 
-def _stale(job: Job, now: Mapping[str, Any], before: Mapping[str, Any], layout: Layout) -> list[Path]:
+def _stale(
+    job: StudyJob, now: Mapping[str, Any], before: Mapping[str, Any], layout: StudyLayout
+) -> list[Path]:
     """Return where something would be that does not go with the settings of now."""
     if job.policy is None:
         return [layout.dataset(job.cell)] if now["recording"] != before.get("recording") else []
@@ -104,7 +106,7 @@ def _stale(job: Job, now: Mapping[str, Any], before: Mapping[str, Any], layout: 
     return [layout.evaluation(policy, what) for what in others]
 
 
-def work(job: Job, design: StudyDesign, layout: Layout) -> dict[str, Any]:
+def work(job: StudyJob, design: StudyDesign, layout: StudyLayout) -> dict[str, Any]:
     """Do a job and return what is to be known of it when what is large is gone."""
     if job.policy:
         return _train_and_evaluate(job, job.policy, design, layout)
@@ -119,7 +121,7 @@ def work(job: Job, design: StudyDesign, layout: Layout) -> dict[str, Any]:
     return found
 
 
-def collect(cell: Cell, design: StudyDesign, root: Path) -> None:
+def collect(cell: StudyCell, design: StudyDesign, root: Path) -> None:
     """Record in turns of a few episodes, each by another person, until there is enough."""
     from handrail.collect.commands.record import record
 
@@ -141,7 +143,9 @@ def collect(cell: Cell, design: StudyDesign, root: Path) -> None:
             raise HandrailError(f"collecting {cell.name}: recording ended with exit code {code}")
 
 
-def _train_and_evaluate(job: Job, policy: StudyPolicy, design: StudyDesign, layout: Layout) -> dict[str, Any]:
+def _train_and_evaluate(
+    job: StudyJob, policy: StudyPolicy, design: StudyDesign, layout: StudyLayout
+) -> dict[str, Any]:
     """Train a policy and let it drive, under every condition into a file of its own."""
     from handrail.policies.imitation.evaluation.evaluation import evaluate
     from handrail.policies.imitation.training.training import train

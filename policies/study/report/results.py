@@ -12,7 +12,7 @@ from handrail.controllers.arrays import FloatArray
 from handrail.datasets.statistics.paired import wilson
 from handrail.datasets.statistics.resampling import Interval
 from handrail.datasets.statistics.student import Estimate, student, variance_of_share
-from handrail.policies.study.design.jobs import Job, StudyPolicy
+from handrail.policies.study.design.jobs import StudyJob, StudyPolicy
 from handrail.policies.study.design.progress import StudyProgress, read_json
 
 MEASURES = {
@@ -171,7 +171,7 @@ def _place(draws: Mapping[int, Driven]) -> tuple[bool, bool]:
     return policy.budget == "number", policy.actions != "realised"
 
 
-def _driven(job: Job, progress: StudyProgress) -> Iterable[Driven]:
+def _driven(job: StudyJob, progress: StudyProgress) -> Iterable[Driven]:
     for file in progress.rollouts(job):
         for label, (entry,) in read_json(file)["arms"].items():
             assert job.policy is not None

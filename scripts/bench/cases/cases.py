@@ -22,7 +22,7 @@ _HELD = (1.5, 0.4, 0.7)
 
 
 @dataclass(frozen=True)
-class Case:
+class PaperCase:
     """One case.
 
     Attributes:
@@ -52,12 +52,12 @@ class Case:
         object.__setattr__(self, "q", frozen(self.q))
 
 
-def cases() -> Mapping[str, Case]:
+def cases() -> Mapping[str, PaperCase]:
     """Return the three cases by name."""
     return {case.name: case for case in (_hand_forward(), _base_forward(), _base_circle())}
 
 
-def _hand_forward() -> Case:
+def _hand_forward() -> PaperCase:
     scene = Scene(
         (
             pillar("low_1", 1.3, -0.4, 0.3, 0.3),
@@ -66,7 +66,7 @@ def _hand_forward() -> Case:
         ),
         Viewpoint(position=(0.8, -4.9, 3.3), target=(1.0, 0.15, 0.35), fovy=38.0),
     )
-    return Case(
+    return PaperCase(
         name="a",
         title="A: the operator steers the hand forward; the base goes round the low obstacles",
         scene=scene,
@@ -77,7 +77,7 @@ def _hand_forward() -> Case:
     )
 
 
-def _base_forward() -> Case:
+def _base_forward() -> PaperCase:
     scene = Scene(
         (
             pillar("tall_1", 1.5, 1.0, 0.25, 1.5),
@@ -86,7 +86,7 @@ def _base_forward() -> Case:
         ),
         Viewpoint(position=(-1.0, -3.8, 3.1), target=(0.4, 0.35, 0.6), fovy=38.0),
     )
-    return Case(
+    return PaperCase(
         name="b",
         title="B: the operator drives the base forward; the arm keeps clear of the obstacles",
         scene=scene,
@@ -97,7 +97,7 @@ def _base_forward() -> Case:
     )
 
 
-def _base_circle() -> Case:
+def _base_circle() -> PaperCase:
     centre = _START + [_RADIUS, 0.0]
     angles = np.linspace(0.0, 2.0 * np.pi, 48, endpoint=False)
     dots = tuple(
@@ -111,7 +111,7 @@ def _base_circle() -> Case:
         for index, angle in enumerate(angles)
     )
     ball = SceneObject("held", Shape("sphere", np.array([0.03])), np.array(_HELD), rgba=_HAND, ghost=True)
-    return Case(
+    return PaperCase(
         name="c",
         title="C: the operator drives the base in a circle; the hand stays at a point",
         scene=Scene(

@@ -8,14 +8,14 @@ from handrail.controllers.arrays import FloatArray
 from handrail.controllers.numerics.rotation import turned
 from handrail.controllers.robot.model import RobotModel
 from handrail.datasets.presentation.drawing import COLOURS, GREY, INK, new_figure, tidy
-from handrail.scripts.bench.cases.trace import Trace
+from handrail.scripts.bench.cases.trace import CaseTrace
 
 _BASE, _HAND, _OBSTACLE, _OWN = COLOURS[0], COLOURS[1], COLOURS[4], COLOURS[5]
 _FARTHEST = 0.5  # distance that is shown [m]
 _GHOSTS = 6  # moments at which the robot is drawn
 
 
-def case_figure(trace: Trace, model: RobotModel, margin: float) -> Any:
+def case_figure(trace: CaseTrace, model: RobotModel, margin: float) -> Any:
     """Return the figure.
 
     Args:
@@ -39,7 +39,7 @@ def case_figure(trace: Trace, model: RobotModel, margin: float) -> Any:
     return figure
 
 
-def _paths(axes: Any, trace: Trace, model: RobotModel) -> None:
+def _paths(axes: Any, trace: CaseTrace, model: RobotModel) -> None:
     from matplotlib.patches import Circle
 
     for item in trace.case.scene.objects:
@@ -67,7 +67,7 @@ def _robot(axes: Any, q: FloatArray, model: RobotModel, alpha: float) -> None:
     axes.plot(*np.array(points).T, color=GREY, lw=2.2, alpha=alpha, zorder=3, solid_capstyle="round")
 
 
-def _distances(axes: Any, trace: Trace, margin: float) -> None:
+def _distances(axes: Any, trace: CaseTrace, margin: float) -> None:
     obstacles = {item.name for item in trace.case.scene.obstacles()}
     scene = np.array([bool({*pair} & obstacles) for pair in trace.pairs])
     floor = np.array(["floor" in pair for pair in trace.pairs])
@@ -87,7 +87,7 @@ def _distances(axes: Any, trace: Trace, margin: float) -> None:
     axes.legend(fontsize=8, loc="upper right")
 
 
-def _errors(axes: Any, trace: Trace) -> None:
+def _errors(axes: Any, trace: CaseTrace) -> None:
     error, cruise = 1e3 * trace.tracking_error, trace.cruise
     what = "hand" if trace.case.channels[0].startswith("ee") else "base"
     label = f"{what}: mean {error.mean():.1f} mm/s of {1e3 * cruise:.0f}"

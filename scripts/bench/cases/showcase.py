@@ -31,10 +31,10 @@ from handrail.datasets.presentation.terminal import Terminal
 from handrail.datasets.recording.frames import Frame
 from handrail.datasets.storage.atomic import explained, write_whole
 from handrail.datasets.storage.strict_json import write_json
-from handrail.scripts.bench.cases.cases import Case, cases
+from handrail.scripts.bench.cases.cases import PaperCase, cases
 from handrail.scripts.bench.cases.config import ShowcaseConfig
 from handrail.scripts.bench.cases.figure import case_figure
-from handrail.scripts.bench.cases.trace import Trace
+from handrail.scripts.bench.cases.trace import CaseTrace
 
 FPS = 20
 _WINDOW, _FADE = 0.2, 1.0  # of the intent's prediction [s]
@@ -65,7 +65,7 @@ def showcase(config: ShowcaseConfig) -> dict[str, Any]:
     return result
 
 
-def _words(case: Case, frame: Frame) -> str:
+def _words(case: PaperCase, frame: Frame) -> str:
     """Say what is steered and how near things are."""
     diagnostics = frame.diagnostics
     return (
@@ -81,13 +81,15 @@ def build_controller(model: RobotModel) -> MaskedMpc:
     return MaskedMpc(model, settings, objectives=(switchable(hold),), predict=Extrapolated(_WINDOW, _FADE))
 
 
-def parameters(case: Case) -> Mapping[str, FloatArray]:
+def parameters(case: PaperCase) -> Mapping[str, FloatArray]:
     """Return the parameters of the objectives in a case, by objective."""
     point = np.array(case.held) if case.held else np.zeros(3)
     return {"hold": switched(hold_parameters(Pose(point, np.eye(3))), bool(case.held))}
 
 
-def run_case(case: Case, mpc: MaskedMpc, observers: tuple[Observer, ...] = (), **render: Any) -> Trace:
+def run_case(
+    case: PaperCase, mpc: MaskedMpc, observers: tuple[Observer, ...] = (), **render: Any
+) -> CaseTrace:
     """Run a case and return what happened.
 
     Args:
@@ -106,7 +108,7 @@ def run_case(case: Case, mpc: MaskedMpc, observers: tuple[Observer, ...] = (), *
         env.close()
     states, collision = observer.states, CollisionModel(mpc.model, case.scene.obstacles())
     q = np.array([state.q for state in states])
-    return Trace(
+    return CaseTrace(
         case=case,
         times=np.array([state.time for state in states]),
         q=q,
@@ -121,7 +123,7 @@ def run_case(case: Case, mpc: MaskedMpc, observers: tuple[Observer, ...] = (), *
     )
 
 
-def _realised(case: Case, mpc: MaskedMpc, state: State) -> FloatArray:
+def _realised(case: PaperCase, mpc: MaskedMpc, state: State) -> FloatArray:
     """Return the measured velocity on the commanded channels."""
     velocity = channel_matrix(mpc.model, mpc.channels, state.q) @ state.v
     if case.frames.base == "world":
@@ -132,7 +134,7 @@ def _realised(case: Case, mpc: MaskedMpc, state: State) -> FloatArray:
 class _Operator:
     """Commands what the case says."""
 
-    def __init__(self, case: Case, channels: Channels) -> None:
+    def __init__(self, case: PaperCase, channels: Channels) -> None:
         self._case, self._mask = case, channels.mask(*case.channels)
 
     def reset(self, view: View, rng: np.random.Generator) -> None:
@@ -148,7 +150,7 @@ class _Operator:
 class _Observer:
     """Gives the objectives the case's parameters, once the controller is reset; notes what happens."""
 
-    def __init__(self, case: Case, mpc: MaskedMpc) -> None:
+    def __init__(self, case: PaperCase, mpc: MaskedMpc) -> None:
         self._case, self._mpc = case, mpc
         self.states: list[State] = []
         self.solve_times: list[float] = []

@@ -7,11 +7,11 @@ import numpy as np
 
 from handrail.collect.session.outcome import Outcome
 from handrail.controllers.arrays import BoolArray, FloatArray
-from handrail.scripts.bench.cases.cases import Case
+from handrail.scripts.bench.cases.cases import PaperCase
 
 
 @dataclass(frozen=True)
-class Trace:
+class CaseTrace:
     """What happened, after each of the T control periods.
 
     Attributes:
@@ -28,7 +28,7 @@ class Trace:
         outcome: of the session.
     """
 
-    case: Case
+    case: PaperCase
     times: FloatArray
     q: FloatArray
     asked: FloatArray

@@ -8,7 +8,7 @@ import numpy as np
 from handrail.controllers.robot.model import Pose
 from handrail.datasets.presentation.drawing import COLOURS, GREY, INK, new_figure, tidy
 from handrail.scripts.bench.goal_reaching.results import column, rows_of
-from handrail.scripts.bench.goal_reaching.run import Episode
+from handrail.scripts.bench.goal_reaching.run import BenchEpisode
 from handrail.scripts.bench.goal_reaching.tables import HEADINGS, PUBLISHED
 
 CAPTIONS = {
@@ -32,7 +32,9 @@ _LOGARITHMIC = ("final_position_error", "arm_effort", "jerkiness", "wall_time_s"
 _COLUMNS = 4  # panels side by side
 
 
-def figures(results: Mapping[str, Any], episodes: Sequence[Episode], goals: Sequence[Pose]) -> dict[str, Any]:
+def figures(
+    results: Mapping[str, Any], episodes: Sequence[BenchEpisode], goals: Sequence[Pose]
+) -> dict[str, Any]:
     """Return matplotlib figures by name.
 
     Args:
@@ -99,7 +101,7 @@ def _paired(differences: Mapping[str, Any]) -> Any:
     return _panels(list(differences), draw)
 
 
-def _paths(episodes: Sequence[Episode], names: Sequence[str], goals: Sequence[Pose]) -> Any:
+def _paths(episodes: Sequence[BenchEpisode], names: Sequence[str], goals: Sequence[Pose]) -> Any:
     """Draw base and hand of some goals from above, one panel a controller."""
     rows = -(-len(names) // _COLUMNS)
     figure = new_figure(_WIDTH, 2.9 * rows)

@@ -30,7 +30,7 @@ _EVERY = 5  # steps between two points of a path
 
 
 @dataclass(frozen=True)
-class Episode:
+class BenchEpisode:
     """The row of an episode, and for some goals the paths of base and hand seen from above, (k, 2) each."""
 
     row: dict[str, Any]
@@ -77,7 +77,7 @@ def available(
 
 def run(
     config: BenchmarkConfig, baselines: tuple[Baseline, ...], console: Terminal | None = None
-) -> list[Episode]:
+) -> list[BenchEpisode]:
     """Run everything and return the episodes, by goal.
 
     Args:
@@ -90,7 +90,7 @@ def run(
         for index in range(config.goals)
         for profile in config.profile_names
     ]
-    found: dict[str, list[Episode]] = {}
+    found: dict[str, list[BenchEpisode]] = {}
     with Execution(config, "episodes", console, _PRELOAD) as execution:
         for result in execution.run(jobs):
             if result.error:
@@ -101,7 +101,7 @@ def run(
 
 def run_goal(
     config: BenchmarkConfig, baselines: tuple[Baseline, ...], index: int, profile: str
-) -> list[Episode]:
+) -> list[BenchEpisode]:
     """Run all controllers on one goal, one after the other, so that noise hits all alike."""
     model, given = load_model(), conditions(config, index, profile)
     _warm_up(baselines, config)
@@ -112,7 +112,7 @@ def run_goal(
         row = {"goal": index, "profile": profile, "controller": baseline.name}
         row |= measure(trace, collision, len(model.description.base_joints))
         paths = (trace.q[::_EVERY, :2], trace.hand[::_EVERY, :2]) if index < _PATHS else ()
-        episodes.append(Episode(row, paths))
+        episodes.append(BenchEpisode(row, paths))
     return episodes
 
 

@@ -62,7 +62,7 @@ def busy(programs: int) -> Iterator[None]:
 
 
 @dataclass(frozen=True)
-class Case:
+class LatencyCase:
     """What goes on beside the one who drives.
 
     Attributes:
@@ -80,14 +80,14 @@ class Case:
     browser: str = ""
 
 
-def cases(config: LatencyConfig) -> list[Case]:
+def cases(config: LatencyConfig) -> list[LatencyCase]:
     """Return what is to be measured."""
-    chosen = [Case("as it should be", config.spectators)]
+    chosen = [LatencyCase("as it should be", config.spectators)]
     if config.browser:
-        chosen.append(Case("a browser watches too", config.spectators, browser=config.browser))
+        chosen.append(LatencyCase("a browser watches too", config.spectators, browser=config.browser))
     if config.overload:
         cores = os.cpu_count() or 1
-        chosen.append(Case("overload", config.spectators, config.slow_spectators, cores))
+        chosen.append(LatencyCase("overload", config.spectators, config.slow_spectators, cores))
     return chosen
 
 
@@ -140,7 +140,7 @@ def _address(process: "subprocess.Popen[str]") -> str:
 
 
 async def _drive_all(
-    config: LatencyConfig, chosen: list[Case], address: str, process: int
+    config: LatencyConfig, chosen: list[LatencyCase], address: str, process: int
 ) -> dict[str, dict[str, Any]]:
     """Return what came of each case."""
     rng, came = np.random.default_rng(config.seed), {}
@@ -195,7 +195,7 @@ def _shares(spent: dict[int, float], recording: int, took: float) -> dict[str, f
 
 
 @contextlib.asynccontextmanager
-async def _watching(case: Case, address: str) -> AsyncIterator[list[Spectator]]:
+async def _watching(case: LatencyCase, address: str) -> AsyncIterator[list[Spectator]]:
     """Let pages watch; give those that take what they are sent at once."""
     quick = [Spectator(address, f"page-that-watches-{n}") for n in range(case.spectators)]
     slow = [Spectator(address, f"page-that-is-slow-{n}", _SLOW_PAUSE) for n in range(case.slow)]

@@ -18,7 +18,7 @@ _UNNAMED = {"robot": "ridgeback_ur10"}  # of files from before there was a choic
 
 
 @dataclass(frozen=True)
-class Trial:
+class OperatorTrial:
     """How one episode went.
 
     Attributes:
@@ -66,7 +66,7 @@ class TrialsFile:
         self._head = {"format": FORMAT, **settings}
         self._trials = {_key(trial): trial for trial in self._read()} if path.exists() else {}
 
-    def add(self, trial: Trial) -> None:
+    def add(self, trial: OperatorTrial) -> None:
         """Keep a trial, on the disk too."""
         self._trials[_key(trial)] = trial
         head = self._head | {"versions": versions(*SIMULATION)}
@@ -79,27 +79,27 @@ class TrialsFile:
         """Return the numbers of the episodes that have not been run."""
         return [episode for episode in range(episodes) if (task, mode, episode) not in self._trials]
 
-    def trials(self, tasks: Sequence[str], modes: Sequence[str], episodes: int) -> list[Trial]:
+    def trials(self, tasks: Sequence[str], modes: Sequence[str], episodes: int) -> list[OperatorTrial]:
         """Return those that are there, by task, mode and number."""
         keys = [(task, mode, episode) for task in tasks for mode in modes for episode in range(episodes)]
         return [self._trials[key] for key in keys if key in self._trials]
 
-    def _read(self) -> list[Trial]:
+    def _read(self) -> list[OperatorTrial]:
         try:
             content = read_json(self._path)
             found = {name: content.get(name, _UNNAMED.get(name)) for name in self._head}
             if found == self._head:
-                return [Trial(**row) for row in content["trials"]]
+                return [OperatorTrial(**row) for row in content["trials"]]
         except (OSError, ValueError, AttributeError, KeyError, TypeError) as error:
             raise HandrailError(f"--json {self._path}: expected a file of trials, got {error}") from error
         raise HandrailError(f"--json {self._path}: expected {self._head}, got {found}; choose another file")
 
 
-def _key(trial: Trial) -> tuple[str, str, int]:
+def _key(trial: OperatorTrial) -> tuple[str, str, int]:
     return trial.task, trial.mode, trial.episode
 
 
-def _rounded(trial: Trial) -> dict[str, Any]:
+def _rounded(trial: OperatorTrial) -> dict[str, Any]:
     return {
         name: round(value, _PLACES) if isinstance(value, float) else value
         for name, value in asdict(trial).items()

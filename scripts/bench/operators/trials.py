@@ -25,7 +25,7 @@ from handrail.datasets.recording.frames import Frame
 from handrail.datasets.statistics.paired import wilson
 from handrail.scripts.bench.command_line import command_line
 from handrail.scripts.bench.operators.config import SLOW_LIMITS, SLOW_MODE, TrialsConfig
-from handrail.scripts.bench.operators.file import Trial, TrialsFile
+from handrail.scripts.bench.operators.file import OperatorTrial, TrialsFile
 
 _PRELOAD = ("handrail.scripts.bench.operators.trials",)
 _FPS = 20  # [Hz]
@@ -44,20 +44,20 @@ _WORDS = (
 )
 
 
-def trials_table(trials: Sequence[Trial], modes: Sequence[str], task: str) -> Table:
+def trials_table(trials: Sequence[OperatorTrial], modes: Sequence[str], task: str) -> Table:
     """Return a task's table: a line for each mode that has trials."""
     groups = [[each for each in trials if (each.task, each.mode) == (task, mode)] for mode in modes]
     return Table(HEADINGS, [_line(group) for group in groups if group], task)
 
 
-def write_page(trials: Sequence[Trial], config: TrialsConfig) -> None:
+def write_page(trials: Sequence[OperatorTrial], config: TrialsConfig) -> None:
     """Put a table a task between the trials' marks of the page, made if need be; other text stays."""
     parts = [f"`{command_line('operators', config)}` wrote this. {_WORDS}"]
     parts += [markdown_table(trials_table(trials, config.mode_names, task)) for task in config.task_names]
     write_part(Path(config.page).expanduser(), "Scripted operators", "trials", "\n\n".join(parts))
 
 
-def _line(group: Sequence[Trial]) -> list[str]:
+def _line(group: Sequence[OperatorTrial]) -> list[str]:
     successes = [trial.seconds for trial in group if trial.success]
     low, high = wilson(len(successes), len(group))
     failures = Counter(trial.failure_reason for trial in group if not trial.success)
@@ -78,8 +78,8 @@ def _line(group: Sequence[Trial]) -> list[str]:
 
 
 def run_trials(
-    config: TrialsConfig, told: Callable[[Trial], None], console: Terminal | None = None
-) -> list[Trial]:
+    config: TrialsConfig, told: Callable[[OperatorTrial], None], console: Terminal | None = None
+) -> list[OperatorTrial]:
     """Run what is not in the file yet, and return every episode that was asked for, in order.
 
     Args:
@@ -105,14 +105,14 @@ def run_trials(
     return file.trials(config.task_names, config.mode_names, config.episodes)
 
 
-def run_trial(config: TrialsConfig, task: str, mode: str, episode: int) -> Trial:
+def run_trial(config: TrialsConfig, task: str, mode: str, episode: int) -> OperatorTrial:
     """Return how one episode went; person `i mod persons` does episode i."""
     person = episode % config.persons
     session, hands = _watched(config, task, mode, person)
     outcome = session.run(episode_seed(config.seed, episode))
     went = {name: getattr(outcome, name) for name in _OF_OUTCOME}
     own = {"switches": hands.switches, "switching": hands.away / _FPS}
-    return Trial(task, mode, episode, person, **went, **own)
+    return OperatorTrial(task, mode, episode, person, **went, **own)
 
 
 @lru_cache(maxsize=16)

@@ -25,7 +25,7 @@ from handrail.controllers.robot.model import Pose, load_model
 from handrail.policies.rl.observation import (
     ACTION_SIZE,
     OBSERVATION_SIZE,
-    Situation,
+    TrackingSituation,
     base_velocity,
     check_robot,
     observe,
@@ -150,7 +150,7 @@ class GoalReachingEnv(gymnasium.Env[FloatArray, FloatArray]):
 
     def _observation(self) -> FloatArray:
         goal = self.planner.goal
-        situation = Situation(
+        situation = TrackingSituation(
             q=self.q,
             start=self._start,
             twist=clamp_twist(self.planner.twist(self.time)),

@@ -8,7 +8,7 @@ import numpy as np
 from handrail.datasets.format.layout import Layout
 from handrail.scripts.bench.soak.child import command
 from handrail.scripts.bench.soak.faults import KILLED, Fault
-from handrail.scripts.bench.soak.recordings import RayRecording, Recording
+from handrail.scripts.bench.soak.recordings import RayRecording, RecordingWork
 from handrail.scripts.bench.soak.whole import Saved, rollouts_of, saved_in
 from handrail.scripts.bench.soak.work import Work
 from handrail.scripts.bench.soak.workshop import RECIPES, Recipe, Workshop
@@ -16,7 +16,7 @@ from handrail.scripts.bench.soak.workshop import RECIPES, Recipe, Workshop
 _RAY = 0.2  # share of the kills that befall a recording on a cluster
 
 
-class Evaluation(Work):
+class EvaluationWork(Work):
     """`handrail-evaluate`, with one process or two."""
 
     _EPISODES = 6
@@ -158,12 +158,12 @@ def any_work(
     if kind == "edit":
         return _any_edit(folder, workshop, rng, recipe)
     if kind.startswith("evaluate"):
-        return Evaluation(folder, workshop, 2 if fault.workers or rng.random() < 0.5 else 1)
+        return EvaluationWork(folder, workshop, 2 if fault.workers or rng.random() < 0.5 else 1)
     if kind == "replay":
         return Replaying(folder, workshop, recipe)
     shared = ("--workers", "2") if kind == "record_2" or rng.random() < 0.2 else ()
     had = int(rng.choice((2, 4))) if kind in ("resume", "packed") else 0
-    return Recording(folder, workshop, recipe, shared, had, packed=kind == "packed")
+    return RecordingWork(folder, workshop, recipe, shared, had, packed=kind == "packed")
 
 
 def _any_edit(folder: Path, workshop: Workshop, rng: np.random.Generator, recipe: Recipe) -> Work:

@@ -35,10 +35,10 @@ def main() -> None:
     hear_signals()
     out.mkdir(parents=True, exist_ok=True)
     first = next_number(out / ROUNDS)
-    Drive(out, first).run(time.monotonic() + 3600.0 * hours)
+    DrivenHours(out, first).run(time.monotonic() + 3600.0 * hours)
 
 
-class Drive:
+class DrivenHours:
     """One long recording.
 
     Args:

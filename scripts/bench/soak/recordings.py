@@ -21,7 +21,7 @@ os.environ["RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER"] = "0"  # else Ray looks for 127.
 _CLUSTER_STARTS, _CLUSTER_ENDS = 600.0, 120.0  # [s]
 
 
-class Recording(Work):
+class RecordingWork(Work):
     """`handrail-record`, with one process or several, anew or as an addition to what was recorded or packed.
 
     Args:
@@ -73,7 +73,7 @@ class Recording(Work):
         return saved_by(self._place)
 
 
-class RayRecording(Recording):
+class RayRecording(RecordingWork):
     """`handrail-record --ray` on a cluster of two computers, both here."""
 
     def __init__(self, folder: Path, workshop: Workshop, recipe: Recipe) -> None:

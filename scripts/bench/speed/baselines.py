@@ -17,7 +17,7 @@ Solve = Callable[[Update], float | None]
 """Time that the problem of an update takes [s]; None where it is not solved."""
 
 
-class Baseline:
+class Rival:
     """One other solver on the problems of a loop.
 
     Args:

@@ -14,14 +14,14 @@ from handrail.controllers.numerics.threads import single_threaded
 from handrail.controllers.robot.catalogue import ROBOTS
 from handrail.datasets.presentation.terminal import Terminal
 from handrail.datasets.storage.strict_json import write_json
-from handrail.scripts.bench.speed.baselines import Baseline, converged, mink
+from handrail.scripts.bench.speed.baselines import Rival, converged, mink
 from handrail.scripts.bench.speed.config import ProfileConfig
 from handrail.scripts.bench.speed.qp import compare_qp
 from handrail.scripts.bench.speed.tables import profile_tables
 from handrail.scripts.bench.speed.tasks import time_tasks
 from handrail.scripts.bench.speed.timing_loop import (
     CASES,
-    Case,
+    SpeedCase,
     TimingLoop,
     Update,
     longer,
@@ -32,11 +32,11 @@ _BLOCK = 10  # updates of one loop before the next has its turn
 _SHORT = 0.05  # beyond the margin: a mink that looks no farther than it needs to [m]
 _GROWTH = (
     *longer(20, 40),
-    Case("pairs_50", obstacles=2),
-    Case("pairs_200", obstacles=18),
-    Case("pairs_300", obstacles=30),
-    Case("no_collision_10_dof", own="none", robot="ridgeback_panda"),
-    Case("pairs_40_10_dof", obstacles=2, robot="ridgeback_panda"),
+    SpeedCase("pairs_50", obstacles=2),
+    SpeedCase("pairs_200", obstacles=18),
+    SpeedCase("pairs_300", obstacles=30),
+    SpeedCase("no_collision_10_dof", own="none", robot="ridgeback_panda"),
+    SpeedCase("pairs_40_10_dof", obstacles=2, robot="ridgeback_panda"),
 )
 
 
@@ -78,26 +78,26 @@ def profile(config: ProfileConfig) -> dict[str, Any]:
     }
 
 
-def _baselines(config: ProfileConfig, loops: dict[str, TimingLoop]) -> dict[str, Baseline]:
+def _baselines(config: ProfileConfig, loops: dict[str, TimingLoop]) -> dict[str, Rival]:
     """Return what is measured besides, by the name of the ratio."""
     bare, pairs = loops["no_collision"], loops["pairs_30"]
     every, seldom = (max(config.updates // max(count, 1), 1) for count in (config.solves, config.solves // 4))
     return {
-        "ratio_vs_ipopt": Baseline("ipopt", bare, converged(bare), every),
-        "ratio_vs_ipopt_pairs_30": Baseline("ipopt", pairs, converged(pairs), seldom),
-        "ratio_vs_mink": Baseline("mink", pairs, mink(pairs, ACTIVATION_DISTANCE)),
-        "ratio_vs_mink_short_reach": Baseline("mink_short_reach", pairs, mink(pairs, _SHORT)),
+        "ratio_vs_ipopt": Rival("ipopt", bare, converged(bare), every),
+        "ratio_vs_ipopt_pairs_30": Rival("ipopt", pairs, converged(pairs), seldom),
+        "ratio_vs_mink": Rival("mink", pairs, mink(pairs, ACTIVATION_DISTANCE)),
+        "ratio_vs_mink_short_reach": Rival("mink_short_reach", pairs, mink(pairs, _SHORT)),
     }
 
 
-def _by_case(baselines: list[Baseline]) -> dict[str, list[dict[str, Any]]]:
+def _by_case(baselines: list[Rival]) -> dict[str, list[dict[str, Any]]]:
     found: dict[str, list[dict[str, Any]]] = {}
     for baseline in baselines:
         found.setdefault(baseline.loop.case.name, []).append(baseline.measured())
     return found
 
 
-def _case(case: Case, updates: list[Update]) -> dict[str, Any]:
+def _case(case: SpeedCase, updates: list[Update]) -> dict[str, Any]:
     solved = [(update, update.plan) for update in updates if update.plan is not None]
     plans = [plan for _, plan in solved]
     pairs = len(plans[0].distances)

@@ -13,7 +13,7 @@ from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import not_installed
 from handrail.controllers.solvers.active_set import NOTHING_ACTIVE, ActiveSet, QuadraticProgram
 from handrail.controllers.solvers.dense import DenseProgram, dense
-from handrail.scripts.bench.speed.timing_loop import Case, TimingLoop, longer, times
+from handrail.scripts.bench.speed.timing_loop import SpeedCase, TimingLoop, longer, times
 
 _TOLERANCE = 1e-6  # of the interior-point method
 _SMALL = 1e-3  # objective that counts as little
@@ -92,7 +92,7 @@ def compare_qp(count: int, seed: int, horizons: tuple[int, ...] = (10, 40)) -> d
     return {case.name: _compared(case, count, seed) for case in longer(*horizons)}
 
 
-def _compared(case: Case, count: int, seed: int) -> dict[str, Any]:
+def _compared(case: SpeedCase, count: int, seed: int) -> dict[str, Any]:
     loop = TimingLoop(case, seed)
     solvers = {"own": _own(case.horizon, loop.model.size), "daqp": _daqp(), "piqp": _piqp()}
     programs: list[DenseProgram] = []

@@ -28,7 +28,7 @@ _MODES = (("ee",), ("base",), ("base", "ee"), ("joint",))
 
 
 @dataclass(frozen=True)
-class Case:
+class SpeedCase:
     """What one loop measures.
 
     Attributes:
@@ -47,13 +47,13 @@ class Case:
 
 
 CASES = (
-    Case("no_collision", own="none"),
-    Case("pairs_30", own="few", obstacles=2),
-    Case("pairs_100", obstacles=7),
+    SpeedCase("no_collision", own="none"),
+    SpeedCase("pairs_30", own="few", obstacles=2),
+    SpeedCase("pairs_100", obstacles=7),
 )
 
 
-def longer(*horizons: int) -> list[Case]:
+def longer(*horizons: int) -> list[SpeedCase]:
     """Return the cases with other numbers of stages."""
     return [
         replace(case, name=f"{case.name}_horizon_{horizon}", horizon=horizon)
@@ -84,7 +84,7 @@ class TimingLoop:
         seed: of scenes and intents; cases with the same robot and seed get the same ones.
     """
 
-    def __init__(self, case: Case, seed: int) -> None:
+    def __init__(self, case: SpeedCase, seed: int) -> None:
         self.case = case
         self.model = _robot(case.robot, case.own)
         self.mpc = MaskedMpc(self.model, MpcSettings(horizon=case.horizon))

@@ -7,7 +7,7 @@ import pytest
 from cockpit_helpers import drive, heard, heard_by, page, server, stage, told
 
 from handrail.collect.cockpit.cards import Cards
-from handrail.collect.cockpit.messages import Answer, parse
+from handrail.collect.cockpit.messages import CardAnswer, parse
 from handrail.collect.cockpit.pipe import ANSWER, STOP
 from handrail.controllers.errors import HandrailError
 
@@ -27,7 +27,7 @@ def said(**changes):
 
 @pytest.mark.parametrize("value", [45, 4.5, "a text\nof two lines", True, None, ""])
 def test_an_answer_is_one_value(value):
-    assert parse(said(value=value)) == Answer("ee/tlx", "mental", value)
+    assert parse(said(value=value)) == CardAnswer("ee/tlx", "mental", value)
 
 
 @pytest.mark.parametrize(
@@ -82,7 +82,7 @@ def test_cards_hear_answers_and_leave_out_what_devices_say(served):
         found, until = [], time.monotonic() + 10.0
         while not found and time.monotonic() < until:
             found += cards.hear()
-        assert found == [Answer("ee/tlx", "mental", 45)]
+        assert found == [CardAnswer("ee/tlx", "mental", 45)]
 
 
 def test_a_stop_between_episodes_is_left_for_the_next_one(served):

@@ -11,7 +11,7 @@ import time
 import pytest
 
 from handrail.collect.devices.reading import DeviceGoneError
-from handrail.collect.devices.terminal import Terminal, has_terminal
+from handrail.collect.devices.terminal import KeyTerminal, has_terminal
 
 pytest.importorskip("termios", reason="only Linux and macOS have such terminals")
 
@@ -76,7 +76,7 @@ def test_without_a_terminal_it_says_what_to_do(monkeypatch):
         monkeypatch.setattr(sys, "stdin", nothing)
         assert not has_terminal()
         with pytest.raises(DeviceGoneError) as error:
-            Terminal().open()
+            KeyTerminal().open()
     said = str(error.value)
     assert "expected a terminal to read keys from, found none; start it in a terminal without a pipe" in said
     assert "--operator browser" in said

@@ -2,7 +2,7 @@
 
 import pytest
 
-from handrail.collect.lerobot.scripted import EpisodeClock, Phase
+from handrail.collect.lerobot.scripted import ClockPhase, EpisodeClock
 from handrail.collect.lerobot.sim import Pace
 
 PERIOD = 0.05
@@ -38,10 +38,10 @@ def test_the_scene_changes_in_every_reset_and_never_in_an_episode(stall, late):
     for episode in range(4):
         recorded = [what for number, phase, what in said if (number, phase) == (episode, "episode")]
         between = [what for number, phase, what in said if (number, phase) == (episode, "reset")]
-        assert between.count(Phase.NEXT) == 1
-        assert Phase.NEXT not in recorded
-        assert set(recorded) == {Phase.DRIVE}
-        assert Phase.DRIVE not in between[2:]
+        assert between.count(ClockPhase.NEXT) == 1
+        assert ClockPhase.NEXT not in recorded
+        assert set(recorded) == {ClockPhase.DRIVE}
+        assert ClockPhase.DRIVE not in between[2:]
 
 
 def test_without_an_episode_s_time_the_task_decides():
@@ -52,7 +52,7 @@ def test_without_an_episode_s_time_the_task_decides():
         phases.append(clock.phase(done=20 <= step < 30))
         now.time += PERIOD
     changes = [phase for phase, before in zip(phases, [None, *phases], strict=False) if phase is not before]
-    assert changes == [Phase.DRIVE, Phase.WAIT, Phase.NEXT, Phase.WAIT, Phase.DRIVE]
+    assert changes == [ClockPhase.DRIVE, ClockPhase.WAIT, ClockPhase.NEXT, ClockPhase.WAIT, ClockPhase.DRIVE]
 
 
 @pytest.mark.parametrize("asked", [10.0, 20.0, 60.0, 1000.0])

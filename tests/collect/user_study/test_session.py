@@ -17,7 +17,7 @@ from user_study_helpers import (
     wanted,
 )
 
-from handrail.collect.cockpit.messages import Answer
+from handrail.collect.cockpit.messages import CardAnswer
 from handrail.collect.operators.operator import EpisodeEvent
 from handrail.collect.user_study.conduct import Ending
 from handrail.collect.user_study.design import DEMO_NOTE
@@ -125,7 +125,7 @@ def test_whoever_ends_for_today_goes_on_with_that_trial(tmp_path):
 def test_a_form_that_is_paused_keeps_what_was_answered(tmp_path):
     folder = study_folder(tmp_path)
     half = SyntheticDesk("P001")
-    half.hear = lambda: [Answer(half.card["id"], *half_answered(half))]
+    half.hear = lambda: [CardAnswer(half.card["id"], *half_answered(half))]
     ending, _, _ = session(folder, "P001", half)
     assert ending is Ending.PAUSED
     key = next(card["id"] for card in half.cards if card["id"].endswith("/questions"))
@@ -147,11 +147,11 @@ def test_wrong_late_and_early_answers_change_nothing(tmp_path):
     folder = study_folder(tmp_path)
     desk = SyntheticDesk("P001")
     odd = [
-        Answer("another/card", "trust", 3),
-        Answer("consent", ":next", True),
-        Answer("consent", "consent", None),
-        Answer("consent", "consent", "perhaps"),
-        Answer("consent", "nothing", 1),
+        CardAnswer("another/card", "trust", 3),
+        CardAnswer("consent", ":next", True),
+        CardAnswer("consent", "consent", None),
+        CardAnswer("consent", "consent", "perhaps"),
+        CardAnswer("consent", "nothing", 1),
     ]
     errors = []
     honest = desk.hear

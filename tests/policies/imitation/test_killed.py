@@ -18,7 +18,7 @@ from handrail.policies.imitation.interface.checkpoint import load_policy, read_m
 from handrail.policies.imitation.training.curve import read_curve
 from handrail.policies.imitation.training.training import train
 from handrail.policies.study.config import StudyConfig
-from handrail.policies.study.design.jobs import Layout, jobs
+from handrail.policies.study.design.jobs import StudyLayout, jobs
 from handrail.policies.study.design.load import load_design
 from handrail.policies.study.execution.run import run_study
 from handrail.policies.study.execution.work import do
@@ -144,7 +144,7 @@ def test_a_study_killed_while_it_writes(tmp_path):
     """Law: whatever a job has saved stays, and the same job goes on; every job is killed twice."""
     preset, study, rng = tmp_path / "tiny.toml", tmp_path / "study", np.random.default_rng(0)
     preset.write_text(SMALLEST)
-    design, layout, kills = load_design(str(preset)), Layout(study), 0
+    design, layout, kills = load_design(str(preset)), StudyLayout(study), 0
     kept: set[str] = set()
     for job in jobs(design):
         for change in (*rng.integers(5, 60, 2).tolist(), NEVER):

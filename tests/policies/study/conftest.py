@@ -4,7 +4,7 @@ import pytest
 from made_study import DESIGN, SHARES
 from study_helpers import make
 
-from handrail.policies.study.design.jobs import Layout, jobs
+from handrail.policies.study.design.jobs import StudyLayout, jobs
 from handrail.policies.study.design.progress import StudyProgress
 from handrail.policies.study.report.results import gather
 
@@ -14,7 +14,7 @@ def gathered(tmp_path):
     """Return what a study gathers of made-up rollouts; some of its jobs may be missing."""
 
     def found(design=DESIGN, shares=SHARES, missing=lambda job: False):
-        layout = Layout(tmp_path / "study")
+        layout = StudyLayout(tmp_path / "study")
         for job in jobs(design):
             if not missing(job):
                 make(job, design, layout, shares)

@@ -16,7 +16,7 @@ from handrail.controllers.baselines.arm_completion import ArmCompletion
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.numerics.rotation import turned
 from handrail.controllers.robot.model import Pose, load_model
-from handrail.policies.rl.observation import Situation, base_velocity, observe
+from handrail.policies.rl.observation import TrackingSituation, base_velocity, observe
 from handrail.scripts.bench.rl.env import GoalReachingEnv, Reward
 
 SEEDS = st.integers(0, 2**32 - 1)
@@ -30,13 +30,13 @@ def poses(rng):
     return tuple((rng.uniform(-1, 1, 3), np.linalg.qr(rng.normal(size=(3, 3)))[0]) for _ in range(3))
 
 
-def situation(rng) -> Situation:
+def situation(rng) -> TrackingSituation:
     current, desired, goal = poses(rng)
     q, start, twist, previous = (rng.uniform(-1, 1, size) for size in (9, 3, 6, 3))
-    return Situation(q, start, twist, current, desired, goal, previous)
+    return TrackingSituation(q, start, twist, current, desired, goal, previous)
 
 
-def moved(before: Situation, shift, angle) -> Situation:
+def moved(before: TrackingSituation, shift, angle) -> TrackingSituation:
     """Return a situation with robot, twist and poses moved and turned on the floor together."""
     turn = turned(np.eye(3), angle)
 
@@ -46,7 +46,7 @@ def moved(before: Situation, shift, angle) -> Situation:
     def base(place):
         return np.array([*(turn[:2, :2] @ place[:2] + shift), place[2] + angle])
 
-    return Situation(
+    return TrackingSituation(
         q=np.concatenate([base(before.q), before.q[3:]]),
         start=base(before.start),
         twist=np.concatenate([turn @ before.twist[:3], turn @ before.twist[3:]]),
@@ -74,7 +74,7 @@ def test_an_observation_does_not_know_where_the_world_is(seed):
 def test_an_observation_shows_everything(seed, part):
     """Law: any other twist, pose, coordinate or action is another observation."""
     before, other = situation(np.random.default_rng(seed)), situation(np.random.default_rng(seed + 1))
-    changed = Situation(**{**vars(before), part: getattr(other, part)})
+    changed = TrackingSituation(**{**vars(before), part: getattr(other, part)})
     assert not np.allclose(observe(before), observe(changed))
 
 
