@@ -1,5 +1,6 @@
 """Settings of the bench `latency`; light to import."""
 
+import os
 from dataclasses import dataclass
 
 from handrail.collect.flags import check_json, check_page, check_whole
@@ -34,5 +35,7 @@ class LatencyConfig:
         check_whole(self, seconds=5, spectators=0, slow_spectators=0, image_size=0, seed=0)
         if self.spectators + self.slow_spectators > 30:
             raise HandrailError("--spectators and --slow_spectators: expected at most 30 together")
+        if self.browser and not os.access(self.browser, os.X_OK):
+            raise HandrailError(f"--browser {self.browser}: expected a program, such as /usr/bin/chromium")
         check_json(self.json)
         check_page(self.page)

@@ -1,4 +1,4 @@
-"""Laws of `handrail-benchmark`: paired, reproducible, self-contained; the masked MPC arrives."""
+"""Laws of the bench `goal_reaching`: paired, reproducible, self-contained; the masked MPC arrives."""
 
 import base64
 import json

@@ -1,4 +1,4 @@
-"""`handrail-profile` works and writes what it promises; nothing here is timed."""
+"""The bench `speed` works and writes what it promises; nothing here is timed."""
 
 import json
 
