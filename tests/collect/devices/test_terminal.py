@@ -3,6 +3,7 @@
 import fcntl
 import os
 import pty
+import select
 import subprocess
 import sys
 import termios
@@ -17,8 +18,8 @@ pytest.importorskip("termios", reason="only Linux and macOS have such terminals"
 
 TAKE = """
 import sys
-from handrail.collect.devices.terminal import Terminal, has_terminal
-terminal = Terminal()
+from handrail.collect.devices.terminal import KeyTerminal, has_terminal
+terminal = KeyTerminal()
 assert has_terminal()
 terminal.open()
 print("open", flush=True)
@@ -41,7 +42,9 @@ def until(master, words, patience=20.0):
     """Return what a terminal showed until it said some words."""
     said, end = b"", time.monotonic() + patience
     while words not in said and time.monotonic() < end:
-        said += os.read(master, 4096)
+        ready, _, _ = select.select([master], [], [], 1.0)
+        said += os.read(master, 4096) if ready else b""
+    assert words in said, said
     return said
 
 
