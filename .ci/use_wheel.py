@@ -14,6 +14,7 @@ from pathlib import Path
 # imported at the top of modules that only an extra's users import
 EXTRAS = ("accelerate", "stable_baselines3", "mink", "uvicorn", "starlette", "websockets", "ray")
 FOLDERS = ("collect", "controllers", "datasets", "policies", "scripts")
+BENCHES = Path("scripts/bench")  # of a clone alone
 
 
 def commands() -> list[str]:
@@ -75,10 +76,14 @@ def check(repository: Path) -> None:
         if not path.is_file() or "__pycache__" in path.parts:
             continue
         inside = path.relative_to(repository)
+        if inside.is_relative_to(BENCHES):
+            continue
         if not (home / inside).is_file():
             sys.exit(f"the wheel lacks {inside}: list its package or its data files in pyproject.toml")
         if path.suffix == ".py" and path.stem != "__init__":
             load(".".join(("handrail", *inside.with_suffix("").parts)))
+    if (home / BENCHES).exists():
+        sys.exit(f"the wheel has {BENCHES}, which measures and is not the product")
     declared = tomllib.loads((repository / "pyproject.toml").read_text())["project"]["scripts"]
     if commands() != sorted(declared):
         sys.exit(f"commands: expected {sorted(declared)}, got {commands()}")
