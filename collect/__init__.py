@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import gymnasium
 
-from handrail.collect.tasks.catalogue import TASKS
+from handrail.collect.world.tasks.catalogue import TASKS
 from handrail.controllers.lazy import lazily
 
 if TYPE_CHECKING:
@@ -17,11 +17,11 @@ if TYPE_CHECKING:
     from handrail.collect.commands.replay import replay_episode as replay_episode
     from handrail.collect.config import RecordConfig as RecordConfig
     from handrail.collect.config import SessionConfig as SessionConfig
-    from handrail.collect.envs.env import HandrailEnv as HandrailEnv
     from handrail.collect.operators.modes import MODES as MODES
     from handrail.collect.session.build import build_env as build_env
     from handrail.collect.session.build import build_session as build_session
     from handrail.collect.session.session import Session as Session
+    from handrail.collect.world.envs.env import HandrailEnv as HandrailEnv
 
 _MODULES = {
     "HandrailEnv": "envs.env",
@@ -41,7 +41,7 @@ __getattr__ = lazily(__name__, _MODULES)
 for _spec in TASKS.built_in:
     gymnasium.register(
         f"handrail/{str(_spec.task).rpartition(':')[2]}-v0",
-        entry_point="handrail.collect.envs.env:HandrailEnv",
+        entry_point="handrail.collect.world.envs.env:HandrailEnv",
         kwargs={"task": _spec.task},
     )
 

@@ -13,10 +13,10 @@ from handrail.collect.cockpit_config import CockpitConfig
 from handrail.collect.execution.config import ExecutionConfig
 from handrail.collect.flags import one_of, only_one
 from handrail.collect.operators.catalogue import OPERATORS
-from handrail.collect.operators.human.human import HumanSettings
 from handrail.collect.operators.modes import MODES
-from handrail.collect.tasks.catalogue import TASKS
+from handrail.collect.operators.scripted.human import HumanSettings
 from handrail.collect.teleop_config import TeleopConfig
+from handrail.collect.world.tasks.catalogue import TASKS
 from handrail.controllers.errors import HandrailError, unknown_name
 from handrail.controllers.robot.catalogue import ROBOTS
 from handrail.datasets.lists import Names

@@ -8,7 +8,7 @@ from handrail.scripts import cli
 def main(config: CalibrateConfig) -> int:
     """Run the command."""
     config.check()
-    from handrail.collect.leader.guided_calibration import calibrate
+    from handrail.collect.devices.guided_calibration import calibrate
 
     return calibrate(config)
 

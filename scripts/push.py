@@ -9,9 +9,9 @@ def main(config: PushConfig) -> None:
     """Run the command."""
     config.check()
     from handrail.datasets.editing.pack_config import packing_advice
+    from handrail.datasets.editing.push import prepare, upload
+    from handrail.datasets.editing.store import copy
     from handrail.datasets.presentation.terminal import Terminal
-    from handrail.datasets.sharing.push import prepare, upload
-    from handrail.datasets.sharing.store import copy
 
     dataset = config.dataset
     settings = config.license, config.private, config.verify, config.to

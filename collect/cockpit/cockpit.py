@@ -38,13 +38,13 @@ from handrail.collect.cockpit.process import ServerProcess
 from handrail.collect.cockpit.snapshot import Counts, Snapshots
 from handrail.collect.cockpit.strain import Strain
 from handrail.collect.config import RecordConfig
-from handrail.collect.envs.env import HandrailEnv
 from handrail.collect.operators.modes import TeleopMode
 from handrail.collect.operators.operator import EpisodeEvent, View
 from handrail.collect.operators.person.inputs import Ask, Inputs
 from handrail.collect.operators.person.person import Person, Phase
 from handrail.collect.session.build import build_modes
 from handrail.collect.session.outcome import Outcome
+from handrail.collect.world.envs.env import HandrailEnv
 from handrail.controllers.errors import HandrailError, not_installed
 from handrail.controllers.interface.intent import Intent
 from handrail.controllers.robot.model import RobotModel

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from handrail.collect.cockpit import stage
-from handrail.collect.simulation.gl import MjData, MjModel
+from handrail.collect.world.gl import MjData, MjModel
 from handrail.controllers.arrays import FloatArray
 
 _PERIOD = 0.1  # between two rows [s]

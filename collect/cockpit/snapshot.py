@@ -8,13 +8,13 @@ import numpy as np
 
 from handrail.collect.cockpit import stage
 from handrail.collect.cockpit.lead import Lead, Leads
-from handrail.collect.envs.env import HandrailEnv
 from handrail.collect.operators.operator import View
 from handrail.collect.operators.person.person import Person, Phase
 from handrail.collect.session.outcome import Outcome
-from handrail.collect.simulation.geometry import ROBOT_BIT
-from handrail.collect.simulation.gl import MjData, MjModel, mujoco
-from handrail.collect.tasks.task import Aimed, TaskState
+from handrail.collect.world.envs.env import HandrailEnv
+from handrail.collect.world.geometry import ROBOT_BIT
+from handrail.collect.world.gl import MjData, MjModel, mujoco
+from handrail.collect.world.tasks.task import Aimed, TaskState
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.interface.command import Status
 from handrail.controllers.interface.trajectory import Trajectory

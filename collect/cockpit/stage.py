@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from handrail.collect.simulation.geometry import VISIBLE_GROUP
-from handrail.collect.simulation.gl import MjData, MjModel, mujoco
+from handrail.collect.world.geometry import VISIBLE_GROUP
+from handrail.collect.world.gl import MjData, MjModel, mujoco
 from handrail.controllers.arrays import FloatArray
 
 _KINDS = {

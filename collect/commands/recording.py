@@ -9,7 +9,6 @@ from typing import Any, Protocol
 import numpy as np
 
 from handrail.collect.config import RecordConfig
-from handrail.collect.envs.env import HandrailEnv
 from handrail.collect.session.build import (
     build_env,
     build_modes,
@@ -22,6 +21,7 @@ from handrail.collect.session.recorded_settings import settings_json
 from handrail.collect.session.recorder import Recorder
 from handrail.collect.session.rehearsal import Rehearsal
 from handrail.collect.session.session import Observer
+from handrail.collect.world.envs.env import HandrailEnv
 from handrail.controllers.interrupts import Interrupts
 from handrail.controllers.versions import SIMULATION, versions
 from handrail.datasets.format.columns import CLIENT, Scalar

@@ -13,12 +13,12 @@ from handrail.collect.commands.account import RecordingLog, report
 from handrail.collect.commands.recording import Recording, episode_seed, open_writer
 from handrail.collect.commands.shards import Shard, Shards
 from handrail.collect.config import RecordConfig
-from handrail.collect.envs.env import HandrailEnv
 from handrail.collect.execution.execution import Execution
 from handrail.collect.execution.forking import RECORDING
 from handrail.collect.execution.job import Job
 from handrail.collect.session.build import build_env, build_session
 from handrail.collect.session.outcome import Outcome
+from handrail.collect.world.envs.env import HandrailEnv
 from handrail.controllers.errors import FAILED, INTERRUPTED, HandrailError
 from handrail.controllers.interrupts import Interrupts
 from handrail.datasets.format.layout import Layout

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from handrail.collect.config import RecordConfig
-from handrail.collect.envs.env import HandrailEnv
 from handrail.collect.lekiwi.link import Link, connect
 from handrail.collect.session.build import build_env
-from handrail.collect.simulation.scene import Scene
+from handrail.collect.world.envs.env import HandrailEnv
+from handrail.collect.world.scene import Scene
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.errors import HandrailError

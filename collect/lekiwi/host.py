@@ -10,12 +10,12 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from handrail.collect.envs.env import HandrailEnv
 from handrail.collect.lekiwi.body import LeKiwiBody
 from handrail.collect.lekiwi.host_config import HostConfig
 from handrail.collect.lekiwi.host_loop import LeKiwiLoop
 from handrail.collect.processor.units import robot_units
-from handrail.collect.tasks.catalogue import TASKS
+from handrail.collect.world.envs.env import HandrailEnv
+from handrail.collect.world.tasks.catalogue import TASKS
 from handrail.controllers.errors import HandrailError, message_of, not_installed
 from handrail.controllers.registry import resolved
 from handrail.controllers.robot.model import load_model

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from handrail.collect.flags import check_json, names, one_of
-from handrail.collect.tasks.catalogue import TASKS
+from handrail.collect.world.tasks.catalogue import TASKS
 from handrail.controllers.errors import HandrailError, unknown_name
 from handrail.controllers.robot.catalogue import ROBOTS
 from handrail.datasets.lists import Names

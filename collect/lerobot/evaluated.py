@@ -8,15 +8,15 @@ from gymnasium import spaces
 from numpy.typing import ArrayLike, NDArray
 
 from handrail.collect.config import SessionConfig
-from handrail.collect.envs.env import Observation
-from handrail.collect.envs.observation import box_space
-from handrail.collect.envs.obstacle_numbers import MOST, WIDTH, to_numbers
 from handrail.collect.lerobot.mode_action import ModeAction
 from handrail.collect.operators.modes import MODES, TeleopMode
 from handrail.collect.session.build import build_controller, build_env, build_mode
 from handrail.collect.session.loop import EpisodeLoop
 from handrail.collect.session.mode_controller import ModeController
-from handrail.collect.simulation.rendering import Painter
+from handrail.collect.world.envs.env import Observation
+from handrail.collect.world.envs.observation import box_space
+from handrail.collect.world.envs.obstacle_numbers import MOST, WIDTH, to_numbers
+from handrail.collect.world.rendering import Painter
 from handrail.controllers.baselines.direct import DirectController
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.channels import Channels

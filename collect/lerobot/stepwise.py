@@ -10,9 +10,9 @@ from handrail.collect.commands.recording import episode_seed
 from handrail.collect.config import SessionConfig
 from handrail.collect.lerobot.mode_action import ModeAction
 from handrail.collect.lerobot.names import lerobot_name
-from handrail.collect.operators.human.steering import FOLLOW
 from handrail.collect.operators.modes import MODES
 from handrail.collect.operators.operator import EpisodeEvent, View
+from handrail.collect.operators.scripted.steering import FOLLOW
 from handrail.collect.seeds import evaluation_seed
 from handrail.collect.session.build import build_controller, build_env, build_mode
 from handrail.collect.session.loop import EpisodeLoop

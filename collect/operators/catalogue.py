@@ -31,7 +31,7 @@ OPERATORS = Registry(
     (
         OperatorSpec(
             "scripted",
-            "handrail.collect.operators.scripts.scripted:scripted_operator",
+            "handrail.collect.operators.scripted.scripted:scripted_operator",
             "a script with a human-like hand",
         ),
         OperatorSpec(
@@ -42,25 +42,25 @@ OPERATORS = Registry(
         ),
         OperatorSpec(
             "gamepad",
-            "handrail.collect.local_operators.open_devices:open_gamepad",
+            "handrail.collect.devices.open_devices:open_gamepad",
             "a person with a gamepad at this computer",
             interactive=True,
         ),
         OperatorSpec(
             "spacemouse",
-            "handrail.collect.local_operators.open_devices:open_spacemouse",
+            "handrail.collect.devices.open_devices:open_spacemouse",
             "a person with a SpaceMouse",
             interactive=True,
         ),
         OperatorSpec(
             "keyboard",
-            "handrail.collect.local_operators.open_devices:open_keyboard",
+            "handrail.collect.devices.open_devices:open_keyboard",
             "a person with the keys of this terminal",
             interactive=True,
         ),
         OperatorSpec(
             "leader_arm",
-            "handrail.collect.local_operators.open_devices:open_leader_arm",
+            "handrail.collect.devices.open_devices:open_leader_arm",
             "a person with a leader arm of LeRobot's (--teleop.type)",
             interactive=True,
         ),

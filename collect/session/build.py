@@ -7,18 +7,18 @@ from functools import partial
 import numpy as np
 
 from handrail.collect.config import SessionConfig, check_fps
-from handrail.collect.envs.env import RENDER_SIZE, HandrailEnv
 from handrail.collect.operators.catalogue import OPERATORS
 from handrail.collect.operators.modes import MODES, TeleopMode, mode_of_mask
 from handrail.collect.operators.operator import Operator
-from handrail.collect.perturbations.shift import sample_shifted
 from handrail.collect.session.mode_controller import ModeController
 from handrail.collect.session.session import Observer, Session
-from handrail.collect.simulation.ideal_robot import IdealRobot
-from handrail.collect.simulation.protocols import Plant
-from handrail.collect.simulation.simulation import Simulation
-from handrail.collect.tasks.catalogue import TASKS
-from handrail.collect.tasks.task import Task
+from handrail.collect.session.shift import sample_shifted
+from handrail.collect.world.envs.env import RENDER_SIZE, HandrailEnv
+from handrail.collect.world.ideal_robot import IdealRobot
+from handrail.collect.world.protocols import Plant
+from handrail.collect.world.simulation import Simulation
+from handrail.collect.world.tasks.catalogue import TASKS
+from handrail.collect.world.tasks.task import Task
 from handrail.controllers.baselines.catalogue import CONTROLLERS
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import Controller

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
-from handrail.collect.envs.env import HandrailEnv
 from handrail.collect.session.video_file import VideoFile
+from handrail.collect.world.envs.env import HandrailEnv
 from handrail.datasets.recording.frames import Frame
 
 _font = cache(ImageFont.load_default)

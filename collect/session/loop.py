@@ -14,10 +14,10 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from handrail.collect.envs.env import HandrailEnv, Observation
 from handrail.collect.operators.operator import EpisodeEvent, View
 from handrail.collect.session.outcome import Tally
 from handrail.collect.session.rate import Rate
+from handrail.collect.world.envs.env import HandrailEnv, Observation
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.interface.command import Command
 from handrail.controllers.interface.controller import Controller, State

@@ -7,9 +7,9 @@ from typing import Any
 
 from handrail.collect.config import SessionConfig
 from handrail.collect.operators.catalogue import OPERATORS
-from handrail.collect.operators.human.human import HumanSettings
 from handrail.collect.operators.modes import MODES
-from handrail.collect.tasks.catalogue import TASKS
+from handrail.collect.operators.scripted.human import HumanSettings
+from handrail.collect.world.tasks.catalogue import TASKS
 from handrail.controllers.entries import Entry, check_entries, is_number, is_table
 from handrail.controllers.errors import HandrailError, shown
 from handrail.controllers.robot.catalogue import ROBOTS

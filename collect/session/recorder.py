@@ -2,8 +2,8 @@
 
 from collections.abc import Mapping
 
-from handrail.collect.envs.env import HandrailEnv
 from handrail.collect.session.outcome import Outcome
+from handrail.collect.world.envs.env import HandrailEnv
 from handrail.datasets.recording.frames import Frame, frame_row
 from handrail.datasets.recording.writer import EpisodeWriter, Scalar
 

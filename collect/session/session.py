@@ -14,12 +14,12 @@ from typing import Protocol
 
 import numpy as np
 
-from handrail.collect.envs.env import HandrailEnv
 from handrail.collect.operators.operator import EpisodeEvent, Operator
 from handrail.collect.session.loop import Disturbance, EpisodeLoop
 from handrail.collect.session.outcome import Outcome, Tally
 from handrail.collect.session.rate import Sampling
 from handrail.collect.session.undo import Undo
+from handrail.collect.world.envs.env import HandrailEnv
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import Controller
 from handrail.controllers.interface.intent import LONG_AGO, Intent

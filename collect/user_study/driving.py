@@ -6,13 +6,13 @@ from handrail.collect.cockpit.cockpit import Cockpit
 from handrail.collect.cockpit.pipe import STOP
 from handrail.collect.cockpit.process import ServerProcess
 from handrail.collect.commands.recording import Recording, come_first, open_writer
-from handrail.collect.envs.env import HandrailEnv
 from handrail.collect.operators.modes import TeleopMode
 from handrail.collect.session.build import build_env, build_modes
 from handrail.collect.session.outcome import Outcome
 from handrail.collect.user_study.design import ALLOWED, UserStudy
 from handrail.collect.user_study.folder import StudyFolder
 from handrail.collect.user_study.plan import Step, trial_seed
+from handrail.collect.world.envs.env import HandrailEnv
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interrupts import Interrupts
 from handrail.datasets.recording.writer import EpisodeWriter

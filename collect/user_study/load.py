@@ -5,8 +5,8 @@ from pathlib import Path
 from typing import Any
 
 from handrail.collect.operators.modes import MODES
-from handrail.collect.tasks.catalogue import TASKS
 from handrail.collect.user_study.design import ALLOWED, FORMS, KINDS, WHEN, Practice, Question, UserStudy
+from handrail.collect.world.tasks.catalogue import TASKS
 from handrail.controllers.entries import (
     Entry,
     check_entries,

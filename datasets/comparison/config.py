@@ -8,8 +8,8 @@ from typing import Annotated
 import tyro
 
 from handrail.controllers.errors import HandrailError
-from handrail.datasets.demonstrations.columns import ColumnNames
 from handrail.datasets.lists import Words
+from handrail.datasets.reading.columns import ColumnNames
 
 
 @dataclass(frozen=True)

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from handrail.controllers.errors import HandrailError, unknown_name
-from handrail.datasets.demonstrations.columns import ColumnNames
-from handrail.datasets.demonstrations.episode import Episode
-from handrail.datasets.demonstrations.load import each_opened, recorded_episodes
+from handrail.datasets.reading.columns import ColumnNames
+from handrail.datasets.reading.episode import Episode
+from handrail.datasets.reading.load import each_opened, recorded_episodes
 from handrail.datasets.reading.reader import DatasetInfo, read_info
 
 FEWEST, MOST = 2, 8

@@ -13,13 +13,13 @@ import pyarrow as pa
 
 from handrail.controllers.arrays import BoolArray, FloatArray
 from handrail.controllers.errors import HandrailError, unknown_name
-from handrail.datasets.demonstrations.demonstration import Demonstration
 from handrail.datasets.editing.config import EditConfig
 from handrail.datasets.editing.pack import Edited, check_free, merge_datasets, taken
 from handrail.datasets.editing.source import EditSource
 from handrail.datasets.format.columns import ColumnTypes
 from handrail.datasets.format.video import GROUP
 from handrail.datasets.quality.motion import FLOOR
+from handrail.datasets.reading.demonstration import Demonstration
 from handrail.datasets.reading.reader import read_rows_of
 from handrail.datasets.recording.piece import TRIMMED, Piece
 from handrail.datasets.recording.rewrite import drafted, write_anew

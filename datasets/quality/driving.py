@@ -3,9 +3,9 @@
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray
-from handrail.datasets.demonstrations.demonstration import Demonstration, DoesNotApply
 from handrail.datasets.quality.metric import metric
 from handrail.datasets.quality.pool import ObservationPool
+from handrail.datasets.reading.demonstration import Demonstration, DoesNotApply
 
 _LATE = 95.0  # percentile
 

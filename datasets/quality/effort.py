@@ -9,9 +9,9 @@ the others are common in teleoperation.
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray
-from handrail.datasets.demonstrations.demonstration import Demonstration, DoesNotApply
 from handrail.datasets.quality.metric import metric
 from handrail.datasets.quality.pool import ObservationPool
+from handrail.datasets.reading.demonstration import Demonstration, DoesNotApply
 
 DEAD_BAND = 0.05  # of full deflection: below it an axis is not in use
 

@@ -7,12 +7,12 @@ from functools import cached_property
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray
-from handrail.datasets.demonstrations.demonstration import Demonstration
-from handrail.datasets.demonstrations.episode import Episode
-from handrail.datasets.demonstrations.load import each_opened
 from handrail.datasets.quality.metric import Metric
 from handrail.datasets.quality.pool import ObservationPool
 from handrail.datasets.quality.sample import Sample
+from handrail.datasets.reading.demonstration import Demonstration
+from handrail.datasets.reading.episode import Episode
+from handrail.datasets.reading.load import each_opened
 
 _SOME = 200  # episodes that stand for all of them where sizes are told apart
 

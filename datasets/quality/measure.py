@@ -6,15 +6,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray, IntArray
-from handrail.datasets.demonstrations.demonstration import Demonstration, DoesNotApply
-from handrail.datasets.demonstrations.episode import Episode
-from handrail.datasets.demonstrations.load import each_opened
 from handrail.datasets.quality.catalogue import METRICS
 from handrail.datasets.quality.group_reading import GroupReading
 from handrail.datasets.quality.metric import Metric
 from handrail.datasets.quality.pool import FRAMES, ObservationPool
 from handrail.datasets.quality.sample import frames_of
 from handrail.datasets.quality.units import why_not
+from handrail.datasets.reading.demonstration import Demonstration, DoesNotApply
+from handrail.datasets.reading.episode import Episode
+from handrail.datasets.reading.load import each_opened
 from handrail.datasets.statistics.resampling import FEWEST, Interval, bootstrap_mean
 
 Groups = Mapping[str, Sequence[Episode]]

@@ -7,9 +7,9 @@ from typing import Literal
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray
-from handrail.datasets.demonstrations.demonstration import Demonstration
 from handrail.datasets.quality.pool import ObservationPool
 from handrail.datasets.quality.sample import Sample
+from handrail.datasets.reading.demonstration import Demonstration
 
 Needs = Literal["", "motion", "position", "action", "controller", "pool"]
 OfEpisode = Callable[[Demonstration, ObservationPool], float]

@@ -3,10 +3,10 @@
 import numpy as np
 
 from handrail.controllers.arrays import BoolArray, FloatArray, IntArray
-from handrail.datasets.demonstrations.demonstration import Demonstration, DoesNotApply
 from handrail.datasets.quality.metric import metric
 from handrail.datasets.quality.metrics import ldlj, path_length, sparc
 from handrail.datasets.quality.pool import ObservationPool
+from handrail.datasets.reading.demonstration import Demonstration, DoesNotApply
 
 WINDOW = 0.5  # [s]
 FLOOR = 0.005  # net motion below which nothing moves: 5 mm where the motion is in metres

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray
-from handrail.datasets.demonstrations.demonstration import Demonstration, DoesNotApply
+from handrail.datasets.reading.demonstration import Demonstration, DoesNotApply
 
 FRAMES = 2048  # of a group at most, for what compares every frame with every other
 _FEW = 2  # values that an entry takes if it is a switch

@@ -4,9 +4,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from handrail.controllers.arrays import FloatArray
-from handrail.datasets.demonstrations.demonstration import Demonstration, DoesNotApply
 from handrail.datasets.quality.metric import metric
 from handrail.datasets.quality.pool import ObservationPool
+from handrail.datasets.reading.demonstration import Demonstration, DoesNotApply
 
 _ROUNDING = 1e-6  # of the solver: below it, slack is zero
 

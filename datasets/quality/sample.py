@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray, IntArray
-from handrail.datasets.demonstrations.demonstration import Demonstration
+from handrail.datasets.reading.demonstration import Demonstration
 
 
 class Sample:

@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray
-from handrail.datasets.demonstrations.demonstration import Demonstration, DoesNotApply
-from handrail.datasets.demonstrations.load import each_demonstration
 from handrail.datasets.format.columns import CLIENT
 from handrail.datasets.quality import motion, safety
 from handrail.datasets.quality.metric import Metric
 from handrail.datasets.quality.metrics import corrections, high_frequency_content, rate_of_change
 from handrail.datasets.quality.pool import ObservationPool
+from handrail.datasets.reading.demonstration import Demonstration, DoesNotApply
+from handrail.datasets.reading.load import each_demonstration
 
 UNKNOWN = "–"
 CHATTERING = (

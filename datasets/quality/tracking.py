@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from handrail.datasets.demonstrations.demonstration import Demonstration, DoesNotApply
 from handrail.datasets.quality.metric import metric
 from handrail.datasets.quality.pool import ObservationPool
+from handrail.datasets.reading.demonstration import Demonstration, DoesNotApply
 
 TOLERANCE = 0.005  # of an entry's range: this close to its end is at the end
 

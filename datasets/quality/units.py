@@ -10,10 +10,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray
-from handrail.datasets.demonstrations.demonstration import Demonstration, DoesNotApply
-from handrail.datasets.demonstrations.naming import quantity
 from handrail.datasets.quality.group_reading import GroupReading
 from handrail.datasets.quality.metric import Needs
+from handrail.datasets.reading.demonstration import Demonstration, DoesNotApply
+from handrail.datasets.reading.naming import quantity
 
 _FACTOR = 10.0  # ranges that differ by more are of other units: degrees are 57 times radians
 _PERCENT = (1.0, 99.0)

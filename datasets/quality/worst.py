@@ -9,11 +9,11 @@ import numpy as np
 
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import HandrailError, unknown_name
-from handrail.datasets.demonstrations.episode import Episode
-from handrail.datasets.demonstrations.load import recorded_episodes
 from handrail.datasets.quality.catalogue import METRICS
 from handrail.datasets.quality.measure import measure
 from handrail.datasets.quality.metric import Metric
+from handrail.datasets.reading.episode import Episode
+from handrail.datasets.reading.load import recorded_episodes
 from handrail.datasets.reading.reader import DatasetInfo
 
 RANKING = {metric.name: metric for metric in METRICS if metric.good}

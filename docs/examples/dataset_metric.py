@@ -8,8 +8,8 @@ import sys
 
 import numpy as np
 
-from handrail.datasets.demonstrations.load import read_demonstrations
 from handrail.datasets.quality.metrics import sparc
+from handrail.datasets.reading.load import read_demonstrations
 
 
 def main(folder: str) -> None:

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from handrail.collect import SessionConfig, build_env, build_session
-from handrail.collect.simulation.scene import Scene, SceneObject
-from handrail.collect.tasks.catalogue import TaskSpec
-from handrail.collect.tasks.task import Start, TaskState, Verdict
+from handrail.collect.world.scene import Scene, SceneObject
+from handrail.collect.world.tasks.catalogue import TaskSpec
+from handrail.collect.world.tasks.task import Start, TaskState, Verdict
 from handrail.controllers import Pose, RobotModel, Shape
 from handrail.controllers.arrays import FloatArray
 
@@ -40,7 +40,7 @@ class TouchBall:
         return Verdict(bool(np.linalg.norm(state.tool.position - state.pose("ball").position) < 0.05))
 
 
-SCRIPT = "handrail.collect.operators.scripts.reach:ReachScript"  # goes to the goal that an episode names
+SCRIPT = "handrail.collect.operators.scripted.reach:ReachScript"  # goes to the goal that an episode names
 TOUCH_BALL = TaskSpec("touch_ball", TouchBall, SCRIPT, "touch a ball with the hand's tip")
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pinocchio as pin
 
-from handrail.collect.tasks.goal_reaching import STEP
+from handrail.collect.world.tasks.goal_reaching import STEP
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.baselines.arm_completion import ArmCompletion, clamp_twist
 from handrail.controllers.baselines.twist_completion import twist_controller

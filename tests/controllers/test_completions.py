@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from handrail.collect.tasks.goal_reaching import STEP
+from handrail.collect.world.tasks.goal_reaching import STEP
 from handrail.controllers.baselines.arm_completion import WeldedBaseCompletion
 from handrail.controllers.baselines.base_following import FREE, BaseFollowingCompletion
 from handrail.controllers.baselines.twist_completion import (

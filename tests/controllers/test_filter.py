@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from collect_helpers import environment
 
-from handrail.collect.simulation.scene import Scene
-from handrail.collect.tasks.furniture import pillar
-from handrail.collect.tasks.task import Start
+from handrail.collect.world.scene import Scene
+from handrail.collect.world.tasks.furniture import pillar
+from handrail.collect.world.tasks.task import Start
 from handrail.controllers.baselines.cbf_filter import ALPHA, MARGIN, CbfFilter
 from handrail.controllers.baselines.direct import DirectController
 from handrail.controllers.collision.model import CollisionModel

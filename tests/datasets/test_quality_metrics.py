@@ -8,11 +8,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from handrail.datasets.demonstrations.columns import ColumnNames
-from handrail.datasets.demonstrations.demonstration import Demonstration, DoesNotApply
 from handrail.datasets.format.schema import Feature
 from handrail.datasets.quality import driving, effort, motion, safety, tracking
 from handrail.datasets.quality.consistency import action_variance, information, state_coverage
+from handrail.datasets.reading.columns import ColumnNames
+from handrail.datasets.reading.demonstration import Demonstration, DoesNotApply
 from handrail.datasets.reading.reader import DatasetInfo
 
 NONE = np.empty(0, int)

@@ -8,11 +8,11 @@ from compare_helpers import handrail_dataset
 from hypothesis import given
 from hypothesis import strategies as st
 
-from handrail.datasets.demonstrations import load
-from handrail.datasets.demonstrations.demonstration import Demonstration
-from handrail.datasets.demonstrations.load import read_demonstrations, recorded_episodes
 from handrail.datasets.quality.measure import measure, measured, read
 from handrail.datasets.quality.pool import Extent, Spread, embed
+from handrail.datasets.reading import load
+from handrail.datasets.reading.demonstration import Demonstration
+from handrail.datasets.reading.load import read_demonstrations, recorded_episodes
 
 
 @pytest.fixture(scope="module")

@@ -11,12 +11,12 @@ from datasets_helpers import create, record
 
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.comparison.evaluations import read_evaluations
-from handrail.datasets.demonstrations.load import read_demonstrations
 from handrail.datasets.format.layout import Layout
 from handrail.datasets.format.path_pattern import check_pattern, fill
 from handrail.datasets.format.schema import Feature
 from handrail.datasets.quality.measure import measure
 from handrail.datasets.quality.summary import summarize
+from handrail.datasets.reading.load import read_demonstrations
 from handrail.datasets.reading.reader import read_episodes, read_frames, read_info
 from handrail.datasets.storage.strict_json import MOST_BYTES, MOST_DEPTH, parse_json, read_json
 from handrail.policies.imitation.interface.checkpoint import read_meta

@@ -11,8 +11,8 @@ from editing_helpers import record_episodes
 from hypothesis import given
 from hypothesis import strategies as st
 
-from handrail.datasets.demonstrations.load import read_demonstrations
 from handrail.datasets.quality.worst import RANKING, deletion, ranked
+from handrail.datasets.reading.load import read_demonstrations
 from handrail.datasets.reading.reader import read_episodes, read_info
 
 

@@ -9,12 +9,12 @@ from device_players import Clock, PlayedPoller
 from rich.console import Console
 
 from handrail.collect.devices import gamepad, spacemouse
+from handrail.collect.devices.calibration import LeaderCalibration, LeaderGripper, LeaderJoint
+from handrail.collect.devices.card import Card
 from handrail.collect.devices.control_map import ControlMap, load_map
 from handrail.collect.devices.key_bytes import NAMES
+from handrail.collect.devices.local_person import LocalPerson
 from handrail.collect.devices.source import DeviceSource
-from handrail.collect.leader.calibration import LeaderCalibration, LeaderGripper, LeaderJoint
-from handrail.collect.local_operators.card import Card
-from handrail.collect.local_operators.local_person import LocalPerson
 from handrail.collect.operators.modes import MODES
 from handrail.collect.operators.operator import View
 from handrail.collect.operators.person.inputs import Ask

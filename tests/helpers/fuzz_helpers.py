@@ -12,12 +12,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from handrail.collect.simulation.gate import Gate
-from handrail.collect.simulation.gl import mujoco
-from handrail.collect.simulation.robot import FINGERS
-from handrail.collect.simulation.scene import Scene, SceneObject, Viewpoint
-from handrail.collect.simulation.simulation import Simulation
-from handrail.collect.tasks.reach import sample_movers
+from handrail.collect.world.gate import Gate
+from handrail.collect.world.gl import mujoco
+from handrail.collect.world.robot import FINGERS
+from handrail.collect.world.scene import Scene, SceneObject, Viewpoint
+from handrail.collect.world.simulation import Simulation
+from handrail.collect.world.tasks.reach import sample_movers
 from handrail.controllers.arrays import FloatArray, IntArray
 from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.collision.slacks import MOVING

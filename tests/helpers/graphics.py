@@ -2,6 +2,6 @@
 
 import functools
 
-from handrail.collect.simulation import gl
+from handrail.collect.world import gl
 
 graphics_trouble = functools.cache(gl.graphics_trouble)

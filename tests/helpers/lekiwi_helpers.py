@@ -7,15 +7,15 @@ import numpy as np
 from fuzz_helpers import RudeOperator
 from processor_helpers import Clock
 
-from handrail.collect.envs.env import HandrailEnv
 from handrail.collect.lekiwi.body import LeKiwiBody
 from handrail.collect.lekiwi.client_plant import plant_of
 from handrail.collect.lekiwi.host_config import HostConfig
 from handrail.collect.lekiwi.host_loop import SEED, LeKiwiLoop
 from handrail.collect.lekiwi.link import Link
 from handrail.collect.processor.units import robot_units
-from handrail.collect.tasks.pick_place import PickPlace
-from handrail.collect.tasks.reach import Reach
+from handrail.collect.world.envs.env import HandrailEnv
+from handrail.collect.world.tasks.pick_place import PickPlace
+from handrail.collect.world.tasks.reach import Reach
 from handrail.controllers.mpc.masked_mpc import MaskedMpc
 from handrail.controllers.robot.model import load_model
 

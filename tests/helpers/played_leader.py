@@ -6,7 +6,7 @@ from typing import Any
 from lerobot.teleoperators.config import TeleoperatorConfig
 from lerobot.teleoperators.teleoperator import Teleoperator
 
-from handrail.collect.leader.calibration import LeaderCalibration, LeaderGripper, LeaderJoint
+from handrail.collect.devices.calibration import LeaderCalibration, LeaderGripper, LeaderJoint
 
 UR10 = (
     "shoulder_pan_joint",

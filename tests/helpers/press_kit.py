@@ -5,14 +5,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from handrail.collect.operators.catalogue import OperatorSpec
-from handrail.collect.operators.human.human import HumanSettings
-from handrail.collect.operators.human.motion_goal import MotionGoal, Target
-from handrail.collect.operators.human.steering import hand_twist
 from handrail.collect.operators.modes import TeleopMode, always
-from handrail.collect.operators.scripts.scripted import scripted_operator
-from handrail.collect.simulation.scene import Scene
-from handrail.collect.tasks.catalogue import TaskSpec
-from handrail.collect.tasks.task import Start, Verdict
+from handrail.collect.operators.scripted.human import HumanSettings
+from handrail.collect.operators.scripted.motion_goal import MotionGoal, Target
+from handrail.collect.operators.scripted.scripted import scripted_operator
+from handrail.collect.operators.scripted.steering import hand_twist
+from handrail.collect.world.scene import Scene
+from handrail.collect.world.tasks.catalogue import TaskSpec
+from handrail.collect.world.tasks.task import Start, Verdict
 from handrail.controllers.baselines.catalogue import ControllerSpec
 from handrail.controllers.baselines.twist_completion import WholeBodyCompletion, twist_controller
 from handrail.controllers.robot.catalogue import ROBOTS, RobotSpec

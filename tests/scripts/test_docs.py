@@ -22,9 +22,9 @@ from handrail.collect.config import (
     SessionConfig,
 )
 from handrail.collect.operators.modes import MODES
-from handrail.collect.perturbations.perturbations import DEFAULTS
 from handrail.collect.session.build import build_env, session_features
-from handrail.collect.tasks.catalogue import TASKS
+from handrail.collect.session.perturbations import DEFAULTS
+from handrail.collect.world.tasks.catalogue import TASKS
 from handrail.controllers.interface.command import Status
 from handrail.datasets.quality.catalogue import METRICS
 from handrail.policies.imitation.evaluation.config import PROTECTIONS

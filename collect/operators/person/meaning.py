@@ -5,10 +5,10 @@ from typing import Literal
 
 import numpy as np
 
-from handrail.collect.operators.devices.input_map import StickMap
-from handrail.collect.operators.human.steering import FOLLOW, Gains
 from handrail.collect.operators.modes import Focus, TeleopMode
 from handrail.collect.operators.person.inputs import Inputs
+from handrail.collect.operators.scripted.input_map import StickMap
+from handrail.collect.operators.scripted.steering import FOLLOW, Gains
 from handrail.controllers.arrays import BoolArray, FloatArray
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import State

@@ -2,10 +2,10 @@
 
 import math
 
-from handrail.datasets.demonstrations.demonstration import Demonstration, DoesNotApply
 from handrail.datasets.quality.catalogue import METRICS
 from handrail.datasets.quality.metric import metric
 from handrail.datasets.quality.pool import ObservationPool
+from handrail.datasets.reading.demonstration import Demonstration, DoesNotApply
 
 _CHOSEN = (
     "contacts",

@@ -9,10 +9,10 @@ import numpy as np
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.comparison.people.folder import PeopleFolder
 from handrail.datasets.comparison.people.measures import MEASURES
-from handrail.datasets.demonstrations.columns import ColumnNames
-from handrail.datasets.demonstrations.episode import Episode
-from handrail.datasets.demonstrations.load import recorded_episodes
 from handrail.datasets.quality.measure import measure
+from handrail.datasets.reading.columns import ColumnNames
+from handrail.datasets.reading.episode import Episode
+from handrail.datasets.reading.load import recorded_episodes
 
 SCRIPTED = "scripted"  # the name of the operator, as handrail-record writes it
 _MARGIN = 0.1  # of a metric that is not used here [m]

@@ -13,12 +13,12 @@ from handrail.datasets.comparison.compare import Comparison
 from handrail.datasets.comparison.differences import Difference
 from handrail.datasets.comparison.groups import Group, group_of
 from handrail.datasets.comparison.outcomes import ConditionOutcome
-from handrail.datasets.demonstrations.demonstration import Demonstration, DoesNotApply
-from handrail.datasets.demonstrations.load import each_opened
-from handrail.datasets.demonstrations.naming import position_entries
 from handrail.datasets.presentation.drawing import COLOURS, GREY, INK, Panel, new_figure, rows, short, tidy
 from handrail.datasets.quality.measure import Measured
 from handrail.datasets.quality.metric import Metric
+from handrail.datasets.reading.demonstration import Demonstration, DoesNotApply
+from handrail.datasets.reading.load import each_opened
+from handrail.datasets.reading.naming import position_entries
 
 _WIDTH = 5.2  # [inch]
 _LABEL, _SMALL_LABEL, _AXIS_LABEL = 26, 14, 30  # characters beside axes

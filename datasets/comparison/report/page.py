@@ -20,7 +20,6 @@ from handrail.datasets.comparison.report.figures import (
     metrics_panels,
     trajectory_panels,
 )
-from handrail.datasets.demonstrations.episode import Episode
 from handrail.datasets.format.path_pattern import fill
 from handrail.datasets.format.schema import video_keys
 from handrail.datasets.presentation.drawing import Panel, address, svg
@@ -49,6 +48,7 @@ from handrail.datasets.presentation.wording import (
 from handrail.datasets.quality.catalogue import METRICS
 from handrail.datasets.quality.metric import Metric
 from handrail.datasets.quality.worst import RANKING, deletion, ranked
+from handrail.datasets.reading.episode import Episode
 from handrail.datasets.reading.reader import DatasetInfo
 
 _HOW = (

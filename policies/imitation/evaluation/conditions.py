@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from handrail.collect.operators.modes import MODES
-from handrail.collect.perturbations.perturbations import Perturbation
-from handrail.collect.tasks.catalogue import TASKS
+from handrail.collect.session.perturbations import Perturbation
+from handrail.collect.world.tasks.catalogue import TASKS
 from handrail.controllers.baselines.catalogue import CONTROLLERS
 from handrail.controllers.entries import is_count
 from handrail.controllers.errors import HandrailError

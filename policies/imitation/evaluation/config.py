@@ -9,9 +9,9 @@ import tyro
 from handrail.collect.config import FPS_RANGE, MOST_TIME
 from handrail.collect.execution.config import ExecutionConfig
 from handrail.collect.flags import one_of, only_one
-from handrail.collect.perturbations.perturbations import Perturbation
 from handrail.collect.seeds import MOST_ROLLOUTS, evaluation_seed
-from handrail.collect.tasks.catalogue import TASKS
+from handrail.collect.session.perturbations import Perturbation
+from handrail.collect.world.tasks.catalogue import TASKS
 from handrail.controllers.errors import HandrailError, unknown_name
 from handrail.datasets.lists import Names, Words
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from handrail.collect.config import CAMERAS, MOST_MOVING, SessionConfig
 from handrail.collect.session.build import build_mode, build_task
-from handrail.collect.tasks.catalogue import TASKS
+from handrail.collect.world.tasks.catalogue import TASKS
 from handrail.controllers.entries import is_count
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.channels import Channels

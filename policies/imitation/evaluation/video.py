@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from handrail.collect.session.film import SIZE, Filmer
-from handrail.collect.simulation.gl import graphics_trouble
+from handrail.collect.world.gl import graphics_trouble
 from handrail.datasets.recording.frames import Frame
 from handrail.policies.imitation.evaluation.conditions import policy_conditions
 from handrail.policies.imitation.evaluation.config import EvaluateConfig

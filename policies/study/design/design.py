@@ -52,7 +52,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from handrail.collect.operators.modes import MODES
-from handrail.collect.tasks.catalogue import TASKS
+from handrail.collect.world.tasks.catalogue import TASKS
 from handrail.controllers.errors import HandrailError, unknown_name
 
 CONTRASTS = ("input", "controller", "interaction")

@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 
 from handrail.controllers.errors import HandrailError
-from handrail.datasets.demonstrations.load import recorded_episodes
 from handrail.datasets.presentation.terminal import Terminal
 from handrail.datasets.quality.measure import measure
 from handrail.datasets.reading.digest import digest_of_dataset
+from handrail.datasets.reading.load import recorded_episodes
 from handrail.datasets.reading.reader import read_episodes
 from handrail.datasets.storage.atomic import remove
 from handrail.policies.imitation.interface.checkpoint import last_checkpoint, read_meta

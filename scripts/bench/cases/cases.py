@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from handrail.collect.simulation.scene import Colour, Scene, SceneObject, Viewpoint
-from handrail.collect.tasks.furniture import pillar
+from handrail.collect.world.scene import Colour, Scene, SceneObject, Viewpoint
+from handrail.collect.world.tasks.furniture import pillar
 from handrail.controllers.arrays import FloatArray, frozen
 from handrail.controllers.interface.frames import Frames
 from handrail.controllers.numerics.rotation import matrix_from_rpy

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from handrail.collect.tasks.goal_reaching import STEP
+from handrail.collect.world.tasks.goal_reaching import STEP
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.baselines.arm_completion import WeldedBaseCompletion
 from handrail.controllers.baselines.base_following import BaseFollowingCompletion

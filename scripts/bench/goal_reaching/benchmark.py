@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from handrail.collect.simulation.gl import graphics_trouble
+from handrail.collect.world.gl import graphics_trouble
 from handrail.datasets.presentation.drawing import address, png, svg
 from handrail.datasets.presentation.markdown import markdown_table, write_part
 from handrail.datasets.presentation.markup import film, folded, page, panels, paragraph, section

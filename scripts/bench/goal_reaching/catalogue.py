@@ -10,7 +10,7 @@ _HERE = "handrail.scripts.bench.goal_reaching.baselines"
 _DIRECT = "handrail.controllers.baselines.direct:DirectController"
 _CBF = "handrail.controllers.baselines.cbf_filter:CbfFilter"
 _FILTER = "handrail.controllers.mpc.safety_filter:safety_filter"
-_MINK = "handrail.collect.simulation.mink:MinkController"
+_MINK = "handrail.collect.world.mink:MinkController"
 _RL = "handrail.policies.rl.controller:RlController"
 TAKE_UP = (1.0, 0.65)  # time constants of the low-pass, of the hand's translation and turn [s]
 _JOINTS, _SMOOTHED = f"{_HERE}:joint_intent", f"{_HERE}:smoothed_hand_intent"
@@ -44,7 +44,7 @@ class Baseline:
 
     def controller(self, model: Any) -> Any:
         """Return the controller of a robot."""
-        from handrail.collect.tasks.goal_reaching import STEP
+        from handrail.collect.world.tasks.goal_reaching import STEP
 
         return resolved(self.build)(model, self.period or STEP)
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from handrail.collect.tasks.goal_reaching import STEP, reached
+from handrail.collect.world.tasks.goal_reaching import STEP, reached
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.interface.command import Diagnostics

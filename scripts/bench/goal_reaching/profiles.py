@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from handrail.collect.tasks.goal_reaching import STEP, T_MAX, StraightPlanner
+from handrail.collect.world.tasks.goal_reaching import STEP, T_MAX, StraightPlanner
 from handrail.controllers.arrays import FloatArray, IntArray, frozen
 from handrail.controllers.errors import unknown_name
 from handrail.scripts.bench.goal_reaching.config import PROFILES

@@ -9,8 +9,8 @@ import numpy as np
 
 from handrail.collect.execution.execution import Execution
 from handrail.collect.execution.job import Job
-from handrail.collect.simulation.scene import Scene
-from handrail.collect.tasks.goal_reaching import sample_goal
+from handrail.collect.world.scene import Scene
+from handrail.collect.world.tasks.goal_reaching import sample_goal
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.errors import HandrailError

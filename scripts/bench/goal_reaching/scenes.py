@@ -5,12 +5,12 @@ from typing import Any
 
 import numpy as np
 
-from handrail.collect.simulation.gate import Gate
-from handrail.collect.simulation.ideal_robot import IdealRobot
-from handrail.collect.simulation.protocols import Plant
-from handrail.collect.simulation.scene import Scene, SceneObject, Viewpoint
-from handrail.collect.simulation.simulation import Simulation
-from handrail.collect.tasks.furniture import footprint, pillar
+from handrail.collect.world.gate import Gate
+from handrail.collect.world.ideal_robot import IdealRobot
+from handrail.collect.world.protocols import Plant
+from handrail.collect.world.scene import Scene, SceneObject, Viewpoint
+from handrail.collect.world.simulation import Simulation
+from handrail.collect.world.tasks.furniture import footprint, pillar
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.errors import HandrailError

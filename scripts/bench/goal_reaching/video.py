@@ -13,11 +13,11 @@ from PIL import Image
 from handrail.collect.session.contact_sheet import contact_sheet
 from handrail.collect.session.film import captioned
 from handrail.collect.session.video_file import VideoFile
-from handrail.collect.simulation.rendering import Painter
-from handrail.collect.simulation.scene import Scene
-from handrail.collect.simulation.simulation import Simulation
-from handrail.collect.tasks.goal_reaching import STEP
-from handrail.collect.tasks.reach import goal_marker
+from handrail.collect.world.rendering import Painter
+from handrail.collect.world.scene import Scene
+from handrail.collect.world.simulation import Simulation
+from handrail.collect.world.tasks.goal_reaching import STEP
+from handrail.collect.world.tasks.reach import goal_marker
 from handrail.controllers.robot.model import Pose, load_model
 from handrail.scripts.bench.goal_reaching.episode import Conditions
 from handrail.scripts.bench.goal_reaching.metrics import Trace

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from handrail.collect.execution.config import ExecutionConfig
 from handrail.collect.flags import check_names, check_page, check_whole, names
 from handrail.collect.operators.modes import MODES
-from handrail.collect.tasks.catalogue import TASKS
+from handrail.collect.world.tasks.catalogue import TASKS
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.lists import Names
 

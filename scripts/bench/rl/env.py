@@ -9,7 +9,7 @@ import gymnasium
 import numpy as np
 from gymnasium import spaces
 
-from handrail.collect.tasks.goal_reaching import (
+from handrail.collect.world.tasks.goal_reaching import (
     ORIENTATION_TOLERANCE,
     POSITION_TOLERANCE,
     STEP,

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
-from handrail.collect.tasks.goal_reaching import STEP, sample_goal
+from handrail.collect.world.tasks.goal_reaching import STEP, sample_goal
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.robot.model import Pose
 from handrail.scripts.bench.goal_reaching.metrics import arm_effort, jerkiness

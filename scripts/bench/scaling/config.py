@@ -7,7 +7,7 @@ from typing import Annotated
 from handrail.collect.execution.config import MOST_WORKERS, ExecutionConfig
 from handrail.collect.flags import check_json, check_names, check_whole, one_of
 from handrail.collect.operators.modes import MODES
-from handrail.collect.tasks.catalogue import TASKS
+from handrail.collect.world.tasks.catalogue import TASKS
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.lists import Names
 

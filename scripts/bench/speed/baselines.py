@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from handrail.collect.simulation.mink import MinkController
+from handrail.collect.world.mink import MinkController
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.robot.shape import Obstacle
 from handrail.controllers.solvers.converged import ConvergedSolver

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from handrail.collect.flags import check_json, check_names, check_whole, names
-from handrail.collect.tasks.catalogue import TASKS
+from handrail.collect.world.tasks.catalogue import TASKS
 from handrail.controllers.robot.catalogue import ROBOTS
 from handrail.datasets.lists import Names
 

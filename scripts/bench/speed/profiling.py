@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from handrail.collect.flags import names
-from handrail.collect.simulation.mink import ACTIVATION_DISTANCE
-from handrail.collect.tasks.catalogue import TASKS
+from handrail.collect.world.mink import ACTIVATION_DISTANCE
+from handrail.collect.world.tasks.catalogue import TASKS
 from handrail.controllers.numerics.threads import single_threaded
 from handrail.controllers.robot.catalogue import ROBOTS
 from handrail.datasets.presentation.terminal import Terminal

@@ -17,7 +17,7 @@ from handrail.collect.operators.operator import View
 from handrail.collect.operators.person.inputs import Ask
 from handrail.collect.operators.person.person import Person
 from handrail.collect.session.build import build_env, build_modes
-from handrail.collect.simulation.gl import mujoco
+from handrail.collect.world.gl import mujoco
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.command import Diagnostics, Status
 from handrail.controllers.interface.frames import Frames

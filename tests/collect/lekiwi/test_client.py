@@ -14,7 +14,7 @@ from handrail.collect.commands.tables import summary_table
 from handrail.collect.lekiwi import client_plant
 from handrail.collect.lekiwi.client_plant import ClientPlant
 from handrail.collect.lekiwi.link import Link
-from handrail.collect.simulation.scene import Scene, Viewpoint
+from handrail.collect.world.scene import Scene, Viewpoint
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.robot.model import load_model
 from handrail.datasets.reading.reader import read_episodes

@@ -14,7 +14,7 @@ from handrail.collect.lerobot import HandrailSim, HandrailSimConfig
 from handrail.collect.lerobot.names import lerobot_name
 from handrail.collect.seeds import FIRST_SEED
 from handrail.collect.session.build import build_env
-from handrail.collect.tasks.catalogue import TASKS
+from handrail.collect.world.tasks.catalogue import TASKS
 from handrail.controllers.errors import HandrailError
 
 

@@ -9,8 +9,8 @@ from lerobot_helpers import steered
 
 from handrail.collect.lerobot import HandrailSim
 from handrail.collect.lerobot.mode_action import NEXT
-from handrail.datasets.demonstrations.naming import point_entries
 from handrail.datasets.quality.summary import summarize
+from handrail.datasets.reading.naming import point_entries
 from handrail.datasets.reading.simulated import ROBOT
 
 FPS = 20

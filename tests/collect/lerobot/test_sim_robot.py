@@ -13,7 +13,7 @@ from handrail.collect.lerobot.mode_action import AGAIN, BUTTONS, HOLD, NEXT
 from handrail.collect.operators.modes import MODES
 from handrail.collect.seeds import evaluation_seed
 from handrail.collect.session.build import build_env
-from handrail.collect.tasks.catalogue import TASKS
+from handrail.collect.world.tasks.catalogue import TASKS
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.command import Status
 

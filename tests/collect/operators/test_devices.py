@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 from device_helpers import GOAL, HOME, MODEL, PERFECT, PERIOD, Wisher, drive, first_view
 
-from handrail.collect.operators.devices.devices import DEVICES
-from handrail.collect.operators.devices.input_map import StickMap
-from handrail.collect.operators.devices.single_axis import clear_order, sweep_clearance
-from handrail.collect.operators.human.human import HumanSettings
-from handrail.collect.operators.human.motion_goal import MotionGoal
-from handrail.collect.operators.human.steering import Gains
 from handrail.collect.operators.modes import MODES
 from handrail.collect.operators.operator import View
-from handrail.collect.operators.scripts.reach import ReachScript
-from handrail.collect.operators.scripts.scripted import gains_of, scripted_operator
-from handrail.collect.tasks.catalogue import TaskSpec
+from handrail.collect.operators.scripted.devices import DEVICES
+from handrail.collect.operators.scripted.human import HumanSettings
+from handrail.collect.operators.scripted.input_map import StickMap
+from handrail.collect.operators.scripted.motion_goal import MotionGoal
+from handrail.collect.operators.scripted.reach import ReachScript
+from handrail.collect.operators.scripted.scripted import gains_of, scripted_operator
+from handrail.collect.operators.scripted.single_axis import clear_order, sweep_clearance
+from handrail.collect.operators.scripted.steering import Gains
+from handrail.collect.world.tasks.catalogue import TaskSpec
 from handrail.controllers.baselines.split_controller import split_controller
 from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.interface.channels import Channels

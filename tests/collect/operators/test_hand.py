@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from device_helpers import PERFECT
 
-from handrail.collect.operators.devices.input_map import StickMap
-from handrail.collect.operators.human.hand import HumanHand, minimum_jerk
-from handrail.collect.operators.human.human import HumanSettings
-from handrail.collect.operators.human.steering import Gains
 from handrail.collect.operators.modes import MODES
+from handrail.collect.operators.scripted.hand import HumanHand, minimum_jerk
+from handrail.collect.operators.scripted.human import HumanSettings
+from handrail.collect.operators.scripted.input_map import StickMap
+from handrail.collect.operators.scripted.steering import Gains
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.robot.model import load_model
 

@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from handrail.collect.envs.env import HandrailEnv
 from handrail.collect.session.build import session_features
 from handrail.collect.session.recorder import Recorder
 from handrail.collect.session.session import Session
-from handrail.collect.simulation.ideal_robot import IdealRobot
-from handrail.collect.tasks.reach import Reach
+from handrail.collect.world.envs.env import HandrailEnv
+from handrail.collect.world.ideal_robot import IdealRobot
+from handrail.collect.world.tasks.reach import Reach
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.command import Command, Diagnostics, Status
 from handrail.controllers.interface.intent import Intent, RawInput

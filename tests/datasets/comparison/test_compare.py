@@ -17,9 +17,9 @@ from handrail.datasets.comparison.config import CompareConfig
 from handrail.datasets.comparison.evaluations import FORMAT
 from handrail.datasets.comparison.headline import headline
 from handrail.datasets.comparison.report.report import as_json, write_report
-from handrail.datasets.demonstrations.load import read_demonstrations
 from handrail.datasets.quality.catalogue import METRICS
 from handrail.datasets.quality.measure import measure
+from handrail.datasets.reading.load import read_demonstrations
 from handrail.scripts import cli
 from handrail.scripts.compare import main
 

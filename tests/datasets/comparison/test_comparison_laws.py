@@ -15,11 +15,11 @@ from handrail.datasets.comparison.evaluations import Condition, Policy
 from handrail.datasets.comparison.groups import Group
 from handrail.datasets.comparison.outcomes import LIKE_FOR_LIKE, Pair, in_families, judge_pairs
 from handrail.datasets.comparison.report.tables import metrics_table
-from handrail.datasets.demonstrations.demonstration import Demonstration
 from handrail.datasets.format.schema import Feature
 from handrail.datasets.quality.catalogue import METRICS
 from handrail.datasets.quality.measure import measure
 from handrail.datasets.quality.sample import frames_of
+from handrail.datasets.reading.demonstration import Demonstration
 from handrail.datasets.reading.reader import DatasetInfo
 from handrail.datasets.statistics import resampling
 from handrail.datasets.statistics.paired import wilson

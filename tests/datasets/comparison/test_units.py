@@ -12,11 +12,11 @@ from handrail.datasets.comparison.cautions import cautions
 from handrail.datasets.comparison.compare import compare
 from handrail.datasets.comparison.config import CompareConfig
 from handrail.datasets.comparison.report.page import report_page
-from handrail.datasets.demonstrations.demonstration import Demonstration
 from handrail.datasets.format.schema import Feature
 from handrail.datasets.quality.catalogue import METRICS
 from handrail.datasets.quality.measure import measure, read
 from handrail.datasets.quality.units import why_not
+from handrail.datasets.reading.demonstration import Demonstration
 from handrail.datasets.reading.reader import DatasetInfo
 
 NAMES = ("a.pos", "b.pos", "c.pos")

@@ -6,10 +6,10 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from handrail.collect.tasks.pick_place import PickPlace
-from handrail.collect.tasks.reach import Reach
-from handrail.collect.tasks.task import TaskState
-from handrail.collect.tasks.tray import Tray
+from handrail.collect.world.tasks.pick_place import PickPlace
+from handrail.collect.world.tasks.reach import Reach
+from handrail.collect.world.tasks.task import TaskState
+from handrail.collect.world.tasks.tray import Tray
 from handrail.controllers.robot.model import Pose, load_model
 from handrail.policies.imitation.evaluation.rollout import RolloutProgress
 

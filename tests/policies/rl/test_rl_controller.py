@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from rl_helpers import random_actor
 
-from handrail.collect.simulation.gate import Gate
-from handrail.collect.simulation.ideal_robot import IdealRobot
-from handrail.collect.simulation.scene import Scene
-from handrail.collect.tasks.goal_reaching import STEP
+from handrail.collect.world.gate import Gate
+from handrail.collect.world.ideal_robot import IdealRobot
+from handrail.collect.world.scene import Scene
+from handrail.collect.world.tasks.goal_reaching import STEP
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.command import Status
 from handrail.controllers.interface.controller import State

@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 
-from handrail.collect.tasks.goal_reaching import STEP, T_MAX, StraightPlanner, pose_error, reached
+from handrail.collect.world.tasks.goal_reaching import STEP, T_MAX, StraightPlanner, pose_error, reached
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import State
 from handrail.controllers.interface.intent import Intent

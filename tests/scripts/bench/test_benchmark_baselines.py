@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from handrail.collect.tasks.goal_reaching import STEP
+from handrail.collect.world.tasks.goal_reaching import STEP
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import State
 from handrail.controllers.interface.prediction import after

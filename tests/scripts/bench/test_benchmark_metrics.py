@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from handrail.collect.tasks.goal_reaching import STEP
+from handrail.collect.world.tasks.goal_reaching import STEP
 from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.interface.command import Diagnostics, Status
 from handrail.controllers.robot.model import load_model

@@ -4,7 +4,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from handrail.collect.tasks.goal_reaching import STEP, T_MAX, StraightPlanner, pose_error, sample_goal
+from handrail.collect.world.tasks.goal_reaching import STEP, T_MAX, StraightPlanner, pose_error, sample_goal
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.robot.model import load_model
 from handrail.scripts.bench.goal_reaching.config import PROFILES

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import handrail.policies  # noqa: F401  (registers the environment)
-from handrail.collect.tasks.goal_reaching import STEP, T_MAX, pose_error, sample_goal
+from handrail.collect.world.tasks.goal_reaching import STEP, T_MAX, pose_error, sample_goal
 from handrail.controllers.baselines.arm_completion import ArmCompletion
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.numerics.rotation import turned

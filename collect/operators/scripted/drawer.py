@@ -1,0 +1,79 @@
+"""How an operator pulls a drawer open."""
+
+import numpy as np
+
+from handrail.collect.operators.operator import View
+from handrail.collect.operators.scripted.base_placement import standing_within_reach
+from handrail.collect.operators.scripted.phases import PhasedScript, ScriptPhase, from_phase
+from handrail.collect.world.tasks.cabinet import inward
+from handrail.collect.world.tasks.drawer import handle, handle_rotation, opened
+from handrail.controllers.arrays import FloatArray
+from handrail.controllers.numerics.rotation import matrix_from_rpy
+from handrail.controllers.robot.model import Pose
+
+_PULL = 0.26  # how far the operator means to open it [m]
+_ENOUGH = 0.21  # [m]
+_BACK = 0.16  # hand before the handle at the beginning and at the end [m]
+_AWAY = 0.10  # from it that is far enough to leave it alone [m]
+
+
+class DrawerScript(PhasedScript):
+    """Approach, grasp, pull, let go for `handrail/Drawer-v0`; a script.
+
+    Who drives the base by itself turns the hand first, where there is room, and drives up to the handle then.
+    """
+
+    def replan(self, view: View, name: str) -> list[ScriptPhase] | None:
+        """Begin again at the handle when the drawer did not come along; leave it as long as it is near."""
+        if name == "release" and opened(view.task) <= _ENOUGH:
+            return from_phase(self.plan(view), "stage")
+        away = np.linalg.norm(view.tool.position - handle(view.task))
+        if name == "release" or (name == "leave" and away < _AWAY):
+            return [self._leave(view)]
+        return None
+
+    def _leave(self, view: View) -> ScriptPhase:
+        """Return the phase that backs off from where the handle is now, the base where it is."""
+        into = inward(view.task.object("cabinet").rotation)
+        back = Pose(handle(view.task) - _BACK * into, handle_rotation(view.tool.rotation, into))
+        base = view.state.q[:3] if self._model.description.base_joints else np.zeros(3)
+        return ScriptPhase(back, base, name="leave", distance=0.03, angle=3.2, pace=0.5, patience=5.0)
+
+    def plan(self, view: View) -> list[ScriptPhase]:
+        """Return the way to the handle, how to pull it, and how to let go."""
+        into = inward(view.task.object("cabinet").rotation)
+        bar, grasp = handle(view.task), handle_rotation(view.tool.rotation, into)
+        pull = max(_PULL - opened(view.task), 0.05)
+        yaw = float(np.arctan2(into[1], into[0]))
+        base = standing_within_reach(self._model, view.state.q, Pose(bar, grasp), yaw)
+
+        def phase(name: str, back: float, **options: float) -> ScriptPhase:
+            stand = base - np.array([pull * into[0], pull * into[1], 0.0]) * (name in ("pull", "release"))
+            return ScriptPhase(Pose(bar - back * into, grasp), stand, name=name, **options)  # type: ignore[arg-type]
+
+        phases = [
+            phase("stage", _BACK, distance=0.02, angle=0.10),
+            phase("approach", 0.0, distance=0.010, angle=0.10, pace=0.4, patience=8.0),
+            phase("grasp", 0.0, distance=1.0, angle=3.2, gripper=1.0, dwell=1.2),
+            phase("pull", pull, distance=0.03, angle=3.2, gripper=1.0, pace=0.5, patience=15.0),
+            phase("release", pull, distance=1.0, angle=3.2, dwell=0.8),
+        ]
+        if self._drives:
+            hand, now = phases[0].hand, view.state.q[:3]
+            ready = ScriptPhase(before_driving(hand, base, now), now, name="ready", distance=0.05, angle=0.15)
+            phases = [
+                ready,
+                ScriptPhase(hand, base, name="drive", focus="base", distance=0.08, angle=0.08),
+                *phases,
+            ]
+        return phases
+
+
+def before_driving(hand: Pose, base: FloatArray, now: FloatArray) -> Pose:
+    """Return where the hand is to be while the base is at `now`, so that driving to `base` brings it along.
+
+    `p = p_now + R_z(θ_now − θ) (p_hand − p_base)`, and the rotation likewise.
+    """
+    turn = matrix_from_rpy([0.0, 0.0, now[2] - base[2]])
+    away = hand.position - [base[0], base[1], 0.0]
+    return Pose(turn @ away + [now[0], now[1], 0.0], turn @ hand.rotation)

@@ -1,0 +1,194 @@
+"""Input maps: how a goal becomes values on the channels of a mode; nothing else differs between modes."""
+
+from abc import ABC, abstractmethod
+
+import numpy as np
+
+from handrail.collect.operators.modes import Focus, TeleopMode
+from handrail.collect.operators.operator import View
+from handrail.collect.operators.scripted.arm_solutions import straight_solution
+from handrail.collect.operators.scripted.human import HumanSettings
+from handrail.collect.operators.scripted.motion_goal import MotionGoal, Target
+from handrail.collect.operators.scripted.steering import Gains
+from handrail.controllers.arrays import BoolArray, FloatArray
+from handrail.controllers.collision.model import CollisionModel
+from handrail.controllers.interface.channels import Channels
+from handrail.controllers.interface.controller import State
+from handrail.controllers.numerics.rotation import rotation_vector, turned
+from handrail.controllers.robot.inverse_kinematics import arm_configuration
+from handrail.controllers.robot.model import RobotModel
+
+_DAMPING = 0.006  # beside the hand's weight of 1, like the two below: larger ones hold it off its goal
+_BASE_WEIGHT = 0.03
+_POSTURE = 0.02  # weight of the arm's posture at home, so that it does not fold the wrong way
+_LARGE = 2.0  # turn of the hand from which on the expert thinks of where the arm's joints belong [rad]
+_RETURN = 0.5  # how fast it would go back there [1/s]
+
+
+_CLEAR = 0.03  # what the motion shall keep clear [m]
+_EXACTLY = 1e-3  # how well one knows where joints belong [m, rad]
+
+
+class LargeTurn:
+    """Turns the hand by joints, where following the hand would fold the arm into itself.
+
+    `q̇ = s k_h (q_ik − q)`, with s such that neither hand nor joints move faster than at full stick. Which of
+    the inverse kinematics' solutions it is, is thought of once a target: the nearest that is clear. Where
+    it is follows the pose as the operator sees it from moment to moment.
+
+    Args:
+        model: of the robot.
+        gains: full stick of hand and joints.
+        large: turn of the hand from which on it matters how the arm gets there [rad].
+        view: of the scene, at the beginning of an episode.
+    """
+
+    def __init__(self, model: RobotModel, gains: Gains, large: float, view: View) -> None:
+        self._model, self._gains, self._large = model, gains, large
+        self._base = len(model.description.base_joints)
+        self._collision = CollisionModel(model, view.task.obstacles)
+        self._goal = view.state.q.copy()
+        self._thought = b""
+
+    def is_ahead(self, target: Target, q: FloatArray) -> bool:
+        """Return whether the hand has to turn far to where a goal leads."""
+        turn = target.hand.rotation @ self._model.pose(q).rotation.T
+        return float(np.linalg.norm(rotation_vector(turn))) > self._large
+
+    def arm_velocity(self, target: Target, q: FloatArray, base: FloatArray) -> FloatArray:
+        """Return the velocity straight to where the arm's joints belong, (n − b,) [rad/s].
+
+        Args:
+            target: where the goal leads, as it is seen.
+            q: joint positions, (n,).
+            base: of the base, from where the operator thinks the hand reaches the target, (b,).
+        """
+        if target.identity != self._thought:
+            start = np.concatenate([base, q[self._base :]])
+            self._goal = straight_solution(self._model, self._collision, start, target.hand, _CLEAR)
+            self._thought = target.identity
+        else:
+            before = np.concatenate([base, self._goal[self._base :]])
+            self._goal = arm_configuration(self._model, before, target.hand, _EXACTLY)[0]
+        velocity = self._gains.gain * (self._goal - q)[self._base :]
+        hand = self._model.jacobian(q)[:, self._base :] @ velocity
+        fastest = target.pace * self._gains.full[[0, 3]]  # of the hand, and how fast it may turn
+        excess = np.array([np.linalg.norm(hand[:3]), np.linalg.norm(hand[3:])]) / fastest
+        excess_of_joints = np.max(np.abs(velocity)) / self._gains.joint_rate
+        return velocity / max(1.0, float(np.max(excess)), float(excess_of_joints))
+
+
+class InputMap(ABC):
+    """What lies between a goal and an intent: what the operator has in hand.
+
+    Args:
+        model: of the robot.
+        mode: the teleop mode.
+        gains: full stick of hand and base.
+
+    Attributes:
+        channels: of the robot.
+        full: full deflection of every input, (m,) [m/s, rad/s].
+        fine: what the hand's dead zone and drift are shares of, (m,): full deflection, of all joints together
+            made to the measure of the stick for the hand (`as_fine`).
+    """
+
+    def __init__(self, model: RobotModel, mode: TeleopMode, gains: Gains) -> None:
+        self.mode = mode
+        self.channels = Channels.of(model.description)
+        self._model, self._gains = model, gains
+        self._base = len(self.channels.base)
+        self._arm = slice(self.channels.joint_slice.start + self._base, self.channels.size)
+        base, joints = gains.full[6:][: self._base], np.full(model.size, gains.joint_rate)
+        joints[: self._base] = base
+        self.full: FloatArray = np.concatenate([base, gains.full[:6], joints])
+        finely = as_fine(model, joints, gains.full[:6]) * joints
+        self.fine: FloatArray = np.concatenate([base, gains.full[:6], finely])
+
+    @abstractmethod
+    def reset(self, view: View, settings: HumanSettings, rng: np.random.Generator) -> None:
+        """Begin an episode with a person."""
+
+    @abstractmethod
+    def wanted(self, goal: MotionGoal, state: State) -> tuple[BoolArray, FloatArray]:
+        """Return the channels that the operator owns now, (m,), and how far they want each input, (m,)."""
+
+    def sent(self, moved: FloatArray, state: State) -> FloatArray:
+        """Return what the device makes of where the inputs are, (m,): of sticks, the velocities they mean."""
+        return moved
+
+    def raw(self, moved: FloatArray) -> FloatArray:
+        """Return what the device reads, (m,): deflections from −1 to 1."""
+        return moved / self.full
+
+
+class StickMap(InputMap):
+    """Velocity sticks on all channels of a mode at once.
+
+    Where the mode has joint channels, the operator solves for them, as an expert would, who sees the goal no
+    better than who steers the hand, but knows the arm:
+    `min ‖J v - hand‖² + w_b ‖v_base - base‖² + w_p ‖v_arm - k (q_home - q)‖² + λ ‖v / v_max‖²`.
+    A large turn would fold the arm into itself that way; there they bring the arm's joints straight to where
+    these belong (`LargeTurn`), while the base drives.
+    """
+
+    def reset(self, view: View, settings: HumanSettings, rng: np.random.Generator) -> None:
+        """Begin with nothing thought of."""
+        if self.mask("hand")[self.channels.joint_slice].any():
+            self._turn = LargeTurn(self._model, self._gains, _LARGE, view)
+
+    def mask(self, focus: Focus) -> BoolArray:
+        """Return the channels that the operator owns, (m,)."""
+        return self.channels.mask(*self.mode.groups(focus))
+
+    def wanted(self, goal: MotionGoal, state: State) -> tuple[BoolArray, FloatArray]:
+        """Return the mask, and the goal on every channel of the mode, within full stick, (m,)."""
+        mask = self.mask(goal.focus)
+        values = np.zeros(self.channels.size)
+        values[self.channels.base_slice] = goal.base[: self._base]
+        values[self.channels.tool_slice] = goal.hand
+        if mask[self.channels.joint_slice].any():
+            values[self.channels.joint_slice] = self._joint_velocities(goal, state.q)
+        return mask, np.clip(np.where(mask, values, 0.0), -self.full, self.full)
+
+    def _joint_velocities(self, goal: MotionGoal, q: FloatArray) -> FloatArray:
+        """Return what the expert makes of a goal on all joints, (n,), within full stick."""
+        if goal.target is not None and self._turn.is_ahead(goal.target, q):
+            arm = self._turn.arm_velocity(goal.target, q, goal.target.base[: self._base])
+            return np.concatenate([self._base_world(goal, q), arm])
+        return self._inner_kinematics(goal, q)
+
+    def _inner_kinematics(self, goal: MotionGoal, q: FloatArray) -> FloatArray:
+        """Return the expert's inner inverse kinematics, (n,): the hand first, the base when it can."""
+        jacobian = self._model.jacobian(q)
+        base = self._base_world(goal, q)
+        weights = np.full(self._model.size, _DAMPING) / self._model.description.limits.velocity
+        home = self._model.description.home - q
+        home[: self._base] = 0.0
+        posture = _POSTURE * np.any(goal.hand) * np.eye(self._model.size)[self._base :]
+        rows = [jacobian, np.diag(weights), posture]
+        targets = [goal.hand, np.zeros(self._model.size), posture @ (_RETURN * home)]
+        if len(base):
+            rows.append(_BASE_WEIGHT * np.eye(len(base), self._model.size))
+            targets.append(_BASE_WEIGHT * base)
+        solution: FloatArray = np.linalg.lstsq(np.vstack(rows), np.concatenate(targets), rcond=None)[0]
+        return solution / max(1.0, float(np.max(np.abs(solution) / self.full[self.channels.joint_slice])))
+
+    def _base_world(self, goal: MotionGoal, q: FloatArray) -> FloatArray:
+        return turned(goal.base, q[2]) if self.channels.base else np.zeros(0)
+
+
+def as_fine(model: RobotModel, joints: FloatArray, hand: FloatArray) -> float:
+    """Return the share of full stick on all joints that moves the tool at home as 1 of the hand's stick does.
+
+    `1 / √(mean_i Σ_j (J_ij joints_j / hand_i)²)`. So a person is as exact at the tool with joints as with the
+    hand; else 2 % of every joint's stick shake it 2.5 times as much as 2 % of the hand's, and inside a dead
+    zone of 3 % each it may stay 3 cm from where it shall be.
+
+    Args:
+        model: of the robot.
+        joints: full stick of each joint, (n,).
+        hand: full stick of the hand, (6,).
+    """
+    moved = model.jacobian(model.description.home) * joints / hand[:, None]
+    return float(1.0 / np.sqrt(np.mean(np.sum(moved**2, axis=1))))

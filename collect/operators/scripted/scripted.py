@@ -1,0 +1,113 @@
+"""The scripted operator: a script that knows what it wants, seen and steered as a person would."""
+
+from dataclasses import replace
+from typing import Protocol
+
+import numpy as np
+
+from handrail.collect.operators.modes import TeleopMode
+from handrail.collect.operators.operator import View
+from handrail.collect.operators.scripted.devices import DEVICES
+from handrail.collect.operators.scripted.hand import HumanHand
+from handrail.collect.operators.scripted.human import HumanSettings
+from handrail.collect.operators.scripted.motion_goal import MotionGoal
+from handrail.collect.operators.scripted.perception import Perception
+from handrail.collect.operators.scripted.steering import Gains
+from handrail.collect.world.tasks.catalogue import TaskSpec
+from handrail.controllers.arrays import BoolArray
+from handrail.controllers.interface.intent import Intent, RawInput
+from handrail.controllers.registry import resolved
+from handrail.controllers.robot.model import RobotModel
+
+
+class Script(Protocol):
+    """What to do for a task, moment by moment."""
+
+    def reset(self, view: View) -> None:
+        """Look at the scene and make up the mind."""
+        ...
+
+    def motion_goal(self, view: View) -> MotionGoal:
+        """Return what is wanted now."""
+        ...
+
+
+class ScriptedOperator:
+    """Follows a script in a teleop mode; an operator.
+
+    ```
+    script ─ goal ─▶ perception ─▶ input map ─ wanted ─▶ hand ─▶ input map ─ sent ─▶ intent
+                     (misjudges)   (of the mode)         (late, intermittent, noisy)
+    ```
+    Only the input map differs between modes.
+
+    Args:
+        model: of the robot.
+        script: of the task.
+        mode: the teleop mode.
+        human: who steers.
+        gains: how briskly they steer.
+
+    Attributes:
+        free_at: when the hand is back on the input after the last change of channels [s]; −∞ before any.
+    """
+
+    def __init__(
+        self,
+        model: RobotModel,
+        script: Script,
+        mode: TeleopMode,
+        human: HumanSettings,
+        gains: Gains,
+    ) -> None:
+        self._script = script
+        self._mode = mode
+        device = DEVICES.find(mode.device)
+        self._map = device.build(model, mode, gains)
+        self._human = replace(human, refractory=human.refractory * device.refractory)
+
+    def reset(self, view: View, rng: np.random.Generator) -> None:
+        """Begin an episode; how the person is today is drawn first."""
+        self._settings = self._human.episode(rng)
+        self._script.reset(view)
+        self._perception = Perception(self._settings, rng)
+        self._hand = HumanHand(self._settings, self._map.full, self._map.fine, rng)
+        self._map.reset(view, self._settings, rng)
+        self._mask: BoolArray | None = None
+        self._switches = 0
+        self.free_at = -np.inf
+
+    def act(self, view: View) -> Intent:
+        """Return the intent now: the goal in this mode's channels, as the hand manages it."""
+        time = view.state.time
+        goal = self._perception.see(self._script.motion_goal(view), view.tool, time)
+        mask, wanted = self._map.wanted(goal, view.state)
+        self._switch(mask, time)
+        moved = self._hand.move(np.zeros_like(wanted) if time < self.free_at else wanted, time)
+        moved = np.where(mask, moved, 0.0)
+        values = np.where(mask, self._map.sent(moved, view.state), 0.0)
+        raw = RawInput(self._map.raw(moved), int(np.count_nonzero(moved)), self._switches)
+        return Intent(values, mask, goal.gripper, self._mode.name, time, raw=raw)
+
+    def _switch(self, mask: BoolArray, time: float) -> None:
+        """Take the hand off the input for a moment when it acts on other channels from now on."""
+        if self._mask is not None and not np.array_equal(mask, self._mask):
+            self._switches += 1
+            self.free_at = time + self._settings.switch_time
+        self._mask = mask
+
+
+def scripted_operator(
+    model: RobotModel, mode: TeleopMode, task: TaskSpec, human: HumanSettings
+) -> ScriptedOperator:
+    """Return who does a task's script in a mode, as brisk as people are with its device."""
+    gains = gains_of(model, mode, human)
+    drives = DEVICES.find(mode.device).drives or mode.by_focus
+    script = resolved(task.script)(model, gains, drives=drives)
+    return ScriptedOperator(model, script, mode, human, gains)
+
+
+def gains_of(model: RobotModel, mode: TeleopMode, human: HumanSettings) -> Gains:
+    """Return how briskly a person steers a robot with a mode's device."""
+    gains = DEVICES.find(mode.device).gains.within(model.description.world)
+    return replace(gains, gain=human.briskness * gains.gain)

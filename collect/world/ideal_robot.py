@@ -1,0 +1,126 @@
+"""The ideal robot: it does exactly what it is sent, in a world where nothing can be moved."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from handrail.collect.world.gate import Gate
+from handrail.collect.world.scene import Scene
+from handrail.controllers.arrays import FloatArray
+from handrail.controllers.collision.model import CollisionModel
+from handrail.controllers.errors import HandrailError
+from handrail.controllers.interface.controller import State
+from handrail.controllers.robot.model import Pose, RobotModel
+from handrail.controllers.robot.shape import Obstacle
+
+_FAR = 0.15  # a pair that stays farther apart than this need not be measured exactly [m]
+
+
+class IdealRobot:
+    """Integrates what it is sent; shapes that overlap count as contacts. A robot and a world.
+
+    Args:
+        model: of the robot.
+        scene: what stands around it, or moves by itself.
+        q: where it begins, (n,).
+        step: from one command to the next [s].
+        meshes: taken for the sake of MuJoCo's robot; there is nothing to draw.
+        grip: None, for nothing can be held.
+        gate: what every command passes; by default one that sends a dataset's numbers.
+    """
+
+    is_stable = True
+
+    def __init__(
+        self,
+        model: RobotModel,
+        scene: Scene,
+        q: FloatArray,
+        step: float,
+        meshes: bool = False,
+        grip: float | None = None,
+        gate: Gate | None = None,
+    ) -> None:
+        if scene.movables or grip is not None:
+            things = ", ".join(item.name for item in scene.movables)
+            raise HandrailError(f"ideal robot: expected a scene where nothing can be moved, got {things}")
+        self._model, self._scene, self._step = model, scene, step
+        self._gate = gate or Gate(model, step)
+        self._collision = CollisionModel(model, scene.obstacles())
+        self._q, self._steps = np.array(q), 0
+        self._distances = self._collision.values(self._q[None])[0]
+        self._far = np.full(self._collision.size, _FAR)
+
+    def state(self) -> State:
+        """Return position, velocity and time."""
+        return State(self._q, self._gate.velocity, self.time, self._gate.velocity)
+
+    def send(self, command: ArrayLike) -> NDArray[np.floating]:
+        """Move by `½ h (v + v⁺)`; return what was sent."""
+        before, v = self._q, self._gate.velocity
+        sent = self._gate.limit(command, before)
+        self._q = before + 0.5 * self._step * (v + self._gate.velocity)
+        self._steps += 1
+        known = (before, self._distances)
+        if self._scene.movers:
+            self._collision.update_scene(self.obstacles())
+            known = None
+        self._distances = self._collision.values(self._q[None], now=known, within=self._far)[0]
+        return sent
+
+    def checkpoint(self) -> object:
+        """Return the whole state, to come back to."""
+        return self._q.copy(), self._steps, self._gate.state()
+
+    def restore(self, checkpoint: Any) -> None:
+        """Come back to a state: from there all goes on as it did."""
+        self._q, self._steps, sent = checkpoint
+        self._gate.restore(sent)
+        self._collision.update_scene(self.obstacles())
+        self._distances = self._collision.values(self._q[None])[0]
+
+    def stop(self) -> None:
+        """Brake until it rests."""
+        self._gate.bring_to_rest(self)
+
+    @property
+    def time(self) -> float:
+        """Since the episode began [s]."""
+        return self._steps * self._step
+
+    @property
+    def tool(self) -> Pose:
+        """The pose of the tool point."""
+        return self._model.pose(self._q)
+
+    @property
+    def opening(self) -> float:
+        """How far the gripper is open, from 0 to 1; 0 for a robot without one."""
+        return 1.0 - self._gate.gripper if self._model.description.gripper else 0.0
+
+    @property
+    def contacts(self) -> tuple[str, ...]:
+        """The pairs of shapes that overlap now."""
+        overlaps = np.flatnonzero(self._distances < 0.0)
+        return tuple(" – ".join(self._collision.pairs[index]) for index in overlaps)
+
+    def obstacles(self) -> tuple[Obstacle, ...]:
+        """Return what stands around, where it is now."""
+        return self._scene.obstacles(self.time)
+
+    def held(self) -> tuple[Obstacle, ...]:
+        """Return nothing: it holds nothing."""
+        return ()
+
+    def poses(self) -> Mapping[str, Pose]:
+        """Return where every scene object is now, by name."""
+        return {
+            item.name: Pose(item.patrol.position(self.time) if item.patrol else item.position, item.rotation)
+            for item in self._scene.objects
+        }
+
+    def still(self) -> frozenset[str]:
+        """Return nothing: nothing can be moved."""
+        return frozenset()

@@ -1,0 +1,93 @@
+"""Pictures of a simulation: a fast setting for observations, a pretty one for people."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from handrail.collect.world.geometry import VISIBLE_GROUP
+from handrail.collect.world.gl import MjData, MjModel, missing_graphics, mujoco
+from handrail.controllers.errors import unknown_name
+
+CAMERAS = ("wrist", "scene")
+_MOST_GEOMS = 300
+
+
+class Painter:
+    """Draws simulations, offscreen, episode after episode.
+
+    The OpenGL context stays from one to the next: what it compiles takes as long as a hundred pictures.
+
+    Args:
+        size: height and width of the pictures [px].
+        pretty: with shadows and smooth edges, which takes longer.
+    """
+
+    _context: Any = None  # of OpenGL
+    _loaded: Any = None  # meshes and textures of one model in it
+
+    def __init__(self, size: tuple[int, int], pretty: bool = False) -> None:
+        self._size, self._pretty = size, pretty
+        self._area = mujoco.MjrRect(0, 0, size[1], size[0])
+        self._option = mujoco.MjvOption()
+        self._option.geomgroup[:] = 0
+        self._option.geomgroup[VISIBLE_GROUP] = 1
+        self._camera = mujoco.MjvCamera()
+        self._camera.type = mujoco.mjtCamera.mjCAMERA_FIXED
+        self._model: MjModel = None
+
+    def paint(self, model: MjModel, data: MjData, camera: str) -> NDArray[np.uint8]:
+        """Return what a camera sees, (height, width, 3).
+
+        Args:
+            model: of the simulation; its visual settings become those of the pictures.
+            data: its state.
+            camera: name of the camera.
+        """
+        cameras = [model.camera(index).name for index in range(model.ncam)]
+        if camera not in cameras:
+            raise unknown_name("camera", camera, cameras)
+        if model is not self._model:
+            self._load(model)
+        self._camera.fixedcamid = cameras.index(camera)
+        everything = mujoco.mjtCatBit.mjCAT_ALL.value
+        mujoco.mjv_updateScene(model, data, self._option, None, self._camera, everything, self._scene)
+        picture = np.empty((*self._size, 3), np.uint8)
+        self._context.make_current()
+        mujoco.mjr_render(self._area, self._scene, self._loaded)
+        mujoco.mjr_readPixels(picture, None, self._area, self._loaded)
+        return np.flipud(picture).copy()  # OpenGL begins at the bottom
+
+    def _load(self, model: MjModel) -> None:
+        """Take the meshes and textures of a model instead of those of the last one."""
+        visual = model.vis
+        visual.global_.offheight, visual.global_.offwidth = self._size
+        visual.quality.shadowsize, visual.quality.offsamples = (4096, 8) if self._pretty else (0, 0)
+        self._unload()
+        try:
+            self._context = self._context or mujoco.GLContext(self._size[1], self._size[0])
+            self._context.make_current()
+            self._loaded = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_50.value)
+        except Exception as error:  # each backend has its own kind
+            raise missing_graphics(error) from error
+        mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, self._loaded)
+        self._scene = mujoco.MjvScene(model, _MOST_GEOMS)
+        for flag in (mujoco.mjtRndFlag.mjRND_SHADOW, mujoco.mjtRndFlag.mjRND_REFLECTION):
+            self._scene.flags[flag] = self._pretty
+        self._model = model
+
+    def _unload(self) -> None:
+        loaded, self._loaded, self._model = self._loaded, None, None
+        if loaded is not None:
+            with self._context.as_current():
+                loaded.free()
+
+    def close(self) -> None:
+        """Give the OpenGL context back; the next picture makes another."""
+        self._unload()
+        context, self._context = self._context, None
+        if context is not None:
+            context.free()
+
+    def __del__(self) -> None:
+        self.close()

@@ -1,0 +1,282 @@
+"""One episode's physics: a robot in a scene, driven by velocities."""
+
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+from copy import copy
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from handrail.collect.world.contacts import ContactMonitor, GraspMonitor
+from handrail.collect.world.gate import Gate
+from handrail.collect.world.gl import mujoco
+from handrail.collect.world.robot import BASE_BODY, FINGERS, SimulatedRobot, build_robot
+from handrail.collect.world.scene import Scene, add_scene
+from handrail.collect.world.world import set_stage
+from handrail.controllers.arrays import FloatArray, IntArray
+from handrail.controllers.errors import HandrailError
+from handrail.controllers.interface.controller import State
+from handrail.controllers.numerics.jit import exact_jit
+from handrail.controllers.robot.model import Pose, RobotModel
+from handrail.controllers.robot.shape import Obstacle
+
+_TIMESTEP = 0.002  # [s]
+
+
+class Simulation:
+    """A fresh MuJoCo model and data; nothing of an earlier episode can remain in it. A robot and a world.
+
+    Args:
+        model: of the robot.
+        scene: what stands around it.
+        q: where it begins, (n,).
+        step: of the control [s].
+        meshes: whether to draw the robot as it looks.
+        grip: width of what the gripper is closed around at the beginning [m]; None where it is open.
+        grips: whether the gripper can move; else it stays open.
+        timestep: longest step of the integrator [s].
+        gate: what every command passes; by default one that sends a dataset's numbers.
+
+    Attributes:
+        mujoco_model: the compiled model.
+        data: its state.
+    """
+
+    def __init__(
+        self,
+        model: RobotModel,
+        scene: Scene,
+        q: FloatArray,
+        step: float,
+        meshes: bool = False,
+        grip: float | None = None,
+        grips: bool = True,
+        timestep: float = _TIMESTEP,
+        gate: Gate | None = None,
+    ) -> None:
+        if grip is not None and not grips:
+            raise HandrailError(f"grip of a simulation: expected none without grips, got {grip}")
+        self._model = model
+        self._gripper = model.description.gripper if grips else None
+        self._scene = scene
+        self._step = step
+        substeps = math.ceil(step / timestep - 1e-9)
+        self._shares = np.arange(1, substeps + 1) / substeps
+        with _understood(model):
+            robot = _robot(model, meshes, grips, step / substeps)
+            spec = robot.spec.copy()
+            add_scene(spec, scene)
+            self.mujoco_model = spec.compile()
+        self.data = mujoco.MjData(self.mujoco_model)
+        self._contacts = ContactMonitor(
+            self.mujoco_model, robot.contact_geoms, robot.grasp_geoms, [m.name for m in scene.movables]
+        )
+        fingers = FINGERS if self._gripper else ()
+        portable = [item.name for item in scene.movables if item.portable]
+        self._grasp = GraspMonitor(self.mujoco_model, fingers, portable)
+        self._index(robot.finger_joints)
+        self._gate = gate or Gate(model, step, float(grip is not None))
+        self._place(q, grip)
+
+    def _index(self, fingers: tuple[str, ...]) -> None:
+        """Find where the robot is in MuJoCo's arrays."""
+        compiled, names = self.mujoco_model, self._model.joints
+        self._q_index = _span([compiled.joint(name).qposadr[0] for name in names])
+        self._v_index = _span([compiled.joint(name).dofadr[0] for name in names])
+        self._servo_index = np.array([compiled.actuator(name).id for name in names])
+        self._tool = compiled.site("tool").id
+        gripper = self._gripper
+        self._travel = gripper.travel if gripper else 0.0
+        self._speed = gripper.pace if gripper else 0.0
+        self._beyond = gripper.beyond if gripper else 0.0
+        self._gripper_servo = -1
+        if gripper:
+            self._finger_index = np.array([compiled.joint(name).qposadr[0] for name in fingers])
+            self._gripper_servo = compiled.actuator("gripper").id
+        bodies = {item.name: int(compiled.body(item.name).mocapid[0]) for item in self._scene.movers}
+        self._patrols = [(bodies[item.name], item.patrol) for item in self._scene.movers if item.patrol]
+
+    def _place(self, q: FloatArray, grip: float | None) -> None:
+        """Put the robot at q, the gripper open, or closed around something of width `grip` [m]."""
+        self.data.qpos[self._q_index] = q
+        if self._gripper:
+            apart = self._travel if grip is None else grip * (self._travel / self._gripper.stroke)
+            self.data.qpos[self._finger_index] = apart / len(self._finger_index)
+            self.data.ctrl[self._gripper_servo] = self._gripper_target(0.0 if grip is None else 1.0)
+        mujoco.mj_forward(self.mujoco_model, self.data)
+
+    def show(self, q: FloatArray) -> None:
+        """Put the robot at q, (n,), at rest, for a picture; no time passes."""
+        self.data.qpos[self._q_index] = q
+        self.data.qvel[:] = 0.0
+        mujoco.mj_kinematics(self.mujoco_model, self.data)
+        mujoco.mj_camlight(self.mujoco_model, self.data)
+
+    def send(self, command: ArrayLike) -> NDArray[np.floating]:
+        """Reach velocities linearly over one step, the gripper at its own speed; return what was sent.
+
+        Args:
+            command: velocities at the end of the step [m/s, rad/s] and gripper, (n + 1,).
+        """
+        contacts, patrols, before = self._contacts, self._patrols, self._gate.velocity
+        contacts.clear()
+        model, data, control = self.mujoco_model, self.data, self.data.ctrl
+        sent = self._gate.limit(command, data.qpos[self._q_index])
+        for control[:] in self._ramp(before, float(sent[-1])):
+            if patrols:
+                self._move_obstacles()
+            mujoco.mj_step(model, data)
+            if data.ncon:
+                contacts.look(data)
+        self._move_obstacles()
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_camlight(model, data)
+        return sent
+
+    def stop(self) -> None:
+        """Brake until the robot is sent rest."""
+        self._gate.bring_to_rest(self)
+
+    def checkpoint(self) -> object:
+        """Return the whole state, to come back to."""
+        return copy(self.data), self._gate.state()
+
+    def restore(self, checkpoint: Any) -> None:
+        """Come back to a state: from there all goes on as it did."""
+        data, sent = checkpoint
+        mujoco.mj_copyData(self.data, self.mujoco_model, data)
+        self._gate.restore(sent)
+        self._contacts.clear()
+
+    @property
+    def contacts(self) -> tuple[str, ...]:
+        """The forbidden contacts of the last step."""
+        return self._contacts.names
+
+    def push(self, base: FloatArray, hand: FloatArray) -> None:
+        """Let forces act from now on, until others are set.
+
+        Args:
+            base: on the base's centre of mass, in the world, (3,) [N].
+            hand: at the tool point, in the world, (3,) [N].
+        """
+        data = self.data
+        carrier = self.mujoco_model.site_bodyid[self._tool]
+        lever = data.site_xpos[self._tool] - data.xipos[carrier]
+        data.xfrc_applied[:] = 0.0
+        data.xfrc_applied[self.mujoco_model.body(BASE_BODY).id, :3] = base
+        data.xfrc_applied[carrier] += np.concatenate([hand, np.cross(lever, hand)])
+
+    def _ramp(self, before: FloatArray, gripper: float) -> FloatArray:
+        """Return what the servos are sent at every substep: linear to the command, (substeps, servos)."""
+        fingers = self._gripper_servo, self._gripper_target(gripper), self._speed * self._step
+        return _ramp(self.data.ctrl, before, self._gate.velocity, self._shares, self._servo_index, fingers)
+
+    def _gripper_target(self, gripper: float) -> float:
+        """Return the opening that the gripper's servo is sent to [m, rad]; closed is a little beyond it."""
+        return (1.0 - gripper) * self._travel - self._beyond * gripper
+
+    def _move_obstacles(self) -> None:
+        """Put what moves by itself where it is now."""
+        for body, patrol in self._patrols:
+            self.data.mocap_pos[body] = patrol.position(self.data.time)
+
+    def state(self) -> State:
+        """Return the measured positions and velocities, and what was commanded last."""
+        data = self.data
+        return State(data.qpos[self._q_index], data.qvel[self._v_index], data.time, self._gate.velocity)
+
+    @property
+    def time(self) -> float:
+        """Since the episode began [s]."""
+        return float(self.data.time)
+
+    @property
+    def tool(self) -> Pose:
+        """The pose of the tool point."""
+        rotation = self.data.site_xmat[self._tool].reshape(3, 3).copy()
+        return Pose(self.data.site_xpos[self._tool].copy(), rotation)
+
+    @property
+    def opening(self) -> float:
+        """How far the gripper is open, from 0 to 1; 0 for a robot without one."""
+        if self._gripper is None:
+            return float(self._model.description.gripper is not None)
+        return float(np.clip(self.data.qpos[self._finger_index].sum() / self._travel, 0.0, 1.0))
+
+    @property
+    def is_stable(self) -> bool:
+        """Whether MuJoCo never had to give up on a step."""
+        warnings = self.data.warning
+        bad = (
+            mujoco.mjtWarning.mjWARN_BADQACC,
+            mujoco.mjtWarning.mjWARN_BADQVEL,
+            mujoco.mjtWarning.mjWARN_BADQPOS,
+        )
+        return all(warnings[int(kind)].number == 0 for kind in bad)
+
+    def poses(self) -> dict[str, Pose]:
+        """Return where every scene object is now, by name."""
+        return {item.name: self._pose(item.name) for item in self._scene.objects}
+
+    def still(self) -> frozenset[str]:
+        """Return the names of the movable objects that are at rest: slower than 2 cm/s and 0.2 rad/s."""
+        velocities = {item.name: self.data.joint(item.name).qvel for item in self._scene.movables}
+        norm = np.linalg.norm  # of v; of ω, of which what slides has none
+        return frozenset(name for name, v in velocities.items() if norm(v[:3]) < 0.02 and norm(v[3:]) < 0.2)
+
+    def obstacles(self) -> tuple[Obstacle, ...]:
+        """Return what stands around, where it is now, and what the fingers hold, fixed to the tool."""
+        return (*self._scene.obstacles(self.time), *self.held())
+
+    def held(self) -> tuple[Obstacle, ...]:
+        """Return what the fingers hold, fixed to the tool as it is now."""
+        tool = self.tool
+        names = self._grasp.held(self.data)
+        return tuple(self._scene.find(name).carried(tool, self._pose(name)) for name in names)
+
+    def _pose(self, name: str) -> Pose:
+        body = self.data.body(name)
+        return Pose(body.xpos.copy(), body.xmat.reshape(3, 3).copy())
+
+
+@exact_jit
+def _ramp(control, before, after, shares, servos, fingers):
+    """Return controls on the way from one velocity to another, and the fingers' towards their opening."""
+    ramp = np.empty((len(shares), len(control)))
+    finger, opening, reach = fingers
+    for k in range(len(shares)):
+        for joint in range(len(servos)):
+            ramp[k, servos[joint]] = (1.0 - shares[k]) * before[joint] + shares[k] * after[joint]
+        if finger >= 0:
+            way = opening - control[finger]
+            ramp[k, finger] = control[finger] + min(max(way, -(reach * shares[k])), reach * shares[k])
+    return ramp
+
+
+def _span(places: list[int]) -> slice | IntArray:
+    """Return places that follow each other as a slice, for which numpy needs no copy."""
+    index = np.array(places)
+    together = np.array_equal(index, np.arange(index[0], index[0] + len(index)))
+    return slice(int(index[0]), int(index[-1]) + 1) if together else index
+
+
+@contextmanager
+def _understood(model: RobotModel) -> Iterator[None]:
+    """Say in one line what MuJoCo says of a robot or its scene that it does not take, as two of one name."""
+    try:
+        yield
+    except ValueError as error:
+        said = " ".join(str(error).split())
+        raise HandrailError(f"robot {model.description.name} in its scene: MuJoCo says: {said}") from error
+
+
+@lru_cache(maxsize=8)
+def _robot(model: RobotModel, meshes: bool, grips: bool, timestep: float) -> SimulatedRobot:
+    robot = build_robot(model, meshes, grips)
+    robot.spec.compiler.usethread = meshes  # without any, waking a second thread takes longer than its work
+    set_stage(robot.spec, timestep, meshes)
+    return robot

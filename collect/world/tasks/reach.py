@@ -1,0 +1,213 @@
+"""Reach a pose with the tool: the benchmark of the paper's Table I."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from handrail.collect.world.patrol import Patrol
+from handrail.collect.world.scene import Part, Scene, SceneObject, Viewpoint
+from handrail.collect.world.tasks.furniture import footprint
+from handrail.collect.world.tasks.goal_reaching import (
+    ANGLE_TOLERANCE,
+    POSITION_TOLERANCE,
+    pose_error,
+    reached,
+    sample_goal,
+)
+from handrail.collect.world.tasks.task import Aim, Start, TaskState, Verdict
+from handrail.controllers.arrays import FloatArray
+from handrail.controllers.collision.model import CollisionModel
+from handrail.controllers.errors import HandrailError
+from handrail.controllers.numerics.rotation import matrix_from_rpy, matrix_to_axis, quaternion_from_matrix
+from handrail.controllers.robot.inverse_kinematics import body_configuration
+from handrail.controllers.robot.model import Pose, RobotModel
+from handrail.controllers.robot.shape import Shape
+
+_COLOURS = ((0.85, 0.15, 0.15, 1.0), (0.15, 0.7, 0.2, 1.0), (0.15, 0.3, 0.9, 1.0))
+_ARROW = 0.18  # length of the marker's axes [m]
+_STAGES = ("approach", "turn")
+
+
+_MOST_TRIES = 200
+_REACHED = 1e-3  # error of the hand's pose that is left [m, rad]
+_CLEAR = 0.12  # kept to itself and to the floor there, at scale 1 [m]
+
+
+FASTEST = 0.5  # [m/s]
+_SLOWEST = 0.2  # [m/s]
+_APART = 1.2  # of a lane's start from the robot's base [m]
+_QUANTITIES = ("x", "y", "vx", "vy", "radius", "height")
+_COLOUR = (0.80, 0.20, 0.45, 1.0)
+
+
+def mover_names(count: int) -> tuple[str, ...]:
+    """Return the names of what `mover_features` returns, (6 count,)."""
+    return tuple(f"mover_{index}.{quantity}" for index in range(count) for quantity in _QUANTITIES)
+
+
+def mover_features(scene: Scene, time: float, count: int) -> FloatArray:
+    """Return place [m], velocity [m/s], radius and height [m] of the movers at a time [s], (6 count,).
+
+    Zero for those that a scene of one's own does not have.
+    """
+    numbers = np.zeros((count, len(_QUANTITIES)))
+    for row, item in zip(numbers, scene.movers, strict=False):
+        obstacle = item.obstacle(time)
+        row[:] = (*obstacle.position[:2], *obstacle.velocity[:2], footprint(item), item.top)
+    return numbers.ravel()
+
+
+def sample_movers(
+    count: int, model: RobotModel, q: FloatArray, rng: np.random.Generator
+) -> list[SceneObject]:
+    """Draw cylinders that pass through the workspace's middle, in any direction, at up to 0.5 m/s · scale.
+
+    Args:
+        count: how many.
+        model: of the robot.
+        q: where the robot starts, (n,); no mover starts near its base.
+        rng: drawn from.
+    """
+    base, scale = model.pose(q, "planar_base").position[:2], model.description.world.scale
+    movers: list[SceneObject] = []
+    while len(movers) < count:
+        item = _sample_mover(f"mover_{len(movers)}", scale, rng)
+        if np.linalg.norm(item.position[:2] - base) > _APART * scale + footprint(item):
+            movers.append(item)
+    return movers
+
+
+def _sample_mover(name: str, scale: float, rng: np.random.Generator) -> SceneObject:
+    """Return a mover from 1.5 to 2 m · scale before a point of the workspace to 3 m · scale behind it."""
+    radius, height = scale * rng.uniform(0.1, 0.2), scale * rng.uniform(0.3, 1.5)
+    angle = rng.uniform(-np.pi, np.pi)
+    ahead = np.array([np.cos(angle), np.sin(angle), 0.0])
+    middle = np.array([*(scale * rng.uniform([-1.2, -0.8], [0.6, 0.8])), height / 2])
+    start, end = middle - scale * rng.uniform(1.5, 2.0) * ahead, middle + 3.0 * scale * ahead
+    patrol = Patrol(start, end, scale * rng.uniform(_SLOWEST, FASTEST))
+    return SceneObject(
+        name, Shape("cylinder", np.array([radius, height])), start, rgba=_COLOUR, patrol=patrol
+    )
+
+
+def sample_goal_for(model: RobotModel, rng: np.random.Generator) -> Pose:
+    """Draw a goal in a robot's world.
+
+    An arm of six joints or more points everywhere: a goal of the paper's, its place made to the measure of
+    the robot's world. A shorter one gets the hand's heading, pitch and roll, and only goals that it can reach
+    from some place of the base, clear of itself and of the floor.
+    """
+    description = model.description
+    world, joints = description.world, len(description.arm_joints)
+    lower, upper = (-world.scale, -world.scale, world.goals[0]), (world.scale, world.scale, world.goals[1])
+    if joints >= 6:
+        return sample_goal(rng, lower, upper)
+    collision = CollisionModel(model)
+    for _ in range(_MOST_TRIES):
+        goal = Pose(rng.uniform(lower, upper), _rotation(world.pitch, world.roll, rng))
+        if _is_reached(model, collision, goal, _CLEAR * world.scale):
+            return goal
+    raise HandrailError(
+        f"task Reach: expected a robot that reaches its goals, got {description.name}, "
+        f"which reached none of {_MOST_TRIES}"
+    )
+
+
+def _rotation(pitch: tuple[float, float], roll: tuple[float, float], rng: np.random.Generator) -> FloatArray:
+    """Return a hand with any heading; pitch 0 points ahead, π/2 down; x of roll 0 points down, then back."""
+    yaw = rng.uniform(-np.pi, np.pi)
+    ahead = matrix_from_rpy([0.0, rng.uniform(*pitch), yaw]) @ np.array(
+        [[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]]
+    )
+    return ahead @ matrix_from_rpy([0.0, 0.0, rng.uniform(*roll)])
+
+
+def _is_reached(model: RobotModel, collision: CollisionModel, goal: Pose, clear: float) -> bool:
+    q, error = body_configuration(model, model.description.home, goal)
+    return error < _REACHED and float(np.min(collision.values(q[None]))) >= clear
+
+
+@dataclass(frozen=True)
+class Reach:
+    """Goals uniform in x, y ∈ [−1, 1] m, z ∈ [0.7, 1.0] m, with a random orientation; start at home.
+
+    Success at the first moment with `d_p ≤ 0.1 m` and `d_r = 1 − ⟨q, g⟩² ≤ 0.05`. Lengths are made to the
+    measure of the robot's world; goals of an arm that cannot point everywhere are those that it gets to.
+
+    Attributes:
+        description: what the operator is asked to do.
+        horizon: time limit [s].
+        moving_obstacles: how many cylinders cross the robot's way; goals are the same with and without.
+    """
+
+    description: str = "Move the gripper to the goal frame."
+    horizon: float = 30.0
+    moving_obstacles: int = 0
+
+    @property
+    def state_names(self) -> tuple[str, ...]:
+        """The goal's position and quaternion, and what moves."""
+        goal = tuple(f"goal.{axis}" for axis in ("x", "y", "z", "qw", "qx", "qy", "qz"))
+        return (*goal, *mover_names(self.moving_obstacles))
+
+    def sample(self, model: RobotModel, rng: np.random.Generator) -> Start:
+        """Draw a goal, then the moving obstacles."""
+        goal, scale = sample_goal_for(model, rng), model.description.world.scale
+        movers = sample_movers(self.moving_obstacles, model, model.description.home, rng)
+        scene = Scene((goal_marker(goal, scale), *movers), _VIEW.scaled(scale))
+        return Start(scene, model.description.home, goal)
+
+    def features(self, state: TaskState) -> FloatArray:
+        """Return the goal pose, (7,), and place, velocity and size of what moves, (6,) each."""
+        goal = _goal(state)
+        movers = mover_features(state.start.scene, state.time, self.moving_obstacles)
+        return np.concatenate([goal.position, quaternion_from_matrix(goal.rotation), movers])
+
+    def aim(self, state: TaskState) -> Aim:
+        """Return the goal."""
+        goal = _goal(state)
+        return Aim("goal", goal.position, goal.rotation, POSITION_TOLERANCE * state.scale, ANGLE_TOLERANCE)
+
+    @property
+    def stages(self) -> tuple[str, ...]:
+        """What is done one after the other."""
+        return _STAGES
+
+    def stage(self, state: TaskState) -> str:
+        """Return what is to be done: get to the goal, or turn there."""
+        d_p, _ = pose_error(state.tool.position, state.tool.rotation, _goal(state))
+        return "turn" if d_p / state.scale <= POSITION_TOLERANCE else "approach"
+
+    def outcome(self, state: TaskState) -> Verdict:
+        """Judge by the distance and the orientation error."""
+        d_p, d_r = pose_error(state.tool.position, state.tool.rotation, _goal(state))
+        return Verdict(reached(d_p / state.scale, d_r))
+
+
+_VIEW = Viewpoint(position=(-2.6, -3.0, 2.2), target=(-0.35, 0.0, 0.65))
+
+
+def _goal(state: TaskState) -> Pose:
+    return state.goal if state.goal is not None else state.tool
+
+
+def goal_marker(goal: Pose, scale: float = 1.0) -> SceneObject:
+    """Return three coloured axes on a ball, drawn without contact."""
+    axes = tuple(
+        Part(
+            Shape("capsule", scale * np.array([0.011, _ARROW])),
+            scale * np.eye(3)[index] * _ARROW / 2,
+            matrix_to_axis(np.eye(3)[index]),
+            colour,
+        )
+        for index, colour in enumerate(_COLOURS)
+    )
+    ball = Part(Shape("sphere", scale * np.array([0.03])), np.zeros(3), rgba=(0.95, 0.85, 0.2, 1.0))
+    return SceneObject(
+        "goal",
+        Shape("sphere", scale * np.array([_ARROW])),
+        goal.position,
+        goal.rotation,
+        ghost=True,
+        parts=(*axes, ball),
+    )

@@ -1,0 +1,172 @@
+"""What a task is: it samples an episode, names its state, and judges the outcome."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+
+from handrail.collect.world.scene import Scene, SceneObject
+from handrail.controllers.arrays import FloatArray, frozen
+from handrail.controllers.errors import unknown_name
+from handrail.controllers.robot.model import Pose, RobotModel
+from handrail.controllers.robot.shape import Obstacle
+
+_AWAY = 0.08  # [m]
+
+
+@dataclass(frozen=True)
+class Start:
+    """A sampled beginning.
+
+    Attributes:
+        scene: everything around the robot.
+        q: where the robot starts, (n,).
+        goal: of the tool, if there is one.
+        grip: width of what the gripper already holds [m]; None begins with it open.
+    """
+
+    scene: Scene
+    q: FloatArray
+    goal: Pose | None = None
+    grip: float | None = None
+
+    def __post_init__(self) -> None:
+        """Copy the array and make it read-only."""
+        object.__setattr__(self, "q", frozen(self.q))
+
+
+@dataclass(frozen=True)
+class TaskState:
+    """The truth of a moment, for judging an outcome and for scripted operators.
+
+    Attributes:
+        time: since the episode began [s].
+        tool: pose of the tool point.
+        opening: of the gripper, 0 closed to 1 open.
+        start: how the episode began: scene with the objects' shapes, goal.
+        poses: of every object of the scene, by name.
+        still: names of the movable objects that are at rest.
+        stable: whether the physics went well so far.
+        scale: of the robot's world.
+    """
+
+    time: float
+    tool: Pose
+    opening: float
+    start: Start
+    poses: Mapping[str, Pose]
+    still: frozenset[str] = frozenset()
+    stable: bool = True
+    scale: float = 1.0
+
+    @property
+    def goal(self) -> Pose | None:
+        """Where the tool has to go, if the task says so."""
+        return self.start.goal
+
+    @property
+    def obstacles(self) -> tuple[Obstacle, ...]:
+        """What the robot must not touch, where it is now."""
+        return self.start.scene.obstacles(self.time)
+
+    def let_go(self, place: FloatArray) -> bool:
+        """Return whether the gripper is open, and the tool point away from a place, (3,): by 8 cm · scale."""
+        away = float(np.linalg.norm(self.tool.position - place))
+        return away >= _AWAY * self.scale and self.opening > 0.8
+
+    def pose(self, name: str) -> Pose:
+        """Return where an object is."""
+        if name not in self.poses:
+            raise unknown_name("scene object", name, self.poses)
+        return self.poses[name]
+
+    def object(self, name: str) -> SceneObject:
+        """Return an object as it was at the beginning, with its shape."""
+        return self.start.scene.find(name)
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """How a task stands: success, a failure with its reason, or neither yet."""
+
+    success: bool = False
+    failure: str = ""
+
+    @property
+    def over(self) -> bool:
+        """Whether the episode ends."""
+        return self.success or bool(self.failure)
+
+
+@dataclass(frozen=True)
+class Aim:
+    """A place that the hand is to be brought to now; a person is shown how far that is.
+
+    Attributes:
+        name: of what is there.
+        position: of the tool point [m], (3,).
+        rotation: world from tool, (3, 3); None where any will do.
+        distance: tolerance of the task's judge [m]; 0 where it has none.
+        angle: likewise [rad].
+    """
+
+    name: str
+    position: FloatArray
+    rotation: FloatArray | None = None
+    distance: float = 0.0
+    angle: float = 0.0
+
+
+class Task(Protocol):
+    """A task: a frozen dataclass in its own file, with one entry in `collect/world/tasks/catalogue.py`."""
+
+    @property
+    def description(self) -> str:
+        """One sentence: what to do; LeRobot's `task` string."""
+        ...
+
+    @property
+    def horizon(self) -> float:
+        """Time after which an episode is given up [s]."""
+        ...
+
+    @property
+    def state_names(self) -> tuple[str, ...]:
+        """Names of the numbers in `environment_state`, (k,)."""
+        ...
+
+    def sample(self, model: RobotModel, rng: np.random.Generator) -> Start:
+        """Return the beginning of an episode."""
+        ...
+
+    def features(self, state: TaskState) -> FloatArray:
+        """Return the `environment_state`, (k,), in [m], wxyz quaternions."""
+        ...
+
+    def outcome(self, state: TaskState) -> Verdict:
+        """Judge a moment."""
+        ...
+
+
+@runtime_checkable
+class Aimed(Protocol):
+    """A task that says where the hand is to be brought."""
+
+    def aim(self, state: TaskState) -> Aim:
+        """Return where to at a moment."""
+        ...
+
+
+@runtime_checkable
+class Staged(Protocol):
+    """A task that is done in stages, one after the other."""
+
+    @property
+    def stages(self) -> tuple[str, ...]:
+        """Their names, in order."""
+        ...
+
+    def stage(self, state: TaskState) -> str:
+        """Return which of them is to be done at a moment."""
+        ...

@@ -1,0 +1,190 @@
+"""One recorded episode, read by what its columns mean rather than by what they are called."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from handrail.controllers.arrays import FloatArray, IntArray
+from handrail.controllers.errors import HandrailError
+from handrail.datasets.format.data_file import DataFiles
+from handrail.datasets.reading.columns import ColumnNames
+from handrail.datasets.reading.episode import Episode
+from handrail.datasets.reading.naming import (
+    gripper_entry,
+    is_velocity,
+    point_entries,
+    position_entries,
+    same_thing,
+)
+from handrail.datasets.reading.reader import DatasetInfo
+
+
+class DoesNotApply(HandrailError):  # noqa: N818, it says what the report says
+    """A metric has no value for an episode or a dataset; the message says why, for the report.
+
+    Raised instead of a NaN or a zero: "no contact was recorded" is not "no contact".
+    """
+
+
+@dataclass(frozen=True)
+class Demonstration(Episode):
+    """One episode with its rows. What it does not hold raises `DoesNotApply` with the reason.
+
+    Attributes:
+        number: of the episode in its dataset.
+        info: What the dataset is; it also tells the units of the numbers, as far as anything does.
+        frames: Columns, `(N,)` or `(N, d)`; no pictures.
+        meta: The episode's line of metadata.
+        columns: Which column plays which part.
+    """
+
+    number: int
+    info: DatasetInfo
+    frames: Mapping[str, np.ndarray]
+    meta: Mapping[str, Any]
+    columns: ColumnNames = field(default_factory=ColumnNames)
+
+    def opened(self, files: DataFiles) -> "Demonstration":
+        """Return itself: its rows are at hand."""
+        return self
+
+    def some(self, frames: IntArray) -> "Demonstration":
+        """Return some of its frames."""
+        rows = {name: values[frames] for name, values in self.frames.items()}
+        return replace(self, frames=rows, meta={**self.meta, "length": len(frames)})
+
+    @cached_property
+    def motion(self) -> FloatArray:
+        """What moves: the tool's position, `(N, 3)` [m], or else the configuration, in the state's units."""
+        state, names = self.matrix("state"), self.entries("state")
+        return state[:, point_entries(names)] if point_entries(names) else self.configuration
+
+    @property
+    def speed(self) -> FloatArray:
+        """How fast `motion` changes, `(N − 1,)` [1/s]."""
+        return np.linalg.norm(np.diff(self.motion, axis=0), axis=1) * self.fps
+
+    @property
+    def motion_is_tool(self) -> bool:
+        """Whether `motion` is the tool's position [m]."""
+        return bool(point_entries(self.entries("state")))
+
+    @cached_property
+    def configuration(self) -> FloatArray:
+        """Where the robot is: the positions in the state, `(N, c)`, or all of it where no name says."""
+        state, names = self.matrix("state"), self.entries("state")
+        return state[:, position_entries(names)] if position_entries(names) else state
+
+    @cached_property
+    def observation(self) -> FloatArray:
+        """What a policy reads, pictures aside: all numbers under `observation.`, `(N, s)`."""
+        known = [values for name, values in self.frames.items() if name.startswith("observation")]
+        found = [_rows(values) for values in known if values.dtype.kind in "fiub"]
+        if not found:
+            raise DoesNotApply("no column 'observation.…' with numbers")
+        return np.hstack(found)
+
+    @cached_property
+    def pairs(self) -> tuple[tuple[int, int], ...]:
+        """Entries of action and state that mean the same in the same unit."""
+        found = same_thing(self.entries("action"), self.entries("state"))
+        if not found:
+            raise DoesNotApply("no entry of the action has its counterpart in the state, by name")
+        return tuple(found)
+
+    @cached_property
+    def commanded(self) -> FloatArray:
+        """The entries of the action that the state measures too, `(N, p)`."""
+        return self.matrix("action")[:, [place for place, _ in self.pairs]]
+
+    @cached_property
+    def reached(self) -> FloatArray:
+        """What the state measured of `commanded`, `(N, p)`."""
+        return self.matrix("state")[:, [place for _, place in self.pairs]]
+
+    @cached_property
+    def relative_action(self) -> FloatArray:
+        """The action, positions taken relative to where the robot is, `(N, a)`."""
+        action, names = self.matrix("action").copy(), self.entries("action")
+        for place, measured in same_thing(names, self.entries("state")):
+            if not is_velocity(names[place]):
+                action[:, place] -= self.matrix("state")[:, measured]
+        return action
+
+    @cached_property
+    def gripper(self) -> FloatArray:
+        """What opens and closes the gripper, commanded or else measured, `(N,)`."""
+        for part in ("action", "state"):
+            place = gripper_entry(self.entries(part))
+            if place is not None:
+                return self.matrix(part)[:, place]
+        raise DoesNotApply("no entry of action or state is called gripper")
+
+    @property
+    def modes(self) -> str:
+        """The teleop modes that the frames name, in the order in which they first occur; "" for none."""
+        found = self.column("mode") if self.has("mode") else np.empty(0, str)
+        known = dict.fromkeys(found.tolist() if found.dtype.kind == "U" else ())
+        return " → ".join(mode for mode in known if mode)
+
+    @cached_property
+    def inputs(self) -> FloatArray:
+        """What the operator put in, zero on axes not owned and without the gripper, `(N, u)`."""
+        values = self.matrix("asked")
+        owned = self.matrix("owned") if self.has("owned") else np.empty(0)
+        if owned.shape == values.shape:
+            values = np.where(owned.astype(bool), values, 0.0)
+        axes = self.entries("asked") or map(str, range(values.shape[1]))
+        return values[:, [place for place, name in enumerate(axes) if "gripper" not in name]]
+
+    def has(self, part: str) -> bool:
+        """Return whether a part is there."""
+        return any(name in self.frames for name in self.columns.choices(part))
+
+    def column(self, part: str) -> np.ndarray:
+        """Return the column that plays a part, as it is.
+
+        Raises:
+            DoesNotApply: There is none.
+        """
+        choices = self.columns.choices(part)
+        for name in choices:
+            if name in self.frames:
+                return self.frames[name]
+        raise DoesNotApply(f"no column {' or '.join(map(repr, choices))}")
+
+    def numbers(self, part: str) -> FloatArray:
+        """Return the numbers of a part as `(N, d)`, finite or not.
+
+        Raises:
+            DoesNotApply: There is none, or it holds text.
+        """
+        values = self.column(part)
+        if values.dtype.kind not in "fiub" or not values.size:
+            raise DoesNotApply(f"the column of {part} holds no numbers")
+        return _rows(values)
+
+    def matrix(self, part: str) -> FloatArray:
+        """Return the numbers of a part as `(N, d)`.
+
+        Raises:
+            DoesNotApply: There is none, it holds text, or a number that is not finite.
+        """
+        rows = self.numbers(part)
+        if not np.isfinite(rows).all():
+            raise DoesNotApply(f"the column of {part} holds numbers that are not finite")
+        return rows
+
+    def entries(self, part: str) -> tuple[str, ...]:
+        """Return the names of a part's entries; none where the dataset names none."""
+        for name in self.columns.choices(part):
+            if name in self.frames:
+                return self.info.features[name].names or ()
+        return ()
+
+
+def _rows(values: np.ndarray) -> FloatArray:
+    return values.reshape(len(values), -1).astype(np.float64)

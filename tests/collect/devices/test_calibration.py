@@ -1,0 +1,170 @@
+"""Laws of calibrations: what is guided is what was turned; a file keeps it; a wrong one is one line."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+from played_leader import CALIBRATION, PLAYED, UR10, PlayedLeaderConfig
+
+from handrail.collect.devices import setup
+from handrail.collect.devices.calibration import LeaderGripper, load_calibration, save_calibration
+from handrail.collect.devices.guided_calibration import calibrate
+from handrail.collect.devices.setup import calibration_file
+from handrail.collect.devices.teleoperators import make_teleoperator
+from handrail.collect.teleop_config import CalibrateConfig, LeaderConfig
+from handrail.controllers.errors import HandrailError
+from handrail.controllers.robot.model import load_model
+
+TYPE = PlayedLeaderConfig.get_choice_name(PlayedLeaderConfig)
+REST = {"pan.pos": 10.0, "lift.pos": -20.0, "flex.pos": 5.0, "handle.pos": 80.0}
+
+
+@pytest.fixture(autouse=True)
+def home(tmp_path, monkeypatch):
+    """LeRobot's calibrations lie where it was imported from: here, below the test's own folder."""
+    monkeypatch.setattr("lerobot.utils.constants.HF_LEROBOT_CALIBRATION", tmp_path)
+    monkeypatch.setattr("lerobot.teleoperators.teleoperator.HF_LEROBOT_CALIBRATION", tmp_path)
+    PLAYED.actions, PLAYED.last, PLAYED.plugged, PLAYED.calibrated = [], dict(REST), True, False
+
+
+class Hands:
+    """A person who does what they are asked: turns a joint, types, presses Enter."""
+
+    def __init__(self, *does):
+        self.does, self.asked = list(does), []
+
+    def __call__(self, words):
+        self.asked.append(words)
+        typed, turned = self.does.pop(0) if self.does else ("", {})
+        PLAYED.last = {name: value + turned.get(name, 0.0) for name, value in PLAYED.last.items()}
+        return typed
+
+
+def run(hands, unit="degrees"):
+    config = CalibrateConfig(LeaderConfig(type=TYPE, id="mine", options="calibrated=false"), unit=unit)
+    assert calibrate(config, hands) == 0
+    path = calibration_file(config.teleop, "ridgeback_ur10")
+    return load_calibration(path, UR10, "advice")
+
+
+GUIDED = (
+    ("", {"pan.pos": 80.0, "lift.pos": 3.0}),
+    ("", {"lift.pos": -95.0}),
+    ("-", {}),
+    ("", {"flex.pos": 40.0}),
+    ("-", {}),
+    ("-", {}),
+    ("", {"handle.pos": 10.0}),
+    ("", {"handle.pos": -70.0}),
+)
+
+
+def test_what_was_turned_drives_what_was_asked_for_the_right_way(capsys):
+    found = run(Hands(*GUIDED))
+    assert {name: (joint.source, round(joint.scale, 6)) for name, joint in found.joints.items()} == {
+        UR10[0]: ("pan.pos", round(math.pi / 180, 6)),
+        UR10[1]: ("lift.pos", -round(math.pi / 180, 6)),
+        UR10[3]: ("flex.pos", round(math.pi / 180, 6)),
+    }
+    assert found.gripper == LeaderGripper("handle.pos", closed=20.0, opened=90.0)
+    home = np.array(load_model().description.home)[3:]
+    assert found.angles(PLAYED.last, UR10)[[0, 1, 3]] == pytest.approx(
+        home[[0, 1, 3]]
+    )  # as it stands at last
+    assert PLAYED.calibrated  # by LeRobot first, which had not done so
+    assert "saved: " in capsys.readouterr().out
+
+
+def test_another_unit_is_measured_by_the_quarter_turn():
+    scale = run(Hands(*GUIDED), "other").joints[UR10[1]].scale
+    assert scale == pytest.approx(-0.5 * math.pi / 95.0)
+
+
+@pytest.mark.parametrize("turned", [{}, {"pan.pos": 9.0}, {"pan.pos": 80.0, "flex.pos": 60.0}])
+def test_what_is_not_clear_is_asked_again(turned, capsys):
+    hands = Hands(("", turned), *GUIDED)
+    assert run(hands).joints[UR10[0]].source == "pan.pos"
+    assert sum(words.startswith(UR10[0]) for words in hands.asked) == 2
+    assert "Once more" in capsys.readouterr().out
+
+
+def test_a_joint_drives_one_joint_alone():
+    again = ("", {"pan.pos": -90.0})
+    hands = Hands(GUIDED[0], again, *GUIDED[1:])
+    assert run(hands).joints[UR10[1]].source == "lift.pos"
+
+
+@pytest.mark.parametrize("garbage", [{}, {"pan.pos": math.nan}, None, ConnectionError("gone")])
+def test_a_leader_that_says_nothing_is_one_line(garbage):
+    PLAYED.last = garbage
+    with pytest.raises(HandrailError, match="leader arm: "):
+        run(Hands())
+
+
+def test_nothing_at_all_is_no_calibration():
+    with pytest.raises(HandrailError, match="at least one joint"):
+        run(Hands(*[("-", {})] * 6))
+
+
+def test_a_file_keeps_it(tmp_path):
+    path = tmp_path / "new" / "leader.json"
+    save_calibration(CALIBRATION, path)
+    assert load_calibration(path, UR10, "advice") == CALIBRATION
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"joints": {"tail": {}}}, "unknown entry 'tail'; expected some of shoulder_pan_joint"),
+        ({"joints": {UR10[0]: {"source": "a.pos", "scale": 0.0}}}, "scale: expected a finite number, not 0"),
+        ({"joints": {UR10[0]: {"source": "a.pos", "scale": math.nan}}}, "scale"),
+        ({"joints": {UR10[0]: 3}}, "expected a table"),
+        ({"joints": []}, "expected a table"),
+        (
+            {"gripper": {"source": "g.pos", "closed": 1.0, "opened": 1.0}},
+            "expected closed and opened to differ",
+        ),
+        ({"wrong": 1}, "unknown entry 'wrong'"),
+    ],
+)
+def test_a_wrong_file_is_refused_in_one_line(tmp_path, change, said):
+    path = tmp_path / "leader.json"
+    path.write_text(json.dumps({"joints": {}, **change}))
+    with pytest.raises(HandrailError) as error:
+        load_calibration(path, UR10, "handrail-calibrate")
+    assert said in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def test_no_file_or_no_json_says_how_to_make_one(tmp_path):
+    advice = setup.how_to_calibrate(LeaderConfig(type="so101_leader", port="/dev/ttyACM0"), "ridgeback_ur10")
+    assert (
+        advice
+        == "handrail-calibrate --teleop.type=so101_leader --teleop.port=/dev/ttyACM0 --robot=ridgeback_ur10"
+    )
+    for content in (None, "{", '{"joints": 1e999}'):
+        path = tmp_path / "leader.json"
+        if content:
+            path.write_text(content)
+        with pytest.raises(HandrailError) as error:
+            load_calibration(path, UR10, advice)
+        assert content == '{"joints": 1e999}' or advice in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("config", "said"),
+    [
+        (LeaderConfig(type="nobody"), "unknown --teleop.type 'nobody': expected one of"),
+        (LeaderConfig(type=TYPE, options="speed=3"), "speed"),
+        (LeaderConfig(type=TYPE, options="calibrated"), "expected name=value"),
+        (LeaderConfig(type=TYPE, options="calibrated=perhaps"), "bool"),
+        (LeaderConfig(type="so101_leader"), "port"),
+    ],
+)
+def test_lerobots_own_settings_are_checked_by_lerobot_and_said_in_one_line(config, said):
+    with pytest.raises(HandrailError) as error:
+        make_teleoperator(config)
+    assert said in str(error.value)
+    assert config.type in str(error.value)
+    assert "\n" not in str(error.value)

@@ -1,0 +1,116 @@
+"""Laws of a leader arm: recorded motion comes through; garbage, jumps and a cut cable steer nothing."""
+
+import math
+
+import pytest
+from device_players import Clock, recorded
+from played_leader import CALIBRATION, PLAYED, SOURCES, UR10, PlayedLeader, PlayedLeaderConfig
+
+from handrail.collect.devices.leader_arm import LeaderArm
+from handrail.collect.devices.reading import DeviceGoneError
+
+FIRST = recorded("leader.json")[0]["action"]
+
+
+@pytest.fixture
+def clock():
+    return Clock()
+
+
+@pytest.fixture(autouse=True)
+def played():
+    PLAYED.actions, PLAYED.last, PLAYED.plugged, PLAYED.calibrated = [], dict(FIRST), True, False
+
+
+def leader(tmp_path, clock, **settings):
+    config = PlayedLeaderConfig(id="mine", calibration_dir=tmp_path, **settings)
+    return LeaderArm(lambda: PlayedLeader(config), "played_leader", SOURCES, clock)
+
+
+@pytest.fixture
+def arm(tmp_path, clock):
+    made = leader(tmp_path, clock)
+    made.open()
+    return made
+
+
+def test_recorded_motion_comes_through_in_the_arms_terms(arm, clock):
+    start, before = clock.now, False
+    grips = []
+    for event in recorded("leader.json"):
+        clock.now = start + event["time"]
+        PLAYED.actions = [event["action"]]
+        reading = arm.read()
+        assert reading.time == clock.now
+        assert set(reading.joints) == set(SOURCES)
+        before = CALIBRATION.gripper.grips(reading.joints, before)
+        grips.append(before)
+    angles = CALIBRATION.angles(reading.joints, UR10)
+    assert angles[0] == pytest.approx(1.0 + math.radians(event["action"]["shoulder_pan.pos"]))
+    assert angles[2] == pytest.approx(-math.radians(event["action"]["elbow_flex.pos"]))
+    assert not angles[[1, 3, 4, 5]].any()  # which no joint of the leader drives
+    assert arm.dropped == 0
+    assert grips == sorted(grips)  # closed once, without a flutter
+    assert grips[-1]
+
+
+@pytest.mark.parametrize(
+    "garbage",
+    [
+        FIRST | {"shoulder_pan.pos": math.nan},
+        FIRST | {"elbow_flex.pos": -math.inf},
+        FIRST | {"elbow_flex.pos": "left"},
+        FIRST | {"elbow_flex.pos": None},
+        FIRST | {"shoulder_pan.pos": FIRST["shoulder_pan.pos"] + 60.0},
+        {name: value for name, value in FIRST.items() if name != "gripper.pos"},
+        {},
+        None,
+        ConnectionError("Incorrect status packet!"),
+    ],
+    ids=str,
+)
+def test_garbage_is_as_old_as_what_came_before_it(arm, clock, garbage):
+    good = arm.read()
+    PLAYED.actions = [garbage]
+    clock.now += 0.1
+    assert arm.read() == good
+    assert arm.dropped == 1
+    PLAYED.actions = [FIRST]
+    clock.now += 0.1
+    assert arm.read().time == clock.now
+
+
+def test_nothing_but_garbage_for_a_second_is_a_device_that_is_gone(arm, clock):
+    PLAYED.last = ConnectionError("no status packet")
+    clock.now += 0.9
+    arm.read()
+    clock.now += 0.2
+    with pytest.raises(DeviceGoneError, match="no status packet; check its cable and its power"):
+        arm.read()
+
+
+def test_a_cut_cable_is_a_device_that_is_gone_at_once(arm):
+    PLAYED.plugged = False
+    with pytest.raises(DeviceGoneError, match="check its cable"):
+        arm.read()
+    arm.close()
+    with pytest.raises(DeviceGoneError, match="no such port"):
+        arm.open()
+    PLAYED.plugged = True
+    arm.open()
+    assert arm.read().joints
+
+
+@pytest.mark.parametrize(
+    ("settings", "said"),
+    [
+        ({"calibrated": False}, "not calibrated; run lerobot-calibrate"),
+        ({"refuses": "[Errno 13] Permission denied: '/dev/ttyACM0'"}, "usermod -aG dialout"),
+        ({"refuses": "could not open port"}, "check --teleop.port"),
+    ],
+)
+def test_one_that_cannot_be_used_says_what_to_do(tmp_path, clock, settings, said):
+    with pytest.raises(DeviceGoneError) as error:
+        leader(tmp_path, clock, **settings).open()
+    assert said in str(error.value)
+    assert "\n" not in str(error.value)

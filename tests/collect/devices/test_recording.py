@@ -1,0 +1,198 @@
+"""Real recordings with local devices: a terminal, a gamepad of SDL's, a leader that plays back."""
+
+import io
+import sys
+import threading
+import time
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+from command_helpers import command
+from device_players import PlayedHid, VirtualPad, recorded
+from judges import doctor_fails, lint_defects
+from played_leader import CALIBRATION, PLAYED
+from terminal_player import TerminalPlayer
+
+from handrail.collect.devices.calibration import save_calibration
+from handrail.collect.devices.gamepad import Gamepad
+from handrail.collect.devices.local_person import LocalPerson
+from handrail.collect.devices.reading import DeviceGoneError
+from handrail.collect.devices.setup import calibration_file
+from handrail.collect.teleop_config import LeaderConfig
+
+LEADER = ("--operator", "leader_arm", "--teleop.type", "played_leader")
+
+
+def frames(folder):
+    """Return the columns of all episodes."""
+    tables = [pq.read_table(path).to_pydict() for path in sorted(folder.glob("data/**/*.parquet"))]
+    return {name: [value for table in tables for value in table[name]] for name in tables[0]}
+
+
+def episodes(folder):
+    return sum(len(pq.read_table(path)) for path in folder.glob("meta/episodes/**/*.parquet"))
+
+
+@pytest.mark.slow
+def test_a_reach_with_the_keys_of_a_terminal_and_lerobots_keys(tmp_path):
+    folder = tmp_path / "dataset"
+    words = [str(folder), "--task", "reach", "--operator", "keyboard", "--dataset.num_episodes", "5"]
+    with TerminalPlayer(*words) as player:
+        player.until("press enter to begin", 300.0)
+        player.press("\r")
+        time.sleep(0.5)  # all is let go
+        player.go_to_the_goal()
+        player.until("press enter to begin")
+        for key, ends in (("\x1b[D", "press enter to begin"), ("\x1b[C", "last episode saved")):
+            player.press("\r")
+            time.sleep(0.5)
+            player.press("w")
+            time.sleep(0.5)
+            player.press(key)  # ← begins it again, → ends it
+            player.until(ends)
+        player.press("\x1b")  # Esc ends the recording
+        assert player.ended() == 0
+    seen = frames(folder)
+    assert episodes(folder) == 2
+    assert set(seen["teleop.device"]) == {"keyboard"}
+    assert 0.0 <= min(seen["teleop.age"]) <= max(seen["teleop.age"]) <= 0.25
+    assert np.any(seen["teleop.raw"])
+    assert max(seen["episode_index"]) == 1
+
+
+@pytest.fixture
+def pad():
+    made = VirtualPad()
+    with pytest.raises(DeviceGoneError):
+        Gamepad().open()
+    made.plug_in()
+    yield made
+    made.unplug()
+
+
+@pytest.fixture
+def listens(monkeypatch):
+    """Say when a person is asked for the first time: what comes before can take minutes on a new machine."""
+    event, act = threading.Event(), LocalPerson.act
+
+    def first(person, view):
+        event.set()
+        return act(person, view)
+
+    monkeypatch.setattr(LocalPerson, "act", first)
+    return event
+
+
+def played_by(listens, steps, *arguments):
+    """Record while somebody does one step after the other, each after some time [s]."""
+
+    def play():
+        assert listens.wait(500.0)
+        for wait, step in steps:
+            time.sleep(wait)
+            step()
+
+    hands = threading.Thread(target=play)
+    hands.start()
+    done = command(*arguments)
+    hands.join()
+    return done
+
+
+@pytest.mark.slow
+def test_a_recording_with_a_gamepad(tmp_path, pad, listens):
+    folder = tmp_path / "dataset"
+    steps = [
+        (0.0, lambda: pad.move("left_shoulder", 1)),
+        (0.3, lambda: pad.move("start", 1)),
+        (0.1, lambda: pad.move("start", 0)),
+        (0.5, lambda: pad.move("left_y", -1.0)),
+        (1.0, lambda: pad.move("left_shoulder", 0)),  # brakes, and nothing is recorded
+        (1.0, lambda: pad.move("y", 1)),
+        (0.2, lambda: pad.move("y", 0)),
+    ]
+    done = played_by(
+        listens, steps, folder, "--task", "reach", "--operator", "gamepad", "--dataset.num_episodes", "1"
+    )
+    assert done.returncode == 0, done.stderr
+    seen = frames(folder)
+    assert set(seen["teleop.device"]) == {"gamepad"}
+    assert max(seen["teleop.age"]) <= 0.25
+    driven = np.array(seen["teleop.raw"])[:, 3]
+    assert driven.max() == 1.0
+    assert driven[0] == 0.0
+    assert len(driven) < 60  # two seconds of driving, not the third one
+    assert seen["next.done"][-1]
+    assert not doctor_fails(folder)
+    assert not lint_defects(folder)
+
+
+@pytest.mark.slow
+def test_a_recording_with_a_leader_arm_and_a_gamepad(tmp_path, pad, listens, monkeypatch):
+    monkeypatch.setattr("lerobot.utils.constants.HF_LEROBOT_CALIBRATION", tmp_path / "calibration")
+    monkeypatch.setattr("lerobot.teleoperators.teleoperator.HF_LEROBOT_CALIBRATION", tmp_path / "calibration")
+    save_calibration(CALIBRATION, calibration_file(LeaderConfig(type="played_leader"), "ridgeback_ur10"))
+    actions = [event["action"] for event in recorded("leader.json")]
+    PLAYED.actions, PLAYED.last, PLAYED.plugged = [], actions[0], True
+    folder = tmp_path / "dataset"
+
+    def turn():
+        PLAYED.actions = [action for action in actions for _ in range(5)]
+
+    steps = [
+        (0.3, lambda: pad.move("start", 1)),
+        (0.2, lambda: pad.move("start", 0)),
+        (0.5, lambda: pad.move("right_shoulder", 1)),
+        (0.5, turn),
+        (2.0, lambda: pad.move("y", 1)),
+        (0.2, lambda: pad.move("y", 0)),
+    ]
+    flags = (
+        "--task",
+        "reach",
+        "--mode",
+        "leader",
+        "--teleop.beside",
+        "gamepad",
+        "--dataset.num_episodes",
+        "1",
+    )
+    done = played_by(listens, steps, folder, *LEADER, *flags)
+    assert done.returncode == 0, done.stderr
+    seen = frames(folder)
+    state = np.array(seen["observation.state"])
+    assert set(seen["teleop.device"]) == {"played_leader"}
+    assert max(seen["teleop.age"]) <= 0.25
+    turned = np.degrees(state[-1, 3] - state[0, 3])
+    assert turned == pytest.approx(actions[-1]["shoulder_pan.pos"] - actions[0]["shoulder_pan.pos"], abs=2.0)
+
+
+@pytest.mark.parametrize(
+    ("flags", "said"),
+    [
+        (("--operator", "leader_arm"), "--operator leader_arm: expected --teleop.type, such as"),
+        (("--teleop.type", "so101_leader"), "expected --operator leader_arm, got scripted"),
+        (("--operator", "gamepad", "--teleop.map", "no.toml"), "expected a .toml file, found none"),
+        (("--operator", "gamepad", "--teleop.dead_zone", "0.9"), "expected a number from 0.0 to 0.5"),
+        ((*LEADER, "--teleop.beside", "mouse"), "expected keyboard or gamepad"),
+        ((*LEADER, "--mode", "ee"), "expected a mode that steers every joint of the arm: joints, direct,"),
+        ((*LEADER, "--mode", "direct_single"), "leader; got direct_single"),
+        (
+            (*LEADER, "--mode", "leader", "--teleop.id", "new"),
+            "no calibration for this robot yet; make it once",
+        ),
+        (("--operator", "spacemouse"), "SpaceMouse: expected one, found none; plug it in"),
+        (("--operator", "keyboard"), "keyboard: expected a terminal to read keys from"),
+    ],
+)
+def test_what_cannot_be_is_one_line_and_nothing_is_written(tmp_path, monkeypatch, flags, said):
+    hid = PlayedHid()
+    hid.plugged = False
+    monkeypatch.setitem(sys.modules, "hid", hid)
+    monkeypatch.setattr(sys, "stdin", io.StringIO())
+    done = command(tmp_path / "dataset", "--task", "reach", *flags)
+    assert done.returncode == 2
+    assert said in done.stderr
+    assert done.stderr.count("\n") == 1
+    assert not (tmp_path / "dataset").exists()

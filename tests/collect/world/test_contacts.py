@@ -1,0 +1,58 @@
+"""Contacts: what counts as forbidden is counted, and nothing else."""
+
+import numpy as np
+from collect_helpers import action, environment
+
+from handrail.collect.world.scene import Scene, SceneObject, box
+from handrail.collect.world.tasks.furniture import pillar
+from handrail.collect.world.tasks.task import Start
+
+
+def in_the_way(env) -> Start:
+    env.reset(seed=0)
+    episode = env.start
+    block = pillar("block", -0.7, 0.0, 0.15, 0.4)
+    return Start(Scene((*episode.scene.objects, block)), episode.q, episode.goal)
+
+
+def test_driving_into_an_obstacle_is_counted_and_ends_nothing():
+    with environment("Reach") as env:
+        env.reset(options={"start": in_the_way(env)})
+        seen, terminated = set(), False
+        for _ in range(40):
+            *_, terminated, _, info = env.step(action(env, [1.0] + [0.0] * 8))
+            assert info["contacts"] == len(info["contact_names"])
+            seen.update(info["contact_names"])
+        assert seen == {"block – chassis"}
+        assert not terminated
+        assert env.state().q[0] < -1.5 + 0.3  # the block held it
+
+
+def test_driving_freely_touches_nothing():
+    with environment("Reach") as env:
+        env.reset(seed=0)
+        assert all(env.step(action(env, [0.5, 0.5, 0.3] + [0.0] * 6))[4]["contacts"] == 0 for _ in range(40))
+
+
+def test_touching_oneself_is_counted():
+    with environment("Reach") as env:
+        env.reset(seed=0)
+        q = np.array(env.start.q)
+        q[3:] = [0.0, -1.57, 2.6, 0.0, 0.0, 0.0]
+        names = set()
+        env.reset(options={"start": Start(env.start.scene, q, env.start.goal)})
+        for _ in range(40):
+            names.update(env.step(action(env, [0, 0, 0, 0, 0, 1.0, 0, 0, 0]))[4]["contact_names"])
+        assert any("forearm" in name or "wrist" in name or "palm" in name for name in names), names
+
+
+def test_the_cube_in_the_fingers_is_no_forbidden_contact_but_the_table_is():
+    table = SceneObject("table", box([0.4, 0.4, 0.4]), np.array([0.0, 0.174, 0.25]), work_surface=True)
+    with environment("Reach") as env:
+        env.reset(seed=0)
+        episode = env.start
+        env.reset(options={"start": Start(Scene((*episode.scene.objects, table)), episode.q, episode.goal)})
+        names = set()
+        for _ in range(30):  # the home pose is horizontal above this table: lower the arm
+            names.update(env.step(action(env, [0, 0, 0, 0, 0.5, 0, 0, 0, 0]))[4]["contact_names"])
+        assert any(name.endswith("table") for name in names)

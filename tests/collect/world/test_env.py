@@ -1,0 +1,246 @@
+"""The environment keeps its promises: Gymnasium's, determinism, limits, contacts, another robot."""
+
+import os
+import subprocess
+import sys
+import warnings
+
+import gymnasium
+import numpy as np
+import pytest
+from collect_helpers import action, environment, moved, write_small_robot
+from gymnasium.utils.env_checker import check_env
+
+from handrail.collect.world.gl import mujoco
+from handrail.collect.world.tasks.reach import Reach
+from handrail.controllers.errors import HandrailError
+
+CAMERAS = ("wrist", "scene")
+
+
+@pytest.mark.parametrize("name", ["Reach", "PickPlace"])
+@pytest.mark.parametrize("cameras", [(), pytest.param(CAMERAS, marks=pytest.mark.needs_gl)])
+def test_gymnasium_is_content(name, cameras):
+    env = gymnasium.make(
+        f"handrail/{name}-v0", cameras=cameras, image_size=(32, 32), disable_env_checker=True
+    )
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        # actions are in m/s and rad/s, as the dataset stores them: no advice to normalise them is taken
+        warnings.filterwarnings("ignore", message=".*recommend using a symmetric and normalized space")
+        check_env(env.unwrapped, skip_render_check=not cameras)
+    env.close()
+
+
+def play(env, seed: int, steps: int = 25) -> bytes:
+    rng = np.random.default_rng(seed)
+    observation, _ = env.reset(seed=seed)
+    record = [observation["agent_pos"].tobytes(), observation["environment_state"].tobytes()]
+    for _ in range(steps):
+        drive = rng.uniform(env.action_space.low, env.action_space.high).astype(np.float32)
+        observation, reward, *ends, info = env.step(drive)
+        record += [observation["agent_pos"].tobytes(), observation["environment_state"].tobytes()]
+        record.append(repr((reward, ends, info, env.simulation.data.qpos.tobytes())).encode())
+    return b"".join(record)
+
+
+@pytest.mark.parametrize("name", ["Reach", "PickPlace"])
+def test_the_same_seed_gives_the_same_bytes(name):
+    with environment(name) as fresh, environment(name) as used:
+        play(used, 3)
+        play(used, 4, steps=7)
+        assert play(fresh, 5) == play(used, 5)
+        assert play(fresh, 5) != play(fresh, 6)
+
+
+@pytest.mark.needs_gl
+def test_cameras_change_nothing():
+    with environment() as blind, environment(cameras=CAMERAS, image_size=(16, 16)) as seeing:
+        assert play(blind, 2, steps=10) == play(seeing, 2, steps=10)
+
+
+@pytest.mark.needs_gl
+def test_pictures_follow_the_episode():
+    """One OpenGL context serves all episodes, each with its own model."""
+    with environment(cameras=CAMERAS) as env, environment(cameras=CAMERAS) as other:
+        first = env.reset(seed=1)[0]["pixels"]
+        second = env.reset(seed=2)[0]["pixels"]
+        again = other.reset(seed=2)[0]["pixels"]
+        for camera in CAMERAS:
+            assert second[camera].shape == (128, 128, 3)
+            assert second[camera].std() > 10
+            np.testing.assert_array_equal(second[camera], again[camera])
+        assert np.any(first["scene"] != second["scene"])
+
+
+@pytest.mark.needs_gl
+def test_render_is_a_picture_of_the_asked_size():
+    with environment(render_mode="rgb_array", render_size=(120, 160)) as env:
+        env.reset(seed=0)
+        assert env.render().shape == (120, 160, 3)
+
+
+def test_limits_hold_for_any_action():
+    """Velocity, acceleration and gripper; also for actions out of range or not finite."""
+    rng = np.random.default_rng(0)
+    with environment("Reach") as env:
+        env.reset(seed=0)
+        limits = env.model.description.limits
+        for index in range(60):
+            drive = rng.normal(scale=5.0, size=env.model.size + 1)
+            if index % 7 == 0:
+                drive[rng.integers(len(drive))] = [np.nan, np.inf, -np.inf][index % 3]
+            before = env.state().commanded
+            *_, info = env.step(drive)
+            after = env.state().commanded
+            np.testing.assert_array_equal(info["sent"][:-1], after)
+            assert 0.0 <= info["sent"][-1] <= 1.0
+            assert np.all(np.abs(after) <= limits.velocity * (1.0 + 1e-6))
+            assert np.all(np.abs(after - before) <= limits.acceleration / env.fps * (1.0 + 1e-5))
+
+
+def test_an_action_that_is_no_action_brakes():
+    with environment("Reach") as env:
+        for bad in (np.full(10, np.nan), np.zeros(3), np.array([0.5] * 9 + [np.nan])):
+            env.reset(seed=0)
+            for _ in range(5):
+                env.step(action(env, [0.2] + [0.0] * 8))
+            for _ in range(10):
+                *_, info = env.step(bad)
+            np.testing.assert_array_equal(info["sent"], 0.0)
+            np.testing.assert_array_equal(env.state().commanded, 0.0)
+
+
+def test_a_reachable_action_is_sent_as_it_is():
+    with environment("Reach") as env:
+        env.reset(seed=0)
+        limits = env.model.description.limits
+        wanted = 0.9 * limits.acceleration / env.fps
+        *_, info = env.step(action(env, wanted))
+        np.testing.assert_array_equal(info["sent"], action(env, wanted))
+        np.testing.assert_array_equal(env.state().commanded, info["sent"][:-1])
+
+
+@pytest.mark.parametrize("fps", [10, 30, 100])
+def test_a_step_lasts_one_period(fps):
+    with environment("Reach", fps=fps) as env:
+        env.reset(seed=0)
+        for index in range(1, 6):
+            *_, info = env.step(action(env))
+            assert info["time"] == pytest.approx(index / fps, abs=1e-9)
+        assert env.simulation.mujoco_model.opt.timestep <= 0.002 + 1e-12
+
+
+def test_the_episode_is_truncated_at_the_horizon():
+    with environment("Reach", task=Reach(horizon=0.15)) as env:
+        env.reset(seed=0)
+        ends = [env.step(action(env))[2:] for _ in range(3)]
+    assert [truncated for _, truncated, _ in ends] == [False, False, True]
+    assert ends[-1][2]["failure_reason"] == "timeout"
+    assert not any(terminated for terminated, _, _ in ends)
+
+
+def test_a_second_robot_is_a_file_and_nothing_else(tmp_path):
+    robot = write_small_robot(tmp_path)
+    for name in ("Reach", "PickPlace"):
+        with environment(name, robot=robot) as env:
+            observation, _ = env.reset(seed=0)
+            assert env.observation_space.contains(observation)
+            start = env.state().q
+            for _ in range(20):
+                observation, *_, info = env.step(action(env, [0.3, 0.0, 0.0] + [0.1] * 6))
+                assert info["contacts"] == 0, info["contact_names"]
+            np.testing.assert_allclose(env.state().v, [0.3, 0.0, 0.0] + [0.1] * 6, atol=5e-3)
+            assert env.state().q[0] > start[0] + 0.2
+            assert env.observation_space.contains(observation)
+
+
+def test_names_match_the_numbers():
+    with environment() as env:
+        observation, _ = env.reset(seed=0)
+        assert len(env.agent_names) == 26 == observation["agent_pos"].size
+        assert len(env.state_names) == observation["environment_state"].size
+        numbers = dict(zip(env.agent_names, observation["agent_pos"], strict=True))
+        assert numbers["gripper.opening"] == pytest.approx(1.0)
+        np.testing.assert_allclose(
+            [numbers[f"tool.{axis}"] for axis in "xyz"], env.task_state().tool.position, atol=1e-6
+        )
+        assert np.linalg.norm(observation["agent_pos"][-4:]) == pytest.approx(1.0, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"fps": 5}, "fps 5: expected 10 to 100 steps a second"),
+        ({"cameras": ("left",)}, "unknown camera 'left': expected one of scene, wrist"),
+        ({"render_mode": "human"}, "unknown render mode 'human': expected one of rgb_array"),
+        ({"robot": "hal"}, "unknown robot 'hal'"),
+    ],
+)
+def test_wrong_options_are_named(options, message):
+    from handrail.collect.world.envs.env import HandrailEnv
+
+    with pytest.raises(HandrailError, match=message):
+        HandrailEnv("handrail.collect.world.tasks.reach:Reach", **options)
+
+
+def test_before_reset_there_is_nothing_to_see():
+    with environment("Reach") as env, pytest.raises(HandrailError, match=r"call reset\(\)"):
+        env.state()
+
+
+def test_unstable_physics_is_a_failure(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)  # MuJoCo writes MUJOCO_LOG.TXT where it runs
+    with environment("Reach") as env:
+        env.reset(seed=0)
+        env.simulation.data.qvel[:] = np.nan
+        *_, terminated, _, info = env.step(action(env))
+        assert terminated
+        assert info["failure_reason"] == "unstable"
+
+
+def run(code: str, **environment_variables: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-c", code],
+        env={**os.environ, **environment_variables},
+        capture_output=True,
+        text=True,
+    )
+
+
+def test_without_graphics_cameras_say_what_to_install_and_states_still_work():
+    code = """
+import gymnasium, handrail.collect
+from handrail.controllers.errors import HandrailError
+gymnasium.make("handrail/Reach-v0").reset(seed=0)
+try:
+    gymnasium.make("handrail/Reach-v0", cameras=("scene",)).reset(seed=0)
+except HandrailError as error:
+    print(error)
+"""
+    result = run(code, MUJOCO_GL="disable")
+    assert result.returncode == 0, result.stderr
+    assert "apt-get install libegl1 libgl1-mesa-dri" in result.stdout
+    assert len(result.stdout.strip().splitlines()) == 1
+
+
+def test_importing_the_package_is_cheap():
+    heavy = "('mujoco', 'torch', 'pinocchio')"
+    code = f"import sys, handrail.collect; print([name for name in {heavy} if name in sys.modules])"
+    assert run(code).stdout.strip() == "[]"
+
+
+def test_mujoco_runs_as_configured():
+    with environment("Reach") as env:
+        env.reset(seed=0)
+        options = env.simulation.mujoco_model.opt
+        assert options.integrator == mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+        assert options.cone == mujoco.mjtCone.mjCONE_ELLIPTIC
+
+
+def test_moved_is_a_new_episode():
+    with environment() as env:
+        env.reset(seed=0)
+        before = env.start
+        after = moved(before, "cube", [0.0, 0.0, 2.0])
+        assert before.scene.find("cube").position[2] < 1.0 < after.scene.find("cube").position[2]

@@ -1,0 +1,158 @@
+"""Moving obstacles: one motion for physics, controller and observation; the session passes it on."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from collect_helpers import action, environment
+
+from handrail.collect.config import SessionConfig
+from handrail.collect.session.build import build_env, build_session
+from handrail.collect.session.session import Session
+from handrail.collect.world.envs.env import HandrailEnv
+from handrail.collect.world.patrol import Patrol
+from handrail.collect.world.scene import Scene, SceneObject
+from handrail.collect.world.tasks.reach import FASTEST, Reach, sample_movers
+from handrail.collect.world.tasks.task import Start
+from handrail.controllers.baselines.direct import DirectController
+from handrail.controllers.collision.model import CollisionModel
+from handrail.controllers.errors import HandrailError
+from handrail.controllers.interface.channels import Channels
+from handrail.controllers.interface.intent import Intent
+from handrail.controllers.mpc.masked_mpc import MaskedMpc
+from handrail.controllers.robot.model import Pose, load_model
+from handrail.controllers.robot.shape import Shape
+
+MODEL = load_model()
+HOME = MODEL.description.home
+PATROL = Patrol([0.0, 1.0, 0.5], [3.0, -3.0, 0.5], 0.5)
+DIRECT_AT_THE_BASE = Patrol([-1.4, -2.2, 0.25], [-1.4, 4.0, 0.25], 0.5)
+
+
+def test_a_patrol_is_the_integral_of_its_velocity():
+    times = np.linspace(0.0, 45.0, 901)
+    steps = np.diff([PATROL.position(time) for time in times], axis=0)
+    expected = [PATROL.velocity(time) * (times[1] - times[0]) for time in 0.5 * (times[1:] + times[:-1])]
+    np.testing.assert_allclose(steps, expected, atol=1e-9)
+    np.testing.assert_allclose(PATROL.position(0.0), PATROL.start)
+    np.testing.assert_allclose(PATROL.position(10.0), PATROL.end)
+    np.testing.assert_allclose(PATROL.position(20.0), PATROL.start, atol=1e-12)
+    assert np.linalg.norm(PATROL.velocity(17.0)) == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize(
+    ("end", "speed"), [([0.0, 1.0, 0.5], 0.5), ([1.0, 0.0, 0.0], 0.0), ([1.0, 0, 0], np.nan)]
+)
+def test_a_patrol_that_goes_nowhere_is_refused(end, speed):
+    with pytest.raises(HandrailError, match="patrol: expected two points and a positive speed"):
+        Patrol([0.0, 1.0, 0.5], end, speed)
+
+
+def test_physics_controller_and_observation_see_the_same():
+    with environment("Reach", task=Reach(moving_obstacles=2)) as env:
+        observation, _ = env.reset(seed=4)
+        for _ in range(30):
+            state = env.task_state()
+            movers = [item for item in env.obstacles() if item.velocity.any()]
+            assert len(movers) == 2
+            for item in movers:
+                np.testing.assert_allclose(state.pose(item.name).position, item.position, atol=1e-12)
+                for axis, place, speed in zip("xy", item.position, item.velocity, strict=False):
+                    names = [f"{item.name}.{axis}", f"{item.name}.v{axis}"]
+                    seen = observation["environment_state"][[env.state_names.index(name) for name in names]]
+                    np.testing.assert_allclose(seen, [place, speed], atol=1e-6)
+            observation = env.step(action(env))[0]
+
+
+def test_goals_are_the_same_with_and_without_and_all_follows_from_the_seed():
+    def sample(count, seed):
+        return Reach(moving_obstacles=count).sample(MODEL, np.random.default_rng(seed))
+
+    for seed in range(5):
+        alone, first, again = sample(0, seed), sample(3, seed), sample(3, seed)
+        np.testing.assert_array_equal(alone.goal.position, first.goal.position)
+        assert [item.patrol.speed for item in first.scene.movers] == [
+            item.patrol.speed for item in again.scene.movers
+        ]
+    assert sample(3, 0).scene.movers[0].patrol.speed != sample(3, 1).scene.movers[0].patrol.speed
+
+
+def test_movers_start_clear_of_the_robot_and_cross_the_workspace():
+    for seed in range(30):
+        movers = sample_movers(4, MODEL, HOME, np.random.default_rng(seed))
+        obstacles = tuple(item.obstacle() for item in movers)
+        collision = CollisionModel(MODEL, obstacles)
+        scene = [second.startswith("mover") for _, second in collision.pairs]
+        assert collision.values(HOME[None])[0][scene].min() > 0.1
+        for item in movers:
+            assert 0.2 <= np.linalg.norm(item.patrol.velocity(0.0)) <= FASTEST
+            path = np.array([item.patrol.position(time) for time in np.linspace(0, 25, 200)])
+            assert np.linalg.norm(path[:, :2] - [-0.3, 0.0], axis=1).min() < 1.3
+
+
+@dataclass(frozen=True)
+class Meeting(Reach):
+    """Something comes straight at the robot; the goal is out of reach."""
+
+    horizon: float = 9.0
+    moving_obstacles: int = 1
+
+    def sample(self, model, rng):
+        shape = Shape("cylinder", [0.2, 0.5])
+        item = SceneObject("mover_0", shape, DIRECT_AT_THE_BASE.start, patrol=DIRECT_AT_THE_BASE)
+        return Start(Scene((item,)), HOME, Pose(np.array([0.0, 0.0, 9.0]), np.eye(3)))
+
+
+class Idle:
+    """Touches nothing."""
+
+    def reset(self, view, rng):
+        self._channels = Channels.of(MODEL.description)
+
+    def act(self, view):
+        return Intent.idle(self._channels, view.state.time)
+
+
+@pytest.mark.parametrize(("kind", "touched"), [(MaskedMpc, False), (DirectController, True)])
+def test_a_robot_that_nobody_steers_steps_aside(kind, touched):
+    """The session tells the controller what comes; what stands still is hit, and that is counted."""
+    env = HandrailEnv(Meeting())
+    outcome = Session(env, kind(env.model), Idle()).run(0)
+    env.close()
+    assert (outcome.contacts > 0) == touched
+    assert (outcome.smallest_distance < 0.0) == touched
+
+
+@pytest.mark.parametrize("count", [0, 1])
+def test_the_controller_observes_before_every_update_if_anything_moves(count):
+    class Witness(DirectController):
+        def update_scene(self, obstacles):
+            super().update_scene(obstacles)
+            seen.append((obstacles, float(env.simulation.data.time)))
+
+        def update(self, state, intent):
+            assert not count or seen[-1][1] == state.time
+            return super().update(state, intent)
+
+    seen, env = [], HandrailEnv(Reach(horizon=3.0, moving_obstacles=count))
+    outcome = Session(env, Witness(env.model), Idle()).run(0)
+    env.close()
+    assert len(seen) == count * outcome.frames
+    if count:
+        places = np.array([obstacles[0].position for obstacles, _ in seen])
+        assert np.linalg.norm(np.diff(places, axis=0), axis=1).max() <= 1.01 * FASTEST / 20
+        assert np.linalg.norm(places[-1] - places[0]) > 0.5
+
+
+def test_an_episode_among_movers_is_the_seeds():
+    def run():
+        config = SessionConfig(task="reach", moving_obstacles=1)
+        env = build_env(config, 20)
+        outcome = build_session(config, env).run(3)
+        return outcome, env.state().q
+
+    (first, q), (again, same) = run(), run()
+    assert first.success
+    assert first.contacts == 0
+    assert first.frames == again.frames
+    np.testing.assert_array_equal(q, same)

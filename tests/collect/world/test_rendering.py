@@ -1,0 +1,50 @@
+"""A picture depends on what is drawn, not on what was drawn before."""
+
+import numpy as np
+import pytest
+
+from handrail.collect.config import SessionConfig
+from handrail.collect.session.build import build_env
+from handrail.collect.world.rendering import CAMERAS, Painter
+from handrail.controllers.errors import HandrailError
+
+
+@pytest.fixture(scope="module")
+def simulations():
+    """Simulations of two episodes each of two tasks."""
+    found = []
+    for task in ("reach", "pick_place"):
+        env = build_env(SessionConfig(task=task, cameras="wrist"), 20)
+        for seed in (1, 2):
+            env.reset(seed=seed)
+            found.append(env.simulation)
+        env.close()
+    return found
+
+
+@pytest.mark.needs_gl
+@pytest.mark.parametrize("pretty", [False, True])
+def test_one_painter_draws_what_a_new_one_draws(simulations, pretty):
+    kept, size = Painter((48, 64), pretty), (48, 64)
+    for simulation in (*simulations, simulations[0]):
+        new = Painter(size, pretty)
+        for camera in CAMERAS:
+            pictures = [
+                painter.paint(simulation.mujoco_model, simulation.data, camera) for painter in (kept, new)
+            ]
+            assert np.array_equal(*pictures)
+            assert pictures[0].shape == (*size, 3)
+            assert np.ptp(pictures[0]) > 50
+        new.close()
+    kept.close()
+    kept.close()
+
+
+@pytest.mark.needs_gl
+def test_episodes_look_different_and_an_unknown_camera_is_named(simulations):
+    painter = Painter((48, 64))
+    first, second, *_ = (painter.paint(each.mujoco_model, each.data, "scene") for each in simulations)
+    assert not np.array_equal(first, second)
+    with pytest.raises(HandrailError, match="unknown camera 'roof': expected one of"):
+        painter.paint(simulations[0].mujoco_model, simulations[0].data, "roof")
+    painter.close()

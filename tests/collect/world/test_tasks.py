@@ -1,0 +1,261 @@
+"""Tasks: what they sample, and how they judge."""
+
+import numpy as np
+import pytest
+from collect_helpers import UP, action, environment, moved, over_cube, reach
+from scipy.stats import kstest
+
+from handrail.collect.world.gl import mujoco
+from handrail.collect.world.scene import Scene, SceneObject, box
+from handrail.collect.world.simulation import Simulation
+from handrail.collect.world.tasks.furniture import footprint
+from handrail.collect.world.tasks.pick_place import PickPlace
+from handrail.collect.world.tasks.reach import Reach
+from handrail.collect.world.tasks.task import Start
+from handrail.controllers.errors import HandrailError
+from handrail.controllers.numerics.rotation import rotation_vector
+from handrail.controllers.robot.description import robot_names
+from handrail.controllers.robot.model import load_model
+
+SEEDS = range(60)
+
+
+def episodes(task) -> list[Start]:
+    return [task.sample(load_model(), np.random.default_rng(seed)) for seed in SEEDS]
+
+
+def test_reach_goals_are_the_benchmarks():
+    rng = np.random.default_rng(0)
+    sampled = [Reach().sample(load_model(), rng) for _ in range(400)]
+    goals = [episode.goal for episode in sampled]
+    assert all(goal is not None for goal in goals)
+    positions = np.array([goal.position for goal in goals if goal])
+    angles = [np.linalg.norm(rotation_vector(goal.rotation)) for goal in goals if goal]
+    assert kstest(positions[:, 0], "uniform", (-1, 2)).pvalue > 1e-3
+    assert kstest(positions[:, 1], "uniform", (-1, 2)).pvalue > 1e-3
+    assert kstest(positions[:, 2], "uniform", (0.7, 0.3)).pvalue > 1e-3
+    assert kstest(angles, "uniform", (0, np.pi)).pvalue > 1e-3
+    np.testing.assert_array_equal(sampled[0].q, load_model().description.home)
+    assert sampled[0].scene.obstacles() == ()
+
+
+def test_reach_succeeds_at_the_goal_and_only_there():
+    with environment("Reach") as env:
+        env.reset(seed=0)
+        model, q = env.model, env.model.description.home
+        here = model.pose(q)
+        for offset, success in ((0.0, True), (0.09, True), (0.11, False)):
+            goal = type(here)(here.position + np.array([0.0, offset, 0.0]), here.rotation)
+            env.reset(options={"start": Start(Scene(), q, goal)})
+            *_, terminated, _, info = env.step(action(env))
+            assert info["is_success"] == terminated == success
+        turned = type(here)(here.position, here.rotation @ np.diag([1.0, -1.0, -1.0]))
+        env.reset(options={"start": Start(Scene(), q, turned)})
+        assert not env.step(action(env))[4]["is_success"]
+
+
+def test_pick_place_scenes_follow_their_description():
+    for episode in episodes(PickPlace()):
+        scene = episode.scene
+        cube, table, bin_table = (scene.find(name) for name in ("cube", "cube_table", "bin_table"))
+        edge = table.position[0] - table.shape.size[0] / 2
+        assert 0.10 <= cube.position[0] - edge <= 0.20
+        assert cube.position[2] == pytest.approx(table.top + 0.025)
+        assert 0.55 <= table.top <= 0.65
+        assert abs(table.position[1] - bin_table.position[1]) > 2.5
+        assert table.position[1] * bin_table.position[1] < 0
+        bin_, size = scene.find("bin"), scene.find("bin").shape.size
+        assert 0.24 <= size[0] - 0.02 <= 0.28
+        assert np.all(
+            np.abs(bin_.position[:2] - bin_table.position[:2]) < bin_table.shape.size[:2] / 2 - size[:2] / 2
+        )
+        assert bin_.position[2] - size[2] / 2 == pytest.approx(bin_table.top)
+
+
+def test_pick_place_obstacles_leave_room():
+    model = load_model()
+    counts = set()
+    for episode in episodes(PickPlace()):
+        obstacles = [item for item in episode.scene.objects if item.name.startswith("obstacle")]
+        counts.add(len(obstacles))
+        chassis = np.hypot(*model.description.base_size) / 2
+        for index, item in enumerate(obstacles):
+            away = np.linalg.norm(item.position[:2] - episode.q[:2]) - chassis - footprint(item)
+            assert away > 0.15
+            assert 0.2 <= item.top <= 0.5
+            for other in obstacles[:index]:
+                gap = np.linalg.norm(item.position[:2] - other.position[:2])
+                assert gap > footprint(item) + footprint(other)
+    assert counts == {2, 3}
+
+
+def test_pick_place_uses_both_sides():
+    sides = {np.sign(episode.scene.find("cube").position[1]) for episode in episodes(PickPlace())}
+    assert sides == {-1.0, 1.0}
+
+
+@pytest.mark.parametrize("robot", robot_names())
+def test_pick_place_starts_in_contact_with_nothing_and_at_rest(robot):
+    with environment(robot=robot) as env:
+        for seed in range(8):
+            env.reset(seed=seed)
+            start = env.task_state().pose("cube").position
+            for _ in range(5):
+                *_, info = env.step(action(env))
+                assert info["contacts"] == 0, info["contact_names"]
+            state = env.task_state()
+            assert np.linalg.norm(state.pose("cube").position - start) < 1e-3
+            assert "cube" in state.still
+
+
+def test_obstacles_for_the_controller_are_those_of_the_scene():
+    with environment() as env:
+        env.reset(seed=0)
+        obstacles = {item.name: item for item in env.obstacles()}
+        assert "cube" not in obstacles
+        assert obstacles["bin"].work_surface
+        assert obstacles["cube_table"].work_surface
+        assert not obstacles["obstacle_0"].work_surface
+        for name, obstacle in obstacles.items():
+            pose = env.task_state().pose(name)
+            np.testing.assert_allclose(obstacle.position, pose.position, atol=1e-9)
+
+
+def test_an_obstacle_encloses_what_mujoco_collides():
+    with environment() as env:
+        for seed in range(5):
+            env.reset(seed=seed)
+            compiled = env.simulation.mujoco_model
+            for obstacle in env.obstacles():
+                if obstacle.shape.kind != "box":
+                    continue
+                body = compiled.body(obstacle.name)
+                for index in range(body.geomadr[0], body.geomadr[0] + body.geomnum[0]):
+                    reach_ = np.abs(compiled.geom_pos[index]) + compiled.geom_size[index]
+                    assert np.all(reach_ <= obstacle.shape.size / 2 + 1e-9)
+
+
+@pytest.mark.parametrize(
+    ("where", "gripper", "success", "reason"),
+    [
+        ("bin", 0.0, True, ""),
+        ("bin", 1.0, False, ""),
+        ("beside", 0.0, False, ""),
+        ("floor", 0.0, False, "dropped"),
+    ],
+)
+def test_pick_place_is_judged_by_where_the_cube_rests(where, gripper, success, reason):
+    with environment() as env:
+        env.reset(seed=1)
+        scene = env.start.scene
+        bin_ = scene.find("bin")
+        places = {
+            "bin": bin_.position + np.array([-0.05, 0.03, 0.3]),
+            "beside": [bin_.position[0] + 0.25, bin_.position[1], scene.find("bin_table").top + 0.03],
+            "floor": [-0.8, 0.9, 0.03],
+        }
+        env.reset(options={"start": moved(env.start, "cube", places[where])})
+        for _ in range(40):
+            *_, terminated, _, info = env.step(action(env, gripper=gripper))
+            if terminated:
+                break
+        assert info["is_success"] == success
+        assert info["failure_reason"] == reason
+        assert terminated == (success or bool(reason))
+
+
+def test_no_success_while_the_gripper_is_at_the_cube():
+    with environment() as env:
+        env.reset(seed=1)
+        episode = moved(env.start, "cube", env.start.scene.find("bin").position - [0.0, 0.0, 0.015])
+        env.reset(options={"start": episode})
+        cube = env.task_state().pose("cube").position
+        q = np.array([cube[0] - 1.05, cube[1], 0.0, 1.57, -1.2, 1.8, -2.2, -1.57, 0.0])
+        for height, success in ((0.05, False), (0.12, True)):
+            near = reach(env.model, q, cube + height * UP, np.diag([1.0, -1.0, -1.0]))
+            env.reset(options={"start": Start(episode.scene, near)})
+            for _ in range(20):
+                *_, terminated, _, info = env.step(action(env))
+                if terminated:
+                    break
+            assert info["is_success"] == success
+
+
+def test_no_success_while_the_cube_flies_through():
+    with environment() as env:
+        env.reset(seed=1)
+        high = env.start.scene.find("bin").position + 0.5 * UP
+        env.reset(options={"start": moved(env.start, "cube", high)})
+        inside_and_moving = 0
+        for _ in range(60):
+            *_, terminated, _, info = env.step(action(env))
+            state = env.task_state()
+            inside = abs(state.pose("cube").position[2] - state.pose("bin").position[2]) < 0.05
+            inside_and_moving += inside and "cube" not in state.still
+            assert not (info["is_success"] and "cube" not in state.still)
+            if terminated:
+                break
+        assert inside_and_moving > 0
+        assert info["is_success"]
+
+
+def test_a_grasped_cube_stays_through_lifting_driving_and_turning():
+    """Closure: 1 m/s² of the base, 1 rad/s at the wrist, ten seconds of holding; slip below 2 mm."""
+    with environment() as env:
+        env.reset(options={"start": over_cube(env, 1, 0.005)})
+
+        def slip() -> np.ndarray:
+            state = env.task_state()
+            return state.tool.rotation.T @ (state.pose("cube").position - state.tool.position)
+
+        def drive(steps: int, velocity, gripper: float = 1.0) -> None:
+            for _ in range(steps):
+                *_, info = env.step(action(env, velocity, gripper))
+                assert info["contacts"] == 0, info["contact_names"]
+
+        drive(25, 0.0)
+        held = slip()
+        assert 0.4 < env.simulation.opening < 0.7
+        for _ in range(40):
+            J = env.model.jacobian(env.state().q)[:, 3:]
+            lift = np.linalg.lstsq(J, np.array([0, 0, 0.1, 0, 0, 0.0]), rcond=None)[0]
+            drive(1, np.concatenate([np.zeros(3), lift]))
+        drive(20, [-1.0] + [0.0] * 8)  # the limiter makes this ±1 m/s²
+        drive(30, 0.0)
+        drive(20, [0.0] * 8 + [1.0])
+        drive(200, 0.0)
+        assert env.task_state().pose("cube").position[2] > env.task_state().object("cube").position[2] + 0.15
+        assert np.linalg.norm(slip() - held) < 0.002
+        for _ in range(40):
+            env.step(action(env))
+        assert env.task_state().pose("cube").position[2] < 0.7  # open fingers let go
+
+
+def test_a_scene_refuses_two_things_of_one_name():
+    thing = SceneObject("thing", box([0.1] * 3), np.zeros(3))
+    with pytest.raises(HandrailError, match="unique object names, got 'thing'"):
+        Scene((thing, thing))
+
+
+def test_unknown_objects_are_named():
+    with environment() as env:
+        env.reset(seed=0)
+        with pytest.raises(HandrailError, match="unknown scene object 'cup': expected one of bin, "):
+            env.task_state().pose("cup")
+        with pytest.raises(HandrailError, match="unknown scene object 'cup'"):
+            env.task_state().object("cup")
+
+
+def test_no_room_for_obstacles_is_an_error():
+    with pytest.raises(HandrailError, match="no room for"):
+        PickPlace(clearance=3.0).sample(load_model(), np.random.default_rng(0))
+
+
+def test_the_marker_is_never_touched():
+    model = load_model()
+    goal = model.pose(model.description.home)
+    episode = Reach().sample(model, np.random.default_rng(0))
+    marker = moved(episode, "goal", goal.position).scene
+    simulation = Simulation(model, marker, np.array(model.description.home), 0.05)
+    mujoco.mj_step(simulation.mujoco_model, simulation.data)
+    assert simulation.data.ncon == 0
