@@ -1,12 +1,14 @@
 """Settings of the masked MPC."""
 
-from dataclasses import dataclass, fields
-from typing import Self
+from dataclasses import dataclass
+from typing import Annotated, Self
 
 import numpy as np
+from msgspec import Meta
 
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.intent import DEAD_MAN_TIME
+from handrail.controllers.typed import Count, NonNegative, Positive, check_settings
 
 _LENGTHS = ("margin", "work_margin", "activation_distance", "largest_speed", "length")
 
@@ -41,29 +43,29 @@ class MpcSettings:
         length: what weighs as much as one radian [m]: weights of translations are divided by its square.
     """
 
-    horizon: int = 10
-    dt: float = 0.1
-    decay: float = 0.9
-    tracked_stages: int = 0
-    tracking: float = 1000.0
-    turn_tracking: float = 1000.0
-    base_velocity: float = 0.01
-    arm_velocity: float = 0.1
-    acceleration: float = 0.01
-    posture: float = 0.05
-    terminal_velocity: float = 0.1
-    margin: float = 0.10
-    work_margin: float = 0.008
-    margin_share: float = 0.3
-    activation_distance: float = 0.15
-    slack_linear: float = 1e6
-    slack_quadratic: float = 1e6
-    largest_speed: float = 2.0
-    largest_rate: float = 4.0
-    intent_timeout: float = DEAD_MAN_TIME
-    velocity_tolerance: float = 0.1
+    horizon: Annotated[int, Meta(ge=2)] = 10
+    dt: Positive = 0.1
+    decay: Annotated[float, Meta(gt=0, le=1)] = 0.9
+    tracked_stages: Count = 0
+    tracking: NonNegative = 1000.0
+    turn_tracking: NonNegative = 1000.0
+    base_velocity: NonNegative = 0.01
+    arm_velocity: NonNegative = 0.1
+    acceleration: NonNegative = 0.01
+    posture: NonNegative = 0.05
+    terminal_velocity: NonNegative = 0.1
+    margin: NonNegative = 0.10
+    work_margin: NonNegative = 0.008
+    margin_share: NonNegative = 0.3
+    activation_distance: NonNegative = 0.15
+    slack_linear: NonNegative = 1e6
+    slack_quadratic: NonNegative = 1e6
+    largest_speed: NonNegative = 2.0
+    largest_rate: NonNegative = 4.0
+    intent_timeout: NonNegative = DEAD_MAN_TIME
+    velocity_tolerance: NonNegative = 0.1
 
-    length: float = 1.0
+    length: Positive = 1.0
 
     @classmethod
     def of(cls, scale: float, **values: float) -> Self:
@@ -79,17 +81,7 @@ class MpcSettings:
 
     def __post_init__(self) -> None:
         """Check the numbers."""
-        for entry in fields(self):
-            value = getattr(self, entry.name)
-            if not np.isfinite(value) or value < 0:
-                raise HandrailError(f"MPC setting {entry.name}: expected a finite number >= 0, got {value}")
-        if self.horizon < 2 or self.dt <= 0 or not 0 < self.decay <= 1:
-            raise HandrailError(
-                "MPC settings horizon, dt, decay: expected horizon >= 2, dt > 0, 0 < decay <= 1, "
-                f"got {self.horizon}, {self.dt}, {self.decay}"
-            )
-        if not self.length:
-            raise HandrailError("MPC setting length: expected a number > 0, got 0")
+        check_settings(self, "MPC setting")
 
     def check_period(self, period: float, name: str) -> None:
         """Check that a loop is fast enough: only the plan's first stage is certified.
