@@ -1,7 +1,7 @@
 """Types that check: ranges and choices stand on a field's type, and files are decoded into typed values.
 
-A settings class with fields as `Annotated[float, Meta(ge=0)]` checks itself with `check_settings`; a table of a
-file (TOML, JSON, a message) becomes a dataclass by `decoded`. Both refuse what does not fit in one line.
+A settings class with fields as `Annotated[float, Meta(ge=0)]` checks itself with `check_settings`; a table of
+a file (TOML, JSON, a message) becomes a dataclass by `decoded`. Both refuse what does not fit in one line.
 """
 
 from collections.abc import Mapping
