@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from handrail.collect.world.envs.env import HandrailEnv as HandrailEnv
 
 _MODULES = {
-    "HandrailEnv": "envs.env",
+    "HandrailEnv": "world.envs.env",
     "MODES": "operators.modes",
     "RecordConfig": "config",
     "Session": "session.session",

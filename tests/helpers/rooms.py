@@ -1,7 +1,4 @@
-"""The house as its imports draw it: rooms (folders) and the arrows between them.
-
-python tests/helpers/rooms.py    draw it anew in docs/architecture.md
-"""
+"""Rooms (folders) and the arrows between them, from the imports."""
 
 import ast
 import functools
@@ -12,9 +9,7 @@ import networkx
 from places import ROOT
 
 FLOORS = ("controllers", "datasets", "collect", "policies", "scripts")  # from the ground up
-PAGE = ROOT / "docs" / "architecture.md"
 NAMED = re.compile(rf"handrail\.(?:{'|'.join(FLOORS)})[\w.]*(?::\w+)?")
-_DRAWING = re.compile(r"```mermaid\n.*?```", re.DOTALL)
 
 
 def sources(floor: str) -> list[Path]:
@@ -65,38 +60,3 @@ def arrows() -> networkx.DiGraph:
         targets = {modules[name] for path in files for name in imported(path) if name in modules}
         graph.add_edges_from((room, target) for target in targets - {room})
     return graph
-
-
-def drawing() -> str:
-    """Return the graph as a Mermaid drawing, a box a floor, without the arrows that others imply."""
-    graph = networkx.transitive_reduction(arrows())
-    lines = ["```mermaid", "flowchart BT"]
-    for floor in FLOORS:
-        lines.append(f"  subgraph {floor}")
-        lines += [f"    {_node(room)}" for room in sorted(graph) if room.split(".")[0] == floor]
-        lines.append("  end")
-    lines += [f"  {_name(room)} --> {_name(target)}" for room, target in sorted(graph.edges)]
-    return "\n".join([*lines, "```"])
-
-
-def _name(room: str) -> str:
-    return room.replace(".", "_") if "." in room else f"{room}_root"
-
-
-def _node(room: str) -> str:
-    return f"{_name(room)}[{room.partition('.')[2] or 'root'}]"
-
-
-def main() -> None:
-    """Draw the house anew in its page."""
-    PAGE.write_text(_DRAWING.sub(drawing().replace("\\", r"\\"), PAGE.read_text(), count=1))
-
-
-def drawn() -> str:
-    """Return the drawing in the page."""
-    found = _DRAWING.search(PAGE.read_text())
-    return found[0] if found else ""
-
-
-if __name__ == "__main__":
-    main()
