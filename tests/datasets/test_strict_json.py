@@ -2,10 +2,10 @@
 
 import json
 import os
-import shutil
 
 import numpy as np
 import pytest
+from canned import copied
 from command_helpers import command
 from datasets_helpers import create, record
 
@@ -37,14 +37,9 @@ BAD = {
 }
 
 
-@pytest.fixture(scope="module")
-def original(tmp_path_factory):
-    return record(tmp_path_factory.mktemp("info") / "set", 2)
-
-
 @pytest.fixture
-def root(original, tmp_path):
-    return shutil.copytree(original, tmp_path / "set")
+def root(tmp_path):
+    return copied(tmp_path / "set", record, 2)
 
 
 @pytest.mark.parametrize("name", BAD)

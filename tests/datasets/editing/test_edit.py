@@ -4,6 +4,7 @@ import shlex
 
 import numpy as np
 import pytest
+from canned import canned, copied
 from command_helpers import command
 from datasets_helpers import CAMERAS, TASKS, brightness, open_with_lerobot, tree
 from editing_helpers import LENGTH, MOVING, STILL, record_episodes
@@ -19,8 +20,8 @@ WHOLE = (0, LENGTH)
 
 
 @pytest.fixture(scope="module")
-def recorded(tmp_path_factory):
-    return record_episodes(tmp_path_factory.mktemp("recorded") / "set", cameras=True)
+def recorded():
+    return canned(record_episodes, cameras=True)
 
 
 def edit(line, *folders, code=0):
@@ -178,7 +179,7 @@ MISTAKES = {
 
 @pytest.mark.parametrize("line", MISTAKES)
 def test_a_mistake_is_one_line_and_changes_nothing(tmp_path, line):
-    root = record_episodes(tmp_path / "set")
+    root = copied(tmp_path / "set", record_episodes)
     before = tree(tmp_path)
     done = edit(line.replace("OUT", str(tmp_path / "out")).replace("SET", str(root)), root, code=2)
     assert done.stderr.count("\n") == 1
@@ -187,13 +188,13 @@ def test_a_mistake_is_one_line_and_changes_nothing(tmp_path, line):
 
 
 def test_what_another_tool_wrote_is_not_edited(tmp_path):
-    root = record_episodes(tmp_path / "set")
+    root = copied(tmp_path / "set", record_episodes)
     Layout(root).manifest.unlink()
     assert "lerobot-edit-dataset edits it" in edit("trim --in_place", root, code=2).stderr
 
 
 def test_a_damaged_dataset_is_not_edited(tmp_path):
-    root = record_episodes(tmp_path / "set")
+    root = copied(tmp_path / "set", record_episodes)
     Layout(root).data(1).unlink()
     said = edit(f"delete --episodes 0 --output {tmp_path / 'new'}", root, code=2).stderr
     assert "episode 1: data/chunk-000/file-001.parquet is missing" in said
@@ -202,7 +203,7 @@ def test_a_damaged_dataset_is_not_edited(tmp_path):
 
 def test_an_edit_that_was_cut_short_is_finished_and_not_done_twice(tmp_path):
     """Killed between two renames, the same line again would delete another episode."""
-    root = record_episodes(tmp_path / "set")
+    root = copied(tmp_path / "set", record_episodes)
     edit(f"delete --episodes 0 --output {tmp_path / '.set.partial'}", root)
     root.rename(tmp_path / ".set.old")
     said = edit("delete --episodes 0 --in_place", root, code=2).stderr

@@ -6,6 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+from canned import canned
 from command_helpers import command
 from datasets_guillotine import Guillotine
 from datasets_helpers import (
@@ -43,9 +44,9 @@ def groups_of(path) -> list[list[int]]:
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory):
+def whole():
     """Seven episodes recorded one after the other."""
-    return part(tmp_path_factory.mktemp("whole") / "set", 0, 7)
+    return canned(part, 0, 7)
 
 
 @settings(max_examples=6, deadline=None)

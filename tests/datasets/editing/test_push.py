@@ -5,6 +5,7 @@ import re
 import fsspec
 import pytest
 import yaml
+from canned import copied
 from command_helpers import command
 from datasets_helpers import CAMERAS, tree
 from editing_helpers import record_episodes
@@ -57,7 +58,7 @@ def hub(monkeypatch):
 
 @pytest.fixture
 def root(tmp_path):
-    return record_episodes(tmp_path / "set", 3, cameras=True, mode="ee")
+    return copied(tmp_path / "set", record_episodes, 3, cameras=True, mode="ee")
 
 
 def push(root, *words, code=0):

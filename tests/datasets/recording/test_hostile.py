@@ -10,7 +10,7 @@ import socket
 import pyarrow.parquet as pq
 import pytest
 from command_helpers import command
-from datasets_helpers import create, record, resume, tree
+from datasets_helpers import create, resume, tree
 
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.format.layout import Layout
@@ -23,11 +23,6 @@ COMMANDS = (
     ("pack", "--output", "/nowhere/new"),
     ("repair",),
 )
-
-
-@pytest.fixture
-def root(tmp_path):
-    return record(tmp_path / "set", 4, cameras=True)
 
 
 @pytest.mark.parametrize("name", [".handrail", ".damaged", "data", "meta/episodes", "videos"])

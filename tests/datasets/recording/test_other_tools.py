@@ -26,11 +26,6 @@ from handrail.datasets.reading.reader import read_episodes
 from handrail.datasets.recording.repair import repair
 
 
-@pytest.fixture
-def root(tmp_path):
-    return record(tmp_path / "set", 4, cameras=True)
-
-
 def test_what_lerobot_encoded_anew_is_whole(root):
     """The first version set aside every episode of a dataset after `lerobot-edit-dataset reencode_videos`."""
     with warnings.catch_warnings():

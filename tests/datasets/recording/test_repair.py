@@ -28,16 +28,6 @@ from handrail.datasets.recording.folder import set_aside
 from handrail.datasets.recording.repair import repair
 
 
-@pytest.fixture(scope="module")
-def original(tmp_path_factory):
-    return record(tmp_path_factory.mktemp("repair") / "set", 4, cameras=True)
-
-
-@pytest.fixture
-def root(original, tmp_path):
-    return shutil.copytree(original, tmp_path / "set")
-
-
 def _flip_a_byte(path, place=1 / 3):
     content = bytearray(path.read_bytes())
     content[int(len(content) * place)] ^= 0xFF

@@ -3,25 +3,11 @@
 import shutil
 
 import pytest
-from datasets_helpers import (
-    record,
-    resume,
-    tree,
-)
+from datasets_helpers import record, resume, tree
 
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.format.layout import Layout
 from handrail.datasets.recording.repair import repair
-
-
-@pytest.fixture(scope="module")
-def original(tmp_path_factory):
-    return record(tmp_path_factory.mktemp("repair") / "set", 4, cameras=True)
-
-
-@pytest.fixture
-def root(original, tmp_path):
-    return shutil.copytree(original, tmp_path / "set")
 
 
 @pytest.mark.parametrize("asked", [False, True])

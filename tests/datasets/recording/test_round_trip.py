@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from canned import canned
 from datasets_helpers import (
     CAMERA_FEATURES,
     CAMERAS,
@@ -29,8 +30,8 @@ EPISODES = 5
 
 
 @pytest.fixture(scope="module")
-def root(tmp_path_factory):
-    return record(tmp_path_factory.mktemp("round_trip") / "set", EPISODES, cameras=True)
+def root():
+    return canned(record, EPISODES, cameras=True)
 
 
 @pytest.fixture(scope="module")
