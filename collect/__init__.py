@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from handrail.collect.session.build import build_env as build_env
     from handrail.collect.session.build import build_session as build_session
     from handrail.collect.session.session import Session as Session
-    from handrail.collect.world.envs.env import HandrailEnv as HandrailEnv
+    from handrail.collect.world.env import HandrailEnv as HandrailEnv
 
 _MODULES = {
     "HandrailEnv": "world.envs.env",
@@ -41,7 +41,7 @@ __getattr__ = lazily(__name__, _MODULES)
 for _spec in TASKS.built_in:
     gymnasium.register(
         f"handrail/{str(_spec.task).rpartition(':')[2]}-v0",
-        entry_point="handrail.collect.world.envs.env:HandrailEnv",
+        entry_point="handrail.collect.world.env:HandrailEnv",
         kwargs={"task": _spec.task},
     )
 

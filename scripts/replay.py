@@ -18,7 +18,7 @@ def main(config: ReplayConfig) -> int:
     """Run the command."""
     config.check()
     from handrail.collect.commands.replay import replay_one_of
-    from handrail.collect.session.contact_sheet import save_sheet
+    from handrail.collect.session.film import save_sheet
     from handrail.datasets.presentation.table import Table
     from handrail.datasets.presentation.terminal import Terminal
     from handrail.datasets.reading.open_dataset import open_dataset

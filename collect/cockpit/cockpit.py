@@ -44,7 +44,7 @@ from handrail.collect.operators.person.inputs import Ask, Inputs
 from handrail.collect.operators.person.person import Person, Phase
 from handrail.collect.session.build import build_modes
 from handrail.collect.session.outcome import Outcome
-from handrail.collect.world.envs.env import HandrailEnv
+from handrail.collect.world.env import HandrailEnv
 from handrail.controllers.errors import HandrailError, not_installed
 from handrail.controllers.interface.intent import Intent
 from handrail.controllers.robot.model import RobotModel

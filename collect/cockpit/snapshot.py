@@ -11,7 +11,7 @@ from handrail.collect.cockpit.lead import Lead, Leads
 from handrail.collect.operators.operator import View
 from handrail.collect.operators.person.person import Person, Phase
 from handrail.collect.session.outcome import Outcome
-from handrail.collect.world.envs.env import HandrailEnv
+from handrail.collect.world.env import HandrailEnv
 from handrail.collect.world.geometry import ROBOT_BIT
 from handrail.collect.world.gl import MjData, MjModel, mujoco
 from handrail.collect.world.tasks.task import Aimed, TaskState

@@ -6,7 +6,7 @@ from handrail.collect.commands.replay import replay_episode
 from handrail.collect.commands.tables import summary_table
 from handrail.collect.commands.target import command_prefix
 from handrail.collect.config import DatasetConfig, RecordConfig
-from handrail.collect.session.contact_sheet import save_sheet
+from handrail.collect.session.film import save_sheet
 from handrail.collect.world.gl import graphics_trouble
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.presentation.terminal import Terminal

@@ -25,7 +25,7 @@ from handrail.collect.operators.catalogue import OPERATORS
 from handrail.collect.operators.operator import EpisodeEvent
 from handrail.collect.session.build import build_env, build_modes, build_session
 from handrail.collect.session.display import Display
-from handrail.collect.world.envs.env import HandrailEnv
+from handrail.collect.world.env import HandrailEnv
 from handrail.controllers.errors import FAILED, INTERRUPTED, HandrailError
 from handrail.controllers.interrupts import Interrupts
 from handrail.controllers.registry import resolved

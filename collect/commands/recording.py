@@ -16,12 +16,12 @@ from handrail.collect.session.build import (
     session_features,
 )
 from handrail.collect.session.outcome import Outcome
-from handrail.collect.session.recorded_settings import COLUMN as SETTINGS
-from handrail.collect.session.recorded_settings import settings_json
+from handrail.collect.session.recorded import COLUMN as SETTINGS
+from handrail.collect.session.recorded import settings_json
 from handrail.collect.session.recorder import Recorder
 from handrail.collect.session.rehearsal import Rehearsal
 from handrail.collect.session.session import Observer
-from handrail.collect.world.envs.env import HandrailEnv
+from handrail.collect.world.env import HandrailEnv
 from handrail.controllers.interrupts import Interrupts
 from handrail.controllers.versions import SIMULATION, versions
 from handrail.datasets.format.columns import CLIENT, Scalar

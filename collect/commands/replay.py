@@ -11,11 +11,10 @@ from numpy.typing import NDArray
 
 from handrail.collect.operators.operator import View
 from handrail.collect.session.build import build_env
-from handrail.collect.session.recorded_commands import RecordedCommands
-from handrail.collect.session.recorded_settings import recorded_settings
+from handrail.collect.session.film import VideoFile
+from handrail.collect.session.recorded import RecordedCommands, recorded_settings
 from handrail.collect.session.session import Session
-from handrail.collect.session.video_file import VideoFile
-from handrail.collect.world.envs.env import HandrailEnv
+from handrail.collect.world.env import HandrailEnv
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.entries import is_count
 from handrail.controllers.errors import HandrailError

@@ -15,7 +15,7 @@ from typing import Any
 import pyarrow as pa
 
 from handrail.collect.config import RecordConfig
-from handrail.collect.session.recorded_settings import settings_json
+from handrail.collect.session.recorded import settings_json
 from handrail.controllers.errors import HandrailError, message_of
 from handrail.datasets.editing.merge import check_alike, merged_encodings, merged_types
 from handrail.datasets.editing.source import EditSource

@@ -18,7 +18,7 @@ from handrail.collect.execution.forking import RECORDING
 from handrail.collect.execution.job import Job
 from handrail.collect.session.build import build_env, build_session
 from handrail.collect.session.outcome import Outcome
-from handrail.collect.world.envs.env import HandrailEnv
+from handrail.collect.world.env import HandrailEnv
 from handrail.controllers.errors import FAILED, INTERRUPTED, HandrailError
 from handrail.controllers.interrupts import Interrupts
 from handrail.datasets.format.layout import Layout

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from handrail.collect.commands.recording import open_writer
 from handrail.collect.config import FoundDatasetConfig, RecordConfig
-from handrail.collect.world.envs.env import HandrailEnv
+from handrail.collect.world.env import HandrailEnv
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.format.layout import Layout
 from handrail.datasets.recording.folder import is_dataset

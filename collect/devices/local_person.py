@@ -13,7 +13,7 @@ from handrail.collect.operators.operator import EpisodeEvent, View
 from handrail.collect.operators.person.inputs import ASKS, Ask, Inputs
 from handrail.collect.operators.person.person import Person, Phase
 from handrail.collect.session.outcome import Outcome
-from handrail.collect.world.envs.env import HandrailEnv
+from handrail.collect.world.env import HandrailEnv
 from handrail.controllers.interface.intent import Intent
 from handrail.datasets.recording.frames import Frame
 

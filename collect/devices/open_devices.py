@@ -27,7 +27,7 @@ from handrail.collect.operators.person.inputs import Ask
 from handrail.collect.operators.person.person import Person
 from handrail.collect.session.build import build_modes
 from handrail.collect.teleop_config import TeleopConfig
-from handrail.collect.world.envs.env import HandrailEnv
+from handrail.collect.world.env import HandrailEnv
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.channels import Channels
 

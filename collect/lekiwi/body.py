@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from handrail.collect.processor.units import RobotUnits, number
-from handrail.collect.world.envs.env import HandrailEnv
+from handrail.collect.world.env import HandrailEnv
 from handrail.collect.world.rendering import Painter
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.numerics.rotation import turned

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from handrail.collect.config import RecordConfig
 from handrail.collect.lekiwi.link import Link, connect
 from handrail.collect.session.build import build_env
-from handrail.collect.world.envs.env import HandrailEnv
+from handrail.collect.world.env import HandrailEnv
 from handrail.collect.world.scene import Scene
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.collision.model import CollisionModel

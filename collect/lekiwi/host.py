@@ -14,7 +14,7 @@ from handrail.collect.lekiwi.body import LeKiwiBody
 from handrail.collect.lekiwi.host_config import HostConfig
 from handrail.collect.lekiwi.host_loop import LeKiwiLoop
 from handrail.collect.processor.units import robot_units
-from handrail.collect.world.envs.env import HandrailEnv
+from handrail.collect.world.env import HandrailEnv
 from handrail.collect.world.tasks.catalogue import TASKS
 from handrail.controllers.errors import HandrailError, message_of, not_installed
 from handrail.controllers.registry import resolved

@@ -12,7 +12,7 @@ from handrail.collect.lerobot.mode_action import ModeAction
 from handrail.collect.operators.modes import MASK
 from handrail.collect.seeds import FIRST_SEED
 from handrail.collect.session.build import build_mode, build_task
-from handrail.collect.world.envs.observation import AgentObservation
+from handrail.collect.world.observation import AgentObservation
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.robot.model import load_model

@@ -13,9 +13,8 @@ from handrail.collect.operators.modes import MODES, TeleopMode
 from handrail.collect.session.build import build_controller, build_env, build_mode
 from handrail.collect.session.loop import EpisodeLoop
 from handrail.collect.session.mode_controller import ModeController
-from handrail.collect.world.envs.env import Observation
-from handrail.collect.world.envs.observation import box_space
-from handrail.collect.world.envs.obstacle_numbers import MOST, WIDTH, to_numbers
+from handrail.collect.world.env import Observation
+from handrail.collect.world.observation import MOST, WIDTH, box_space, to_numbers
 from handrail.collect.world.rendering import Painter
 from handrail.controllers.baselines.direct import DirectController
 from handrail.controllers.errors import HandrailError

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from handrail.collect.processor.units import BodyReading, RobotUnits
-from handrail.collect.world.gate import Gate
+from handrail.collect.world.plant import Gate
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import HandrailError, shown
 from handrail.controllers.interface.controller import State

@@ -10,12 +10,12 @@ from handrail.collect.config import SessionConfig, check_fps
 from handrail.collect.operators.catalogue import OPERATORS
 from handrail.collect.operators.modes import MODES, TeleopMode, mode_of_mask
 from handrail.collect.operators.operator import Operator
+from handrail.collect.session.disturbances import sample_shifted
 from handrail.collect.session.mode_controller import ModeController
 from handrail.collect.session.session import Observer, Session
-from handrail.collect.session.shift import sample_shifted
-from handrail.collect.world.envs.env import RENDER_SIZE, HandrailEnv
+from handrail.collect.world.env import RENDER_SIZE, HandrailEnv
 from handrail.collect.world.ideal_robot import IdealRobot
-from handrail.collect.world.protocols import Plant
+from handrail.collect.world.plant import Plant
 from handrail.collect.world.simulation import Simulation
 from handrail.collect.world.tasks.catalogue import TASKS
 from handrail.collect.world.tasks.task import Task

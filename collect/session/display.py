@@ -9,7 +9,7 @@ import numpy as np
 
 from handrail.collect.session.outcome import Outcome
 from handrail.collect.session.viewer import Viewer
-from handrail.collect.world.envs.env import HandrailEnv
+from handrail.collect.world.env import HandrailEnv
 from handrail.controllers.errors import HandrailError, message_of, not_installed
 from handrail.controllers.interface.channel_matrix import channel_matrix
 from handrail.controllers.interface.channels import Channels

@@ -1,20 +1,77 @@
-"""The video of an episode: the scene camera's pictures with a caption."""
+"""Pictures of episodes for people: a video file, the video of an episode, a contact sheet."""
 
-from collections.abc import Callable
+import io
+import os
+from collections.abc import Callable, Sequence
+from fractions import Fraction
 from functools import cache
 from pathlib import Path
+from types import TracebackType
+from typing import Self
 
+import av
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
-from handrail.collect.session.video_file import VideoFile
-from handrail.collect.world.envs.env import HandrailEnv
+from handrail.collect.world.env import HandrailEnv
 from handrail.datasets.recording.frames import Frame
+from handrail.datasets.storage.atomic import beside, explained, sync_file, sync_folder, write_whole
 
 _font = cache(ImageFont.load_default)
 SIZE = (540, 960)  # height, width [px]
 _BAR = 64  # height of the caption [px]; both even, as h264 wants
+_GAP = 6  # between pictures [px]
+
+
+class VideoFile:
+    """Encodes pictures; a context that gives the file its name at the end, unless something went wrong.
+
+    Args:
+        path: of the file, .mp4.
+        size: height and width of the pictures [px]; both even, as h264 wants.
+        fps: pictures a second.
+    """
+
+    def __init__(self, path: Path, size: tuple[int, int], fps: int | Fraction) -> None:
+        self._path, self._partial = path, beside(path, "partial")
+        self._container = av.open(str(self._partial), "w", format="mp4")
+        rate = Fraction(fps)
+        self._stream = self._container.add_stream(
+            "libx264", rate=rate, options={"crf": "20", "preset": "medium", "x264-params": "log=-1"}
+        )
+        self._stream.height, self._stream.width = size
+        self._tick = 1 / rate  # [s]; the muxer may choose another for the file
+        self._stream.pix_fmt, self._stream.time_base = "yuv420p", self._tick
+        self._count = 0
+
+    def __enter__(self) -> Self:
+        """Begin."""
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Write what the encoder still holds and close the file; after an error remove it."""
+        try:
+            with explained(str(self._path)):
+                if error is None:
+                    self._container.mux(self._stream.encode(None))
+                self._container.close()
+                if error is None:
+                    sync_file(self._partial)
+                    os.replace(self._partial, self._path)
+                    sync_folder(self._path.parent)
+        finally:
+            self._partial.unlink(missing_ok=True)
+
+    def add(self, picture: NDArray[np.uint8]) -> None:
+        """Add a picture, (height, width, 3)."""
+        frame = av.VideoFrame.from_ndarray(picture, format="rgb24")
+        frame.pts, frame.time_base = self._count, self._tick
+        with explained(str(self._path)):
+            self._container.mux(self._stream.encode(frame))
+        self._count += 1
 
 
 class Filmer(VideoFile):
@@ -59,3 +116,24 @@ def captioned(picture: NDArray[np.uint8], bar: int, *lines: tuple[str, int, int]
     for (text, below, size), colour in zip(lines, ((245, 245, 245), (190, 195, 205)), strict=True):
         draw.text((12, height + below), text, font=_font(size), fill=colour)
     return np.array(image)
+
+
+def contact_sheet(pictures: Sequence[NDArray[np.uint8]], columns: int = 4) -> NDArray[np.uint8]:
+    """Return the pictures in rows, in reading order, (height, width, 3).
+
+    Args:
+        pictures: of one size, (h, w, 3) each.
+        columns: pictures a row.
+    """
+    tiles = [np.pad(picture, ((0, _GAP), (0, _GAP), (0, 0)), constant_values=255) for picture in pictures]
+    tiles += [np.full_like(tiles[0], 255)] * (-len(tiles) % columns)
+    rows = [np.hstack(tiles[start : start + columns]) for start in range(0, len(tiles), columns)]
+    return np.pad(np.vstack(rows), ((_GAP, 0), (_GAP, 0), (0, 0)), constant_values=255)
+
+
+def save_sheet(pictures: Sequence[NDArray[np.uint8]], path: Path) -> None:
+    """Write a contact sheet as a .png file."""
+    stream = io.BytesIO()
+    Image.fromarray(contact_sheet(pictures)).save(stream, format="png")
+    with explained(str(path)):
+        write_whole(path, stream.getvalue())

@@ -16,15 +16,35 @@ import numpy as np
 
 from handrail.collect.operators.operator import EpisodeEvent, View
 from handrail.collect.session.outcome import Tally
-from handrail.collect.session.rate import Rate
-from handrail.collect.world.envs.env import HandrailEnv, Observation
+from handrail.collect.world.env import HandrailEnv, Observation
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.interface.command import Command
 from handrail.controllers.interface.controller import Controller, State
 from handrail.controllers.interface.intent import Intent
 from handrail.datasets.recording.frames import Frame
 
+ROUNDING = 1e-9  # of times [s]
 _CREEP = 1e-3  # slower, a robot that brakes is sent rest [m/s, rad/s]
+
+
+class Rate:
+    """Says at which steps something is due that happens once a period.
+
+    Args:
+        period: [s].
+        start: when it is due first [s].
+    """
+
+    def __init__(self, period: float, start: float = 0.0) -> None:
+        self._period, self._next = period, start
+
+    def due(self, time: float) -> bool:
+        """Whether it is due at a step's time [s]."""
+        return time >= self._next - ROUNDING
+
+    def take(self) -> None:
+        """Take note that it happens."""
+        self._next += self._period
 
 
 class Driver:

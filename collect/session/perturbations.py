@@ -20,7 +20,7 @@ class Perturbation:
     """How much an episode is disturbed, each way; 0 is not at all.
 
     Attributes:
-        push: strength of the pushes on base and hand; 1 is that of `collect/session/push.py`.
+        push: strength of the pushes on base and hand; 1 is that of `collect/session/disturbances.py`.
         shift: how far from the demonstrations' start the robot begins at most [m, rad].
         delay: control periods by which observations come late.
     """

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 
 from handrail.collect.session.outcome import Outcome
-from handrail.collect.world.envs.env import HandrailEnv
+from handrail.collect.world.env import HandrailEnv
 from handrail.datasets.recording.frames import Frame, frame_row
 from handrail.datasets.recording.writer import EpisodeWriter, Scalar
 

@@ -9,17 +9,16 @@ view ─▶ operator ─ intent ─▶ loop.step ─▶ frame ─▶ observers (
 import gc
 import logging
 from collections.abc import Callable, Sequence
+from copy import copy
 from dataclasses import replace
 from typing import Protocol
 
 import numpy as np
 
 from handrail.collect.operators.operator import EpisodeEvent, Operator
-from handrail.collect.session.loop import Disturbance, EpisodeLoop
+from handrail.collect.session.loop import ROUNDING, Disturbance, EpisodeLoop
 from handrail.collect.session.outcome import Outcome, Tally
-from handrail.collect.session.rate import Sampling
-from handrail.collect.session.undo import Undo
-from handrail.collect.world.envs.env import HandrailEnv
+from handrail.collect.world.env import HandrailEnv
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import Controller
 from handrail.controllers.interface.intent import LONG_AGO, Intent
@@ -27,6 +26,83 @@ from handrail.controllers.numerics.threads import single_threaded
 from handrail.datasets.recording.frames import Frame
 
 _log = logging.getLogger(__name__)
+
+
+class Sampling:
+    """Makes the frames of a recording from those of the robot's periods.
+
+    Args:
+        period: of the recording [s].
+
+    Attributes:
+        number: of the frames so far.
+    """
+
+    def __init__(self, period: float) -> None:
+        self._period, self._next = period, period
+        self._open: Frame | None = None
+        self.number = 0
+
+    def add(self, frame: Frame, time: float) -> Frame | None:
+        """Take a period that ends at a time [s]; return the frame that is complete with it, if one is."""
+        lasting = _lasting(self._open, frame) if self._open else frame
+        if not (frame.done or time >= self._next - ROUNDING):
+            self._open = lasting
+            return None
+        self._next += self._period
+        self._open, self.number = None, self.number + 1
+        return replace(lasting, number=self.number - 1)
+
+
+def _lasting(first: Frame, last: Frame) -> Frame:
+    """Return the frame of some periods: observed and asked at the first one, sent at the last one."""
+    return replace(
+        last,
+        state=first.state,
+        environment=first.environment,
+        images=first.images,
+        intent=first.intent,
+        wall_clock=first.wall_clock,
+        contacts=max(first.contacts, last.contacts),
+    )
+
+
+class Undo:
+    """Wraps the loop of an episode that has begun: what came after the last mark can be forgotten.
+
+    Args:
+        loop: of the episode.
+        sampling: of its recording.
+    """
+
+    def __init__(self, loop: EpisodeLoop, sampling: Sampling) -> None:
+        self._loop = loop
+        self._take(sampling)
+
+    @property
+    def safe(self) -> int:
+        """The number of recorded frames that no undo takes back."""
+        return self._sampling.number
+
+    def mark(self, sampling: Sampling) -> None:
+        """Take note of this moment, to come back to; the robot rests."""
+        if self._moved:
+            self._take(sampling)
+
+    def back(self, sampling: Sampling) -> Sampling:
+        """Go back to the last mark; return the recording's sampling of then."""
+        if not self._moved:
+            return sampling
+        self._loop.restore(self._world)
+        return copy(self._sampling)
+
+    @property
+    def _moved(self) -> bool:
+        return self._loop.tally.frames > self._frames
+
+    def _take(self, sampling: Sampling) -> None:
+        self._world, self._frames = self._loop.checkpoint(), self._loop.tally.frames
+        self._sampling = copy(sampling)
 
 
 class Observer(Protocol):

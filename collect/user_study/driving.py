@@ -12,7 +12,7 @@ from handrail.collect.session.outcome import Outcome
 from handrail.collect.user_study.design import ALLOWED, UserStudy
 from handrail.collect.user_study.folder import StudyFolder
 from handrail.collect.user_study.plan import Step, trial_seed
-from handrail.collect.world.envs.env import HandrailEnv
+from handrail.collect.world.env import HandrailEnv
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interrupts import Interrupts
 from handrail.datasets.recording.writer import EpisodeWriter

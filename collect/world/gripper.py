@@ -5,12 +5,13 @@ import pinocchio as pin
 
 from handrail.collect.world import geometry
 from handrail.collect.world.gl import MjsBody, MjSpec, mujoco
-from handrail.collect.world.jaw import JAW, add_jaw, pads
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.robot.description import Gripper, Jaw
 
 _STEEL, _RUBBER = (0.30, 0.31, 0.33, 1.0), (0.10, 0.10, 0.11, 1.0)
 _REFLECTED = 1.0  # inertia of the motor behind each finger, seen through its gear [kg]
+JAW = "finger_left"
+_STIFFNESS, _DAMPING = 6000.0, 120.0  # of its servo, at the pad [N/m], [N s/m]
 
 
 def add_gripper(
@@ -63,8 +64,8 @@ def _add_turning_finger(
     spec: MjSpec, gripper: Gripper, jaw: Jaw, palm: MjsBody, zero: pin.SE3, grips: bool
 ) -> MjsBody:
     """Add the finger that stands still and the jaw; their meshes are drawn, not their pads."""
-    body = add_jaw(spec, gripper, jaw, palm, zero, grips)
-    for name, pad in pads(gripper, jaw, zero).items():
+    body = _add_jaw(spec, gripper, jaw, palm, zero, grips)
+    for name, pad in _pads(gripper, jaw, zero).items():
         at = geometry.pose(pad.translation, pad.rotation)
         _add_pad(body if name == JAW else palm, gripper, name, group=geometry.HIDDEN_GROUP, **at)
     return body
@@ -152,7 +153,7 @@ def _add_servo(spec: MjSpec, gripper: Gripper) -> None:
         ctrlrange=[-gripper.beyond, gripper.stroke],
         forcerange=[-gripper.force, gripper.force],
     )
-    servo.set_to_position(kp=6000.0, kv=120.0)
+    servo.set_to_position(kp=_STIFFNESS, kv=_DAMPING)
 
 
 def _camera_pose(gripper: Gripper) -> dict[str, FloatArray]:
@@ -169,3 +170,57 @@ def _camera_pose(gripper: Gripper) -> dict[str, FloatArray]:
     forward = np.cos(gripper.camera_tilt) * np.array([0.0, 0.0, 1.0]) - np.sin(gripper.camera_tilt) * outward
     up = np.cross(right, forward)
     return geometry.pose(offset, np.column_stack([right, up, -forward]))
+
+
+def _pads(gripper: Gripper, jaw: Jaw, zero: pin.SE3) -> dict[str, pin.SE3]:
+    """Return where the pads are: `finger_right` in the palm's frame, `finger_left` in the jaw's.
+
+    Args:
+        gripper: with the jaw.
+        jaw: it.
+        zero: the jaw's link in the palm's frame, at its joint's zero.
+    """
+    width, _, length = gripper.finger_size
+    height = gripper.tip - length / 2
+    still = pin.SE3(np.eye(3), np.array([width / 2, 0.0, height]))
+    parallel = pin.SE3(np.eye(3), np.array([-jaw.gap - width / 2, 0.0, height]))
+    return {"finger_right": still, JAW: _turned(zero, jaw.parallel).inverse() * parallel}
+
+
+def _turned(zero: pin.SE3, angle: float) -> pin.SE3:
+    """Return the jaw's link at an angle of its joint [rad]."""
+    return zero * pin.SE3(pin.exp3(np.array([0.0, 0.0, angle])), np.zeros(3))
+
+
+def _add_jaw(spec: MjSpec, gripper: Gripper, jaw: Jaw, palm: MjsBody, zero: pin.SE3, grips: bool) -> MjsBody:
+    """Add the body of the jaw, which turns if it grips, else stays open; return it.
+
+    Its servo's torque is limited to the gripper's force at the middle of the pad.
+    """
+    at = _turned(zero, jaw.closed if grips else jaw.open)
+    body = palm.add_body(name=f"{JAW}_body", gravcomp=1.0, **geometry.pose(at.translation, at.rotation))
+    pad = _pads(gripper, jaw, zero)[JAW]
+    body.explicitinertial = True
+    body.mass, body.ipos, body.iquat = gripper.finger_mass, pad.translation, [1.0, 0.0, 0.0, 0.0]
+    body.inertia = geometry.box_inertia(gripper.finger_mass, np.array(gripper.finger_size))
+    if not grips:
+        return body
+    lever = float(np.hypot(*pad.translation[:2]))
+    body.add_joint(
+        name=JAW,
+        type=mujoco.mjtJoint.mjJNT_HINGE,
+        axis=[0.0, 0.0, 1.0],
+        limited=True,
+        range=[0.0, gripper.travel],
+        armature=_REFLECTED * lever**2,
+        damping=[20.0 * lever**2, 0.0, 0.0],
+    )
+    servo = spec.add_actuator(
+        name="gripper",
+        target=JAW,
+        trntype=mujoco.mjtTrn.mjTRN_JOINT,
+        ctrlrange=[-gripper.beyond, gripper.travel],
+        forcerange=[-gripper.force * lever, gripper.force * lever],
+    )
+    servo.set_to_position(kp=_STIFFNESS * lever**2, kv=_DAMPING * lever**2)
+    return body

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from handrail.collect.world.gate import Gate
+from handrail.collect.world.plant import Gate
 from handrail.collect.world.scene import Scene
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.collision.model import CollisionModel

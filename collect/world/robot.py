@@ -11,8 +11,7 @@ import pinocchio as pin
 
 from handrail.collect.world import geometry
 from handrail.collect.world.gl import MjsBody, MjSpec, mujoco
-from handrail.collect.world.gripper import add_gripper
-from handrail.collect.world.jaw import JAW
+from handrail.collect.world.gripper import JAW, add_gripper
 from handrail.collect.world.meshes import placed_meshes
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.numerics.rotation import quaternion_from_matrix

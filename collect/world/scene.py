@@ -2,13 +2,10 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 
 from handrail.collect.world import geometry
-from handrail.collect.world.gl import MjsBody, MjSpec, mujoco
-from handrail.collect.world.patrol import Patrol
 from handrail.controllers.arrays import FloatArray, frozen
 from handrail.controllers.errors import HandrailError, unknown_name
 from handrail.controllers.robot.model import Pose
@@ -16,6 +13,47 @@ from handrail.controllers.robot.shape import Obstacle, Shape
 
 Colour = tuple[float, float, float, float]
 _GREY: Colour = (0.6, 0.6, 0.6, 1.0)
+
+
+@dataclass(frozen=True)
+class Patrol:
+    """From a point to another at a constant speed, back, and again: a function of time alone.
+
+    Attributes:
+        start: where it is at time 0 [m], (3,).
+        end: where it turns [m], (3,).
+        speed: [m/s].
+    """
+
+    start: FloatArray
+    end: FloatArray
+    speed: float
+
+    def __post_init__(self) -> None:
+        """Copy the arrays and make them read-only."""
+        for name in ("start", "end"):
+            object.__setattr__(self, name, frozen(getattr(self, name)))
+        if not self.length > 0 or not 0 < self.speed < np.inf:
+            raise HandrailError(
+                "patrol: expected two points and a positive speed [m/s], "
+                f"got {self.start.tolist()}, {self.end.tolist()} and {self.speed}"
+            )
+
+    @property
+    def length(self) -> float:
+        """Length of the way from start to end [m]."""
+        return float(np.linalg.norm(self.end - self.start))
+
+    def position(self, time: float) -> FloatArray:
+        """Return where it is at a time [s], (3,) [m]."""
+        travelled = (self.speed * time) % (2.0 * self.length)
+        share = min(travelled, 2.0 * self.length - travelled) / self.length
+        return (1.0 - share) * self.start + share * self.end
+
+    def velocity(self, time: float) -> FloatArray:
+        """Return how fast it moves at a time [s], (3,) [m/s]."""
+        forth = (self.speed * time) % (2.0 * self.length) < self.length
+        return (1.0 if forth else -1.0) * self.speed / self.length * (self.end - self.start)
 
 
 @dataclass(frozen=True)
@@ -187,74 +225,6 @@ class Scene:
         Neither the floor, nor markers, nor movable things.
         """
         return tuple(item.obstacle(time) for item in self.objects if not (item.movable or item.ghost))
-
-
-def add_scene(spec: MjSpec, scene: Scene) -> None:
-    """Add the objects and the scene camera to the spec."""
-    for item in scene.objects:
-        _add_object(spec, item)
-    spec.worldbody.add_camera(name="scene", fovy=scene.view.fovy, **_view_pose(scene.view))
-
-
-def _add_object(spec: MjSpec, item: SceneObject) -> None:
-    placement = geometry.pose(item.position, item.rotation)
-    body = spec.worldbody.add_body(name=item.name, mocap=item.patrol is not None, **placement)
-    if item.movable:
-        _add_freedom(body, item)
-    volume = sum(geometry.volume(part.shape) for part in item.parts)
-    for index, part in enumerate(item.solids):
-        mass = item.mass * geometry.volume(part.shape) / volume if item.parts else 0.0
-        body.add_geom(
-            mass=mass,
-            name=item.name if index == 0 else f"{item.name}_{index}",
-            rgba=part.rgba or item.rgba,
-            group=geometry.VISIBLE_GROUP,
-            **geometry.geom_shape(part.shape),
-            **geometry.pose(part.position, part.rotation),
-            **_contact(item),
-        )
-
-
-def _add_freedom(body: MjsBody, item: SceneObject) -> None:
-    """Let a movable thing move; its mass is spread over its parts, or over the box around it."""
-    if item.slide is None:
-        body.add_freejoint(name=item.name)
-    else:
-        body.add_joint(
-            name=item.name,
-            type=mujoco.mjtJoint.mjJNT_SLIDE,
-            axis=item.slide.axis,
-            limited=True,
-            range=[0.0, item.slide.travel],
-            damping=[item.slide.damping, 0.0, 0.0],
-            frictionloss=item.slide.friction,
-        )
-    if not item.parts:
-        body.explicitinertial = True
-        body.mass, body.ipos, body.iquat = item.mass, [0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0]
-        body.inertia = geometry.box_inertia(item.mass, geometry.bounding_box(item.shape))
-
-
-def _contact(item: SceneObject) -> dict[str, Any]:
-    if item.ghost:
-        return {"contype": 0, "conaffinity": 0}
-    return {
-        "contype": geometry.SCENE_BIT,
-        "conaffinity": geometry.SCENE_BIT | (geometry.FLOOR_BIT if item.movable else 0),
-        "condim": 4,
-        "friction": [item.friction, 0.01, 0.0001],
-    }
-
-
-def _view_pose(view: Viewpoint) -> dict[str, FloatArray]:
-    """Return the pose of a camera that looks along −z with y up."""
-    position = np.array(view.position)
-    forward = np.array(view.target) - position
-    forward /= np.linalg.norm(forward)
-    right = np.cross(forward, [0.0, 0.0, 1.0])
-    right = right / np.linalg.norm(right) if np.any(right) else np.array([0.0, -1.0, 0.0])
-    axes = np.column_stack([right, np.cross(right, forward), -forward])
-    return geometry.pose(position, axes.astype(np.float64))
 
 
 def box(size: Iterable[float]) -> Shape:

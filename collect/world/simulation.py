@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from handrail.collect.world.contacts import ContactMonitor, GraspMonitor
-from handrail.collect.world.gate import Gate
 from handrail.collect.world.gl import mujoco
+from handrail.collect.world.plant import Gate
 from handrail.collect.world.robot import BASE_BODY, FINGERS, SimulatedRobot, build_robot
-from handrail.collect.world.scene import Scene, add_scene
-from handrail.collect.world.world import set_stage
+from handrail.collect.world.scene import Scene
+from handrail.collect.world.stage import add_scene, set_stage
 from handrail.controllers.arrays import FloatArray, IntArray
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.controller import State

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 import handrail.collect  # noqa: F401  (registers the environments)
-from handrail.collect.world.envs.env import HandrailEnv
+from handrail.collect.world.env import HandrailEnv
 from handrail.collect.world.scene import Scene, SceneObject
 from handrail.collect.world.tasks.task import Start
 from handrail.controllers.robot.model import RobotModel

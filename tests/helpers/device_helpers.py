@@ -6,8 +6,8 @@ from collect_helpers import environment
 from handrail.collect.operators.modes import MODES
 from handrail.collect.operators.operator import View
 from handrail.collect.operators.scripted.human import HumanSettings
-from handrail.collect.operators.scripted.motion_goal import MotionGoal, Target
 from handrail.collect.operators.scripted.scripted import ScriptedOperator, gains_of
+from handrail.collect.operators.scripted.steering import MotionGoal, Target
 from handrail.collect.world.tasks.task import TaskState
 from handrail.controllers.baselines.direct import DirectController
 from handrail.controllers.baselines.split_controller import split_controller

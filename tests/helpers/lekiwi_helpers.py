@@ -13,7 +13,7 @@ from handrail.collect.lekiwi.host_config import HostConfig
 from handrail.collect.lekiwi.host_loop import SEED, LeKiwiLoop
 from handrail.collect.lekiwi.link import Link
 from handrail.collect.processor.units import robot_units
-from handrail.collect.world.envs.env import HandrailEnv
+from handrail.collect.world.env import HandrailEnv
 from handrail.collect.world.tasks.pick_place import PickPlace
 from handrail.collect.world.tasks.reach import Reach
 from handrail.controllers.mpc.masked_mpc import MaskedMpc

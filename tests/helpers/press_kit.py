@@ -7,9 +7,8 @@ import numpy as np
 from handrail.collect.operators.catalogue import OperatorSpec
 from handrail.collect.operators.modes import TeleopMode, always
 from handrail.collect.operators.scripted.human import HumanSettings
-from handrail.collect.operators.scripted.motion_goal import MotionGoal, Target
 from handrail.collect.operators.scripted.scripted import scripted_operator
-from handrail.collect.operators.scripted.steering import hand_twist
+from handrail.collect.operators.scripted.steering import MotionGoal, Target, hand_twist
 from handrail.collect.world.scene import Scene
 from handrail.collect.world.tasks.catalogue import TaskSpec
 from handrail.collect.world.tasks.task import Start, Verdict

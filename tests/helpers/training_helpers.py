@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from handrail.collect.config import SessionConfig, StoredConfig
-from handrail.collect.session.recorded_settings import settings_json
+from handrail.collect.session.recorded import settings_json
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.robot.description import load_description
 from handrail.datasets.format.manifest import Manifest

@@ -3,10 +3,9 @@
 import numpy as np
 
 from handrail.collect.operators.operator import View
-from handrail.collect.operators.scripted.base_placement import standing_within_reach
 from handrail.collect.operators.scripted.phases import PhasedScript, ScriptPhase, from_phase
-from handrail.collect.world.tasks.cabinet import inward
-from handrail.collect.world.tasks.drawer import handle, handle_rotation, opened
+from handrail.collect.operators.scripted.placement import standing_within_reach
+from handrail.collect.world.tasks.drawer import handle, handle_rotation, inward, opened
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.numerics.rotation import matrix_from_rpy
 from handrail.controllers.robot.model import Pose

@@ -5,8 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from handrail.collect.operators.operator import View
-from handrail.collect.operators.scripted.phases import PhasedScript, ScriptPhase, from_phase
-from handrail.collect.operators.scripted.route import Route
+from handrail.collect.operators.scripted.phases import PhasedScript, Route, ScriptPhase, from_phase
 from handrail.collect.world.scene import SceneObject
 from handrail.collect.world.tasks.pick_place import grasp_rotation
 from handrail.controllers.arrays import FloatArray

@@ -3,8 +3,8 @@
 import numpy as np
 
 from handrail.collect.operators.operator import View
-from handrail.collect.operators.scripted.base_placement import standing_pose
 from handrail.collect.operators.scripted.phases import PhasedScript, ScriptPhase
+from handrail.collect.operators.scripted.placement import standing_pose
 
 
 class ReachScript(PhasedScript):

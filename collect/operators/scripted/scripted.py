@@ -1,23 +1,67 @@
 """The scripted operator: a script that knows what it wants, seen and steered as a person would."""
 
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 import numpy as np
 
 from handrail.collect.operators.modes import TeleopMode
 from handrail.collect.operators.operator import View
-from handrail.collect.operators.scripted.devices import DEVICES
-from handrail.collect.operators.scripted.hand import HumanHand
+from handrail.collect.operators.scripted.hand import HumanHand, Perception
 from handrail.collect.operators.scripted.human import HumanSettings
-from handrail.collect.operators.scripted.motion_goal import MotionGoal
-from handrail.collect.operators.scripted.perception import Perception
-from handrail.collect.operators.scripted.steering import Gains
+from handrail.collect.operators.scripted.input_map import InputMap, LeaderArmMap, StickMap
+from handrail.collect.operators.scripted.single_axis import SingleAxisMap
+from handrail.collect.operators.scripted.steering import Gains, MotionGoal
 from handrail.collect.world.tasks.catalogue import TaskSpec
 from handrail.controllers.arrays import BoolArray
 from handrail.controllers.interface.intent import Intent, RawInput
-from handrail.controllers.registry import resolved
+from handrail.controllers.registry import Registry, resolved
 from handrail.controllers.robot.model import RobotModel
+
+_POSITION_ORDER = 0.25 / 0.35  # refractory time of a position device over a velocity stick's
+
+
+@dataclass(frozen=True)
+class ScriptedDevice:
+    """What an operator has in hand; the numbers are a scripted person's, tuned on the same seeds for each.
+
+    Attributes:
+        name: as a mode names it.
+        help: one line.
+        build: its input map.
+        gains: how briskly they steer.
+        drives: whether they drive the base by itself from place to place, whatever the mode.
+        refractory: their refractory time over that of a velocity stick.
+    """
+
+    name: str
+    help: str
+    build: type[InputMap]
+    gains: Gains = field(default_factory=Gains)
+    drives: bool = False
+    refractory: float = 1.0
+
+
+DEVICES = Registry(
+    "device",
+    ScriptedDevice,
+    (
+        ScriptedDevice("sticks", "velocity sticks on all channels of a mode", StickMap),
+        ScriptedDevice(
+            "single_axis",
+            "one stick, one axis at a time",
+            SingleAxisMap,
+            Gains(gain=1.8, hand_speed=0.7, joint_rate=1.2, patience=4.0),
+            drives=True,
+        ),
+        ScriptedDevice(
+            "leader_arm",
+            "a small copy of the arm, and a stick for the base",
+            LeaderArmMap,
+            refractory=_POSITION_ORDER,
+        ),
+    ),
+)
 
 
 class Script(Protocol):

@@ -3,10 +3,10 @@
 import numpy as np
 
 from handrail.collect.operators.operator import View
-from handrail.collect.operators.scripted.arm_solutions import REACHED, arm_solutions
 from handrail.collect.operators.scripted.human import HumanSettings
 from handrail.collect.operators.scripted.input_map import InputMap
-from handrail.collect.operators.scripted.motion_goal import MotionGoal, Target
+from handrail.collect.operators.scripted.placement import REACHED, arm_solutions
+from handrail.collect.operators.scripted.steering import MotionGoal, Target
 from handrail.controllers.arrays import BoolArray, FloatArray
 from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.interface.controller import State

@@ -3,9 +3,8 @@
 import numpy as np
 
 from handrail.collect.operators.operator import View
-from handrail.collect.operators.scripted.phases import PhasedScript, ScriptPhase
-from handrail.collect.operators.scripted.route import Route
-from handrail.collect.world.tasks.starts import reach_share
+from handrail.collect.operators.scripted.phases import PhasedScript, Route, ScriptPhase
+from handrail.collect.world.tasks.task import reach_share
 from handrail.collect.world.tasks.tray import HANDLE
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.robot.model import Pose

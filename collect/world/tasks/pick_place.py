@@ -5,10 +5,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from handrail.collect.world.scene import Scene, SceneObject, Viewpoint
-from handrail.collect.world.tasks.clutter import obstacle_features, obstacle_names, sample_obstacles
-from handrail.collect.world.tasks.furniture import cube, open_bin, table
-from handrail.collect.world.tasks.starts import near_home
-from handrail.collect.world.tasks.task import Aim, Start, TaskState, Verdict
+from handrail.collect.world.tasks.furniture import (
+    cube,
+    obstacle_features,
+    obstacle_names,
+    open_bin,
+    sample_obstacles,
+    table,
+)
+from handrail.collect.world.tasks.task import Aim, Start, TaskState, Verdict, near_home
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.numerics.rotation import quaternion_from_matrix
 from handrail.controllers.robot.description import WorldScale

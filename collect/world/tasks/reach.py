@@ -4,8 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from handrail.collect.world.patrol import Patrol
-from handrail.collect.world.scene import Part, Scene, SceneObject, Viewpoint
+from handrail.collect.world.scene import Part, Patrol, Scene, SceneObject, Viewpoint
 from handrail.collect.world.tasks.furniture import footprint
 from handrail.collect.world.tasks.goal_reaching import (
     ANGLE_TOLERANCE,

@@ -1,6 +1,6 @@
-"""What a task is: it samples an episode, names its state, and judges the outcome."""
+"""What a task is: it samples an episode, names its state, and judges the outcome; where robots start."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
@@ -8,11 +8,12 @@ import numpy as np
 
 from handrail.collect.world.scene import Scene, SceneObject
 from handrail.controllers.arrays import FloatArray, frozen
-from handrail.controllers.errors import unknown_name
+from handrail.controllers.errors import HandrailError, unknown_name
 from handrail.controllers.robot.model import Pose, RobotModel
 from handrail.controllers.robot.shape import Obstacle
 
 _AWAY = 0.08  # [m]
+_LAID_OUT = 1.49  # of the tool ahead of the base's centre at home [m]
 
 
 @dataclass(frozen=True)
@@ -170,3 +171,55 @@ class Staged(Protocol):
     def stage(self, state: TaskState) -> str:
         """Return which of them is to be done at a moment."""
         ...
+
+
+@dataclass(frozen=True)
+class FixedTask:
+    """A task without anything random.
+
+    Attributes:
+        begin: how every episode begins.
+        judge: says how it stands.
+        horizon: time limit [s].
+    """
+
+    begin: Start
+    judge: Callable[[TaskState], Verdict]
+    horizon: float
+    description: str = ""
+    state_names: tuple[str, ...] = ()
+
+    def sample(self, model: RobotModel, rng: np.random.Generator) -> Start:
+        """Return the beginning."""
+        return self.begin
+
+    def features(self, state: TaskState) -> FloatArray:
+        """Return no features, (0,)."""
+        return np.zeros(0)
+
+    def outcome(self, state: TaskState) -> Verdict:
+        """Return what the judge says."""
+        return self.judge(state)
+
+
+def near_home(model: RobotModel, rng: np.random.Generator) -> FloatArray:
+    """Return home with a little noise: 10 cm · scale, 0.15 rad, 0.05 rad in the arm's joints, (n,)."""
+    base, away = len(model.description.base_joints), 0.10 * model.description.world.scale
+    spread = np.concatenate([np.array([away, away, 0.15])[:base], np.full(model.size - base, 0.05)])
+    return model.description.home + rng.uniform(-spread, spread)
+
+
+def reach_share(model: RobotModel) -> float:
+    """Return how far the tool is from the base at home, as a share of 1.49 m, at most 1."""
+    home = model.description.home
+    away = model.pose(home).position[:2] - model.pose(home, "planar_base").position[:2]
+    return min(1.0, float(np.linalg.norm(away)) / _LAID_OUT)
+
+
+def check_large(model: RobotModel, task: str) -> None:
+    """Check that a robot is as large as a task's furniture, which comes in one size."""
+    if model.description.world.scale < 1.0:
+        raise HandrailError(
+            f"task {task}: expected a robot whose world has scale 1, got {model.description.name} "
+            f"with {model.description.world.scale}; it can do reach and pick_place"
+        )

@@ -5,10 +5,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from handrail.collect.world.scene import Scene, SceneObject, Viewpoint
-from handrail.collect.world.tasks.clutter import obstacle_features, obstacle_names, sample_obstacles
-from handrail.collect.world.tasks.furniture import TRAY_BAR, can, table, tray
-from handrail.collect.world.tasks.starts import check_large, reach_share
-from handrail.collect.world.tasks.task import Aim, Start, TaskState, Verdict
+from handrail.collect.world.tasks.furniture import (
+    TRAY_BAR,
+    can,
+    obstacle_features,
+    obstacle_names,
+    sample_obstacles,
+    table,
+    tray,
+)
+from handrail.collect.world.tasks.task import Aim, Start, TaskState, Verdict, check_large, reach_share
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.channels import Channels

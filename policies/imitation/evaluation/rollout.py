@@ -11,11 +11,10 @@ import numpy as np
 from handrail.collect.config import SessionConfig
 from handrail.collect.operators.modes import MODES
 from handrail.collect.session.build import build_controller, build_env
-from handrail.collect.session.delayed import DelayedOperator
+from handrail.collect.session.disturbances import DelayedOperator, Pusher
 from handrail.collect.session.outcome import Outcome
-from handrail.collect.session.push import Pusher
 from handrail.collect.session.session import Observer, Session
-from handrail.collect.world.envs.env import HandrailEnv
+from handrail.collect.world.env import HandrailEnv
 from handrail.collect.world.tasks.task import Staged
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.baselines.direct import DirectController

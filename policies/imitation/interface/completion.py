@@ -18,7 +18,7 @@ from lerobot.processor import ProcessorStep, ProcessorStepRegistry
 
 from handrail.collect.config import FPS_RANGE
 from handrail.collect.operators.modes import MODES
-from handrail.collect.world.envs.obstacle_numbers import from_numbers
+from handrail.collect.world.observation import from_numbers
 from handrail.collect.world.tasks.catalogue import TASKS
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.entries import Entry, is_count

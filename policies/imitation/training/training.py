@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from handrail.collect.session.build import build_task
-from handrail.collect.session.recorded_settings import COLUMN, recorded_settings
+from handrail.collect.session.recorded import COLUMN, recorded_settings
 from handrail.controllers.entries import is_name
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.versions import TRAINING, versions

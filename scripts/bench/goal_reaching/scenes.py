@@ -5,9 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from handrail.collect.world.gate import Gate
 from handrail.collect.world.ideal_robot import IdealRobot
-from handrail.collect.world.protocols import Plant
+from handrail.collect.world.plant import Gate, Plant
 from handrail.collect.world.scene import Scene, SceneObject, Viewpoint
 from handrail.collect.world.simulation import Simulation
 from handrail.collect.world.tasks.furniture import footprint, pillar

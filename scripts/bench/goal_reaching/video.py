@@ -10,9 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from handrail.collect.session.contact_sheet import contact_sheet
-from handrail.collect.session.film import captioned
-from handrail.collect.session.video_file import VideoFile
+from handrail.collect.session.film import VideoFile, captioned, contact_sheet
 from handrail.collect.world.rendering import Painter
 from handrail.collect.world.scene import Scene
 from handrail.collect.world.simulation import Simulation

@@ -16,7 +16,7 @@ from handrail.collect.execution.job import Job
 from handrail.collect.operators.scripted.scripted import ScriptedOperator
 from handrail.collect.session.build import build_controller, build_env, build_mode, build_operator
 from handrail.collect.session.session import Session
-from handrail.collect.world.envs.env import HandrailEnv
+from handrail.collect.world.env import HandrailEnv
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.presentation.markdown import markdown_table, write_part
 from handrail.datasets.presentation.table import Table

@@ -12,7 +12,7 @@ from handrail.collect.lekiwi.body import LeKiwiBody
 from handrail.collect.lekiwi.host_config import HostConfig
 from handrail.collect.lekiwi.host_loop import EPISODE, SEED, SENT, LeKiwiLoop, Wire
 from handrail.collect.processor.units import robot_units
-from handrail.collect.world.envs.env import HandrailEnv
+from handrail.collect.world.env import HandrailEnv
 from handrail.collect.world.tasks.reach import Reach
 
 STILL = {"x.vel": 0.0, "y.vel": 0.0, "theta.vel": 0.0}

@@ -8,14 +8,12 @@ from device_helpers import GOAL, HOME, MODEL, PERFECT, PERIOD, Wisher, drive, fi
 
 from handrail.collect.operators.modes import MODES
 from handrail.collect.operators.operator import View
-from handrail.collect.operators.scripted.devices import DEVICES
 from handrail.collect.operators.scripted.human import HumanSettings
 from handrail.collect.operators.scripted.input_map import StickMap
-from handrail.collect.operators.scripted.motion_goal import MotionGoal
 from handrail.collect.operators.scripted.reach import ReachScript
-from handrail.collect.operators.scripted.scripted import gains_of, scripted_operator
+from handrail.collect.operators.scripted.scripted import DEVICES, gains_of, scripted_operator
 from handrail.collect.operators.scripted.single_axis import clear_order, sweep_clearance
-from handrail.collect.operators.scripted.steering import Gains
+from handrail.collect.operators.scripted.steering import Gains, MotionGoal
 from handrail.collect.world.tasks.catalogue import TaskSpec
 from handrail.controllers.baselines.split_controller import split_controller
 from handrail.controllers.collision.model import CollisionModel

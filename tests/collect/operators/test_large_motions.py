@@ -9,10 +9,9 @@ from device_helpers import HOME, MODEL, PERFECT, drive, first_view
 from handrail.collect.commands.recording import episode_seed
 from handrail.collect.config import SessionConfig
 from handrail.collect.operators.operator import View
-from handrail.collect.operators.scripted.arm_solutions import REACHED, arm_solutions, straight_solution
 from handrail.collect.operators.scripted.drawer import before_driving
-from handrail.collect.operators.scripted.motion_goal import MotionGoal, Target
-from handrail.collect.operators.scripted.steering import Gains, hand_twist, pose_errors
+from handrail.collect.operators.scripted.placement import REACHED, arm_solutions, straight_solution
+from handrail.collect.operators.scripted.steering import Gains, MotionGoal, Target, hand_twist, pose_errors
 from handrail.collect.session.build import build_env, build_session
 from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.robot.inverse_kinematics import arm_configuration

@@ -8,19 +8,24 @@ from device_helpers import PERFECT, first_view
 from scipy.spatial.transform import Rotation
 
 from handrail.collect.operators.modes import MODES
-from handrail.collect.operators.scripted.base_placement import (
+from handrail.collect.operators.scripted.hand import Perception
+from handrail.collect.operators.scripted.human import HumanSettings
+from handrail.collect.operators.scripted.input_map import StickMap
+from handrail.collect.operators.scripted.placement import (
     standing_point,
     standing_pose,
     standing_within_reach,
 )
-from handrail.collect.operators.scripted.human import HumanSettings
-from handrail.collect.operators.scripted.input_map import StickMap
-from handrail.collect.operators.scripted.motion_goal import MotionGoal, Target
-from handrail.collect.operators.scripted.perception import Perception
 from handrail.collect.operators.scripted.scripted import gains_of
-from handrail.collect.operators.scripted.steering import Gains, base_twist, hand_errors, hand_twist
-from handrail.collect.world.tasks.cabinet import HANDLE, inward
-from handrail.collect.world.tasks.drawer import Drawer, handle_rotation
+from handrail.collect.operators.scripted.steering import (
+    Gains,
+    MotionGoal,
+    Target,
+    base_twist,
+    hand_errors,
+    hand_twist,
+)
+from handrail.collect.world.tasks.drawer import HANDLE, Drawer, handle_rotation, inward
 from handrail.collect.world.tasks.pick_place import grasp_rotation
 from handrail.collect.world.tasks.reach import Reach
 from handrail.controllers.collision.model import CollisionModel

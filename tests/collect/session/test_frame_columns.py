@@ -8,7 +8,7 @@ import pytest
 from handrail.collect.session.build import session_features
 from handrail.collect.session.recorder import Recorder
 from handrail.collect.session.session import Session
-from handrail.collect.world.envs.env import HandrailEnv
+from handrail.collect.world.env import HandrailEnv
 from handrail.collect.world.ideal_robot import IdealRobot
 from handrail.collect.world.tasks.reach import Reach
 from handrail.controllers.interface.channels import Channels

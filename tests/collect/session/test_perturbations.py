@@ -7,11 +7,9 @@ from collect_helpers import action, environment
 from handrail.collect.config import SessionConfig
 from handrail.collect.operators.operator import View
 from handrail.collect.session.build import build_task
-from handrail.collect.session.delayed import DelayedOperator
+from handrail.collect.session.disturbances import DelayedOperator, Pusher, sample_pushes, sample_shifted
 from handrail.collect.session.perturbations import DEFAULTS, Perturbation
-from handrail.collect.session.push import Pusher, sample_pushes
 from handrail.collect.session.session import Session
-from handrail.collect.session.shift import sample_shifted
 from handrail.collect.world.tasks.catalogue import TASKS
 from handrail.collect.world.tasks.reach import Reach
 from handrail.collect.world.tasks.tray import Tray

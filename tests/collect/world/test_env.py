@@ -178,7 +178,7 @@ def test_names_match_the_numbers():
     ],
 )
 def test_wrong_options_are_named(options, message):
-    from handrail.collect.world.envs.env import HandrailEnv
+    from handrail.collect.world.env import HandrailEnv
 
     with pytest.raises(HandrailError, match=message):
         HandrailEnv("handrail.collect.world.tasks.reach:Reach", **options)

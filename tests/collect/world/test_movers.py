@@ -9,9 +9,8 @@ from collect_helpers import action, environment
 from handrail.collect.config import SessionConfig
 from handrail.collect.session.build import build_env, build_session
 from handrail.collect.session.session import Session
-from handrail.collect.world.envs.env import HandrailEnv
-from handrail.collect.world.patrol import Patrol
-from handrail.collect.world.scene import Scene, SceneObject
+from handrail.collect.world.env import HandrailEnv
+from handrail.collect.world.scene import Patrol, Scene, SceneObject
 from handrail.collect.world.tasks.reach import FASTEST, Reach, sample_movers
 from handrail.collect.world.tasks.task import Start
 from handrail.controllers.baselines.direct import DirectController

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from handrail.collect.world.ideal_robot import IdealRobot
-from handrail.collect.world.patrol import Patrol
-from handrail.collect.world.scene import Scene, SceneObject
+from handrail.collect.world.scene import Patrol, Scene, SceneObject
 from handrail.collect.world.simulation import Simulation
 from handrail.collect.world.tasks.furniture import pillar
 from handrail.controllers.errors import HandrailError

@@ -9,9 +9,8 @@ from collect_helpers import action, environment, moved
 from handrail.collect.commands.recording import episode_seed
 from handrail.collect.config import SessionConfig
 from handrail.collect.session.build import build_env, build_session, build_task
-from handrail.collect.world.envs.env import HandrailEnv
-from handrail.collect.world.tasks.cabinet import HANDLE, TRAVEL, inward
-from handrail.collect.world.tasks.drawer import Drawer, handle, opened
+from handrail.collect.world.env import HandrailEnv
+from handrail.collect.world.tasks.drawer import HANDLE, TRAVEL, Drawer, handle, inward, opened
 from handrail.collect.world.tasks.task import Start
 from handrail.collect.world.tasks.tray import Tray
 from handrail.controllers.errors import HandrailError

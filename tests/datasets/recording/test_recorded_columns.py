@@ -11,7 +11,7 @@ from command_helpers import command
 from handrail.collect.commands import replay
 from handrail.collect.config import SessionConfig
 from handrail.collect.operators.scripted.human import HumanSettings
-from handrail.collect.session.recorded_settings import recorded_settings, settings_json
+from handrail.collect.session.recorded import recorded_settings, settings_json
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.command import Diagnostics, Status
 from handrail.controllers.interface.intent import Intent, RawInput

@@ -12,7 +12,7 @@ from lerobot.envs.utils import preprocess_observation
 
 from handrail.collect.config import SessionConfig
 from handrail.collect.session.build import build_env
-from handrail.collect.world.envs.obstacle_numbers import MOST, from_numbers, to_numbers
+from handrail.collect.world.observation import MOST, from_numbers, to_numbers
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.robot.model import load_model

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from rl_helpers import random_actor
 
-from handrail.collect.world.gate import Gate
 from handrail.collect.world.ideal_robot import IdealRobot
+from handrail.collect.world.plant import Gate
 from handrail.collect.world.scene import Scene
 from handrail.collect.world.tasks.goal_reaching import STEP
 from handrail.controllers.interface.channels import Channels

@@ -11,8 +11,8 @@ from gymnasium import spaces
 from gymnasium.envs.registration import load_env_creator
 from numpy.typing import ArrayLike, NDArray
 
-from handrail.collect.world.envs.observation import AgentObservation, bounded, box_space
-from handrail.collect.world.protocols import Plant, Robot, Seeing, World
+from handrail.collect.world.observation import AgentObservation, bounded, box_space
+from handrail.collect.world.plant import Plant, Robot, Seeing, World
 from handrail.collect.world.rendering import CAMERAS, Painter
 from handrail.collect.world.simulation import Simulation
 from handrail.collect.world.tasks.task import Start, Task, TaskState, Verdict
