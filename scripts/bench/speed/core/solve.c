@@ -1,0 +1,98 @@
+/* The plan of one update: Gauss-Newton steps around a guess, usually one. */
+#include "core.h"
+#include "vector.h"
+
+#define MORE_STEPS 2          /* at most, in one update */
+#define LARGE 0.2             /* change of an acceleration near obstacles that asks for another step, by its limit */
+#define COARSE 0.01           /* share of the promised descent by which a linearised cost may be wrong, */
+#define SMALL 0.1             /* or of a descent that is this share of the cost */
+#define SMALLEST_SHARE 0.0625 /* of a step that makes the cost rise */
+
+/* By how much pairs overlap at any node that do not at the first, or not as much. */
+static double depth(const Core *c) {
+  double deepest = 0.0;
+  for (int64_t i = 0; i < c->K * c->P; i++) {
+    double now = SMALLER(c->found[i % c->P], 0.0);
+    deepest = LARGER(deepest, now - c->found[i]);
+  }
+  return deepest;
+}
+
+/* Roll out accelerations; measure distances along them; take the rows of those that are near. */
+static void linearise(Core *c, Scene *scene) {
+  Near near = {c->within, c, take_distance};
+  roll_out(c, c->u, c->path, c->speeds);
+  take_joints(c, c->path, c->speeds, c->u);
+  reach_of(c, c->u);
+  nodes_of(c, c->path, c->speeds);
+  c->count = 0;
+  scene_distances(scene, c->K, c->nodes, c->times, c->found, &near);
+}
+
+/* Take u = guess within its limits; where that runs into something, the fastest stop, if it runs in less. */
+static void begin(Core *c, Scene *scene) {
+  int64_t size = c->N * c->n;
+  for (int64_t i = 0; i < size; i++) c->u[i] = clamp(c->guess[i], -c->a_max[i % c->n], c->a_max[i % c->n]);
+  linearise(c, scene);
+  double deep = c->P ? depth(c) : 0.0;
+  if (!(deep > 0.0)) return;
+  memcpy(c->step_u, c->u, size * sizeof(double));
+  for (int64_t i = 0; i < size; i++) {
+    double v = c->v[i % c->n], limit = c->a_max[i % c->n] * c->dt;
+    double rest = clamp(fabs(v) - (double)(i / c->n) * limit, 0.0, limit) / c->dt;
+    c->u[i] = v > 0.0 ? -rest : rest;
+  }
+  linearise(c, scene);
+  if (!(depth(c) <= deep)) {
+    memcpy(c->u, c->step_u, size * sizeof(double));
+    linearise(c, scene);
+  }
+}
+
+/* Take the step, halved until the cost itself falls: Gauss-Newton alone may go round in circles. The rows are
+   convex, so that from a guess within them a share of the step needs no more than that share of the slack. */
+static double damp(Core *c, double before) {
+  double linear = 0.0, square = dot(c->slack, c->slack, SLACKS);
+  for (int i = 0; i < SLACKS; i++) linear += c->slack[i];
+  memcpy(c->guess, c->u, c->M * sizeof(double));
+  for (double share = 1.0;; share *= 0.5) {
+    for (int64_t i = 0; i < c->M; i++) {
+      double limit = c->a_max[i % c->n], change = c->motion[(3 * (i / c->n) + 2) * c->n + i % c->n];
+      c->step_u[i] = share * change;
+      c->u[i] = clamp(c->guess[i] + share * change, -limit, limit);
+    }
+    roll_out(c, c->u, c->path, c->speeds);
+    double cost = cost_of(c, c->path, c->speeds, c->u);
+    double penalty = c->linear * share * linear + 0.5 * c->quadratic * share * share * square;
+    if (cost + penalty <= before || share <= SMALLEST_SHARE || c->broken) return cost;
+  }
+}
+
+/* Whether the linearisation was too coarse: of the cost, or of distances after a large step. */
+static int is_far(const Core *c, double before, double after, double descent) {
+  int64_t largest = 0;
+  if (fabs(after - before - descent) > COARSE * LARGER(fabs(descent), SMALL * after)) return 1;
+  for (int64_t i = 0; i < c->active_rows; i++) largest = LARGER(largest, c->active[i]);
+  if (largest < SLACKS + 6 * c->M) return 0;
+  for (int64_t i = 0; i < c->M; i++)
+    if (!(fabs(c->step_u[i]) <= LARGE * c->a_max[i % c->n])) return 1;
+  return 0;
+}
+
+/* Solve the problem that stands in the core. A step that is still large, and did not lead where its linearisation
+   said, is followed by another; what is reached when the work is spent is the plan. */
+void core_solve(Core *c, Scene *scene) {
+  for (int64_t p = 0; p < c->P; p++) c->within[p] = c->margins[p] + c->activation;
+  for (c->steps = 1;; c->steps++) {
+    double descent;
+    begin(c, scene);
+    if (c->steps == 1) memcpy(c->distances, c->found, c->P * sizeof(double));
+    double before = expand(c, c->path, c->speeds, c->u);
+    c->rows = c->count;
+    c->solved = solve_program(c, &descent);
+    if (!c->solved) return;
+    double after = damp(c, before);
+    if (c->work <= 0.0 || c->steps > MORE_STEPS || !is_far(c, before, after, descent)) return;
+    memcpy(c->guess, c->u, c->M * sizeof(double));
+  }
+}
