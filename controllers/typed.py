@@ -75,11 +75,12 @@ def check_settings(settings: Any, what: str = "") -> None:
 
     Args:
         settings: the dataclass.
-        what: its fields are called in the error: `MPC setting`.
+        what: its fields are called in the error: `MPC setting`; `--` for flags.
     """
+    before = what if what in ("", "--") else f"{what} "
     for name, kind in _types(type(settings)).items():
         if any(isinstance(each, Meta) for each in get_args(kind)) or get_origin(kind) is Literal:
-            check(getattr(settings, name), kind, f"{what} {name}".lstrip())
+            check(getattr(settings, name), kind, before + name)
 
 
 def decoded[T](content: Any, kind: type[T], where: str) -> T:

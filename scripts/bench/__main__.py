@@ -7,7 +7,7 @@ from typing import Any
 from handrail.controllers.errors import unknown_name
 from handrail.controllers.registry import resolved
 from handrail.scripts import cli
-from handrail.scripts.bench.command_line import PROGRAM
+from handrail.scripts.bench.report import PROGRAM
 
 _HERE = "handrail.scripts.bench"
 

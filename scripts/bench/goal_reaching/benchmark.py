@@ -7,12 +7,11 @@ from typing import Any
 
 from handrail.collect.world.gl import graphics_trouble
 from handrail.datasets.presentation.drawing import address, png, svg
-from handrail.datasets.presentation.markdown import markdown_table, write_part
+from handrail.datasets.presentation.markdown import write_part
 from handrail.datasets.presentation.markup import film, folded, page, panels, paragraph, section
 from handrail.datasets.presentation.terminal import Terminal
 from handrail.datasets.storage.atomic import explained, write_whole
 from handrail.datasets.storage.strict_json import write_json
-from handrail.scripts.bench.command_line import command_line
 from handrail.scripts.bench.goal_reaching.catalogue import BASELINES, Baseline
 from handrail.scripts.bench.goal_reaching.config import BenchmarkConfig
 from handrail.scripts.bench.goal_reaching.figures import CAPTIONS, figures
@@ -20,6 +19,7 @@ from handrail.scripts.bench.goal_reaching.results import measures_by_goal, summa
 from handrail.scripts.bench.goal_reaching.run import available, goals, run, trace_of
 from handrail.scripts.bench.goal_reaching.tables import benchmark_tables
 from handrail.scripts.bench.goal_reaching.video import Example
+from handrail.scripts.bench.report import command_line, report
 
 _CONDITIONS = (
     *("titles", "config", "mpc_settings", "mpc_paper_settings"),
@@ -38,26 +38,23 @@ def write_report(
         video: a file to embed.
         path: of the HTML file.
     """
-    parts = [section("Tables", *benchmark_tables(results))]
-    parts.append(
-        section("Figures", panels([(CAPTIONS[name], "", svg(each)) for name, each in drawn.items()], "wide"))
-    )
+    shown = [(CAPTIONS[name], "", svg(each)) for name, each in drawn.items()]
+    parts = [section("Tables", *benchmark_tables(results)), section("Figures", panels(shown, "wide"))]
     if video is not None:
         parts.append(section("Example", film(address(video.read_bytes(), "video/mp4"))))
-    settings = (folded(group, paragraph(_listed(results[group]))) for group in _CONDITIONS if results[group])
+    listed = {
+        group: ", ".join(f"{name} {value}" for name, value in results[group].items()) for group in _CONDITIONS
+    }
+    settings = (folded(group, paragraph(text)) for group, text in listed.items() if text)
     parts.append(section("Conditions", *settings))
     what = f"{results['config']['goals']} goals, the same for every controller"
     write_whole(path, page("Goal reaching", *parts, what=what).encode())
 
 
-def _listed(settings: Mapping[str, Any]) -> str:
-    return ", ".join(f"{name} {value}" for name, value in settings.items())
-
-
 def write_page(
     results: Mapping[str, Any], pictures: Mapping[str, bytes], path: Path, config: BenchmarkConfig
 ) -> None:
-    """Put tables and figures into a page, between the marks of this kind of run; other text stays.
+    """Put the figures into a page, between the marks of this kind of run; other text stays.
 
     Figures, and summaries and every episode's measures as JSON, go beside the page, named `<page>_<label>…`.
 
@@ -72,23 +69,12 @@ def write_page(
         write_whole(path.parent / f"{stem}_{name}.png", data)
     write_json(path.parent / f"{stem}.json", {**results, "episodes": measures_by_goal(results)}, indent=None)
     command = command_line("goal_reaching", replace(config, json="", report="", page=""))
-    parts = [f"`{command}` wrote this. {_how(results)}"]
-    for table in benchmark_tables(results):
-        parts += [markdown_table(table), table.caption]
-    parts += [f"![{CAPTIONS.get(name, name)}]({stem}_{name}.png)" for name in pictures]
-    parts += [f"Left out: {name} ({reason})." for name, reason in results["skipped"].items()]
-    once = dict.fromkeys(filter(None, parts))  # a caption
-    write_part(path, "Goal reaching", config.label, "\n\n".join(once))
-
-
-def _how(results: Mapping[str, Any]) -> str:
-    """Return how the numbers are to be read, those that depend on the machine above all."""
-    machine, workers = results["machine"], results["config"]["workers"]
-    return (
-        "Mean ± SD (min, max) over the episodes. Update ms: the median over an episode's updates, without the"
-        f" distances that baselines only report. {machine['cores']} cores; load at the end"
-        f" {machine['load']:.1f}, of which {workers} by this run: times are longer where others computed too."
-    )
+    parts = [
+        f"`{command}`; [every number]({stem}.json).",
+        *(f"![{name}]({stem}_{name}.png)" for name in pictures),
+        *(f"Left out: {name} ({reason})." for name, reason in results["skipped"].items()),
+    ]
+    write_part(path, "Goal reaching", config.label, "\n\n".join(parts))
 
 
 def benchmark(
@@ -102,26 +88,29 @@ def benchmark(
         console: to show how far it is, and what was left out.
     """
     config.check()
-    report = Path(config.report).expanduser()
+    folder = Path(config.report).expanduser()
     if config.report:
         with explained(f"--report {config.report}: cannot be made"):
-            report.mkdir(parents=True, exist_ok=True)
+            folder.mkdir(parents=True, exist_ok=True)
     present, skipped = available(baselines, config)
     for name, reason in skipped.items():
         console.print(f"without {name}: {reason}")
     episodes = run(config, present, console)
     results = summarise([episode.row for episode in episodes], config, present, skipped)
-    if config.json:
-        write_json(Path(config.json).expanduser(), results)
     if not (config.report or config.page):
         return results
-    drawn, example = figures(results, episodes, goals(config)), _example(config, present, console)
+    drawn, example = figures(results, episodes, goals(config)), None
+    if trouble := graphics_trouble() if config.video else "not asked for":
+        console.print(f"without an example to look at: {trouble}")
+    else:  # the first two controllers on the first goal
+        runs = [(who, *trace_of(config, who, 0)) for who in present[:2]]
+        example = Example(runs[0][1], [(who.help, trace) for who, _, trace in runs])
     if config.report:
-        write_json(report / "benchmark.json", results)
-        video = report / "benchmark.mp4" if example else None
+        write_json(folder / "benchmark.json", results)
+        video = folder / "benchmark.mp4" if example else None
         if example and video:
             example.film(video)
-        write_report(results, drawn, video, report / "benchmark.html")
+        write_report(results, drawn, video, folder / "benchmark.html")
     if config.page:
         pictures = {name: png(figure) for name, figure in drawn.items()}
         pictures |= {"example": example.strip()} if example else {}
@@ -129,22 +118,12 @@ def benchmark(
     return results
 
 
-def _example(config: BenchmarkConfig, present: tuple[Baseline, ...], console: Terminal) -> Example | None:
-    """Return what the first two controllers do on the first goal; None without OpenGL, which is said."""
-    trouble = graphics_trouble() if config.video else "not asked for"
-    if trouble:
-        console.print(f"without an example to look at: {trouble}")
-        return None
-    runs = [(who, *trace_of(config, who, 0)) for who in present[:2]]
-    return Example(runs[0][1], [(who.help, trace) for who, _, trace in runs])
-
-
 def main(config: BenchmarkConfig) -> int:
     """Run the benchmark and print its tables."""
     console = Terminal()
     results = benchmark(config, {name: BASELINES.find(name) for name in config.controller_names}, console)
-    console.print(*benchmark_tables(results), sep="\n")
-    for written in (config.json, config.report and f"{config.report}/benchmark.html", config.page):
+    report("goal_reaching", replace(config, page=""), benchmark_tables(results), results)
+    for written in (config.report and f"{config.report}/benchmark.html", config.page):
         if written:
             console.print(f"Written: {written}")
     return 0

@@ -5,23 +5,25 @@ from pathlib import Path
 from typing import Annotated
 
 from handrail.collect.execution.config import ExecutionConfig
-from handrail.collect.flags import check_json, check_names, check_page, check_whole, names, one_of
+from handrail.collect.flags import check_names, names, one_of
 from handrail.controllers.errors import HandrailError
+from handrail.controllers.typed import AtLeastOne, Count
 from handrail.datasets.lists import Names
 from handrail.scripts.bench.goal_reaching.catalogue import BASELINES
+from handrail.scripts.bench.report import ReportConfig
 
 PROFILES = ("nominal", "fast15", "fast2", "fast3", "steps", "noise", "delay", "dropouts", "quantised")
 
 
 @dataclass(frozen=True)
-class BenchmarkConfig(ExecutionConfig):
+class BenchmarkConfig(ReportConfig, ExecutionConfig):
     """Run the paper's goal-reaching benchmark: every controller on the same goals, with the same planner."""
 
     controllers: Annotated[Names, one_of(BASELINES)] = "all"
     """Which controllers, or all."""
-    goals: int = 100
+    goals: AtLeastOne = 100
     """Goals, the same for every controller."""
-    seed: int = 1
+    seed: Count = 1
     """Of the goals, obstacles and command noise."""
     profile: Names = "nominal"
     """How the planner's twist arrives, one or more, or all: nominal, fast15, fast2, fast3, steps, noise,
@@ -36,12 +38,8 @@ class BenchmarkConfig(ExecutionConfig):
     """The planner sees the hand and corrects its errors, instead of running open loop."""
     workers: int = field(default=1, kw_only=True)
     """Processes that share the work; 0 for as many as there are cores, which makes all times longer."""
-    json: str = ""
-    """Write everything measured, every episode too, to this file."""
     report: str = ""
     """Write an HTML report with figures and a video to this folder."""
-    page: str = ""
-    """Put the tables into this Markdown page, between marks of this kind of run; figures go beside it."""
     video: bool = True
     """Whether the report has an example video, the page a strip of pictures (needs OpenGL)."""
 
@@ -66,11 +64,9 @@ class BenchmarkConfig(ExecutionConfig):
 
     def check(self) -> None:
         """Check what can be checked without loading anything heavy."""
+        super().check()
         check_names("controller", "--controllers", self.controller_names, BASELINES)
         check_names("profile", "--profile", self.profile_names, PROFILES)
-        check_whole(self, goals=1, seed=0)
         self.check_execution()
-        check_json(self.json)
-        check_page(self.page)
         if self.report and Path(self.report).expanduser().is_file():
             raise HandrailError(f"--report {self.report}: expected a folder, found a file")

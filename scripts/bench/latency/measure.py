@@ -1,51 +1,59 @@
 """Drives a recording of its own through its web server, and takes times from what comes and what is saved."""
 
-import asyncio
 import contextlib
 import os
 import subprocess
 import sys
 import tempfile
-from collections.abc import AsyncIterator, Iterator
-from dataclasses import dataclass
+import time
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import psutil
 
 from handrail.controllers.errors import HandrailError, not_installed
-from handrail.datasets.presentation.terminal import Terminal
+from handrail.datasets.presentation.table import Table
 from handrail.datasets.reading.reader import read_episodes, read_frames
-from handrail.datasets.storage.strict_json import write_json
-from handrail.scripts.bench.latency.clients import DrivingPage, Spectator, connected
+from handrail.scripts.bench.latency.clients import DrivingPage, Spectator
 from handrail.scripts.bench.latency.config import LatencyConfig
-from handrail.scripts.bench.latency.table import latency_table, write_page
+from handrail.scripts.bench.report import machine, report, spread
 
 FPS = 20  # [Hz]
 _SLOW_PAUSE = 0.2  # of a page that takes things slowly [s]
-
-
-_TICKS = os.sysconf("SC_CLK_TCK") if hasattr(os, "sysconf") else 100
+_SPREAD = ("p50", "p95", "p99", "worst")
+_LATENCIES = {
+    "key to command": "key to commanded velocity",
+    "key to page": "key to motion on the page",
+    "round trip": "page to server and back",
+    "release to brake": "release to commanded braking",
+    "release to rest": "release to commanded rest",
+}
+_RATES = {
+    "driver_frames_hz": "driver: frames a second",
+    "driver_pictures_hz": "driver: pictures a second and camera",
+    "spectator_frames_hz": "spectator: frames a second",
+    "spectator_pictures_hz": "spectator: pictures a second and camera",
+}
 
 
 def family(process: int) -> dict[int, str]:
-    """Return a process and its descendants, with their command lines; nothing where there is no /proc."""
-    parents, words = {}, {}
-    for place in Path("/proc").glob("[0-9]*"):
-        with contextlib.suppress(OSError):
-            parents[int(place.name)] = int((place / "stat").read_text().rpartition(")")[2].split()[1])
-            words[int(place.name)] = (place / "cmdline").read_bytes().decode(errors="replace")
-    found = {process} & set(words)
-    while more := {each for each, parent in parents.items() if parent in found} - found:
-        found |= more
-    return {each: words.get(each, "") for each in found}
+    """Return a process and its descendants, with their command lines."""
+    found = {}
+    with contextlib.suppress(psutil.Error):
+        first = psutil.Process(process)
+        for each in (first, *first.children(recursive=True)):
+            with contextlib.suppress(psutil.Error):
+                found[each.pid] = "\0".join(each.cmdline())
+    return found
 
 
-def seconds(process: int) -> float:
+def _seconds(process: int) -> float:
     """Return how long a process has kept a processor busy [s]."""
-    with contextlib.suppress(OSError):
-        fields = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
-        return (int(fields[11]) + int(fields[12])) / _TICKS
+    with contextlib.suppress(psutil.Error):
+        times = psutil.Process(process).cpu_times()
+        return times.user + times.system
     return 0.0
 
 
@@ -61,55 +69,35 @@ def busy(programs: int) -> Iterator[None]:
             burner.wait()
 
 
-@dataclass(frozen=True)
-class LatencyCase:
-    """What goes on beside the one who drives.
-
-    Attributes:
-        name: of it.
-        spectators: pages that watch.
-        slow: pages that take what they are sent slowly.
-        burners: programs that keep processors busy.
-        browser: Chromium that watches; empty for none.
-    """
-
-    name: str
-    spectators: int
-    slow: int = 0
-    burners: int = 0
-    browser: str = ""
-
-
-def cases(config: LatencyConfig) -> list[LatencyCase]:
-    """Return what is to be measured."""
-    chosen = [LatencyCase("as it should be", config.spectators)]
-    if config.browser:
-        chosen.append(LatencyCase("a browser watches too", config.spectators, browser=config.browser))
-    if config.overload:
-        cores = os.cpu_count() or 1
-        chosen.append(LatencyCase("overload", config.spectators, config.slow_spectators, cores))
-    return chosen
-
-
 def measure(config: LatencyConfig) -> dict[str, Any]:
     """Measure; return everything as one dictionary.
 
     Args:
         config: how much to measure.
     """
-    chosen, load = cases(config), os.getloadavg()[0]
+    cases = {"as it should be": (0, 0, "")}  # slow pages, programs that keep processors busy, a browser
+    if config.browser:
+        cases["a browser watches too"] = (0, 0, config.browser)
+    if config.overload:
+        cases["overload"] = (config.slow_spectators, os.cpu_count() or 1, "")
+    load, rng, found = os.getloadavg()[0], np.random.default_rng(config.seed), {}
     with tempfile.TemporaryDirectory(prefix="handrail-latency-") as folder:
         root = Path(folder) / "dataset"
-        with _recording(root, config, len(chosen)) as (process, address):
-            came = asyncio.run(_drive_all(config, chosen, address, process.pid))
+        with _recording(root, config, len(cases)) as (process, address):
+            page = DrivingPage(address)
+            for name, (slow, burners, browser) in cases.items():
+                page.until(lambda frame: frame["phase"] == "ready")
+                with busy(burners), _watching(config.spectators, slow, browser, address) as spectators:
+                    page.ask("start")
+                    page.until(lambda frame: frame["phase"] == "driving")
+                    found[name] = _drive(page, spectators, config.seconds, rng, process.pid)
+                    page.ask("success")
+                    page.until(lambda frame: frame["phase"] != "driving")
+            page.close()
             process.wait(300)
-        for index, case in enumerate(chosen):
-            came[case.name] |= _saved(root, index)
-    return {
-        "cases": came,
-        "seconds": config.seconds,
-        "machine": {"cores": os.cpu_count(), "load_before": load, "load_after": os.getloadavg()[0]},
-    }
+        for index, name in enumerate(cases):
+            found[name] |= _saved(root, index)
+    return {"cases": found, "seconds": config.seconds, "machine": machine(load)}
 
 
 @contextlib.contextmanager
@@ -123,111 +111,84 @@ def _recording(root: Path, config: LatencyConfig, episodes: int) -> Iterator[tup
     with tempfile.TemporaryFile("w+") as log:
         process = subprocess.Popen(command, stderr=subprocess.PIPE, stdout=log, text=True)
         try:
-            yield process, _address(process)
+            lines = []
+            for line in process.stderr or ():
+                lines.append(line.strip())
+                if "Drive at " in line:
+                    yield process, line.split("Drive at ")[1].strip()
+                    return
+            raise HandrailError(f"latency: the recording did not begin: {' '.join(lines)[-300:]}")
         finally:
             if process.poll() is None:
                 process.terminate()
             process.communicate(timeout=60)
 
 
-def _address(process: "subprocess.Popen[str]") -> str:
-    said = []
-    for line in process.stderr or ():
-        if "Drive at " in line:
-            return line.split("Drive at ")[1].strip()
-        said.append(line.strip())
-    raise HandrailError(f"latency: the recording did not begin: {' '.join(said)[-300:]}")
-
-
-async def _drive_all(
-    config: LatencyConfig, chosen: list[LatencyCase], address: str, process: int
-) -> dict[str, dict[str, Any]]:
-    """Return what came of each case."""
-    rng, came = np.random.default_rng(config.seed), {}
-    async with connected(address, "page-that-drives") as socket, DrivingPage(socket) as page:
-        for case in chosen:
-            await page.until(lambda frame: frame["phase"] == "ready")
-            with busy(case.burners):
-                async with _watching(case, address) as spectators:
-                    await page.ask("start")
-                    await page.until(lambda frame: frame["phase"] == "driving")
-                    came[case.name] = await _drive(page, spectators, config.seconds, rng, process)
-                    await page.ask("success")
-                    await page.until(lambda frame: frame["phase"] != "driving")
-    return came
-
-
-async def _drive(
+def _drive(
     page: DrivingPage, watching: list[Spectator], duration: float, rng: np.random.Generator, process: int
 ) -> dict[str, Any]:
-    page.begin()
-    before = [dict(each.counts) for each in watching]
-    spent = {each: seconds(each) for each in family(os.getpid())}
-    start = asyncio.get_running_loop().time()
-    await page.drive(duration, rng)
-    took = asyncio.get_running_loop().time() - start
-    gained = [
-        {kind: each.counts[kind] - was[kind] for kind in was}
-        for each, was in zip(watching, before, strict=True)
-    ]
+    before = [(each.frames, each.pictures) for each in watching]
+    spent = {each: _seconds(each) for each in family(os.getpid())}
+    start = time.monotonic()
+    page.drive(duration, rng)
+    took = time.monotonic() - start
+    after = [(each.frames, each.pictures) for each in watching]
+    frames, pictures = np.mean(np.subtract(after, before), axis=0) / took if watching else (0.0, 0.0)
+    shares: dict[str, float] = {}  # of one processor
+    for each, words in family(os.getpid()).items():
+        name = _program(words) if each != process else "recording"
+        shares[name] = shares.get(name, 0.0) + (_seconds(each) - spent.get(each, 0.0)) / took
     return {
         "latencies_ms": {name: _spread(times) for name, times in page.times.items() if times},
         "driver_frames_hz": page.frames / took,
         "driver_pictures_hz": page.pictures / took / 2,
-        "spectator_frames_hz": _mean(each["frames"] for each in gained) / took,
-        "spectator_pictures_hz": _mean(each["pictures"] for each in gained) / took / 2,
+        "spectator_frames_hz": float(frames),
+        "spectator_pictures_hz": float(pictures) / 2,
         "dropped": page.frame["dropped"],
-        "processor_shares": _shares(spent, process, took),
+        "processor_shares": shares,
     }
 
 
-def _shares(spent: dict[int, float], recording: int, took: float) -> dict[str, float]:
-    """Return how much of one processor each program took."""
-    shares: dict[str, float] = {}
-    for process, words in family(os.getpid()).items():
-        program = words.partition("\0")[0]
-        name = "browser" if "chrom" in program else "burners" if "while True" in words else "clients"
-        name = "web server" if "cockpit.server" in words else name
-        name = "recording" if process == recording else name
-        used = (seconds(process) - spent.get(process, 0.0)) / took
-        shares[name] = shares.get(name, 0.0) + used
-    return shares
+def _program(words: str) -> str:
+    if "cockpit.server" in words:
+        return "web server"
+    if "while True" in words:
+        return "burners"
+    return "browser" if "chrom" in words.partition("\0")[0] else "clients"
 
 
-@contextlib.asynccontextmanager
-async def _watching(case: LatencyCase, address: str) -> AsyncIterator[list[Spectator]]:
+@contextlib.contextmanager
+def _watching(quick: int, slow: int, browser: str, address: str) -> Iterator[list[Spectator]]:
     """Let pages watch; give those that take what they are sent at once."""
-    quick = [Spectator(address, f"page-that-watches-{n}") for n in range(case.spectators)]
-    slow = [Spectator(address, f"page-that-is-slow-{n}", _SLOW_PAUSE) for n in range(case.slow)]
-    tasks = [asyncio.create_task(each.watch()) for each in (*quick, *slow)]
+    pages = [Spectator(address, f"page-that-watches-{n}") for n in range(quick)]
+    late = [Spectator(address, f"page-that-is-slow-{n}", _SLOW_PAUSE) for n in range(slow)]
     try:
-        async with _browser(case.browser, address):
-            await asyncio.sleep(2.0)
-            yield quick
+        with _browser(browser, address):
+            time.sleep(2.0)
+            yield pages
     finally:
-        for task in tasks:
-            task.cancel()
-        await asyncio.gather(*tasks, return_exceptions=True)
+        for each in (*pages, *late):
+            each.close()
 
 
-@contextlib.asynccontextmanager
-async def _browser(program: str, address: str) -> AsyncIterator[None]:
+@contextlib.contextmanager
+def _browser(program: str, address: str) -> Iterator[None]:
     """Let a browser watch, one that draws in software."""
     if not program:
         yield
         return
     try:
-        from playwright.async_api import async_playwright
+        from playwright.sync_api import sync_playwright
     except ImportError as error:
         raise not_installed("--browser", "playwright", "dev") from error
-    async with async_playwright() as play:
-        flags = ["chromium", "--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"][1:]
-        browser = await play.chromium.launch(executable_path=program, args=flags)
-        page = await browser.new_page(viewport={"width": 1280, "height": 720})
-        await page.goto(address)
-        await asyncio.sleep(5.0)
+    with sync_playwright() as play:
+        flags = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+        browser = play.chromium.launch(executable_path=program, args=flags)
+        page = browser.new_page(viewport={"width": 1280, "height": 720})
+        page.goto(address)
+        time.sleep(5.0)
         yield
-        await browser.close()
+        browser.close()
 
 
 def _saved(root: Path, episode: int) -> dict[str, Any]:
@@ -244,23 +205,38 @@ def _saved(root: Path, episode: int) -> dict[str, Any]:
     }
 
 
-def _mean(values: Iterator[float]) -> float:
-    numbers = list(values)
-    return float(np.mean(numbers)) if numbers else 0.0
-
-
 def _spread(times: list[float]) -> dict[str, float]:
-    """Return the spread of times [ms]."""
-    p50, p95, p99, worst = np.percentile(1e3 * np.array(times), [50, 95, 99, 100])
-    return {"p50": float(p50), "p95": float(p95), "p99": float(p99), "worst": float(worst), "n": len(times)}
+    return {**spread(times, _SPREAD), "n": len(times)}
+
+
+def latency_table(results: Mapping[str, Any]) -> Table:
+    """Return everything measured, a column for each case."""
+    cases, computer = results["cases"], results["machine"]
+    rows = [
+        [words, *(_percentiles(case["latencies_ms"].get(name)) for case in cases.values())]
+        for name, words in _LATENCIES.items()
+    ]
+    rows.append(["jitter of the loop, p99", *(f"{case['jitter_ms']['p99']:.1f}" for case in cases.values())])
+    rows.append(["late periods", *(f"{each['late_periods']} of {each['frames']}" for each in cases.values())])
+    rows += [[words, *(f"{case[name]:.1f}" for case in cases.values())] for name, words in _RATES.items()]
+    rows.append(["share of a processor", *(_shares(case["processor_shares"]) for case in cases.values())])
+    caption = (
+        f"{computer['cores']} cores, load {computer['load_before']:.1f} before, {computer['load_after']:.1f} "
+        f"after; {results['seconds']} s each, control at 20 Hz; times in ms as p50 / p95 / p99."
+    )
+    return Table(("", *cases), rows, "Latency of the cockpit", caption)
+
+
+def _percentiles(times: Mapping[str, float] | None) -> str:
+    return f"{times['p50']:.0f} / {times['p95']:.0f} / {times['p99']:.0f}" if times else "–"
+
+
+def _shares(shares: Mapping[str, float]) -> str:
+    return ", ".join(f"{name} {100 * share:.0f} %" for name, share in shares.items() if share >= 0.005)
 
 
 def main(config: LatencyConfig) -> int:
     """Measure and print the table."""
     results = measure(config)
-    if config.json:
-        write_json(Path(config.json).expanduser(), results)
-    if config.page:
-        write_page(results, config)
-    Terminal().print(latency_table(results))
+    report("latency", config, [latency_table(results)], results)
     return 0

@@ -1,40 +1,43 @@
 """Settings of the bench `operators`; light to import."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Annotated
+
+from msgspec import Meta
 
 from handrail.collect.execution.config import ExecutionConfig
-from handrail.collect.flags import check_names, check_page, check_whole, names
+from handrail.collect.flags import check_names, check_page, names
 from handrail.collect.operators.modes import MODES
 from handrail.collect.world.tasks.catalogue import TASKS
 from handrail.controllers.errors import HandrailError
+from handrail.controllers.typed import AtLeastOne, Count, check_settings
 from handrail.datasets.lists import Names
+from handrail.scripts.bench.report import ReportConfig
 
 SLOW_MODE = "direct_single"  # needs more time than the tasks give
 SLOW_LIMITS = {"drawer": 180.0, "pick_place": 180.0, "reach": 60.0, "tray": 180.0}  # [s]
 
 
 @dataclass(frozen=True)
-class TrialsConfig(ExecutionConfig):
+class TrialsConfig(ReportConfig, ExecutionConfig):
     """Let the scripted operators do every task in every mode, and count how it went."""
 
     tasks: Names = "all"
     """Which tasks, or all: drawer, pick_place, reach, tray."""
     modes: Names = "ee,switching,base+ee,direct,direct_single,leader,decoupled"
     """Which teleop modes, or all."""
-    episodes: int = 20
+    episodes: AtLeastOne = 20
     """Episodes of each task in each mode; the same beginnings in all modes."""
-    persons: int = 5
+    persons: AtLeastOne = 5
     """Scripted operators, who take turns episode by episode."""
-    noise: float = 1.0
+    noise: Annotated[float, Meta(ge=0, le=5)] = 1.0
     """How human they are: 0 perfect, 1 the default, partly from studies of people."""
     robot: str = "ridgeback_ur10"
     """A robot that comes with Handrail, or a `.toml` file."""
-    seed: int = 900
+    seed: Count = 900
     """Of scenes and operators."""
-    json: str = "outputs/trials.json"
+    json: str = field(default="outputs/trials.json", kw_only=True)
     """Every episode is added to this file at once; what it has already is not run again."""
-    page: str = ""
-    """Put the tables into this Markdown page, between marks; other text stays."""
 
     @property
     def task_names(self) -> tuple[str, ...]:
@@ -48,11 +51,9 @@ class TrialsConfig(ExecutionConfig):
 
     def check(self) -> None:
         """Check what can be checked without loading anything heavy."""
+        check_settings(self, "--")
         check_names("task", "--tasks", self.task_names, TASKS)
         check_names("mode", "--modes", self.mode_names, MODES)
-        check_whole(self, episodes=1, persons=1, seed=0)
-        if not 0.0 <= self.noise <= 5.0:
-            raise HandrailError(f"--noise {self.noise}: expected a number from 0 (perfect) to 5")
         if not self.json.endswith(".json"):
             raise HandrailError(f"--json {self.json}: expected a file that ends in .json")
         check_page(self.page)

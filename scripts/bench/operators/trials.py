@@ -18,14 +18,13 @@ from handrail.collect.session.build import build_controller, build_env, build_mo
 from handrail.collect.session.session import Session
 from handrail.collect.world.env import HandrailEnv
 from handrail.controllers.errors import HandrailError
-from handrail.datasets.presentation.markdown import markdown_table, write_part
 from handrail.datasets.presentation.table import Table
 from handrail.datasets.presentation.terminal import Terminal
 from handrail.datasets.recording.frames import Frame
 from handrail.datasets.statistics.paired import wilson
-from handrail.scripts.bench.command_line import command_line
 from handrail.scripts.bench.operators.config import SLOW_LIMITS, SLOW_MODE, TrialsConfig
 from handrail.scripts.bench.operators.file import OperatorTrial, TrialsFile
+from handrail.scripts.bench.report import report
 
 _PRELOAD = ("handrail.scripts.bench.operators.trials",)
 _FPS = 20  # [Hz]
@@ -47,14 +46,7 @@ _WORDS = (
 def trials_table(trials: Sequence[OperatorTrial], modes: Sequence[str], task: str) -> Table:
     """Return a task's table: a line for each mode that has trials."""
     groups = [[each for each in trials if (each.task, each.mode) == (task, mode)] for mode in modes]
-    return Table(HEADINGS, [_line(group) for group in groups if group], task)
-
-
-def write_page(trials: Sequence[OperatorTrial], config: TrialsConfig) -> None:
-    """Put a table a task between the trials' marks of the page, made if need be; other text stays."""
-    parts = [f"`{command_line('operators', config)}` wrote this. {_WORDS}"]
-    parts += [markdown_table(trials_table(trials, config.mode_names, task)) for task in config.task_names]
-    write_part(Path(config.page).expanduser(), "Scripted operators", "trials", "\n\n".join(parts))
+    return Table(HEADINGS, [_line(group) for group in groups if group], task, _WORDS)
 
 
 def _line(group: Sequence[OperatorTrial]) -> list[str]:
@@ -161,9 +153,5 @@ def main(config: TrialsConfig) -> int:
             f"{done.task} {done.mode} {done.episode}: {done.failure_reason or 'done'}, {done.seconds:.1f} s"
         ),
     )
-    for task in config.task_names:
-        console.print(trials_table(trials, config.mode_names, task))
-    if config.page:
-        write_page(trials, config)
-        console.print(f"Written: {config.page}")
+    report("operators", config, [trials_table(trials, config.mode_names, task) for task in config.task_names])
     return 0

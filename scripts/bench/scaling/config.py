@@ -5,15 +5,17 @@ from pathlib import Path
 from typing import Annotated
 
 from handrail.collect.execution.config import MOST_WORKERS, ExecutionConfig
-from handrail.collect.flags import check_json, check_names, check_whole, one_of
+from handrail.collect.flags import check_names, one_of
 from handrail.collect.operators.modes import MODES
 from handrail.collect.world.tasks.catalogue import TASKS
 from handrail.controllers.errors import HandrailError
+from handrail.controllers.typed import AtLeastOne, Count
 from handrail.datasets.lists import Names
+from handrail.scripts.bench.report import ReportConfig
 
 
 @dataclass(frozen=True)
-class ScalingConfig:
+class ScalingConfig(ReportConfig):
     """Measure how many episodes a second some workers record, against one, and that the rows are the same."""
 
     task: Annotated[str, one_of(TASKS)] = "reach"
@@ -22,7 +24,7 @@ class ScalingConfig:
     """In which teleop mode."""
     cameras: Names = ""
     """With which cameras: wrist, scene or both; none by default."""
-    episodes: int = 60
+    episodes: AtLeastOne = 60
     """Episodes of each recording."""
     workers: Names = "1,2"
     """Numbers of workers, each a recording of its own; the first is what the others are compared with."""
@@ -31,10 +33,8 @@ class ScalingConfig:
     folder: str = ""
     """Where the recordings lie meanwhile, the system's folder for such files by default; with --ray, one that
     all computers of the cluster see."""
-    seed: int = 0
+    seed: Count = 0
     """Of the recordings."""
-    json: str = ""
-    """Write everything measured to this file."""
 
     @property
     def places(self) -> tuple[ExecutionConfig, ...]:
@@ -49,11 +49,10 @@ class ScalingConfig:
 
     def check(self) -> None:
         """Check the settings."""
+        super().check()
         check_names("task", "--task", (self.task,), TASKS)
         check_names("mode", "--mode", (self.mode,), MODES)
-        check_whole(self, episodes=1, seed=0)
         for place in self.places:
             place.check_execution()
         if self.folder and not Path(self.folder).expanduser().is_dir():
             raise HandrailError(f"--folder {self.folder}: expected a folder, found none")
-        check_json(self.json)

@@ -12,10 +12,9 @@ from typing import Any
 from handrail.collect.execution.config import ExecutionConfig
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.presentation.table import Table
-from handrail.datasets.presentation.terminal import Terminal
 from handrail.datasets.reading.digest import digest_of_dataset
 from handrail.datasets.reading.reader import read_episodes
-from handrail.datasets.storage.strict_json import write_json
+from handrail.scripts.bench.report import machine, report
 from handrail.scripts.bench.scaling.config import ScalingConfig
 
 _COMMAND = "from handrail.scripts.record import main; main()"
@@ -40,11 +39,8 @@ def measure(config: ScalingConfig) -> dict[str, Any]:
         for span in ("seconds", "recording_seconds"):
             whole, first = run[span] * run["workers"], runs[0][span] * runs[0]["workers"]
             run["efficiency" if span == "seconds" else "recording_efficiency"] = first / whole
-    machine = {"cores": os.cpu_count(), "load_before": load}
-    return {"task": config.task, "mode": config.mode, "episodes": config.episodes} | {
-        "machine": machine,
-        "runs": runs,
-    }
+    settings = {name: getattr(config, name) for name in ("task", "mode", "episodes")}
+    return settings | {"machine": machine(load), "runs": runs}
 
 
 def scaling_table(results: dict[str, Any]) -> Table:
@@ -61,10 +57,10 @@ def scaling_table(results: dict[str, Any]) -> Table:
         ]
         for run in results["runs"]
     ]
-    machine = results["machine"]
+    computer = results["machine"]
     caption = (
         f"{results['episodes']} episodes each of {results['task']} in mode {results['mode']};"
-        f" {machine['cores']} cores, load {machine['load_before']:.1f} before"
+        f" {computer['cores']} cores, load {computer['load_before']:.1f} before"
     )
     headings = (
         *("workers", "whole [s]", "recording [s]", "episodes a core-second"),
@@ -114,7 +110,5 @@ def _cores(place: ExecutionConfig) -> int:
 def main(config: ScalingConfig) -> int:
     """Measure and print the table; 1 if the recordings differ."""
     results = measure(config)
-    if config.json:
-        write_json(Path(config.json).expanduser(), results)
-    Terminal().print(scaling_table(results))
+    report("scaling", config, [scaling_table(results)], results)
     return int(len({run["rows"] for run in results["runs"]}) != 1)

@@ -2,11 +2,14 @@
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 import tyro
+from msgspec import Meta
 
-from handrail.collect.flags import check_page, check_whole
+from handrail.collect.flags import check_page
 from handrail.controllers.errors import HandrailError
+from handrail.controllers.typed import Count, check_settings
 
 
 @dataclass(frozen=True)
@@ -15,9 +18,9 @@ class SoakConfig:
 
     output: tyro.conf.Positional[str] = "outputs/soak"
     """Folder of the results: every round adds a line to rounds.jsonl."""
-    hours: float = 2.0
+    hours: Annotated[float, Meta(ge=0, le=1000)] = 2.0
     """Duration [h]."""
-    rounds: int = 10**9
+    rounds: Count = 10**9
     """Most rounds."""
     fault: str = ""
     """Only faults with this in their name."""
@@ -25,7 +28,7 @@ class SoakConfig:
     """Only this kind of work."""
     drive: bool = False
     """Also drive in the browser, all the time."""
-    seed: int = 0
+    seed: Count = 0
     """Of the rounds; two may run at once."""
     page: str = ""
     """Put the tables of all rounds into this Markdown page, at the end."""
@@ -37,9 +40,7 @@ class SoakConfig:
 
     def check(self) -> None:
         """Check the settings."""
-        check_whole(self, rounds=0, seed=0)
+        check_settings(self, "--")
         check_page(self.page)
-        if not 0.0 <= self.hours <= 1000.0:
-            raise HandrailError(f"--hours {self.hours}: expected 0 to 1000")
         if self.folder.is_file():
             raise HandrailError(f"OUTPUT {self.output}: expected a folder, found a file")

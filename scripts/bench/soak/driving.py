@@ -5,7 +5,6 @@ recording are frozen, killed, put on a slow disk and on a clock that jumps. Memo
 """
 
 import hashlib
-import os
 import re
 import signal
 import sys
@@ -16,26 +15,88 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import psutil
+from websockets.exceptions import WebSocketException
 
-from handrail.scripts.bench.soak.child import Child, children, command, hear_signals, wait_until
-from handrail.scripts.bench.soak.notes import commit, next_number, note
-from handrail.scripts.bench.soak.page import Page
+from handrail.scripts.bench.page import Page
+from handrail.scripts.bench.soak.child import Child, command, hear_signals, send, wait_until
+from handrail.scripts.bench.soak.notes import DRIVING, MEMORY, next_number, note
 
-ROUNDS, MEMORY = "driving.jsonl", "memory.jsonl"
 _EVERY = 20.0  # between two looks at the memory [s]
 _BETWEEN = (40.0, 100.0)  # from one fault to the next [s]
 _BACK = 300.0  # after a fault it drives again within this [s]
 _START = 1800.0  # [s]
 _PATIENCE = 120.0  # [s]
+_WHILE = 15.0  # a slow disk or another clock stays so long [s]
+_EPISODE = (2.0, 6.0)  # [s]
+_ARMED = 0.4  # everything is let go for so long first [s]
+_AGAIN = 0.5  # between two asks [s]
+_RETRY = 0.7  # as the real page [s]
+_GONE = (OSError, WebSocketException, TimeoutError)
 
 
-def main() -> None:
-    """Drive until time is over."""
-    out, hours = Path(sys.argv[1]), float(sys.argv[2])
-    hear_signals()
-    out.mkdir(parents=True, exist_ok=True)
-    first = next_number(out / ROUNDS)
-    DrivenHours(out, first).run(time.monotonic() + 3600.0 * hours)
+class WanderingPage(Page):
+    """Drives whatever the robot does, and ends an episode every few seconds.
+
+    Args:
+        address: of the cockpit.
+        rng: of where it drives.
+    """
+
+    def __init__(self, address: str, rng: np.random.Generator) -> None:
+        super().__init__(address, "soak-of-handrail")
+        self._rng, self._phase = rng, ""
+        self._since = self._ends = self._asked = 0.0
+
+    @property
+    def saved(self) -> int:
+        """How many episodes are saved."""
+        return self.frame.get("saved", 0)
+
+    def turn(self) -> None:
+        """Take a turn; a server that is gone is asked again."""
+        try:
+            super().turn()
+            if self.frame:
+                self._steer(time.monotonic())
+        except _GONE:
+            self.close()
+            time.sleep(_RETRY)
+
+    def reopen(self) -> None:
+        """Close the page, and open it again at the next turn."""
+        self.close()
+        time.sleep(self._rng.uniform(0.0, 5.0))
+
+    def lag(self, seconds: float) -> None:
+        """Answer an old frame for a while."""
+        self.echo = self.frame.get("stamp", 0.0)
+        self.run(seconds)
+        self.echo = None
+
+    def babble(self) -> None:
+        """Send what is no message."""
+        with suppress(*_GONE):
+            for words in ("{", "[]", '{"kind": "drive"}', '{"kind": "drive", "seq": 1e99}', "\0" * 5000):
+                self.socket.send(words)
+
+    def _steer(self, now: float) -> None:
+        """Ask for what comes next; let a hand wander while it drives, and rest else."""
+        if self.frame["phase"] != self._phase:
+            self._phase, self._since = self.frame["phase"], now
+            self._ends = now + self._rng.uniform(*_EPISODE)
+        ended = str(self._rng.choice(("success", "success", "failure", "discard")))
+        asks = {"ready": "start", "paused": "start", "stopped": "stop", "driving": ended}
+        wanted = asks.get(self._phase, "") if self.is_driving else "take"
+        due = self._phase != "driving" or not self.is_driving or now > self._ends
+        if wanted and due and now > self._asked + _AGAIN:
+            self._asked = now
+            self.ask(wanted, wanted != "stop")
+        if self._phase != "driving" or now < self._since + _ARMED:
+            self.axes = [0.0] * len(self.channels)
+        else:
+            moved = 0.95 * np.array(self.axes) + self._rng.normal(0.0, 0.15, len(self.axes))
+            self.axes = np.clip(moved, -1.0, 1.0).round(3).tolist()
 
 
 class DrivenHours:
@@ -58,130 +119,110 @@ class DrivenHours:
     def run(self, until: float) -> None:
         """Drive, with a fault every minute or so; end with Ctrl-C and look at everything."""
         # the first time on a computer compiles the controller
-        wait_until(lambda: "Ready." in self._child.said or not self._child.runs, _START)
-        page = Page(re.findall(r"Drive at (\S+)", self._child.said)[-1], self._rng)
+        wait_until(lambda: "Ready." in self._child.output or not self._child.runs, _START)
+        page = WanderingPage(re.findall(r"Drive at (\S+)", self._child.output)[-1], self._rng)
         try:
             while time.monotonic() < until and self._child.runs:
-                rest = min(until, time.monotonic() + self._rng.uniform(*_BETWEEN))
-                self._drive(page, rest)
+                self._drive(page, min(until, time.monotonic() + self._rng.uniform(*_BETWEEN)))
                 if time.monotonic() < until and self._child.runs:
                     self._befall(page)
         finally:
             page.close()
             self._end()
 
-    def _drive(self, page: Page, until: float) -> None:
-        while time.monotonic() < until and self._child.runs:
+    def _drive(self, page: WanderingPage, until: float, saved: float = np.inf) -> None:
+        """Drive until a time, the end of the recording, or more episodes are saved."""
+        while time.monotonic() < until and self._child.runs and page.saved <= saved:
             page.turn()
             if time.monotonic() > self._looked + _EVERY:
                 self._look_at_memory(page)
 
-    def _befall(self, page: Page) -> None:
+    def _befall(self, page: WanderingPage) -> None:
         """Let something happen; note whether it drives again, and that nothing saved is another."""
+        uniform = self._rng.uniform
         faults = {
-            "page silent for seconds": lambda: time.sleep(self._rng.uniform(0.5, 6.0)),
+            "page silent for seconds": lambda: time.sleep(uniform(0.5, 6.0)),
             "page closed and opened again": page.reopen,
-            "page answers seconds late": lambda: page.lag(self._rng.uniform(1.0, 4.0)),
+            "page answers seconds late": lambda: page.lag(uniform(1.0, 4.0)),
             "page says nonsense": page.babble,
             "recording frozen for seconds": lambda: self._freeze(self._child.pid),
             "web server frozen for seconds": lambda: self._freeze(self._server),
-            "web server killed": lambda: os.kill(self._server, signal.SIGKILL),
-            "slow disk for seconds": lambda: self._while(page, delay=self._rng.uniform(0.1, 0.5)),
-            "clock jumps forwards": lambda: self._while(page, shift=self._rng.uniform(60.0, 3e7)),
-            "clock jumps backwards": lambda: self._while(page, shift=-self._rng.uniform(60.0, 3e7)),
+            "web server killed": lambda: send(signal.SIGKILL, self._server),
+            "slow disk for seconds": lambda: self._while(page, delay=uniform(0.1, 0.5)),
+            "clock jumps forwards": lambda: self._while(page, shift=uniform(60.0, 3e7)),
+            "clock jumps backwards": lambda: self._while(page, shift=-uniform(60.0, 3e7)),
         }
         name = str(self._rng.choice(list(faults)))
         before, began = self._known(), time.monotonic()
         faults[name]()
-        drives = self._drives_again(page)
-        took = time.monotonic() - began
-        complaints = [] if drives else ["it did not drive again"]
-        complaints += [] if self._child.runs else [f"it ended: {self._child.last_words}"]
-        now = self._known()
-        lost = [each for each in before if now.get(each) != before[each]]
-        complaints += [f"{each} was saved and is gone or another" for each in lost]
-        row = {"round": self._number, "fault": name, "work": "drive in the browser, one process"}
-        row |= {"struck": True, "saved_before": _episodes(before), "saved_after": _episodes(now)}
-        row |= {"lost": _episodes(lost)}
-        row |= {"seconds": round(took, 1), "complaints": complaints, "commit": commit()}
-        note(self._out / ROUNDS, row | {"load": round(os.getloadavg()[0], 1)})
+        saved = page.saved
+        self._drive(page, time.monotonic() + _BACK, saved)
+        complaints = [] if page.saved > saved else ["it did not drive again"]
+        complaints += [] if self._child.runs else [f"it ended: {self._child.last_line}"]
+        self._note(name, before, complaints, seconds=round(time.monotonic() - began, 1), struck=True)
         self._number += 1
 
-    def _drives_again(self, page: Page) -> bool:
-        """Return whether an episode is saved after this."""
-        saved, until = page.saved, time.monotonic() + _BACK
-        while page.saved <= saved and time.monotonic() < until and self._child.runs:
-            page.turn()
-        return page.saved > saved
-
-    def _while(self, page: Page, **faults: float) -> None:
+    def _while(self, page: WanderingPage, **faults: float) -> None:
         self._child.set(**faults)
-        self._drive(page, time.monotonic() + 15.0)
+        self._drive(page, time.monotonic() + _WHILE)
         self._child.set()
 
     def _freeze(self, pid: int) -> None:
-        os.kill(pid, signal.SIGSTOP)
+        send(signal.SIGSTOP, pid)
         time.sleep(self._rng.uniform(0.5, 8.0))
-        os.kill(pid, signal.SIGCONT)
+        send(signal.SIGCONT, pid)
 
     @property
     def _server(self) -> int:
-        servers = [pid for pid in children(self._child.pid) if b"cockpit.server" in _words(pid)]
-        return servers[-1]
+        children = psutil.Process(self._child.pid).children()
+        return [each.pid for each in children if "cockpit.server" in " ".join(each.cmdline())][-1]
 
-    def _known(self) -> dict[str, str]:
-        """Return a digest of every file of saved episodes; each is read once here, and all at the end."""
+    def _known(self, anew: bool = False) -> dict[str, str]:
+        """Return a digest of every file of saved episodes; each is read once, and all at the end."""
         known = {}
         for path in self._root.glob("meta/episodes/*/*.parquet"):
             data = self._root / "data" / path.relative_to(self._root / "meta" / "episodes")
             for file in (path, data):
                 name = str(file.relative_to(self._root))
-                known[name] = self._sums.get(name) if file.exists() else ""
-                if known[name] is None:
-                    known[name] = self._sums[name] = _digest(file)
+                if anew or name not in self._sums:
+                    self._sums[name] = hashlib.sha256(file.read_bytes()).hexdigest() if file.exists() else ""
+                known[name] = self._sums[name] if file.exists() else ""
         return known
 
-    def _look_at_memory(self, page: Page) -> None:
+    def _note(self, fault: str, before: dict[str, str], complaints: list[str], **row: Any) -> None:
+        now = self._known(anew=fault == "Ctrl-C at the end")
+        lost = [each for each in before if now.get(each) != before[each]]
+        complaints += [f"{each} was saved and is gone or another" for each in lost]
+        row |= {"round": self._number, "fault": fault, "work": "drive in the browser, one process"}
+        row |= {"saved_before": _episodes(before), "saved_after": _episodes(now), "lost": _episodes(lost)}
+        note(self._out / DRIVING, row | {"complaints": complaints})
+
+    def _look_at_memory(self, page: WanderingPage) -> None:
         self._looked = time.monotonic()
         row: dict[str, Any] = {"seconds": round(self._looked - self._child.begun), "saved": page.saved}
-        with suppress(OSError, IndexError):
+        with suppress(psutil.Error, IndexError):
             for name, pid in (("recording", self._child.pid), ("server", self._server)):
-                row[name] = {"pid": pid, **_memory(pid)}
+                process = psutil.Process(pid)
+                memory, threads = process.memory_info().rss // 1024, process.num_threads()  # [kB]
+                row[name] = {"pid": pid, "rss": memory, "files": process.num_fds(), "threads": threads}
         note(self._out / MEMORY, row | {"drive": self._root.name})
 
     def _end(self) -> None:
         """End it with Ctrl-C; everything that was saved is whole then."""
         before, ran = self._known(), self._child.runs
         if ran:
-            os.kill(self._child.pid, signal.SIGINT)
+            send(signal.SIGINT, self._child.pid)
         code = self._child.end(_PATIENCE)
         orphans = self._child.orphans()
-        complaints = [] if code == 130 else [f"exit code {code}: {self._child.last_words}"]
+        complaints = [] if code == 130 else [f"exit code {code}: {self._child.last_line}"]
         complaints += [f"{orphans} processes were left behind"] if orphans else []
-        complaints += ["a traceback"] if "Traceback" in self._child.said else []
-        lost = [each for each in before if not (self._root / each).exists()]
-        lost += [each for each in before if each not in lost and _digest(self._root / each) != before[each]]
+        complaints += ["a traceback"] if "Traceback" in self._child.output else []
         repair = Child([command("repair"), str(self._root)], self._out, f"{self._root.name}-repair")
-        if repair.end(_PATIENCE * 5) != 0 or "nothing to repair" not in repair.said:
-            complaints.append(repair.last_words)
-        row = {"round": self._number, "fault": "Ctrl-C at the end", "struck": ran, "code": code}
-        row |= {"work": "drive in the browser, one process", "seconds": 0.0, "commit": commit()}
-        row |= {"saved_before": _episodes(before), "lost": _episodes(lost), "complaints": complaints}
-        note(self._out / ROUNDS, row | {"said": repair.last_words})
-
-
-def _words(pid: int) -> bytes:
-    with suppress(OSError):
-        return Path(f"/proc/{pid}/cmdline").read_bytes()
-    return b""
-
-
-def _memory(pid: int) -> dict[str, int]:
-    """Return how much memory a process has [kB], how many open files, how many threads."""
-    lines = Path(f"/proc/{pid}/status").read_text().splitlines()
-    said = dict(line.split(":", 1) for line in lines)
-    files = len(list(Path(f"/proc/{pid}/fd").iterdir()))
-    return {"rss": int(said["VmRSS"].split()[0]), "files": files, "threads": int(said["Threads"])}
+        if repair.end(_PATIENCE * 5) != 0 or "nothing to repair" not in repair.output:
+            complaints.append(repair.last_line)
+        self._note(
+            "Ctrl-C at the end", before, complaints, seconds=0.0, struck=ran, code=code, said=repair.last_line
+        )
 
 
 def _episodes(files: Iterable[str]) -> int:
@@ -189,9 +230,8 @@ def _episodes(files: Iterable[str]) -> int:
     return len({name.partition("/chunk-")[2] for name in files})
 
 
-def _digest(file: Path) -> str:
-    return hashlib.sha256(file.read_bytes()).hexdigest()[:16]
-
-
 if __name__ == "__main__":
-    main()
+    place = Path(sys.argv[1])
+    hear_signals()
+    place.mkdir(parents=True, exist_ok=True)
+    DrivenHours(place, next_number(place / DRIVING)).run(time.monotonic() + 3600.0 * float(sys.argv[2]))

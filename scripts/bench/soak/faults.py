@@ -13,111 +13,68 @@ from pathlib import Path
 
 import numpy as np
 
-from handrail.scripts.bench.soak.child import Child, members, wait_until
+from handrail.scripts.bench.soak.child import Child, send, session, wait_until
 
-KILLED, HUNG_UP, ASKED = {-signal.SIGKILL}, {-signal.SIGHUP}, {130}
-FINE, FAILED = {0}, {0, 1, 2}  # a failure that comes too late for the command to notice is none
+KILLED = {-signal.SIGKILL}
 CLUSTER = "cluster.json"  # in the folder of work that is done on a cluster
-_DAY = 86_400.0  # [s]
+_FINE, _FAILED = {0}, {0, 1, 2}  # a failure that comes too late for the command to notice is none
+_FAR = 400 * 86_400.0  # of a clock that jumps [s]
 _BEGUN = 600.0  # a command has workers by then [s]
+
+Strike = Callable[[Child, Path, np.random.Generator], object]
 
 
 @dataclass(frozen=True)
 class Fault:
-    """What can go wrong.
-
-    Attributes:
-        name: of it, in the table.
-        strike: lets it happen to a command whose work is in a folder.
-        codes: exit codes that a command may have after it.
-        heal: takes it back, once the command has ended.
-        workers: whether it needs a command with workers.
-        disk: whether it needs a small disk of its own.
-        cluster: whether it needs work on a cluster.
-    """
+    """A thing that can go wrong."""
 
     name: str
-    strike: Callable[[Child, Path, np.random.Generator], None]
+    """As in the table."""
+    strike: Strike
+    """Lets it happen to a command whose work is in a folder."""
     codes: set[int]
+    """Exit codes that a command may have after it."""
     heal: Callable[[Path], None] = lambda folder: None
+    """Takes it back, once the command has ended."""
     workers: bool = False
+    """Whether it needs a command with workers."""
     disk: bool = False
+    """Whether it needs a small disk of its own."""
     cluster: bool = False
+    """Whether it needs work on a cluster."""
 
 
-def _send(pid: int, number: int) -> None:
-    with suppress(ProcessLookupError):
-        os.kill(pid, number)
+def _to_command(number: int) -> Strike:
+    return lambda child, folder, rng: send(number, child.pid)
 
 
-def _kill(child: Child, folder: Path, rng: np.random.Generator) -> None:
-    _send(child.pid, signal.SIGKILL)
+def _to_all(number: int) -> Strike:
+    return lambda child, folder, rng: send(number, *session(child.pid))
 
 
-def _kill_all(child: Child, folder: Path, rng: np.random.Generator) -> None:
-    for pid in (*members(child.pid), child.pid):
-        _send(pid, signal.SIGKILL)
+def _interrupt_twice(child: Child, folder: Path, rng: np.random.Generator) -> None:
+    send(signal.SIGINT, *session(child.pid))  # as a terminal does
+    time.sleep(rng.uniform(0.05, 0.5))
+    send(signal.SIGINT, *session(child.pid))
 
 
 def _kill_slowly(child: Child, folder: Path, rng: np.random.Generator) -> None:
     child.set(delay=rng.uniform(0.1, 0.5))
     time.sleep(rng.uniform(0.0, 6.0))
-    _kill_all(child, folder, rng)
+    send(signal.SIGKILL, *session(child.pid))
 
 
 def _kill_worker(child: Child, folder: Path, rng: np.random.Generator) -> None:
     wait_until(lambda: child.workers or not child.runs, _BEGUN)
     if workers := child.workers:
-        _send(int(rng.choice(workers)), signal.SIGKILL)
-
-
-def _terminate(child: Child, folder: Path, rng: np.random.Generator) -> None:
-    _send(child.pid, signal.SIGTERM)
-
-
-def _hang_up(child: Child, folder: Path, rng: np.random.Generator) -> None:
-    for pid in (child.pid, *members(child.pid)):
-        _send(pid, signal.SIGHUP)
-
-
-def _interrupt(child: Child, folder: Path, rng: np.random.Generator) -> None:
-    for pid in (child.pid, *members(child.pid)):  # as a terminal does
-        _send(pid, signal.SIGINT)
-
-
-def _interrupt_twice(child: Child, folder: Path, rng: np.random.Generator) -> None:
-    _interrupt(child, folder, rng)
-    time.sleep(rng.uniform(0.05, 0.5))
-    _interrupt(child, folder, rng)
+        send(signal.SIGKILL, int(rng.choice(workers)))
 
 
 def _freeze(child: Child, folder: Path, rng: np.random.Generator) -> None:
-    pids = [int(rng.choice(child.workers))] if child.workers else [child.pid]
-    for pid in pids:
-        _send(pid, signal.SIGSTOP)
+    pid = int(rng.choice(child.workers or [child.pid]))
+    send(signal.SIGSTOP, pid)
     time.sleep(rng.uniform(3.0, 12.0))
-    for pid in pids:
-        _send(pid, signal.SIGCONT)
-
-
-def _slow_disk(child: Child, folder: Path, rng: np.random.Generator) -> None:
-    child.set(delay=rng.uniform(0.1, 0.6))
-
-
-def _clock_forwards(child: Child, folder: Path, rng: np.random.Generator) -> None:
-    child.set(shift=rng.uniform(60.0, 400 * _DAY))
-
-
-def _clock_backwards(child: Child, folder: Path, rng: np.random.Generator) -> None:
-    child.set(shift=-rng.uniform(60.0, 400 * _DAY))
-
-
-def _few_files(child: Child, folder: Path, rng: np.random.Generator) -> None:
-    child.limit(resource.RLIMIT_NOFILE, int(rng.integers(4, 12)))
-
-
-def _short_files(child: Child, folder: Path, rng: np.random.Generator) -> None:
-    child.limit(resource.RLIMIT_FSIZE, int(rng.integers(0, 20_000)))
+    send(signal.SIGCONT, pid)
 
 
 def _ballast(folder: Path) -> Path:
@@ -134,42 +91,44 @@ def _fill(child: Child, folder: Path, rng: np.random.Generator) -> None:
         os.truncate(_ballast(folder), max(0, _ballast(folder).stat().st_size - left))
 
 
-def _empty(folder: Path) -> None:
-    _ballast(folder).unlink(missing_ok=True)
-
-
-def _lock_folders(child: Child, folder: Path, rng: np.random.Generator) -> None:
-    subprocess.run(["chattr", "+i", *map(str, _folders(folder))], capture_output=True)
-
-
-def _unlock_folders(folder: Path) -> None:
-    subprocess.run(["chattr", "-i", *map(str, _folders(folder))], capture_output=True)
-
-
-def _folders(folder: Path) -> list[Path]:
-    return [folder, *(path for path in folder.rglob("*") if path.is_dir())]
+def _lock_folders(folder: Path, sign: str = "+") -> None:
+    folders = [folder, *(path for path in folder.rglob("*") if path.is_dir())]
+    subprocess.run(["chattr", f"{sign}i", *map(str, folders)], capture_output=True)
 
 
 def _lose_node(child: Child, folder: Path, rng: np.random.Generator) -> None:
-    _send(json.loads((folder / CLUSTER).read_text())["pid"], signal.SIGUSR1)
+    send(signal.SIGUSR1, json.loads((folder / CLUSTER).read_text())["pid"])
 
 
 FAULTS = (
-    Fault("SIGKILL of the command", _kill, KILLED),
-    Fault("SIGKILL of the command and all its workers", _kill_all, KILLED),
+    Fault("SIGKILL of the command", _to_command(signal.SIGKILL), KILLED),
+    Fault("SIGKILL of the command and all its workers", _to_all(signal.SIGKILL), KILLED),
     Fault("SIGKILL while the disk is slow", _kill_slowly, KILLED),
-    Fault("SIGKILL of one worker", _kill_worker, FINE, workers=True),
-    Fault("a lost Ray node", _lose_node, FINE, cluster=True),
-    Fault("SIGTERM", _terminate, ASKED),
-    Fault("the terminal is closed (SIGHUP)", _hang_up, HUNG_UP),
-    Fault("Ctrl-C", _interrupt, {130}),
+    Fault("SIGKILL of one worker", _kill_worker, _FINE, workers=True),
+    Fault("a lost Ray node", _lose_node, _FINE, cluster=True),
+    Fault("SIGTERM", _to_command(signal.SIGTERM), {130}),
+    Fault("the terminal is closed (SIGHUP)", _to_all(signal.SIGHUP), {-signal.SIGHUP}),
+    Fault("Ctrl-C", _to_all(signal.SIGINT), {130}),
     Fault("Ctrl-C twice", _interrupt_twice, {130, -signal.SIGINT}),
-    Fault("frozen for seconds (SIGSTOP)", _freeze, FINE),
-    Fault("slow disk", _slow_disk, FINE),
-    Fault("clock jumps forwards", _clock_forwards, FINE),
-    Fault("clock jumps backwards", _clock_backwards, FINE),
-    Fault("full disk", _fill, FAILED, _empty, disk=True),
-    Fault("files that cannot grow", _short_files, FAILED),
-    Fault("no more file handles", _few_files, FAILED),
-    Fault("read-only folder", _lock_folders, FAILED, _unlock_folders),
+    Fault("frozen for seconds (SIGSTOP)", _freeze, _FINE),
+    Fault("slow disk", lambda child, _, rng: child.set(delay=rng.uniform(0.1, 0.6)), _FINE),
+    Fault("clock jumps forwards", lambda child, _, rng: child.set(shift=rng.uniform(60.0, _FAR)), _FINE),
+    Fault("clock jumps backwards", lambda child, _, rng: child.set(shift=-rng.uniform(60.0, _FAR)), _FINE),
+    Fault("full disk", _fill, _FAILED, lambda folder: _ballast(folder).unlink(missing_ok=True), disk=True),
+    Fault(
+        "files that cannot grow",
+        lambda child, _, rng: child.limit(resource.RLIMIT_FSIZE, int(rng.integers(0, 20_000))),
+        _FAILED,
+    ),
+    Fault(
+        "no more file handles",
+        lambda child, _, rng: child.limit(resource.RLIMIT_NOFILE, int(rng.integers(4, 12))),
+        _FAILED,
+    ),
+    Fault(
+        "read-only folder",
+        lambda child, folder, rng: _lock_folders(folder),
+        _FAILED,
+        lambda folder: _lock_folders(folder, "-"),
+    ),
 )

@@ -14,10 +14,9 @@ import numpy as np
 
 from handrail.datasets.recording.repair import repair
 from handrail.scripts.bench.soak.child import Child, command, wait_until
-from handrail.scripts.bench.soak.choice import any_work
 from handrail.scripts.bench.soak.faults import FAULTS, Fault
-from handrail.scripts.bench.soak.work import Work
-from handrail.scripts.bench.soak.workshop import Workshop
+from handrail.scripts.bench.soak.whole import Saved
+from handrail.scripts.bench.soak.work import Work, Workshop, any_work
 
 _PATIENCE = 1800.0  # for the end of a command [s]
 _ARRIVAL = 900.0  # for the moment of the fault [s]
@@ -25,8 +24,6 @@ _STARTS = 8.0  # of the processor's time; a command has begun to work by then [s
 _EPISODE = 1.5  # [s]
 _DISK = 48  # size of the small one [MB]
 _GOES = 4  # commands after a fault
-_TRACE = "Traceback (most recent call last)"
-_CLEAN = "nothing to repair"
 
 
 def run_round(
@@ -37,7 +34,7 @@ def run_round(
     Args:
         number: of it.
         seed: of it: which work, which fault, and when.
-        folder: for it; removed at the end, if nothing is to be complained of.
+        folder: for it; removed at the end, if there is no complaint.
         workshop: that it takes from.
         fault: the only one wanted; any when empty.
         work: the only kind of work wanted; any when empty.
@@ -69,34 +66,34 @@ class _Round:
     def __init__(self, work: Work, fault: Fault, folder: Path, rng: np.random.Generator) -> None:
         self._work, self._fault, self._folder, self._rng = work, fault, folder, rng
         self._complaints: list[str] = []
-        self._mended = ""
         self._count = 0
 
     def run(self) -> dict[str, Any]:
         """Return what happened."""
-        work, fault = self._work, self._fault
-        child = self._begin()
+        work, fault, mended = self._work, self._fault, ""
+        child = self._begin(work.words())
         struck = self._await_moment(child)
         when, before = time.monotonic() - child.begun, work.saved()
         try:
             if struck:
                 fault.strike(child, work.folder, self._rng)
-            code = child.end(_PATIENCE)
+            work.code = code = child.end(_PATIENCE)
         finally:
             fault.heal(work.folder)
-        orphans = child.orphans()
-        work.ended(code)
-        self._judge_end(child, code, fault.codes if struck else {0}, orphans)
+        orphans = self._judge_end(child, code, fault.codes if struck else {0})
         after = self._look(before, "after the fault")
         if work.root and self._rng.random() < 0.5:
-            self._repair()
+            repairing = self._begin([command("repair"), str(work.root)])
+            self._judge_end(repairing, repairing.end(_PATIENCE), {0})
+            mended = "" if "nothing to repair" in repairing.output else repairing.last_line
         goes, last = self._go_on()
         final = self._look(after, "in the end")
         if final != work.wanted:
-            self._complain(f"in the end {len(final)} of {len(work.wanted)} pieces are as they should be")
+            self._complaints.append(f"in the end {len(final)} of {len(work.wanted)} are as they should be")
         if work.root and not (report := repair(work.root)).clean:
-            self._complain(f"in the end a repair says: {report}")
-        self._check_left_over()
+            self._complaints.append(f"in the end a repair says: {report}")
+        if left := [path.name for path in work.folder.iterdir() if path.name.startswith(".")]:
+            self._complaints.append(f"left behind: {', '.join(left)}")
         return {
             "struck": struck,
             "at": round(when, 1),
@@ -104,16 +101,15 @@ class _Round:
             "saved_after": len(after),
             "lost": sum(1 for each in before if final.get(each) != work.wanted.get(each)),
             "code": code,
-            "said": child.last_words,
-            "mended": self._mended,
+            "said": child.last_line,
+            "mended": mended,
             "goes": goes,
             "last_code": last,
             "orphans": orphans,
             "complaints": self._complaints,
         }
 
-    def _begin(self) -> Child:
-        words = self._work.words()
+    def _begin(self, words: list[str] | None) -> Child:
         assert words is not None, "nothing to do"
         self._count += 1
         return Child(words, self._folder, f"{self._count}")
@@ -124,64 +120,43 @@ class _Round:
         todo = max(0, work.steps - first)
         wanted = first + int(self._rng.integers(0, todo + 1)) if todo else first
         spent = self._rng.uniform(0.0, _STARTS) if wanted == first else 0.0
-
-        def is_there() -> bool:
-            return not child.runs or (work.progress() >= wanted and child.spent >= spent)
-
-        wait_until(is_there, _ARRIVAL)
+        wait_until(lambda: not child.runs or (work.progress() >= wanted and child.spent >= spent), _ARRIVAL)
         if wanted > first:
             time.sleep(self._rng.uniform(0.0, _EPISODE))
         return child.runs
 
-    def _judge_end(self, child: Child, code: int | None, codes: set[int], orphans: int) -> None:
+    def _judge_end(self, child: Child, code: int | None, codes: set[int]) -> int:
+        """Note an end that may not be; return how many processes were left behind."""
+        orphans = child.orphans()
         if code is None:
-            self._complain("the command did not end by itself")
+            self._complaints.append("the command did not end by itself")
         elif code not in codes:
-            self._complain(f"exit code {code}, expected {' or '.join(map(str, sorted(codes)))}")
-        if _TRACE in child.said:
-            self._complain(f"a traceback: {child.last_words}")
+            self._complaints.append(f"exit code {code}, expected {codes}: {child.last_line}")
+        if "Traceback (most recent call last)" in child.output:
+            self._complaints.append(f"a traceback: {child.last_line}")
         if orphans:
-            self._complain(f"{orphans} processes were left behind")
+            self._complaints.append(f"{orphans} processes were left behind")
+        return orphans
 
-    def _look(self, before: dict[int, str], when: str) -> dict[int, str]:
+    def _look(self, before: Saved, when: str) -> Saved:
         try:
             now = self._work.saved()
         except Exception as error:
-            self._complain(f"{when} what was saved cannot be read: {error}")
+            self._complaints.append(f"{when} what was saved cannot be read: {error}")
             return {}
-        for each in self._work.lost(before, now):
-            self._complain(f"{when} {each}")
+        self._complaints += [f"{when} {each}" for each in self._work.lost(before, now)]
         return now
-
-    def _repair(self) -> None:
-        """Let Handrail repair the dataset."""
-        self._count += 1
-        child = Child([command("repair"), str(self._work.root)], self._folder, f"{self._count}")
-        code = child.end(_PATIENCE)
-        if code != 0 or _TRACE in child.said:
-            self._complain(f"handrail-repair ended with {code}: {child.last_words}")
-        elif _CLEAN not in child.said:
-            self._mended = child.last_words
 
     def _go_on(self) -> tuple[int, int | None]:
         """Do what a user does: the same work again, until it is done; return how often, and the last code."""
         goes, code = 0, None
-        while goes < _GOES and self._work.words() is not None:
+        while goes < _GOES and (words := self._work.words()) is not None:
             goes += 1
-            child = self._begin()
-            code = child.end(_PATIENCE)
-            self._work.ended(code)
-            finished = code == 2 and "is finished now" in child.said
-            self._judge_end(child, 0 if finished else code, {0}, child.orphans())
+            child = self._begin(words)
+            self._work.code = code = child.end(_PATIENCE)
+            finished = code == 2 and "is finished now" in child.output
+            self._judge_end(child, 0 if finished else code, {0})
         return goes, code
-
-    def _check_left_over(self) -> None:
-        left = [path.name for path in self._work.folder.iterdir() if path.name.startswith(".")]
-        if left:
-            self._complain(f"left behind: {', '.join(left)}")
-
-    def _complain(self, words: str) -> None:
-        self._complaints.append(words)
 
 
 @contextmanager

@@ -11,8 +11,9 @@ from handrail.collect.world.mink import MinkController
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.robot.shape import Obstacle
 from handrail.controllers.solvers.converged import ConvergedSolver
+from handrail.scripts.bench.report import spread
 from handrail.scripts.bench.speed.compiled_core import CoreSolver, library
-from handrail.scripts.bench.speed.timing_loop import PERIOD, TimingLoop, Update, times
+from handrail.scripts.bench.speed.timing_loop import PERIOD, TimingLoop, Update
 
 Solve = Callable[[Update], float | None]
 """Time that the problem of an update takes [s]; None where it is not solved."""
@@ -54,7 +55,7 @@ class Rival:
         if not self._seconds:
             return {**counts, "ratio": None}
         ratio = float(np.median(self._ours) / np.median(self._seconds))
-        return {**counts, **times(self._seconds), "ratio": ratio}
+        return {**counts, **spread(self._seconds), "ratio": ratio}
 
 
 def converged(loop: TimingLoop) -> Solve:

@@ -2,7 +2,6 @@
 
 import os
 from importlib import metadata
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,8 +11,7 @@ from handrail.collect.world.mink import ACTIVATION_DISTANCE
 from handrail.collect.world.tasks.catalogue import TASKS
 from handrail.controllers.numerics.threads import single_threaded
 from handrail.controllers.robot.catalogue import ROBOTS
-from handrail.datasets.presentation.terminal import Terminal
-from handrail.datasets.storage.strict_json import write_json
+from handrail.scripts.bench.report import machine, report, spread
 from handrail.scripts.bench.speed.baselines import Rival, converged, core, mink
 from handrail.scripts.bench.speed.compiled_core import compiler
 from handrail.scripts.bench.speed.config import ProfileConfig
@@ -26,7 +24,6 @@ from handrail.scripts.bench.speed.timing_loop import (
     TimingLoop,
     Update,
     longer,
-    times,
 )
 
 _BLOCK = 10  # updates of one loop before the next has its turn
@@ -73,7 +70,7 @@ def profile(config: ProfileConfig) -> dict[str, Any]:
         "tasks": in_tasks,
         "rivals": _by_case(list(baselines.values())),
         "seed": config.seed,
-        "machine": {"cores": os.cpu_count(), "load_before": load, "load_after": os.getloadavg()[0]},
+        "machine": machine(load),
         "versions": {name: metadata.version(name) for name in ("casadi", "coal", "daqp", "numpy", "pin")},
         "qp": qp,
     }
@@ -108,7 +105,7 @@ def _case(case: SpeedCase, updates: list[Update]) -> dict[str, Any]:
     phases["rest"] = [update.seconds - sum(dict(plan.phases).values()) for update, plan in solved]
     near = [np.sum(plan.distances < update.problem.active_within) for update, plan in solved]
     return {
-        **times([update.seconds for update in updates]),
+        **spread([update.seconds for update in updates]),
         "pairs": pairs,
         "near_mean": float(np.mean(near)),
         "rows_mean": float(np.mean([plan.rows for plan in plans])),
@@ -125,7 +122,5 @@ def _case(case: SpeedCase, updates: list[Update]) -> dict[str, Any]:
 def main(config: ProfileConfig) -> int:
     """Measure and print the tables."""
     results = profile(config)
-    if config.json:
-        write_json(Path(config.json).expanduser(), results)
-    Terminal().print(*profile_tables(results), sep="\n")
+    report("speed", config, profile_tables(results), results)
     return 0

@@ -13,7 +13,8 @@ from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import not_installed
 from handrail.controllers.solvers.active_set import NOTHING_ACTIVE, ActiveSet, QuadraticProgram
 from handrail.controllers.solvers.dense import DenseProgram, dense
-from handrail.scripts.bench.speed.timing_loop import SpeedCase, TimingLoop, longer, times
+from handrail.scripts.bench.report import spread
+from handrail.scripts.bench.speed.timing_loop import SpeedCase, TimingLoop, longer
 
 _TOLERANCE = 1e-6  # of the interior-point method
 _SMALL = 1e-3  # objective that counts as little
@@ -117,7 +118,7 @@ def _compared(case: SpeedCase, count: int, seed: int) -> dict[str, Any]:
         "rows_mean": float(np.mean([len(each.rows) for each in programs])),
         "qps": count,
         "solvers": {
-            name: {**times(seconds[name]), "ratio": ratios[name]}
+            name: {**spread(seconds[name]), "ratio": ratios[name]}
             | _accuracy(programs, answers["own"], answers[name])
             for name in solvers
         },

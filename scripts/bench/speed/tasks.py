@@ -14,7 +14,7 @@ from handrail.controllers.interface.controller import State
 from handrail.controllers.interface.intent import Intent
 from handrail.controllers.mpc.masked_mpc import MaskedMpc
 from handrail.controllers.robot.shape import Obstacle
-from handrail.scripts.bench.speed.timing_loop import times
+from handrail.scripts.bench.report import spread
 
 _FPS = 20  # [Hz]
 _COLD = 20  # updates at the beginning that are left out
@@ -89,8 +89,8 @@ def _timed(robot: str, task: str, updates: int, seed: int) -> dict[str, Any]:
         "braked": timed.braked,
         "pairs": mpc.loop.surroundings.collision.size,
         "rows_mean": float(np.mean(timed.rows)),
-        "cpu": times(timed.cpu[_COLD:]),
-        "wall": times(timed.wall[_COLD:]),
+        "cpu": spread(timed.cpu[_COLD:]),
+        "wall": spread(timed.wall[_COLD:]),
         "phases_ms": {
             name: 1e3 * float(np.median([phases[name] for phases in timed.phases]))
             for name in timed.phases[0]

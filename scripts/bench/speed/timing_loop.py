@@ -175,10 +175,3 @@ def _random_intent(
 
 def _unit(vector: FloatArray) -> FloatArray:
     return vector / max(float(np.linalg.norm(vector)), 1e-9)
-
-
-def times(seconds: list[float]) -> dict[str, float]:
-    """Return median, p95, p99 and worst [ms]."""
-    milliseconds = 1e3 * np.array(seconds)
-    names = ("median_ms", "p95_ms", "p99_ms", "worst_ms")
-    return dict(zip(names, np.percentile(milliseconds, (50, 95, 99, 100)).tolist(), strict=True))

@@ -9,12 +9,12 @@ WRONG = {
     "none": ("", "unknown bench 'none'"),
     "goal_reaching": ("--controllers telepathy", "unknown controller 'telepathy'"),
     "cases": ("d", "unknown case 'd'"),
-    "speed": ("--updates 1", "--updates 1: expected"),
+    "speed": ("--updates 1", "--updates: expected"),
     "operators": ("--tasks juggle", "unknown task 'juggle'"),
     "rl": ("--gamma 2", "--gamma 2.0: expected"),
     "latency": ("--browser /none", "--browser /none: expected a program"),
     "scaling": ("--workers x", "--workers x: expected"),
-    "soak": ("--hours nan", "--hours nan: expected"),
+    "soak": ("--hours nan", "--hours: expected"),
 }
 
 

@@ -67,7 +67,7 @@ def test_every_qp_solver_solves_the_same_qps():
 @pytest.mark.parametrize(
     ("config", "said"),
     [
-        (ProfileConfig(updates=3), "--updates 3: expected a whole number >= 10"),
+        (ProfileConfig(updates=3), "--updates: expected a whole number >= 10"),
         (ProfileConfig(json="/nowhere/at/all.json"), "--json /nowhere/at/all.json: expected a file in an"),
     ],
 )

@@ -8,6 +8,7 @@ import sys
 import pytest
 from datasets_helpers import record
 
+from handrail.controllers.errors import HandrailError
 from handrail.datasets.editing.pack import merge_datasets
 from handrail.scripts.bench.soak import whole
 
@@ -26,7 +27,7 @@ def test_a_digest_stays_when_packed_and_moved_and_not_when_a_row_or_a_picture_di
     assert whole.saved_in(many) == found  # the same rows, written by another
     video = "videos/observation.images.wrist/chunk-000/file-00{}.mp4"
     shutil.copy(many / video.format(0), many / video.format(1))
-    with pytest.raises(Exception, match="pictures"):
+    with pytest.raises(HandrailError, match="pictures"):
         whole.saved_in(many)
 
 

@@ -8,7 +8,7 @@ import pytest
 from handrail.controllers.errors import HandrailError
 from handrail.scripts.bench.operators.config import TrialsConfig
 from handrail.scripts.bench.operators.file import OperatorTrial, TrialsFile
-from handrail.scripts.bench.operators.trials import HEADINGS, run_trials, trials_table, write_page
+from handrail.scripts.bench.operators.trials import HEADINGS, run_trials, trials_table
 
 DONE = OperatorTrial("reach", "ee", 0, 0, True, "", 4.0, 80, 0, 0.05, 0, 0, 0.0)
 
@@ -102,16 +102,3 @@ def test_a_table_counts_every_episode():
     assert cells["smallest distance [m]"] == "-0.010"
     assert cells["switches"] == "1.0"
     assert cells["time in switches"] == "8.3 %"
-
-
-def test_a_page_keeps_what_is_around_the_tables(config, tmp_path):
-    page = tmp_path / "page.md"
-    page.write_text("# Ours\n\nBefore.\n\n<!-- trials -->\nold\n<!-- end trials -->\n\nAfter.\n")
-    of_page = replace(config, page=str(page))
-    for _ in range(2):
-        write_page([DONE], of_page)
-    text = page.read_text()
-    assert text.startswith("# Ours\n\nBefore.")
-    assert text.endswith("After.\n")
-    assert "old" not in text
-    assert text.count("| ee | 1 of 1 |") == 1
