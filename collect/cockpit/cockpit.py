@@ -228,14 +228,14 @@ class Cockpit:
             ],
             "refuses": sorted(self._refuses),
             "cameras": self._env.cameras,
-            "gripper": self._model.description.gripper is not None,
+            "gripper": self._model.description.end_effector.gripper is not None,
             "grips": bool(self._env.start.scene.movables),
             "episodes": [each | {"played": self._there(each["played"])} for each in self._counts.episodes],
             "folder": self._folder,
             "wanted": self._wanted,
             "hand": stage.hand(compiled),
             "scale": self._model.description.world.scale,
-            "base_size": self._model.description.base_size if len(channels.base) else (),
+            "base_size": self._model.description.base.size if len(channels.base) else (),
         }
 
     def _there(self, played: str) -> str:

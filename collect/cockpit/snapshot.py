@@ -57,7 +57,7 @@ def reason(status: Status, contacts: Iterable[str], q: FloatArray, robot: RobotD
 
 
 def _at_limits(q: FloatArray, robot: RobotDescription) -> list[str]:
-    limits, base = robot.limits, len(robot.base_joints)
+    limits, base = robot.limits, len(robot.base.joints)
     at = np.flatnonzero((q < limits.position_lower + _CLOSE) | (q > limits.position_upper - _CLOSE))
     names = [_plain(robot.joints[index].removesuffix("_joint")) for index in at if index >= base]
     edge = ["base at the edge of its area"] if np.any(at < base) else []
@@ -243,7 +243,7 @@ class Snapshots:
             return {"path": [], "track": []}
         path, _ = plan.path(q)
         chosen = path[:: max(1, len(path) // _PATH_STEPS)]
-        base = len(self._model.description.base_joints)
+        base = len(self._model.description.base.joints)
         return {
             "path": [np.round(self._model.pose(each).position, 3).tolist() for each in chosen],
             "track": np.round(chosen[:, :base], 3).tolist() if base else [],

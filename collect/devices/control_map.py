@@ -12,14 +12,14 @@ from pathlib import Path
 from typing import Any
 
 from handrail.controllers.errors import HandrailError, shown
-from handrail.controllers.interface.channels import TOOL
+from handrail.controllers.interface.channels import BASE, TOOL
 from handrail.controllers.regular_file import open_regular
 
 SECTIONS: Mapping[str, tuple[str, ...]] = {
     "hand": TOOL,
     "turn": TOOL,
-    "base": ("base.vx", "base.vy", "base.wz"),
-    "both": ("base.vx", "base.vy", "base.wz", *TOOL),
+    "base": BASE,
+    "both": (*BASE, *TOOL),
     "joints": tuple(f"joint.{number}" for number in range(1, 8)),
 }
 ACTIONS: Mapping[str, str] = {

@@ -61,7 +61,7 @@ class Follower:
 
     def __init__(self, model: RobotModel, calibration: LeaderCalibration) -> None:
         description = model.description
-        self._arm, self._first = description.arm_joints, len(description.base_joints)
+        self._arm, self._first = description.arm_joints, len(description.base.joints)
         limits = description.limits
         self._clutch = Clutch(limits.position_lower[self._first :], limits.position_upper[self._first :])
         self._calibration = calibration

@@ -104,7 +104,7 @@ def _person(
     person = Person(env.model, modes, config.mode_name)
     person.ask(Ask("frame", "base"))
     tables = [source.controls for source in (main, beside) if source]
-    card = Card(main.name, tables, len(env.model.description.base_joints))
+    card = Card(main.name, tables, len(env.model.description.base.joints))
     return LocalPerson(person, main, beside, follower, card)
 
 

@@ -38,7 +38,7 @@ _PATIENCE = 20.0  # [s]
 def bring_home(link: Link, q: FloatArray, obstacles: tuple[Obstacle, ...] = ()) -> None:
     """Move the arm to its part of q, or as near as it may come to itself; the base stands."""
     description = link.model.description
-    base, channels = len(description.base_joints), Channels.of(description)
+    base, channels = len(description.base.joints), Channels.of(description)
     mpc = MaskedMpc(link.model)
     mpc.reset(() if base else obstacles)  # where a base stands is not known yet
     mask, values = channels.mask("joint"), np.zeros(channels.size)
@@ -95,7 +95,7 @@ class ClientPlant:
         self._collision = CollisionModel(model, scene.obstacles())
         link.begin(seed)
         bring_home(link, q, scene.obstacles())
-        link.body.place(q[: len(model.description.base_joints)])
+        link.body.place(q[: len(model.description.base.joints)])
         self._start = link.state.time
         link.exchange(())  # nothing usable: it stands
 

@@ -97,15 +97,15 @@ class RobotUnits:
         gripper: GripperUnits | None,
     ) -> None:
         arm = description.arm_joints
-        if set(joints) != set(arm) or bool(base) != bool(description.base_joints):
+        if set(joints) != set(arm) or bool(base) != bool(description.base.joints):
             raise HandrailError(
                 f"units of robot {description.name}: expected joints {', '.join(arm)} and "
-                f"{'a' if description.base_joints else 'no'} base; got {', '.join(joints) or 'no joints'} "
+                f"{'a' if description.base.joints else 'no'} base; got {', '.join(joints) or 'no joints'} "
                 f"and {'a' if base else 'no'} base"
             )
         self.base, self.gripper = base, gripper
         self._joints = [joints[name] for name in arm]
-        offset = len(description.base_joints)
+        offset = len(description.base.joints)
         lower, upper = (
             limit[offset:] for limit in (description.limits.position_lower, description.limits.position_upper)
         )
@@ -194,8 +194,8 @@ def so_follower(description: RobotDescription) -> RobotUnits:
 def plain(description: RobotDescription) -> RobotUnits:
     """Return the description's own names, in radians; the gripper from 0 (open) to 1, the base in radians."""
     joints = {name: JointUnits(name, "radians") for name in description.arm_joints}
-    base = BaseUnits(unit="radians") if description.base_joints else None
-    grip = GripperUnits("gripper.pos", 0.0, 1.0) if description.gripper else None
+    base = BaseUnits(unit="radians") if description.base.joints else None
+    grip = GripperUnits("gripper.pos", 0.0, 1.0) if description.end_effector.gripper else None
     return RobotUnits(description, joints, base, grip)
 
 

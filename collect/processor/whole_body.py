@@ -59,8 +59,8 @@ class WholeBody:
         self, model: RobotModel, units: RobotUnits, period: float, timeout: float = DEAD_MAN_TIME
     ) -> None:
         self._model, self._units, self._period, self._timeout = model, units, period, timeout
-        self._b = len(model.description.base_joints)
-        gripper = model.description.gripper
+        self._b = len(model.description.base.joints)
+        gripper = model.description.end_effector.gripper
         self._grip_step = period * (gripper.speed / gripper.stroke if gripper else _STROKES)
         self.reset()
 

@@ -111,7 +111,7 @@ class Pusher:
         """Draw the pushes of an episode."""
         self._simulation = env.simulation
         self._pushes = sample_pushes(seed, env.task.horizon)
-        effort, base = env.model.description.limits.effort, len(env.model.description.base_joints)
+        effort, base = env.model.description.limits.effort, len(env.model.description.base.joints)
         self._base = float(np.min(effort[: min(base, 2)], initial=np.inf)) * (1.0 + _BASE_EXCESS * self._size)
         self._hand = float(np.max(effort[base:])) * (_HAND_HELD + _HAND_EXCESS * self._size)
         self._movable = base > 0
@@ -146,7 +146,7 @@ def sample_shifted(task: Task, size: float, model: RobotModel, rng: np.random.Ge
     start = task.sample(model, rng)
     least = np.minimum(_distances(model, start), _START_CLEARANCE)
     for attempt in range(_ATTEMPTS):
-        step = _draw(len(model.description.base_joints), model.size, size * (1.0 - attempt / _ATTEMPTS), rng)
+        step = _draw(len(model.description.base.joints), model.size, size * (1.0 - attempt / _ATTEMPTS), rng)
         moved = _moved(model, start, step)
         if _within_limits(model, moved.q) and np.all(_distances(model, moved) >= least):
             return moved
@@ -168,7 +168,7 @@ def _moved(model: RobotModel, start: Start, step: FloatArray) -> Start:
     """Return the start with the robot displaced; what it holds moves with the hand."""
     if start.grip is None:
         return replace(start, q=start.q + step)
-    q = start.q + np.where(np.arange(model.size) < len(model.description.base_joints), step, 0.0)
+    q = start.q + np.where(np.arange(model.size) < len(model.description.base.joints), step, 0.0)
     before, after = model.pose(start.q), model.pose(q)
     turn = after.rotation @ before.rotation.T
 

@@ -98,7 +98,7 @@ class IdealRobot:
     @property
     def opening(self) -> float:
         """How far the gripper is open, from 0 to 1; 0 for a robot without one."""
-        return 1.0 - self._gate.gripper if self._model.description.gripper else 0.0
+        return 1.0 - self._gate.gripper if self._model.description.end_effector.gripper else 0.0
 
     @property
     def contacts(self) -> tuple[str, ...]:

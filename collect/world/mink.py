@@ -63,7 +63,7 @@ class MinkController:
         self._configuration = mink.Configuration(self._shapes)
         self._task = mink.FrameTask("tool", "site", position_cost=1.0, orientation_cost=1.0)
         costs = np.full(model.size, _ARM_COST)
-        costs[: len(model.description.base_joints)] = _BASE_COST
+        costs[: len(model.description.base.joints)] = _BASE_COST
         self._tasks = [self._task, mink.DampingTask(self._shapes, costs)]
         speeds = dict(zip(model.joints, model.description.limits.velocity.tolist(), strict=True))
         limits = [mink.ConfigurationLimit(self._shapes), mink.VelocityLimit(self._shapes, speeds)]
@@ -128,7 +128,8 @@ def _shape_model(model: RobotModel, obstacles: tuple[Obstacle, ...]) -> Any:
     from handrail.collect.world.gl import mujoco
     from handrail.collect.world.robot import build_robot
 
-    bare = RobotModel(replace(model.description, gripper=None))
+    hand = replace(model.description.end_effector, gripper=None)
+    bare = RobotModel(replace(model.description, end_effector=hand))
     spec = build_robot(bare, meshes=False).spec
     spec.worldbody.add_geom(name="floor", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[8.0, 8.0, 0.1])
     for obstacle in obstacles:

@@ -70,7 +70,7 @@ def build_robot(model: RobotModel, meshes: bool = True, grips: bool = True) -> S
     at = geometry.pose(tool.placement.translation, tool.placement.rotation)
     mounts.bodies[tool.parentJoint].add_site(name="tool", group=4, **at)
     contact = _add_contact_shapes(model, mounts)
-    gripper = model.description.gripper
+    gripper = model.description.end_effector.gripper
     jaw = None
     if gripper is not None:
         jaw = _add_hand(spec, model, gripper, mounts, grips)
@@ -117,7 +117,7 @@ def _add_bodies(spec: MjSpec, model: RobotModel) -> list[MjsBody]:
     description, pinocchio = model.description, model.pinocchio
     base = spec.worldbody.add_body(name=BASE_BODY)
     bodies = [base]
-    on_base = len(description.base_joints)
+    on_base = len(description.base.joints)
     for index in range(1, pinocchio.njoints):
         body = base
         if index > on_base:
@@ -152,7 +152,7 @@ def _add_joint(body: MjsBody, model: RobotModel, index: int) -> None:
     joint.calc(data, np.zeros(1))
     axis = np.asarray(data.S).reshape(6)
     hinge = bool(np.any(axis[3:]))
-    limited = name not in model.description.base_joints
+    limited = name not in model.description.base.joints
     body.add_joint(
         name=name,
         type=mujoco.mjtJoint.mjJNT_HINGE if hinge else mujoco.mjtJoint.mjJNT_SLIDE,
@@ -169,10 +169,10 @@ def _add_joint(body: MjsBody, model: RobotModel, index: int) -> None:
 def _base_inertia(model: RobotModel) -> pin.Inertia:
     """Return the chassis as a solid box, and what the URDF fixes to it."""
     description = model.description
-    size = (*description.base_size, description.base_height)
-    chassis = pin.Inertia.FromBox(max(description.base_mass, 1e-3), *size)
-    centre = pin.SE3(np.eye(3), np.array([0.0, 0.0, description.base_height / 2]))
-    fixed = model.pinocchio.inertias[len(description.base_joints)]
+    size = (*description.base.size, description.base.height)
+    chassis = pin.Inertia.FromBox(max(description.base.mass, 1e-3), *size)
+    centre = pin.SE3(np.eye(3), np.array([0.0, 0.0, description.base.height / 2]))
+    fixed = model.pinocchio.inertias[len(description.base.joints)]
     return centre.act(chassis) + fixed
 
 
@@ -195,7 +195,7 @@ def _add_shape(mounts: Mounts, placed: PlacedShape, **arguments: object) -> None
 
 def _add_contact_shapes(model: RobotModel, mounts: Mounts) -> tuple[str, ...]:
     """Add the description's collision shapes; real fingers stand in for the shape around them."""
-    gripper = model.description.gripper
+    gripper = model.description.end_effector.gripper
     solid = [shape for shape in model.description.collision if not (gripper and shape.name == gripper.shape)]
     for shape in solid:
         floor = geometry.FLOOR_BIT if shape.name in floor_shapes(model) else 0
@@ -214,7 +214,7 @@ def _add_contact_shapes(model: RobotModel, mounts: Mounts) -> tuple[str, ...]:
 def _add_pairs(spec: MjSpec, model: RobotModel) -> None:
     """Let the robot touch itself only where the description says that it can."""
     description = model.description
-    enclosing = description.gripper.shape if description.gripper else ""
+    enclosing = description.end_effector.gripper.shape if description.end_effector.gripper else ""
     for pair in description.self_pairs:
         firsts, seconds = (FINGERS if name == enclosing else (name,) for name in pair)
         for first in firsts:
@@ -258,7 +258,7 @@ def _add_meshes(
 
 
 def _grasp_geoms(model: RobotModel, contact: tuple[str, ...]) -> tuple[str, ...]:
-    gripper = model.description.gripper
+    gripper = model.description.end_effector.gripper
     if gripper is None:
         return ()
     palms = [s.name for s in model.description.collision if s.frame == gripper.frame and s.name in contact]

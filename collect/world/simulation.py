@@ -60,7 +60,7 @@ class Simulation:
         if grip is not None and not grips:
             raise HandrailError(f"grip of a simulation: expected none without grips, got {grip}")
         self._model = model
-        self._gripper = model.description.gripper if grips else None
+        self._gripper = model.description.end_effector.gripper if grips else None
         self._scene = scene
         self._step = step
         substeps = math.ceil(step / timestep - 1e-9)
@@ -204,7 +204,7 @@ class Simulation:
     def opening(self) -> float:
         """How far the gripper is open, from 0 to 1; 0 for a robot without one."""
         if self._gripper is None:
-            return float(self._model.description.gripper is not None)
+            return float(self._model.description.end_effector.gripper is not None)
         return float(np.clip(self.data.qpos[self._finger_index].sum() / self._travel, 0.0, 1.0))
 
     @property

@@ -24,7 +24,7 @@ class ArmCompletion:
     def __init__(self, model: RobotModel, damping: float = 0.05) -> None:
         self._model = model
         self._limiter = Limiter(model.description)
-        self._base = len(model.description.base_joints)
+        self._base = len(model.description.base.joints)
         self._damping = np.diag(damping / model.description.limits.velocity[self._base :] ** 2)
 
     def velocity(
@@ -71,7 +71,7 @@ class WeldedBaseCompletion:
     def __init__(self, model: RobotModel, damping: float = 0.05) -> None:
         self._model = model
         self._arm = ArmCompletion(model, damping)
-        self._mobile = bool(model.description.base_joints)
+        self._mobile = bool(model.description.base.joints)
 
     def __call__(self, q: FloatArray, previous: FloatArray, twist: FloatArray, duration: float) -> FloatArray:
         """Return the whole-body velocity, (n,) [m/s, rad/s]."""

@@ -28,7 +28,7 @@ class BaseFollowingCompletion:
     def __init__(self, model: RobotModel) -> None:
         self._model = model
         self._arm = ArmCompletion(model)
-        self._base = len(model.description.base_joints)
+        self._base = len(model.description.base.joints)
         self._home = self._seen_from_base(model.description.home)
 
     def __call__(self, q: FloatArray, previous: FloatArray, twist: FloatArray, duration: float) -> FloatArray:

@@ -12,8 +12,9 @@ from handrail.controllers.errors import unknown_name
 if TYPE_CHECKING:  # the command line asks for names of channels, and shall not wait for a robot
     from handrail.controllers.robot.description import RobotDescription
 
-_BASE = ("base.vx", "base.vy", "base.wz")
-TOOL = ("ee.vx", "ee.vy", "ee.vz", "ee.wx", "ee.wy", "ee.wz")
+BASE = ("base.vx", "base.vy", "base.wz")
+_TWIST = ("vx", "vy", "vz", "wx", "wy", "wz")
+TOOL = tuple(f"ee.{axis}" for axis in _TWIST)
 
 
 @dataclass(frozen=True)
@@ -37,7 +38,8 @@ class Channels:
     def of(cls, description: "RobotDescription") -> "Channels":
         """Return the channels of a robot."""
         joints = tuple(f"joint.{name}" for name in description.joints)
-        return cls(_BASE if description.base_joints else (), TOOL, joints)
+        hand = tuple(f"{description.end_effector.name}.{axis}" for axis in _TWIST)
+        return cls(BASE if description.base.joints else (), hand, joints)
 
     @cached_property
     def names(self) -> tuple[str, ...]:

@@ -88,7 +88,7 @@ def built_in_objectives(
     model: RobotModel, channels: Channels, settings: MpcSettings
 ) -> tuple[Objective, ...]:
     """Return the objectives that every masked MPC has: tracking first, then the regularisation."""
-    base = len(model.description.base_joints)
+    base = len(model.description.base.joints)
     arm = np.arange(model.size) >= base
     velocity = np.where(arm, settings.arm_velocity, settings.base_velocity)
     commanded = np.full(channels.size, settings.tracking)

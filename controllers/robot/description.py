@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path, PurePosixPath
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -112,6 +112,31 @@ class Gripper:
 
 
 @dataclass(frozen=True)
+class EndEffector:
+    """The end of an arm: the name of its channels, the frame that its placement is on, its gripper."""
+
+    name: str
+    frame: str
+    placement: Placement
+    gripper: Gripper | None
+
+
+@dataclass(frozen=True)
+class Base:
+    """What the arm stands on: planar or fixed, its mass [kg], height, length and width [m]."""
+
+    kind: Literal["planar", "fixed"]
+    mass: float
+    height: float
+    size: tuple[float, float]
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Names of its coordinates; none where it is fixed."""
+        return _PLANAR if self.kind == "planar" else ()
+
+
+@dataclass(frozen=True)
 class WorldScale:
     """How large the world is that a robot works in: tasks, sticks and margins are made to its measure.
 
@@ -144,19 +169,14 @@ class RobotDescription:
     """Everything that Handrail knows of a robot; see `robots/ridgeback_ur10.toml` for the format."""
 
     name: str
-    base_kind: str
-    base_mass: float
-    base_height: float
-    base_size: tuple[float, float]
+    base: Base
     urdf: Path
     mesh_root: Path
     mount: Placement
     arm_joints: tuple[str, ...]
-    tool_frame: str
-    tool_placement: Placement
+    end_effector: EndEffector
     home: FloatArray
     limits: Limits
-    gripper: Gripper | None
     collision: tuple[PlacedShape, ...]
     self_pairs: tuple[tuple[str, str], ...]
     self_margins: FloatArray  # largest margin that each self pair can keep [m]
@@ -164,14 +184,9 @@ class RobotDescription:
     world: WorldScale = WorldScale()
 
     @property
-    def base_joints(self) -> tuple[str, ...]:
-        """Names of the base coordinates; none on a fixed base."""
-        return _PLANAR if self.base_kind == "planar" else ()
-
-    @property
     def joints(self) -> tuple[str, ...]:
         """Names of all generalised coordinates, base first."""
-        return self.base_joints + self.arm_joints
+        return self.base.joints + self.arm_joints
 
 
 def robot_names() -> list[str]:
@@ -197,19 +212,16 @@ def _parse(data: dict[str, Any], folder: Path) -> RobotDescription:
     self_collision = data["self_collision"]
     return RobotDescription(
         name=data["name"],
-        base_kind=data["base"]["kind"],
-        base_mass=data["base"]["mass"],
-        base_height=data["base"]["height"],
-        base_size=tuple(data["base"]["size"]),
+        base=Base(**_frozen_lists(data["base"])),
         urdf=urdf,
         mesh_root=mesh_root,
         mount=_placement(data["arm"]),
         arm_joints=tuple(data["arm"]["joints"]),
-        tool_frame=data["tool"]["frame"],
-        tool_placement=_placement(data["tool"]),
+        end_effector=EndEffector(
+            "ee", data["tool"]["frame"], _placement(data["tool"]), _gripper(gripper) if gripper else None
+        ),
         home=frozen(data["home"]["q"]),
         limits=Limits(**{name: frozen(values) for name, values in data["limits"].items()}),
-        gripper=_gripper(gripper) if gripper else None,
         collision=tuple(_placed_shape(entry) for entry in data["collision"]),
         self_pairs=tuple((first, second) for first, second, *_ in self_collision["pairs"]),
         self_margins=frozen([(*pair, np.inf)[2] for pair in self_collision["pairs"]]),

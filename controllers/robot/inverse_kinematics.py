@@ -25,7 +25,7 @@ def arm_configuration(
         goal: of the tool.
         tolerance: largest entry of e that is good enough [m, rad].
     """
-    return _configuration(model, q, goal, tolerance, slice(len(model.description.base_joints), model.size))
+    return _configuration(model, q, goal, tolerance, slice(len(model.description.base.joints), model.size))
 
 
 def body_configuration(

@@ -82,7 +82,7 @@ def _build(description: RobotDescription) -> pin.Model:
     base = pin.Model()
     base.name = description.name
     joint = 0
-    for name in description.base_joints:
+    for name in description.base.joints:
         joint = base.addJoint(joint, _BASE_JOINTS[name](), pin.SE3.Identity(), name)
     base.addFrame(pin.Frame("planar_base", joint, 0, pin.SE3.Identity(), pin.FrameType.BODY))
     model = pin.appendModel(base, _arm(description), base.getFrameId("planar_base"), _se3(description.mount))
@@ -129,13 +129,13 @@ def _without_words() -> Iterator[None]:
 
 
 def _add_tool(model: pin.Model, description: RobotDescription) -> None:
-    if not model.existFrame(description.tool_frame):
+    if not model.existFrame(description.end_effector.frame):
         raise HandrailError(
-            f"tool frame {description.tool_frame!r} of robot {description.name}: not in the URDF"
+            f"tool frame {description.end_effector.frame!r} of robot {description.name}: not in the URDF"
         )
-    parent_id = model.getFrameId(description.tool_frame)
+    parent_id = model.getFrameId(description.end_effector.frame)
     parent = model.frames[parent_id]
-    placement = parent.placement * _se3(description.tool_placement)
+    placement = parent.placement * _se3(description.end_effector.placement)
     model.addFrame(pin.Frame("tool", parent.parentJoint, parent_id, placement, pin.FrameType.OP_FRAME))
 
 

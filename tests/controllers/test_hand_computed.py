@@ -46,7 +46,7 @@ def table() -> Obstacle:
 
 def wall() -> Obstacle:
     """Return a wall beside the chassis, lower than the arm."""
-    width = MODEL.description.base_size[1]
+    width = MODEL.description.base.size[1]
     centre = np.array([HOME[0], HOME[1] + width / 2 + NEARER + 0.05, 0.1])
     return Obstacle("wall", Shape("box", np.array([0.3, 0.1, 0.2])), centre)
 

@@ -36,7 +36,7 @@ def action(env: HandrailEnv, velocity: Any = 0.0, gripper: float = 0.0) -> np.nd
 
 def reach(model: RobotModel, q: np.ndarray, position: np.ndarray, rotation: np.ndarray) -> np.ndarray:
     """Move the arm's joints until the tool is there."""
-    q, arm = q.copy(), slice(len(model.description.base_joints), model.size)
+    q, arm = q.copy(), slice(len(model.description.base.joints), model.size)
     for _ in range(300):
         pose = model.pose(q)
         turn = Rotation.from_matrix(rotation @ pose.rotation.T).as_rotvec()

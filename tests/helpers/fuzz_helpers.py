@@ -50,7 +50,7 @@ class FuzzResult:
 
 def cluttered(model: RobotModel, movers: int, rng: np.random.Generator) -> tuple[Scene, np.ndarray]:
     """Draw a start posture and things around the robot, none nearer than the clearance."""
-    base, scale = len(model.description.base_joints), model.description.world.scale
+    base, scale = len(model.description.base.joints), model.description.world.scale
     while True:
         q = np.array(model.description.home)
         q[:base] = rng.uniform([-1.5, -1.5, -3.0], [1.5, 1.5, 3.0])
@@ -160,7 +160,7 @@ class OwnDistances:
     """MuJoCo's distances between the robot's own geoms, those pairs that it may touch itself with."""
 
     def __init__(self, model, compiled):
-        self._model, gripper = compiled, model.description.gripper
+        self._model, gripper = compiled, model.description.end_effector.gripper
         geoms = {shape.name: (shape.name,) for shape in model.description.collision}
         geoms[gripper.shape] = FINGERS  # stand in for the shape around them
         self._pairs = [

@@ -49,7 +49,7 @@ class Drive:
         self.step = MaskedMpcStep(**({"fps": 30.0} | settings), clock=self.clock)
         self.model = load_model(self.step.robot)
         units = robot_units(self.step.units, self.model.description)
-        base = len(self.model.description.base_joints)
+        base = len(self.model.description.base.joints)
         self.robot = PlainRobot(units, self.model.description.home[base:].copy())
         self.pipeline = mpc_pipeline(self.step)
         self.sent: list[dict] = []
@@ -64,7 +64,7 @@ class Drive:
 
     @property
     def hand(self) -> np.ndarray:
-        base = self.robot.pose[: len(self.model.description.base_joints)]
+        base = self.robot.pose[: len(self.model.description.base.joints)]
         return self.model.pose(np.append(base, self.robot.arm)).position
 
     def moves(self, action: dict) -> bool:

@@ -35,7 +35,7 @@ class DrawerScript(PhasedScript):
         """Return the phase that backs off from where the handle is now, the base where it is."""
         into = inward(view.task.object("cabinet").rotation)
         back = Pose(handle(view.task) - _BACK * into, handle_rotation(view.tool.rotation, into))
-        base = view.state.q[:3] if self._model.description.base_joints else np.zeros(3)
+        base = view.state.q[:3] if self._model.description.base.joints else np.zeros(3)
         return ScriptPhase(back, base, name="leave", distance=0.03, angle=3.2, pace=0.5, patience=5.0)
 
     def plan(self, view: View) -> list[ScriptPhase]:

@@ -44,7 +44,7 @@ class LargeTurn:
 
     def __init__(self, model: RobotModel, gains: Gains, large: float, view: View) -> None:
         self._model, self._gains, self._large = model, gains, large
-        self._base = len(model.description.base_joints)
+        self._base = len(model.description.base.joints)
         self._collision = CollisionModel(model, view.task.obstacles)
         self._goal = view.state.q.copy()
         self._thought = b""

@@ -138,7 +138,7 @@ class Route:
         self._clearance = _ROUTE_CLEARANCE * self._scale
         self._obstacles = floor_obstacles(task.start.scene)
         behind = [item.position[0] - np.hypot(*item.shape.size[:2]) / 2 for item in self._obstacles]
-        self.lane = float(min(behind, default=0.0)) - model.description.base_size[0] / 2 - self._clearance
+        self.lane = float(min(behind, default=0.0)) - model.description.base.size[0] / 2 - self._clearance
 
     def stand(self, place: FloatArray, edge: float) -> FloatArray:
         """Return where the base stands to work at a place, (3,): comfortable, and clear of the table.
@@ -148,7 +148,7 @@ class Route:
             edge: the x of the table's near edge [m].
         """
         base = standing_point(self._model, place, comfort=_FROM_ABOVE)
-        length = self._model.description.base_size[0]
+        length = self._model.description.base.size[0]
         base[0] = min(base[0], edge - length / 2 - self._clearance)
         return base
 
@@ -165,7 +165,7 @@ class Route:
 
     def blocked(self, start: FloatArray, goal: FloatArray) -> bool:
         """Return whether something on the floor is in the chassis' way between two places, (2,) each."""
-        width = np.hypot(*self._model.description.base_size) / 2 + self._clearance / 2
+        width = np.hypot(*self._model.description.base.size) / 2 + self._clearance / 2
         for item in self._obstacles:
             along = np.clip(
                 (item.position[:2] - start) @ (goal - start) / max(np.sum((goal - start) ** 2), 1e-9), 0, 1

@@ -77,7 +77,7 @@ class PickPlaceScript(PhasedScript):
 
         `(stroke − w (cos a + sin a)) / 2` for a cube of width w that is turned by a; as much either way.
         """
-        gripper = self._model.description.gripper
+        gripper = self._model.description.end_effector.gripper
         width = float(cube.shape.size[0]) * (np.cos(_ALIGNED) + np.sin(_ALIGNED))
         near = _NEAR * self._grip
         return near if gripper is None else max(near, (gripper.stroke - width) / 2)
@@ -145,7 +145,7 @@ def _above(position: FloatArray, height: float) -> FloatArray:
 
 def tips_beyond_tool(model: RobotModel) -> float:
     """Return how far the finger tips are beyond the tool point [m]; 0 of a robot without fingers."""
-    gripper, home = model.description.gripper, model.description.home
+    gripper, home = model.description.end_effector.gripper, model.description.home
     if gripper is None:
         return 0.0
     frame, tool = model.pose(home, gripper.frame), model.pose(home)

@@ -32,7 +32,7 @@ def arm_solutions(model: RobotModel, q: FloatArray, goal: Pose) -> list[tuple[Fl
             home.
         goal: of the tool.
     """
-    base = len(model.description.base_joints)
+    base = len(model.description.base.joints)
     starts = [q, np.concatenate([q[:base], model.description.home[base:]])]
     for joint in range(base, model.size):
         starts += [q + angle * (np.arange(model.size) == joint) for angle in _TURNS]
@@ -75,7 +75,7 @@ def straight_solution(
 
 def _unwound(model: RobotModel, q: FloatArray, there: FloatArray) -> FloatArray:
     """Return the same pose of the arm with each joint turned the shorter way, where its limits allow that."""
-    limits, base = model.description.limits, len(model.description.base_joints)
+    limits, base = model.description.limits, len(model.description.base.joints)
     shorter = q + (there - q + np.pi) % (2.0 * np.pi) - np.pi
     allowed = (limits.position_lower <= shorter) & (shorter <= limits.position_upper)
     return np.where(allowed & (np.arange(model.size) >= base), shorter, there)
@@ -90,7 +90,7 @@ def standing_point(
     result stays inside the position limits. A robot with a fixed base stands where it stands: (0, 0, 0).
     """
     description = model.description
-    if not description.base_joints:
+    if not description.base.joints:
         return np.zeros(3)
     x, y, theta = description.home[:3]
     tool = model.pose(description.home).position[:2] - [x, y]
@@ -113,7 +113,7 @@ def standing_within_reach(model: RobotModel, q: FloatArray, goal: Pose, yaw: flo
         yaw: heading of the base [rad].
     """
     stands = [standing_point(model, goal.position, yaw, comfort) for comfort in _FARTHER]
-    if not model.description.base_joints:
+    if not model.description.base.joints:
         return stands[0]
     for stand in stands:
         if arm_configuration(model, np.concatenate([stand, q[3:]]), goal)[1] <= _ABOUT:
@@ -132,7 +132,7 @@ def standing_pose(model: RobotModel, q: FloatArray, goal: Pose) -> FloatArray:
         q: now, (n,).
         goal: of the tool.
     """
-    if not model.description.base_joints:
+    if not model.description.base.joints:
         return np.zeros(3)
     if len(model.description.arm_joints) < 6:
         return _standing_in_line(model, q, goal)

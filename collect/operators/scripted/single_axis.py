@@ -40,7 +40,7 @@ def plan_joints(
         clear: distance kept on the way, less where the robot is nearer at either end [m].
     """
     best, most = (q, list[int]()), -1.0
-    arm = list(range(len(model.description.base_joints), model.size))
+    arm = list(range(len(model.description.base.joints), model.size))
     at_start = _nearest(collision, q)
     for there, error in arm_solutions(model, q, goal):
         kept = min(clear, 0.9 * at_start, 0.9 * _nearest(collision, there))

@@ -196,4 +196,4 @@ def _sample_obstacle(name: str, scale: float, rng: np.random.Generator) -> Scene
 def _start_circle(model: RobotModel, q: FloatArray) -> tuple[FloatArray, float]:
     """Return a circle around the chassis where it starts: centre (2,) and radius [m]."""
     base = model.pose(q, "planar_base").position[:2]
-    return base, float(np.hypot(*model.description.base_size) / 2)
+    return base, float(np.hypot(*model.description.base.size) / 2)

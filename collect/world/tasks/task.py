@@ -204,7 +204,7 @@ class FixedTask:
 
 def near_home(model: RobotModel, rng: np.random.Generator) -> FloatArray:
     """Return home with a little noise: 10 cm · scale, 0.15 rad, 0.05 rad in the arm's joints, (n,)."""
-    base, away = len(model.description.base_joints), 0.10 * model.description.world.scale
+    base, away = len(model.description.base.joints), 0.10 * model.description.world.scale
     spread = np.concatenate([np.array([away, away, 0.15])[:base], np.full(model.size - base, 0.05)])
     return model.description.home + rng.uniform(-spread, spread)
 

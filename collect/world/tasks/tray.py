@@ -123,10 +123,10 @@ def _draw_start(
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return where the base starts, and position and rotation of the hand."""
     q = np.array(model.description.home)
-    if model.description.base_joints:
+    if model.description.base.joints:
         q[:3] += rng.uniform([-0.10, -0.15, -0.15], [0.10, 0.15, 0.15])
         q[1] -= 0.5 * side
-    ahead = np.array([np.cos(q[2]), np.sin(q[2]), 0.0]) if model.description.base_joints else np.eye(3)[0]
+    ahead = np.array([np.cos(q[2]), np.sin(q[2]), 0.0]) if model.description.base.joints else np.eye(3)[0]
     base = model.pose(q, "planar_base").position
     away = rng.uniform(1.05, 1.20) * reach_share(model)
     place = base + away * ahead + np.array([0.0, 0.0, rng.uniform(0.90, 1.00)])

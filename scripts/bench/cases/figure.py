@@ -24,7 +24,7 @@ def case_figure(trace: CaseTrace, model: RobotModel, margin: float) -> Any:
         margin: of the controller [m].
     """
     places = np.vstack([trace.q[:, :2], trace.hand[:, :2]])
-    length, width = np.ptp(places, axis=0) + model.description.base_size
+    length, width = np.ptp(places, axis=0) + model.description.base.size
     if length > 2.0 * width:  # paths on top of the others
         figure, layout = new_figure(11, 8.6), [["paths", "paths"], ["distances", "errors"]]
     else:
@@ -59,7 +59,7 @@ def _paths(axes: Any, trace: CaseTrace, model: RobotModel) -> None:
 
 def _robot(axes: Any, q: FloatArray, model: RobotModel, alpha: float) -> None:
     """Draw the chassis' outline and the arm at q."""
-    length, width = model.description.base_size
+    length, width = model.description.base.size
     corners = 0.5 * np.array([[1, 1], [-1, 1], [-1, -1], [1, -1], [1, 1]]) * [length, width]
     axes.plot(*(turned(corners.T, q[2]).T + q[:2]).T, color=_BASE, lw=1.0, alpha=alpha, zorder=2)
     frames = [shape.frame for shape in model.description.collision if shape.frame != "planar_base"]

@@ -110,7 +110,7 @@ def run_goal(
     for baseline in baselines:
         trace = _trace(baseline, given)
         row = {"goal": index, "profile": profile, "controller": baseline.name}
-        row |= measure(trace, collision, len(model.description.base_joints))
+        row |= measure(trace, collision, len(model.description.base.joints))
         paths = (trace.q[::_EVERY, :2], trace.hand[::_EVERY, :2]) if index < _PATHS else ()
         episodes.append(BenchEpisode(row, paths))
     return episodes

@@ -124,9 +124,8 @@ def _robot(robot: str, pairs: str) -> RobotModel:
     """Return a robot with `all` its own pairs, `few` or `none` at all (it then meets no obstacle either)."""
     description = load_description(robot)
     if pairs == "none":
-        description = replace(
-            description, gripper=None, collision=(), self_pairs=(), self_margins=np.zeros(0)
-        )
+        hand, none = replace(description.end_effector, gripper=None), np.zeros(0)
+        description = replace(description, end_effector=hand, collision=(), self_pairs=(), self_margins=none)
     elif pairs == "few":
         few = slice(None, None, 4)
         description = replace(

@@ -45,7 +45,7 @@ def test_one_axis_at_a_time(view):
     assert all(intent.raw.axes <= 1 for intent in intents)
     used = {channels.names[int(np.argmax(intent.mask))] for intent in intents}
     assert {name.split(".")[0] for name in used} == {"base", "joint"}
-    assert not used & {f"joint.{name}" for name in MODEL.description.base_joints}
+    assert not used & {f"joint.{name}" for name in MODEL.description.base.joints}
 
 
 @pytest.mark.parametrize("name", ["direct_single", "decoupled", "leader", "ee"])

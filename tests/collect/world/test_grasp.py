@@ -150,7 +150,7 @@ def test_the_operator_closes_the_gripper_around_the_cube(robot, mode):
     """The cube is between the fingers, with what the hand may be turned; their tips are beside it."""
     config = SessionConfig(task="pick_place", mode=mode, robot=robot)
     model, edge = load_model(robot), 0.05
-    gripper = model.description.gripper
+    gripper = model.description.end_effector.gripper
     env, watch = build_env(config, 20), Closing()
     try:
         session = build_session(config, env, [watch])

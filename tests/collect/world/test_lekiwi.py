@@ -47,20 +47,20 @@ def test_no_command_inside_the_limits_turns_a_wheel_faster_than_lerobot_lets_it(
 def test_the_arm_is_the_urdfs():
     """Its ranges; and the hand is where the URDF alone has it on the base, for any configuration."""
     arm = pin.buildModelFromUrdf(str(ROBOT.urdf))
-    data, first = arm.createData(), len(ROBOT.base_joints)
+    data, first = arm.createData(), len(ROBOT.base.joints)
     np.testing.assert_allclose(ROBOT.limits.position_lower[first:], arm.lowerPositionLimit[:5])
     np.testing.assert_allclose(ROBOT.limits.position_upper[first:], arm.upperPositionLimit[:5])
     rng = np.random.default_rng(0)
     for _ in range(20):
         q = rng.uniform(ROBOT.limits.position_lower, ROBOT.limits.position_upper)
         pin.framesForwardKinematics(arm, data, np.append(q[first:], 0.0))
-        hand = data.oMf[arm.getFrameId(ROBOT.tool_frame)]
+        hand = data.oMf[arm.getFrameId(ROBOT.end_effector.frame)]
         base = pin.SE3(pin.exp3(np.array([0.0, 0.0, q[2]])), np.array([q[0], q[1], 0.0]))
         mount = pin.SE3(np.eye(3), np.array(ROBOT.mount.translation))
         expected = base * mount * hand
         tool = MODEL.pose(q)
         np.testing.assert_allclose(tool.rotation, expected.rotation, atol=1e-9)
-        place = expected.act(np.array(ROBOT.tool_placement.translation))
+        place = expected.act(np.array(ROBOT.end_effector.placement.translation))
         np.testing.assert_allclose(tool.position, place, atol=1e-9)
 
 

@@ -69,7 +69,7 @@ def test_mass_matrix_is_pinocchios_plus_drives_gripper_and_chassis(model):
     mujoco.mj_forward(compiled, data)
     M = np.zeros((compiled.nv, compiled.nv))
     mujoco.mj_fullM(compiled, data, M)
-    base = len(model.description.base_joints)
+    base = len(model.description.base.joints)
     expected = pin.crba(model.pinocchio, model.pinocchio.createData(), np.array(q))
     expected = np.triu(expected) + np.triu(expected, 1).T
     arm = slice(base, model.size)
@@ -136,7 +136,7 @@ def test_collision_shapes_are_not_absurdly_large(shipped, meshes):
 
 
 def test_fingers_stay_in_the_box_that_the_controller_avoids(shipped):
-    gripper = shipped.description.gripper
+    gripper = shipped.description.end_effector.gripper
     assert gripper is not None
     placed = next(shape for shape in shipped.description.collision if shape.name == gripper.shape)
     assert placed.tool
@@ -202,7 +202,7 @@ def test_velocity_commands_are_tracked(robot):
 def test_fingers_close_and_open_at_their_speed(robot):
     with environment("Reach", robot=robot) as env:
         env.reset(seed=0)
-        gripper = env.model.description.gripper
+        gripper = env.model.description.end_effector.gripper
         assert gripper is not None
         steps = int(np.ceil(gripper.stroke / gripper.speed * env.fps))
         hold = np.zeros(env.model.size + 1, np.float32)
@@ -220,7 +220,7 @@ def test_fingers_close_and_open_at_their_speed(robot):
 
 def test_the_hand_opens_as_far_and_presses_as_hard_as_it_says(shipped):
     """Open it is one stroke wide; around a fixed bar each finger presses with the gripper's force."""
-    gripper, q = shipped.description.gripper, np.array(shipped.description.home)
+    gripper, q = shipped.description.end_effector.gripper, np.array(shipped.description.home)
     assert gripper is not None
     simulation = Simulation(shipped, Scene(), q, 0.05)
     left, right = (simulation.data.geom(name).xpos.copy() for name in FINGERS)

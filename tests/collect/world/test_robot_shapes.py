@@ -27,7 +27,7 @@ def model(request) -> RobotModel:
 
 def configurations(model: RobotModel, count: int) -> np.ndarray:
     """Return random configurations within the limits, the base in the middle, (count, n)."""
-    limits, base = model.description.limits, len(model.description.base_joints)
+    limits, base = model.description.limits, len(model.description.base.joints)
     q = np.random.default_rng(0).uniform(limits.position_lower, limits.position_upper, (count, model.size))
     q[:, :base] = 0.0
     return q

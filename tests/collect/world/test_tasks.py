@@ -78,7 +78,7 @@ def test_pick_place_obstacles_leave_room():
     for episode in episodes(PickPlace()):
         obstacles = [item for item in episode.scene.objects if item.name.startswith("obstacle")]
         counts.add(len(obstacles))
-        chassis = np.hypot(*model.description.base_size) / 2
+        chassis = np.hypot(*model.description.base.size) / 2
         for index, item in enumerate(obstacles):
             away = np.linalg.norm(item.position[:2] - episode.q[:2]) - chassis - footprint(item)
             assert away > 0.15
