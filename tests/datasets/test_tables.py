@@ -40,13 +40,10 @@ def test_every_cell_is_shown_everywhere():
 
 def test_there_is_one_page_one_stylesheet_and_one_table():
     """A report that writes its own would drift away from the others."""
-    floors = ("datasets", "collect/experiments", "policies", "scripts")
+    floors = ("datasets", "collect", "policies", "scripts")
     files = [path for floor in floors for path in (ROOT / floor).rglob("*.py")]
-    made = {
-        mark: [path.name for path in files if mark in path.read_text()]
-        for mark in ("<style", "<table", "<!doctype")
-    }
-    assert made == {"<style": ["markup.py"], "<table": ["markup.py"], "<!doctype": ["markup.py"]}
+    marks = ("<style", "<table", "<!doctype")
+    assert not [path.name for path in files if any(mark in path.read_text() for mark in marks)]
 
 
 def test_a_part_is_replaced_between_either_kind_of_mark():
