@@ -14,17 +14,8 @@ _NEEDED = ("video.codec", "video.pix_fmt")  # in which all videos of a camera ha
 
 def check_alike(first: EditSource, other: EditSource) -> None:
     """Check that frames of one dataset fit into another."""
-    names = [source.layout.root for source in (other, first)]
-    one, two = first.manifest, other.manifest
-    for name in ("fps", "robot_type"):
-        if getattr(one, name) != getattr(two, name):
-            raise _unlike(names, name, getattr(two, name), getattr(one, name))
-    for key in (*one.features, *two.features):
-        mine, theirs = one.features.get(key), two.features.get(key)
-        if mine != theirs:
-            raise _unlike(
-                names, f"column {key!r}", *(each.described if each else "none" for each in (theirs, mine))
-            )
+    names = str(other.layout.root), str(first.layout.root)
+    other.manifest.check_fits(first.manifest, f"merge: cannot add {names[0]!r} to {names[1]!r}")
 
 
 def merged_types(sources: Sequence[EditSource]) -> ColumnTypes:

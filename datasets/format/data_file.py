@@ -6,8 +6,8 @@ say in log₂(groups) steps where one begins. A file whose statistics do not say
 whole. Every page has a checksum, so that no rows are taken for others.
 """
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Sequence
+from contextlib import closing, suppress
 from pathlib import Path
 
 import pyarrow as pa
@@ -167,11 +167,6 @@ class DataFiles:
             self._open.popitem()[1].close()
 
 
-@contextmanager
-def data_files() -> Iterator[DataFiles]:
+def data_files() -> closing[DataFiles]:
     """Provide data files that are closed in the end."""
-    files = DataFiles()
-    try:
-        yield files
-    finally:
-        files.close()
+    return closing(DataFiles())

@@ -4,18 +4,17 @@ A stretch can be copied if it begins with a key frame and no picture in it needs
 be joined to another if both are encoded alike, since a file describes its pictures once.
 """
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any
 
 import av
-import av.error
 
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.regular_file import regular
+from handrail.datasets.format.video import place_of, sought, whole_mp4
 
 
 @dataclass(frozen=True)
@@ -52,26 +51,21 @@ class Videos:
             count: Number of pictures.
             camera: Whose last video stays open until the next.
         """
-        try:
+        with whole_mp4(path):
             container = self._opened(path, camera)
-            stream = container.streams.video[0]
-            if stream.codec_context is None:
-                raise ValueError("a codec that nobody knows")
-            container.seek(round(Fraction(first, self._fps) / stream.time_base), stream=stream)
-            packets, begun = [], False
+            stream = sought(container, first, self._fps)
+            packets: list[Any] = []
             for packet in container.demux(stream):
                 place = place_of(packet, self._fps) if packet.size else first + count
-                inside = first <= place < first + count
-                if inside:
+                if first <= place < first + count:
                     packets.append(packet)
-                elif begun and len(packets) < count:
-                    return None if packet.size else self._short(path, first, count)
-                begun = begun or inside
+                elif packets and packet.size:
+                    return None  # a picture in between is decoded with others
                 if len(packets) == count:
                     return Stretch(packets, stream, first, count) if packets[0].is_keyframe else None
-            return self._short(path, first, count)
-        except (av.error.FFmpegError, IndexError, ValueError) as error:
-            raise HandrailError(f"video {str(path)!r}: expected a whole mp4, got {error}") from error
+        raise HandrailError(
+            f"video {str(path)!r}: expected the pictures {first} to {first + count - 1}, got fewer"
+        )
 
     def close(self) -> None:
         """Close what is open."""
@@ -89,20 +83,10 @@ class Videos:
             self._open[camera] = path, av.open(str(regular(path)))
         return self._open[camera][1]
 
-    def _short(self, path: Path, first: int, count: int) -> NoReturn:
-        raise HandrailError(
-            f"video {str(path)!r}: expected the pictures {first} to {first + count - 1}, got fewer"
-        )
 
-
-@contextmanager
-def videos(fps: int) -> Iterator[Videos]:
+def videos(fps: int) -> closing[Videos]:
     """Provide a reader of mp4s that is closed in the end."""
-    opened = Videos(fps)
-    try:
-        yield opened
-    finally:
-        opened.close()
+    return closing(Videos(fps))
 
 
 class VideoJoin:
@@ -145,11 +129,6 @@ class VideoJoin:
         if self._container is not None:
             self._container.close()
         self._container = None
-
-
-def place_of(shown: Any, fps: int) -> int:
-    """Return which picture of the video a packet or a frame is."""
-    return round((shown.pts or 0) * shown.time_base * fps)
 
 
 def _encoding(stream: Any) -> tuple:

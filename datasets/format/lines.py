@@ -10,8 +10,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
 
+import msgspec
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -28,7 +28,7 @@ from handrail.datasets.format.arrow import (
     strings,
 )
 from handrail.datasets.format.columns import ColumnTypes, is_extra
-from handrail.datasets.format.info_fields import MOST_EPISODES, MOST_FRAMES, whole_number
+from handrail.datasets.format.info_file import SavedLine, SavedTotals
 from handrail.datasets.format.layout import Layout, chunk_and_file, slot_of
 from handrail.datasets.format.manifest import Manifest
 from handrail.datasets.format.metadata import EpisodeRecord, FileSeal, Totals
@@ -89,7 +89,10 @@ class Lines:
         if not rows:
             raise ValueError("no line")
         seals = {inside(name): FileSeal(*seal) for name, seal in parse_json(marks[_SEALS]).items()}
-        totals = _totals(parse_json(marks[_TOTALS])) if _TOTALS in marks else None
+        totals = None
+        if _TOTALS in marks:
+            said = msgspec.convert(parse_json(marks[_TOTALS]), SavedTotals)
+            totals = Totals(said.episodes, said.frames, tuple(said.tasks), stats_from_lists(said.stats))
         return cls(path, names, rows, seals, totals, table if at_once else None)
 
     def __len__(self) -> int:
@@ -111,30 +114,23 @@ class Lines:
             OSError, pyarrow.ArrowException, ValueError, KeyError: The line is damaged.
         """
         row = dict(zip(self.names, self.rows[place], strict=True))
-        start = whole_number(row, "dataset_from_index", MOST_FRAMES)
+        line = msgspec.convert(row, SavedLine)
         return EpisodeRecord(
-            episode=whole_number(row, "episode_index", MOST_EPISODES),
-            start=start,
-            length=whole_number(row, "length", MOST_FRAMES),
-            tasks=tuple(map(str, row["tasks"])),
+            episode=line.episode_index,
+            start=line.dataset_from_index,
+            length=line.length,
+            tasks=tuple(line.tasks),
             stats=self._stats_of(place) if with_stats else None,
             columns={name: value for name, value in row.items() if is_extra(name)},
             files=self.files,
-            slot=slot_of(
-                whole_number(row, "data/chunk_index", MOST_EPISODES),
-                whole_number(row, "data/file_index", MOST_EPISODES),
-            ),
-            offset=start - self._first,
+            slot=slot_of(line.chunk, line.file),
+            offset=line.dataset_from_index - int(self.rows[0][self.names.index("dataset_from_index")]),
             alone=len(self) == 1,
         )
 
     def records(self, with_stats: bool = False) -> Iterator[EpisodeRecord]:
         """Yield all episodes, in order."""
         return (self.record(place, with_stats) for place in range(len(self)))
-
-    @property
-    def _first(self) -> int:
-        return int(self.rows[0][self.names.index("dataset_from_index")])
 
     @cached_property
     def _stats(self) -> dict[str, dict[str, np.ndarray]]:
@@ -224,15 +220,6 @@ def _seals_json(files: Mapping[str, FileSeal]) -> str:
 def _totals_json(totals: Totals) -> str:
     content = {"episodes": totals.episodes, "frames": totals.frames, "tasks": totals.tasks}
     return json.dumps(content | {"stats": stats_to_lists(totals.stats or {})})
-
-
-def _totals(content: dict[str, Any]) -> Totals:
-    return Totals(
-        whole_number(content, "episodes", MOST_EPISODES),
-        whole_number(content, "frames", MOST_FRAMES),
-        tuple(map(str, content["tasks"])),
-        stats_from_lists(content["stats"]),
-    )
 
 
 def _line_columns(manifest: Manifest, records: Sequence[EpisodeRecord]) -> dict[str, pa.Array]:

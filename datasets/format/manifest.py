@@ -8,10 +8,14 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
+
+import msgspec
+from msgspec import Meta
 
 from handrail.controllers.errors import HandrailError
-from handrail.datasets.format.info_fields import features
+from handrail.controllers.typed import check_settings
+from handrail.datasets.format.info_file import ManifestFile, columns_of
 from handrail.datasets.format.layout import Layout
 from handrail.datasets.format.schema import OUTCOME_PREFIX, Feature, check_features
 from handrail.datasets.storage.strict_json import read_json
@@ -21,21 +25,17 @@ FORMAT = 1
 
 @dataclass(frozen=True)
 class Manifest:
-    """What every episode of a dataset has in common.
-
-    Attributes:
-        repo_id: The name, `owner/name`.
-        fps: Frames a second [Hz].
-        robot_type: The robot.
-        features: The columns, without those that LeRobot adds.
-        versions: Software versions of the session that created the dataset.
-    """
+    """What every episode of a dataset has in common."""
 
     repo_id: str
-    fps: int
-    robot_type: str
+    """The name, `owner/name`."""
+    fps: Annotated[int, Meta(ge=1)]
+    """Frames a second [Hz]."""
+    robot_type: Annotated[str, Meta(min_length=1)]
     features: Mapping[str, Feature]
+    """The columns, without those that LeRobot adds."""
     versions: Mapping[str, str] = field(default_factory=dict)
+    """Software versions of the session that created the dataset."""
 
     def named(self, repo_id: str) -> "Manifest":
         """Return it with another name."""
@@ -45,26 +45,27 @@ class Manifest:
         """Check everything that can be checked without a disk."""
         if not isinstance(self.repo_id, str) or not self.repo_id or self.repo_id.count("/") > 1:
             raise HandrailError(f"--dataset.repo_id: expected 'owner/name' or 'name', got {self.repo_id!r}")
-        if not isinstance(self.fps, int) or isinstance(self.fps, bool) or self.fps < 1:
-            raise HandrailError(f"fps: expected a whole number of 1 or more, got {self.fps!r}")
-        if not isinstance(self.robot_type, str) or not self.robot_type:
-            raise HandrailError(f"robot_type: expected a name, got {self.robot_type!r}")
+        check_settings(self)
         check_features(self.features)
+
+    def check_fits(self, other: "Manifest", refused: str) -> None:
+        """Check that episodes of this schema may follow those of another; `refused` begins the error."""
+        things = {name: (getattr(other, name), getattr(self, name)) for name in ("fps", "robot_type")}
+        for key in (*other.features, *self.features):
+            things[f"feature {key!r}"] = _describe(other.features.get(key)), _describe(self.features.get(key))
+        for thing, (theirs, ours) in things.items():
+            if theirs != ours:
+                raise HandrailError(f"{refused}: {thing} of the existing episodes is {theirs}, got {ours}")
 
     def check_continues(self, existing: "Manifest", root: Path) -> None:
         """Check that episodes of this schema may follow those of an existing dataset."""
-        for name in ("fps", "robot_type"):
-            if getattr(self, name) != getattr(existing, name):
-                raise _differs(root, name, getattr(existing, name), getattr(self, name))
-        for key in (*existing.features, *self.features):
-            ours, theirs = self.features.get(key), existing.features.get(key)
-            if theirs is None and key.startswith(OUTCOME_PREFIX):
+        for key in self.features:
+            if key not in existing.features and key.startswith(OUTCOME_PREFIX):
                 raise HandrailError(
                     f"cannot resume {str(root)!r}: an earlier version recorded it, without {key!r};"
                     " choose another root (the episodes there can still be replayed, trained on and compared)"
                 )
-            if ours != theirs:
-                raise _differs(root, f"feature {key!r}", _describe(theirs), _describe(ours))
+        self.check_fits(existing, f"--resume: cannot add to {str(root)!r}")
 
     def to_bytes(self) -> bytes:
         """Return the manifest as JSON."""
@@ -76,12 +77,17 @@ class Manifest:
 def read_manifest(layout: Layout) -> Manifest:
     """Read the manifest of a dataset that Handrail wrote."""
     try:
-        content = _content(layout)
-        fixed = {name: content[name] for name in ("repo_id", "fps", "robot_type")}
-        manifest = Manifest(features=features(content), versions=dict(content["versions"]), **fixed)
+        content = read_json(layout.manifest)
+        if content["format"] != FORMAT:  # first of all: a newer one may say anything else
+            raise HandrailError(
+                f"dataset {str(layout.root)!r}: expected format {FORMAT}, got {str(content['format'])[:60]};"
+                " a newer Handrail wrote it"
+            )
+        said = msgspec.convert(content, ManifestFile)
+        manifest = Manifest(said.repo_id, said.fps, said.robot_type, columns_of(said.features), said.versions)
     except (FileNotFoundError, NotADirectoryError) as error:
         raise HandrailError(_why_no_manifest(layout)) from error
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+    except (OSError, ValueError, KeyError, TypeError) as error:
         raise HandrailError(
             f"{str(layout.manifest)!r}: expected Handrail's manifest, got {error!r}"
         ) from error
@@ -95,17 +101,6 @@ def read_manifest(layout: Layout) -> Manifest:
 def json_bytes(content: Any) -> bytes:
     """Return JSON as LeRobot writes it, the same bytes for the same content."""
     return json.dumps(content, indent=4, ensure_ascii=False, allow_nan=False).encode()
-
-
-def _content(layout: Layout) -> dict[str, Any]:
-    """Return what the manifest says, its format checked first: a newer one may say anything else."""
-    content = read_json(layout.manifest)
-    if content["format"] != FORMAT:
-        raise HandrailError(
-            f"dataset {str(layout.root)!r}: expected format {FORMAT}, got {str(content['format'])[:60]};"
-            " a newer Handrail wrote it"
-        )
-    return content
 
 
 def _why_no_manifest(layout: Layout) -> str:
@@ -122,10 +117,3 @@ def _describe(feature: Feature | None) -> str:
         return "none"
     names = f" ({', '.join(feature.names)})" if feature.names and not feature.is_video else ""
     return f"{feature.dtype} {feature.shape}{names}"
-
-
-def _differs(root: Path, thing: str, existing: object, given: object) -> HandrailError:
-    return HandrailError(
-        f"--resume: cannot add to {str(root)!r}: {thing} of the existing episodes is {existing}, got {given};"
-        " give the same, or choose another folder"
-    )

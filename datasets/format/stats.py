@@ -10,7 +10,10 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-Stats = dict[str, dict[str, np.ndarray]]
+Statistics = dict[str, np.ndarray]
+"""Of one column, by name."""
+Stats = dict[str, Statistics]
+"""By column."""
 
 QUANTILES = {"q01": 0.01, "q10": 0.10, "q50": 0.50, "q90": 0.90, "q99": 0.99}
 _SHARES = np.array(list(QUANTILES.values()))
@@ -21,7 +24,7 @@ _LARGE = 1e150  # what may be squared
 _LEVELS = np.arange(256, dtype=np.float64)
 
 
-def column_stats(values: np.ndarray) -> dict[str, np.ndarray]:
+def column_stats(values: np.ndarray) -> Statistics:
     """Return the statistics of one numeric column of an episode.
 
     Args:
@@ -56,7 +59,7 @@ def image_levels(image: np.ndarray) -> np.ndarray:
     return np.stack([np.bincount(image[..., c].ravel(), minlength=256) for c in range(3)]).astype(np.int32)
 
 
-def image_stats(levels: list[np.ndarray]) -> dict[str, np.ndarray]:
+def image_stats(levels: list[np.ndarray]) -> Statistics:
     """Return the statistics of one camera over an episode.
 
     Args:
@@ -109,7 +112,7 @@ def stats_from_lists(lists: Mapping[str, Mapping[str, list]]) -> Stats:
     return {key: {name: np.array(column[name]) for name in STATISTICS} for key, column in lists.items()}
 
 
-def _many_rows_stats(rows: np.ndarray) -> dict[str, np.ndarray]:
+def _many_rows_stats(rows: np.ndarray) -> Statistics:
     low, high, mean = rows.min(axis=0), rows.max(axis=0), rows.mean(axis=0)
     variance = np.mean(rows**2, axis=0) - mean**2
     stats = {"min": low, "max": high, "mean": mean, "std": np.sqrt(np.maximum(0, variance))}
@@ -120,7 +123,7 @@ def _many_rows_stats(rows: np.ndarray) -> dict[str, np.ndarray]:
     }
 
 
-def _quantiles(values: np.ndarray, edges: np.ndarray) -> dict[str, np.ndarray]:
+def _quantiles(values: np.ndarray, edges: np.ndarray) -> Statistics:
     """Return the quantiles of columns, interpolated inside the first bin up to which enough values lie.
 
     Args:
@@ -166,14 +169,14 @@ def _level_stats(counts: np.ndarray) -> dict[str, float | np.floating]:
     return {"min": float(low), "max": float(high), "mean": mean, "std": spread, **quantiles}
 
 
-def _finite_stats(rows: np.ndarray) -> dict[str, np.ndarray]:
+def _finite_stats(rows: np.ndarray) -> Statistics:
     columns = [column[np.isfinite(column)] for column in rows.T]
     each = [column_stats(column if column.size else np.zeros(1)) for column in columns]
     stats = {name: np.concatenate([one[name] for one in each]) for name in STATISTICS}
     return stats | {"count": np.array([len(rows)])}
 
 
-def _merge_column(first: dict[str, np.ndarray], second: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+def _merge_column(first: dict[str, np.ndarray], second: dict[str, np.ndarray]) -> Statistics:
     """Return the statistics of two sets of frames; `count` is (1,), or one a number."""
     n, m = first["count"], second["count"]
     mean = (first["mean"] * n + second["mean"] * m) / (n + m)
@@ -194,12 +197,12 @@ def _is_large(column: Mapping[str, np.ndarray]) -> bool:
     return max(abs(column["min"]).max(), abs(column["max"]).max()) > _LARGE
 
 
-def _wide(column: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+def _wide(column: Mapping[str, np.ndarray]) -> Statistics:
     kinds = dict.fromkeys(("mean", "std", *QUANTILES), np.longdouble)
     return {name: values.astype(kinds.get(name, values.dtype)) for name, values in column.items()}
 
 
-def _joined(stats: Stats, keys: Sequence[str]) -> dict[str, np.ndarray]:
+def _joined(stats: Stats, keys: Sequence[str]) -> Statistics:
     """Return the statistics of many columns, one after the other: one operation is quicker than many."""
     sizes = [stats[key]["mean"].size for key in keys]
     counts = [stats[key]["count"][0] for key in keys]

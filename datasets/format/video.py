@@ -6,6 +6,8 @@ thread goes on emptying the queue, so that the recording is never stuck; `finish
 
 import queue
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -17,7 +19,7 @@ import numpy as np
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.regular_file import regular
 from handrail.datasets.format.schema import Feature
-from handrail.datasets.format.stats import image_levels, image_stats
+from handrail.datasets.format.stats import Statistics, image_levels, image_stats
 from handrail.datasets.storage.atomic import sync_file
 
 QUEUE_LENGTH = 64  # pictures; 3 MB at 128 x 128, 59 MB at 640 x 480
@@ -44,56 +46,90 @@ def video_info(feature: Feature, fps: int) -> dict[str, Any]:
     }
 
 
+@contextmanager
+def whole_mp4(path: Path) -> Iterator[None]:
+    """Turn an error of reading an mp4 into one line."""
+    try:
+        yield
+    except (av.error.FFmpegError, IndexError, ValueError) as error:  # ValueError: also text that is none
+        said = str(error).partition("\n")[0]
+        raise HandrailError(f"video {str(path)!r}: expected a whole mp4, got {said}") from error
+
+
+def place_of(shown: Any, fps: int) -> int:
+    """Return which picture of the video a packet or a frame is."""
+    return round((shown.pts or 0) * (shown.time_base or 1) * fps)
+
+
+def sought(container: Any, first: int, fps: int) -> Any:
+    """Return the video of a file, at the key frame from which a picture can be decoded."""
+    stream = container.streams.video[0]
+    if stream.codec_context is None:
+        raise ValueError("an unknown codec")
+    if first:
+        container.seek(round(Fraction(first, fps) / (stream.time_base or 1)), stream=stream)
+    return stream
+
+
 def count_frames(path: Path) -> int:
     """Return how many pictures an mp4 really holds; every packet is read."""
-    try:
-        with av.open(str(regular(path))) as container:
-            sizes = [packet.size for packet in container.demux(video=0)]
-        return sum(size > 0 for size in sizes)
-    except (av.error.FFmpegError, IndexError, ValueError) as error:  # ValueError: text that is none
-        raise HandrailError(f"video {str(path)!r}: expected a whole mp4, got {error}") from error
+    with whole_mp4(path), av.open(str(regular(path))) as container:
+        return sum(packet.size > 0 for packet in container.demux(video=0))
 
 
-def decoded_stats(
-    path: Path, frames: int, height: int, width: int, first: int = 0, fps: int = 0
-) -> dict[str, np.ndarray]:
+def decoded_stats(path: Path, frames: int, camera: Feature, first: int = 0, fps: int = 0) -> Statistics:
     """Decode every picture of an mp4, or of a stretch of one, and return their statistics.
 
     Args:
         path: The mp4.
         frames: Number of pictures.
-        height: Of a picture.
-        width: Of a picture.
+        camera: Whose pictures they are.
         first: The picture that the stretch begins with.
         fps: Pictures a second [Hz]; 0 if these must be all pictures of the file.
-
-    Raises:
-        HandrailError: It does not decode to so many pictures of one size.
-        OSError: The file cannot be read.
     """
     levels: list[np.ndarray] = []
-    try:
-        with av.open(str(regular(path))) as container:
-            stream = container.streams.video[0]
-            if stream.codec_context is None:
-                raise ValueError("a codec that nobody knows")
-            stream.codec_context.options = {"err_detect": "explode"}
-            if first:
-                container.seek(round(Fraction(first, fps) / (stream.time_base or 1)), stream=stream)
-            for frame in container.decode(stream):
-                place = round((frame.pts or 0) * (frame.time_base or 1) * fps) if fps else 0
-                if place < first:
-                    continue
-                if fps and place >= first + frames:
-                    break
-                if frame.is_corrupt or (frame.height, frame.width) != (height, width):
-                    raise ValueError(f"a broken picture {len(levels)}, or one of another size")
-                levels.append(image_levels(frame.to_ndarray(format="rgb24")))
-    except (av.error.FFmpegError, IndexError, ValueError) as error:  # ValueError: also text that is none
-        raise HandrailError(f"expected a whole mp4, got {error}".partition("\n")[0]) from error
+    with whole_mp4(path), av.open(str(regular(path))) as container:
+        stream = sought(container, first, fps)
+        stream.codec_context.options = {"err_detect": "explode"}
+        for frame in _stretch(container, stream, first, frames, fps):
+            if frame.is_corrupt or (frame.height, frame.width) != camera.shape[:2]:
+                raise ValueError(f"a broken picture {len(levels)}, or one of another size")
+            levels.append(image_levels(frame.to_ndarray(format="rgb24")))
     if len(levels) != frames:
-        raise HandrailError(f"expected {frames} pictures, got {len(levels)}")
+        raise HandrailError(f"video {str(path)!r}: expected {frames} pictures, got {len(levels)}")
     return image_stats(levels)
+
+
+def encode_stretch(source: Path, first: int, count: int, target: Path, fps: int, camera: Feature) -> None:
+    """Write a stretch of a video, whose packets cannot be copied, as one of its own.
+
+    Args:
+        source: An mp4 at `fps`.
+        first: The picture that it begins with.
+        count: Number of pictures.
+        target: The new mp4.
+        fps: Pictures a second [Hz].
+        camera: Whose pictures they are.
+    """
+    encoder = VideoEncoder(target, fps, camera)
+    try:
+        with whole_mp4(source), av.open(str(regular(source))) as container:
+            for frame in _stretch(container, sought(container, first, fps), first, count, fps):
+                encoder.add(frame.to_ndarray(format="rgb24"))
+    except BaseException:
+        encoder.cancel()
+        raise
+    encoder.finish(count)
+
+
+def _stretch(container: Any, stream: Any, first: int, count: int, fps: int) -> Iterator[Any]:
+    """Yield the pictures of a stretch; without `fps`, those of the whole file."""
+    for frame in container.decode(stream):
+        place = place_of(frame, fps)
+        if fps and place >= first + count:
+            return
+        if place >= first:
+            yield frame
 
 
 class VideoEncoder:

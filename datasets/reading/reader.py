@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -16,17 +17,16 @@ from handrail.controllers.errors import HandrailError, unknown_name
 from handrail.controllers.regular_file import regular
 from handrail.datasets.format.arrow import flat_numbers, plain_values
 from handrail.datasets.format.data_file import DataFiles, data_files
-from handrail.datasets.format.info_fields import MOST_EPISODES, MOST_FRAMES, features, rate, whole_number
+from handrail.datasets.format.info_file import EpisodeLine, InfoFile, columns_of
 from handrail.datasets.format.layout import VIDEO_PATH, Layout
 from handrail.datasets.format.manifest import read_manifest
-from handrail.datasets.format.path_pattern import check_pattern, fill
+from handrail.datasets.format.path_pattern import fill
 from handrail.datasets.format.schema import NUMBERS, Feature
 from handrail.datasets.reading.simulated import STATE, SUCCESS, kept_in_state, out_of_state
 from handrail.datasets.storage.strict_json import read_json
 
 _DAMAGED = " the dataset is damaged"
 _READABLE = (*NUMBERS, "float16", "string")
-_PLACE = ("episode_index", "length", "data/chunk_index", "data/file_index")
 _UNREADABLE = (OSError, pa.ArrowException, ValueError, KeyError, TypeError, AttributeError)
 
 
@@ -70,20 +70,16 @@ def read_info(root: str | Path) -> DatasetInfo:
     if layout.manifest.exists():
         read_manifest(layout)  # of a format that this version understands
     try:
-        robot = content.get("robot_type") or ""
-        if not isinstance(robot, str):
-            raise ValueError(f"robot_type: expected a name, got {str(robot)[:60]}")
+        said = msgspec.convert(content, InfoFile)
         return DatasetInfo(
             root=layout.root,
-            fps=rate(content),
-            robot_type=robot,
-            features=features(content),
-            episodes=whole_number(content, "total_episodes", MOST_EPISODES),
-            frames=whole_number(content, "total_frames", MOST_FRAMES),
-            data_path=check_pattern(content["data_path"], ("chunk_index", "file_index")),
-            video_path=check_pattern(
-                content.get("video_path") or VIDEO_PATH, ("video_key", "chunk_index", "file_index")
-            ),
+            fps=said.fps,  # type: ignore[arg-type] - of some other tool's datasets it is no whole number
+            robot_type=said.robot_type or "",
+            features=columns_of(said.features),
+            episodes=said.total_episodes,
+            frames=said.total_frames,
+            data_path=said.data_path,
+            video_path=said.video_path or VIDEO_PATH,
             from_handrail=layout.manifest.is_file(),
         )
     except _UNREADABLE as error:
@@ -221,19 +217,10 @@ def _read_rows(path: Path) -> list[dict[str, Any]]:
         columns = [plain_values(table.column(place)) for place in range(len(names))]
         rows = [dict(zip(names, values, strict=True)) for values in zip(*columns, strict=True)]
         for row in rows:
-            for name in _PLACE:
-                whole_number(row, name, MOST_FRAMES)
-            row["tasks"] = _tasks(row)
+            row["tasks"] = msgspec.convert(row, EpisodeLine).tasks or []
         return rows
     except _UNREADABLE as error:
         raise _torn(path, error) from error
-
-
-def _tasks(row: dict[str, Any]) -> list[str]:
-    found = row.get("tasks") or []
-    if not isinstance(found, list) or not all(isinstance(task, str) for task in found):
-        raise ValueError(f"tasks: expected a list of texts, got {str(found)[:60]}")
-    return found
 
 
 def _first_odd(numbers: list[int]) -> str:

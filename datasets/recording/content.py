@@ -49,9 +49,8 @@ def _fault(path: Path, name: str, manifest: Manifest, record: EpisodeRecord, fil
 
 
 def _pictures_fault(path: Path, key: str, manifest: Manifest, record: EpisodeRecord) -> str:
-    height, width, _ = manifest.features[key].shape
     stretch = (0, 0) if record.alone else (record.offset, manifest.fps)
-    now = decoded_stats(path, record.length, height, width, *stretch)
+    now = decoded_stats(path, record.length, manifest.features[key], *stretch)
     saved = (record.stats or {})[key]
     same = all(np.abs(now[name] - saved[name]).max() < _SHADE for name in ("mean", "std"))
     return "" if same else "it shows other pictures than were saved"

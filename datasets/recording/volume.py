@@ -8,11 +8,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace as changed
 from pathlib import Path
 
-import numpy as np
-
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.format.columns import ColumnTypes, Scalar, fit_columns
-from handrail.datasets.format.cut import encode_stretch
 from handrail.datasets.format.data_file import DataFiles, GrowingDataFile, data_files
 from handrail.datasets.format.join import Stretch, VideoJoin, Videos, videos
 from handrail.datasets.format.layout import Layout
@@ -21,7 +18,7 @@ from handrail.datasets.format.manifest import Manifest
 from handrail.datasets.format.metadata import EpisodeRecord, FileSeal, Totals
 from handrail.datasets.format.schema import video_keys
 from handrail.datasets.format.tables import data_schema
-from handrail.datasets.format.video import decoded_stats
+from handrail.datasets.format.video import decoded_stats, encode_stretch
 from handrail.datasets.recording.piece import Piece
 from handrail.datasets.storage.atomic import make_folder, remove, write_synced
 
@@ -92,7 +89,10 @@ class _Volume:
         table, tasks, stats = piece.rows(self._schema, self._manifest.fps, totals, files)
         for key, stretch in stretches.items():
             if piece.is_cut:
-                stats |= {key: pictures_of(piece, key, self._manifest)}
+                camera, fps = self._manifest.features[key], self._manifest.fps
+                stats |= {
+                    key: decoded_stats(piece.videos[key], piece.length, camera, piece.first_picture, fps)
+                }
             self._joins[key].add(stretch)
         self._rows.add(table)
         record = changed(
@@ -144,9 +144,3 @@ def _stretches(piece: Piece, manifest: Manifest, opened: Videos, staging: Path) 
             raise HandrailError(f"video {str(video)!r}: expected pictures that can be cut out, got none")
         found[key] = stretch
     return found
-
-
-def pictures_of(piece: Piece, key: str, manifest: Manifest) -> dict[str, np.ndarray]:
-    """Return the statistics of one camera of a stretch."""
-    height, width = manifest.features[key].shape[:2]
-    return decoded_stats(piece.videos[key], piece.length, height, width, piece.first_picture, manifest.fps)

@@ -7,10 +7,9 @@ import numpy as np
 import pytest
 
 from handrail.controllers.errors import HandrailError
-from handrail.datasets.format.cut import encode_stretch
 from handrail.datasets.format.join import VideoJoin, videos
 from handrail.datasets.format.schema import Feature
-from handrail.datasets.format.video import VideoEncoder, count_frames
+from handrail.datasets.format.video import VideoEncoder, count_frames, encode_stretch
 
 COUNT, FPS = 24, 20
 CAMERA = Feature("video", (32, 48, 3))

@@ -169,7 +169,7 @@ def test_tasks_that_are_no_texts_are_one_line(root, tasks):
     path = Layout(root).row(1)
     table = pq.read_table(path)
     pq.write_table(table.set_column(table.schema.names.index("tasks"), "tasks", pa.array(tasks)), path)
-    with pytest.raises(HandrailError, match=r"\A[^\n]{1,400}tasks: expected a list of texts[^\n]{1,100}\Z"):
+    with pytest.raises(HandrailError, match=r"\A[^\n]{1,400}\$\.tasks[^\n]{1,100}\Z"):
         summarize(root)
 
 
