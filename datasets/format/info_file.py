@@ -65,7 +65,7 @@ class SavedLine(EpisodeLine, kw_only=True):
     """What it says of an episode that Handrail saved."""
 
     dataset_from_index: Frames
-    tasks: list[str]
+    tasks: list[str] = msgspec.field()
 
 
 class SavedTotals(msgspec.Struct):

@@ -74,7 +74,8 @@ def sought(container: Any, first: int, fps: int) -> Any:
 def count_frames(path: Path) -> int:
     """Return how many pictures an mp4 really holds; every packet is read."""
     with whole_mp4(path), av.open(str(regular(path))) as container:
-        return sum(packet.size > 0 for packet in container.demux(video=0))
+        sizes = [packet.size for packet in container.demux(video=0)]
+    return sum(size > 0 for size in sizes)
 
 
 def decoded_stats(path: Path, frames: int, camera: Feature, first: int = 0, fps: int = 0) -> Statistics:

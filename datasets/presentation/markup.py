@@ -1,4 +1,4 @@
-"""The few pieces of HTML that reports are made of, as `pieces.jinja` has them; whatever goes in is escaped."""
+"""The pieces of HTML that reports are made of, as `pieces.jinja` has them; whatever goes in is escaped."""
 
 from collections.abc import Iterable
 from functools import cache
