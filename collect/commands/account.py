@@ -92,7 +92,7 @@ def _summary(config: RecordConfig, log: RecordingLog) -> Table:
     simulated = sum(outcome.seconds for outcome in outcomes)
     wall = log.wall_time or sum(outcome.wall_time for outcome in outcomes)
     distance = min(outcome.smallest_distance for outcome in outcomes)
-    contacts = sum(outcome.contacts for outcome in outcomes)
+    contacts = sum(outcome.contact_onsets for outcome in outcomes)
     periods = sum(outcome.contact_periods for outcome in outcomes)
     rows = {
         "task, mode": f"{config.task}, {config.mode_name}",

@@ -123,7 +123,7 @@ def replay_one_of(
         final=difference[-1],
         recorded_success=bool(row.get("success")),
         success=outcome.success,
-        contacts=outcome.contacts,
+        contacts=outcome.contact_onsets,
         robot_client=str(row.get(CLIENT) or ""),
     )
     return replay, camera.taken

@@ -100,8 +100,8 @@ class EvaluatedEnv(gymnasium.Wrapper[Observation, NDArray[np.float32], Observati
         loop = self._loop
         loop.look()
         frame = loop.step(self._intent(numbers, channels))
-        over, cut_short = loop.terminated, loop.done and not loop.terminated
-        return self._shown(loop.observation), float(frame.success), over, cut_short, _plain(loop.info)
+        over, cut_short = loop.now.terminated, loop.now.done and not loop.now.terminated
+        return self._shown(loop.now.observation), float(frame.success), over, cut_short, _plain(loop.now.info)
 
     def render(self) -> NDArray[np.uint8]:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Return a quick picture from the scene camera: LeRobot films every step of ten episodes."""

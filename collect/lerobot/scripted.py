@@ -109,7 +109,7 @@ class HandrailScripted(SimTeleoperator):
         self._begun = 0
 
     def _act(self, session: Stepwise) -> dict[str, float]:
-        phase = self._clock.phase(session.loop.done)
+        phase = self._clock.phase(session.loop.now.done)
         if phase is not ClockPhase.DRIVE:
             return session.action.still(session.gripper) | {NEXT if phase is ClockPhase.NEXT else HOLD: 1.0}
         if session.episodes != self._begun:

@@ -163,7 +163,7 @@ class HandrailSim(Robot):
         """Log how a scene went in which something was done."""
         session = self.stepwise
         if session.driven:
-            result = "success" if session.loop.success else "no success"
+            result = "success" if session.loop.now.success else "no success"
             logging.info("handrail_sim: scene %d: %s, %d brakes", session.scene, result, session.brakes)
 
     def disconnect(self) -> None:

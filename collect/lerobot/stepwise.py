@@ -117,7 +117,7 @@ class Stepwise:
     @property
     def gripper(self) -> float:
         """What the gripper was sent last, 0 open, 1 closed."""
-        return float(self.loop.info["sent"][-1])
+        return float(self.loop.now.info["sent"][-1])
 
     def _move(self, intent: Intent, event: EpisodeEvent | None = None, counts: bool = True) -> None:
         self.loop.look()
@@ -138,22 +138,22 @@ class Stepwise:
         The mode is its place in the list of modes, −1 for a mask of one's own; the status that of `Status`;
         the distance the smallest one now, cut to 10 m.
         """
-        seen = self.loop.observation
+        seen = self.loop.now.observation
         numbers = [*seen["agent_pos"], *seen["environment_state"]]
         if self._told:
             modes = list(MODES)
             mode = modes.index(self.mode.name) if self.mode.name in modes else -1
-            diagnostics, info = self.frame.diagnostics if self.frame else Diagnostics(), self.loop.info
+            diagnostics, info = self.frame.diagnostics if self.frame else Diagnostics(), self.loop.now.info
             status = _STATUSES.index(Status(diagnostics.status))
             distance = finite_distance(diagnostics.smallest_distance)
-            told = (mode, status, distance, info["contacts"], self.brakes, self.loop.success, self.scene)
+            told = (mode, status, distance, info["contacts"], self.brakes, self.loop.now.success, self.scene)
             numbers += [*info["sent"], *told]
         return dict(zip(self.names, map(float, numbers), strict=True))
 
     @property
     def pictures(self) -> dict[str, Any]:
         """What the cameras see, (height, width, 3) uint8 each."""
-        return dict(self.loop.observation.get("pixels", {}))
+        return dict(self.loop.now.observation.get("pixels", {}))
 
     def close(self) -> None:
         """Give the pictures' contexts back."""

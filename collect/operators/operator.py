@@ -60,7 +60,6 @@ class Operator(Protocol):
 
     def reset(self, view: View, rng: np.random.Generator) -> None:
         """Begin an episode."""
-        ...
 
     def act(self, view: View) -> Intent | EpisodeEvent:
         """Return the intent now, or what becomes of the episode."""

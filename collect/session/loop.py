@@ -97,16 +97,26 @@ class Disturbance(Protocol):
 
     def begin(self, env: HandrailEnv, seed: int) -> None:
         """Take note that an episode begins."""
-        ...
 
     def act(self) -> None:
         """Act during the period that begins now."""
-        ...
 
 
 @dataclass
-class _Moment:
-    """Everything that lasts from one step of an episode to the next."""
+class Moment:
+    """Everything that lasts from one step of an episode to the next.
+
+    Attributes:
+        observation: after the last step.
+        info: of the environment's last step.
+        driver: of the robot.
+        tally: the counts along the episode.
+        view: the robot and its world at the last look.
+        success: whether the task has succeeded in this episode.
+        terminated: whether the task or a person has ended it.
+        truncated: whether its time limit has.
+        looked: wall time of the last look since the episode began [s].
+    """
 
     observation: Observation
     info: dict[str, Any]
@@ -116,10 +126,11 @@ class _Moment:
     success: bool = False
     terminated: bool = False
     truncated: bool = False
-    looked: float = 0.0  # wall time since the episode began [s]
+    looked: float = 0.0
 
     @property
     def done(self) -> bool:
+        """Whether the episode is over, at the latest by its time limit."""
         return self.terminated or self.truncated
 
 
@@ -134,9 +145,12 @@ class EpisodeLoop:
         controller: completes the intent.
         control_period: of the controller [s]; the robot's by default.
         disturbances: what acts on the robot from outside.
+
+    Attributes:
+        now: where the episode that has begun stands.
     """
 
-    _now: _Moment
+    now: Moment
 
     def __init__(
         self,
@@ -151,32 +165,7 @@ class EpisodeLoop:
     @property
     def tally(self) -> Tally:
         """The counts along the episode."""
-        return self._now.tally
-
-    @property
-    def info(self) -> dict[str, Any]:
-        """The environment's info of the last step."""
-        return self._now.info
-
-    @property
-    def observation(self) -> Observation:
-        """The observation after the last step."""
-        return self._now.observation
-
-    @property
-    def success(self) -> bool:
-        """Whether the task has succeeded in this episode."""
-        return self._now.success
-
-    @property
-    def terminated(self) -> bool:
-        """Whether the task or a person has ended the episode."""
-        return self._now.terminated
-
-    @property
-    def done(self) -> bool:
-        """Whether the episode is over, at the latest by its time limit."""
-        return self._now.done
+        return self.now.tally
 
     @property
     def time(self) -> float:
@@ -192,21 +181,21 @@ class EpisodeLoop:
         observation, info = self.env.reset(seed=seed)
         driver = Driver(self._controller, self.env, self.control_period)
         tally = Tally(seed or 0, self.env.period)
-        self._now = _Moment(observation, info, driver, tally, self._view(observation))
+        self.now = Moment(observation, info, driver, tally, self._view(observation))
         for disturbance in self._disturbances:
             disturbance.begin(self.env, seed or 0)
-        return self._now.view
+        return self.now.view
 
     def look(self) -> View:
         """Return the robot and its world as they are now; the next step acts on that."""
-        self._now.looked = self.tally.elapsed
-        self._now.view = self._view(self._now.observation)
-        return self._now.view
+        self.now.looked = self.tally.elapsed
+        self.now.view = self._view(self.now.observation)
+        return self.now.view
 
     @property
     def rests(self) -> bool:
         """Whether the robot was at rest at the last look, as it was told."""
-        commanded = self._now.view.state.commanded
+        commanded = self.now.view.state.commanded
         return commanded is not None and not commanded.any()
 
     def step(self, intent: Intent, event: EpisodeEvent | None = None, counts: bool = True) -> Frame:
@@ -217,7 +206,7 @@ class EpisodeLoop:
             event: what they say of the episode; a judgement makes this step the last.
             counts: whether the task judges this step.
         """
-        env, now, seen, wall_clock = self.env, self._now, self._now.observation, self._now.looked
+        env, now, seen, wall_clock = self.env, self.now, self.now.observation, self.now.looked
         driver, tally = now.driver, now.tally
         with tally.timed("controller"):
             if driver.drive(tally.frames, now.view.state, intent):
@@ -256,7 +245,7 @@ class EpisodeLoop:
 
     def checkpoint(self) -> object:
         """Return where the episode stands, to come back to."""
-        return self.env.checkpoint(), replace(self._now, tally=copy(self.tally))
+        return self.env.checkpoint(), replace(self.now, tally=copy(self.tally))
 
     def restore(self, checkpoint: Any) -> None:
         """Come back to where the episode stood; the clock and what was spent go on."""
@@ -264,7 +253,7 @@ class EpisodeLoop:
         observation, info = self.env.restore(world)
         tally = self.tally.back_to(then.tally)
         driver = Driver(self._controller, self.env, self.control_period, tally.frames)
-        self._now = replace(then, observation=observation, info=info, driver=driver, tally=tally)
+        self.now = replace(then, observation=observation, info=info, driver=driver, tally=tally)
 
     def _view(self, observation: Observation) -> View:
         return View(self.env.robot.state(), self.env.task_state(), observation)

@@ -28,7 +28,7 @@ class Outcome:
         wall_time: time it took [s].
         brakes: updates in which the controller braked the robot.
         late: periods that a real-time loop overran.
-        contacts: forbidden contacts that began.
+        contact_onsets: forbidden contacts that began.
         contact_periods: periods with a forbidden contact.
         smallest_distance: smallest signed distance, tool against work surfaces left out [m].
         spent: where the wall time went, by part of the loop [s].
@@ -47,7 +47,7 @@ class Outcome:
     wall_time: float
     brakes: int
     late: int
-    contacts: int
+    contact_onsets: int
     contact_periods: int
     smallest_distance: float
     spent: Mapping[str, float]
@@ -161,7 +161,7 @@ class Tally:
             wall_time=self.elapsed,
             brakes=self.brakes,
             late=self._late,
-            contacts=self._contacts_begun,
+            contact_onsets=self._contacts_begun,
             contact_periods=self._contact_periods,
             smallest_distance=float(self._smallest),
             spent=dict(self._spent),

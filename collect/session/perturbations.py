@@ -6,12 +6,15 @@ seed meets the same disturbance.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Annotated
+
+from msgspec import Meta
 
 from handrail.controllers.errors import HandrailError, unknown_name
+from handrail.controllers.typed import check_settings
 
 NONE = "none"
-DEFAULTS: Mapping[str, float] = {"push": 1.0, "shift": 0.3, "delay": 3.0}
-MOST: Mapping[str, float] = {"push": 10.0, "shift": 2.0, "delay": 100.0}
+DEFAULTS: Mapping[str, float] = {"push": 1.0, "shift": 0.3, "delay": 3}
 _WORDS = {"push": "pushed", "shift": "shifted", "delay": "delayed"}
 
 
@@ -25,9 +28,13 @@ class Perturbation:
         delay: control periods by which observations come late.
     """
 
-    push: float = 0.0
-    shift: float = 0.0
-    delay: int = 0
+    push: Annotated[float, Meta(ge=0, le=10)] = 0.0
+    shift: Annotated[float, Meta(ge=0, le=2)] = 0.0
+    delay: Annotated[int, Meta(ge=0, le=100)] = 0
+
+    def __post_init__(self) -> None:
+        """Check the sizes."""
+        check_settings(self, "--perturbation")
 
     @classmethod
     def parse(cls, text: str) -> "Perturbation":
@@ -35,11 +42,18 @@ class Perturbation:
         sizes: dict[str, float] = {}
         for part in text.strip().split("+") if text.strip() != NONE else ():
             name, _, number = part.strip().partition(":")
+            if name not in DEFAULTS:
+                raise unknown_name("perturbation", name, (NONE, *DEFAULTS))
+            try:
+                size = float(number or DEFAULTS[name])
+            except ValueError:
+                size = 0.0
+            if not size > 0.0:
+                raise HandrailError(f"--perturbation {name}:{number}: expected a number above 0")
             if name in sizes:
                 raise HandrailError(f"--perturbation {text}: expected each of {', '.join(DEFAULTS)} once")
-            sizes[name] = _size(name, number)
-        delay = int(sizes.pop("delay", 0))
-        return cls(**sizes, delay=delay)
+            sizes[name] = int(size) if name == "delay" and size.is_integer() else size
+        return cls(**sizes)  # type: ignore[arg-type]
 
     @property
     def sizes(self) -> dict[str, float]:
@@ -58,21 +72,3 @@ class Perturbation:
             _WORDS[name] + ("" if size == DEFAULTS[name] else f":{size:g}")
             for name, size in self.sizes.items()
         )
-
-
-def _size(name: str, number: str) -> float:
-    if name not in DEFAULTS:
-        raise unknown_name("perturbation", name, (NONE, *DEFAULTS))
-    if not number:
-        return DEFAULTS[name]
-    try:
-        size = float(number)
-    except ValueError:
-        size = float("nan")
-    whole = name != "delay" or size == int(size if size == size else 0)
-    if not (0.0 < size <= MOST[name] and whole):
-        kind = "a whole number of control periods" if name == "delay" else "a number"
-        raise HandrailError(
-            f"--perturbation {name}:{number}: expected {kind} above 0, at most {MOST[name]:g}"
-        )
-    return size

@@ -1,7 +1,7 @@
 """A recorded episode, run again: the settings that it keeps, and its commands as a controller."""
 
 import json
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import asdict, fields
 from typing import Any
 
@@ -10,38 +10,21 @@ import numpy as np
 from handrail.collect.config import SessionConfig
 from handrail.collect.operators.catalogue import OPERATORS
 from handrail.collect.operators.modes import MODES
-from handrail.collect.operators.scripted.human import HumanSettings
 from handrail.collect.world.tasks.catalogue import TASKS
-from handrail.controllers.entries import Entry, check_entries, is_number, is_table
 from handrail.controllers.errors import HandrailError, shown
 from handrail.controllers.interface.command import Command
 from handrail.controllers.interface.controller import State
 from handrail.controllers.interface.intent import Intent
 from handrail.controllers.robot.catalogue import ROBOTS
 from handrail.controllers.robot.shape import Obstacle
+from handrail.controllers.typed import decoded
 
 COLUMN = "settings"
 _OLDER = {"environment": "task"} | {  # what an episode said before it kept every setting, and its name now
     name: name for name in ("robot", "operator", "mode", "noise", "person", "moving_obstacles")
 }
 _GONE = ("inner_error", "tremor")  # of a person, whom older episodes say more of than there is now
-_KINDS: Mapping[type, tuple[str, Callable[[Any], bool]]] = {
-    str: ("a text", lambda value: isinstance(value, str)),
-    bool: ("true or false", lambda value: isinstance(value, bool)),
-    int: ("a whole number", lambda value: type(value) is int),
-    float: ("a finite number", is_number),
-    HumanSettings: ("a table", is_table),
-}
-
-
-def _entries(settings: SessionConfig | HumanSettings, needed: tuple[str, ...] = ()) -> dict[str, Entry]:
-    kinds = {entry.name: _KINDS[type(getattr(settings, entry.name))] for entry in fields(settings)}
-    return {name: Entry(*kind, needed=name in needed) for name, kind in kinds.items()}
-
-
 _WHERE = "settings of the episode"
-_ENTRIES = _entries(SessionConfig(), needed=("task", "robot"))
-_HUMAN = _entries(HumanSettings())
 _NAMES = {"task": TASKS, "mode": MODES, "operator": OPERATORS, "robot": ROBOTS}
 
 
@@ -59,19 +42,19 @@ def recorded_settings(row: Mapping[str, Any], said: Collection[str] = ()) -> Ses
             rest is as by default.
         said: the names of the command line; others that are `module:name` are refused.
     """
-    settings = _parsed(row[COLUMN]) if row.get(COLUMN) else _older(row)
-    check_entries(settings, _ENTRIES, _WHERE)
-    human = settings.pop("human", {})
-    human = {name: value for name, value in human.items() if name not in _GONE}
-    check_entries(human, _HUMAN, f"{_WHERE}: human")
-    config = SessionConfig(**settings, human=HumanSettings(**human))
+    content = _parsed(row[COLUMN]) if row.get(COLUMN) else _older(row)
+    if isinstance(content, dict) and isinstance(content.get("human"), dict):
+        content["human"] = {name: value for name, value in content["human"].items() if name not in _GONE}
+    config = decoded(content, SessionConfig, _WHERE)
+    if missing := {"task", "robot"} - set(content):
+        raise HandrailError(f"{_WHERE}: expected entries task and robot, found no {', '.join(missing)}")
     for name, registry in _NAMES.items():
         registry.admit(getattr(config, name), said)
     config.check()
     return config
 
 
-def _parsed(text: Any) -> dict[str, Any]:
+def _parsed(text: Any) -> Any:
     try:
         return json.loads(text)
     except (TypeError, ValueError, RecursionError) as error:

@@ -7,6 +7,12 @@ from handrail.collect.world.env import HandrailEnv
 from handrail.datasets.recording.frames import Frame, frame_row
 from handrail.datasets.recording.writer import EpisodeWriter, Scalar
 
+_COLUMNS = (
+    *("success", "failure_reason", "seed", "started", "wall_time", "brakes", "late", "undos"),
+    *("contact_onsets", "contact_periods"),
+)
+"""What an episode's metadata says of its outcome."""
+
 
 class Recorder:
     """Records moments as frames; an observer of a session.
@@ -46,20 +52,7 @@ class Recorder:
             self.writer.discard_episode()
             return
         self._add(outcome.frames)
-        says = {"operator_says": outcome.operator_says}  # datasets of old have no such column
-        self.writer.save_episode(
-            dict(self._columns)
-            | (says if self.writer.has_column("operator_says") else {})
-            | {
-                "success": outcome.success,
-                "failure_reason": outcome.failure_reason,
-                "seed": outcome.seed,
-                "started": outcome.started,
-                "wall_time": outcome.wall_time,
-                "brakes": outcome.brakes,
-                "late": outcome.late,
-                "undos": outcome.undos,
-                "contact_onsets": outcome.contacts,
-                "contact_periods": outcome.contact_periods,
-            }
-        )
+        row: dict[str, Scalar] = dict(self._columns)
+        if self.writer.has_column("operator_says"):  # datasets of old have no such column
+            row["operator_says"] = outcome.operator_says
+        self.writer.save_episode(row | {name: getattr(outcome, name) for name in _COLUMNS})

@@ -110,11 +110,9 @@ class Observer(Protocol):
 
     def begin(self, env: HandrailEnv, seed: int) -> None:
         """Take note that an episode begins."""
-        ...
 
     def see(self, frame: Frame) -> None:
         """Take one moment; after an undo its number has been there before, and what that was is forgotten."""
-        ...
 
 
 class Session:
@@ -179,10 +177,12 @@ class Session:
         realtime: bool,
         tell_paused: Callable[[bool], None] = lambda paused: None,
     ) -> Outcome:
-        loop, tell = self._loop, _Change(tell_paused)
+        loop, paused = self._loop, False
         with single_threaded():
-            if realtime:
-                _tidy()
+            if realtime:  # later collections of garbage look at what is new only: none may halt the loop
+                gc.unfreeze()
+                gc.collect()
+                gc.freeze()
             operator.reset(loop.begin(seed), np.random.default_rng([seed, 1]))
             for observer in observers:
                 observer.begin(self.env, seed)
@@ -191,9 +191,11 @@ class Session:
             undo = Undo(loop, sampling) if self._undoes else None
             asked, event = Intent.idle(Channels.of(self.env.model.description)), None
             try:
-                while not loop.done:
+                while not loop.now.done:
                     asked, event = _listen(loop, operator, asked)
-                    tell(event is EpisodeEvent.PAUSE)
+                    if paused is not (event is EpisodeEvent.PAUSE):
+                        paused = not paused
+                        tell_paused(paused)
                     if event is not None and event.drops:
                         break
                     if event is EpisodeEvent.UNDO and undo:
@@ -203,14 +205,17 @@ class Session:
                             undo.mark(sampling)
                         loop.tally.held()
                     elif frame := sampling.add(loop.step(asked, event), loop.time):
-                        _show(replace(frame, safe=undo.safe) if undo else frame, loop.tally, observers)
+                        frame = replace(frame, safe=undo.safe) if undo else frame
+                        with loop.tally.timed("observers"):
+                            for observer in observers:
+                                observer.see(frame)
                     if realtime:
                         loop.tally.pace()
             finally:
                 self.env.robot.stop()
                 self._warn_if_slow(loop.tally, realtime)
         ended_by = None if event is EpisodeEvent.PAUSE else event
-        return loop.tally.outcome(loop.info, ended_by, not self.env.real)
+        return loop.tally.outcome(loop.now.info, ended_by, not self.env.real)
 
     def _warn_if_slow(self, tally: Tally, realtime: bool) -> None:
         """Warn when more than one update in a hundred took longer than the period, in real time."""
@@ -223,24 +228,6 @@ class Session:
             )
 
 
-def _show(frame: Frame, tally: Tally, observers: Sequence[Observer]) -> None:
-    with tally.timed("observers"):
-        for observer in observers:
-            observer.see(frame)
-
-
-class _Change:
-    """Tells whether something is so, whenever that changes."""
-
-    def __init__(self, tell: Callable[[bool], None]) -> None:
-        self._tell, self._before = tell, False
-
-    def __call__(self, now: bool) -> None:
-        if now is not self._before:
-            self._tell(now)
-        self._before = now
-
-
 def _listen(loop: EpisodeLoop, operator: Operator, before: Intent) -> tuple[Intent, EpisodeEvent | None]:
     """Ask the operator; while they do not steer, what the controller hears is stale, and it brakes."""
     view = loop.look()
@@ -249,10 +236,3 @@ def _listen(loop: EpisodeLoop, operator: Operator, before: Intent) -> tuple[Inte
     if isinstance(asked, EpisodeEvent):
         return replace(before, mask=np.zeros_like(before.mask), time=LONG_AGO), asked
     return asked, None
-
-
-def _tidy() -> None:
-    """Collect garbage now, and let later collections look at what is new only: none may halt the loop."""
-    gc.unfreeze()
-    gc.collect()
-    gc.freeze()

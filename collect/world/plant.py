@@ -32,7 +32,6 @@ class Robot(Protocol):
 
     def stop(self) -> None:
         """Come to rest as fast as the limits allow, and stay there; the gripper stays as it is."""
-        ...
 
 
 class World(Protocol):
@@ -44,7 +43,6 @@ class World(Protocol):
 
     def restore(self, checkpoint: Any) -> None:
         """Come back to a state: from there all goes on as it did."""
-        ...
 
     @property
     def time(self) -> float:

@@ -43,7 +43,7 @@ def main() -> None:
         outcome = session.run(seed)
         result = "reached" if outcome.success else outcome.failure_reason
         print(
-            f"seed {seed}: {result} after {outcome.seconds:.1f} s, {outcome.contacts} contacts,"
+            f"seed {seed}: {result} after {outcome.seconds:.1f} s, {outcome.contact_onsets} contacts,"
             f" smallest distance {outcome.smallest_distance:.2f} m"
         )
     env.close()

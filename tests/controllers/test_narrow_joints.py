@@ -47,4 +47,4 @@ def test_a_hand_that_is_steered_to_a_far_pose_is_not_led_into_a_corner():
     with closing(build_env(config, 20)) as env:
         outcome = build_session(config, env).run(episode_seed(100, 3))
     assert outcome.success, outcome
-    assert outcome.contacts == 0
+    assert outcome.contact_onsets == 0

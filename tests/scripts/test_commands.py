@@ -46,7 +46,7 @@ WRONG = {
     "fps text": (["--dataset.fps", "fast"], "--dataset.fps"),
     "no episodes": (["--dataset.num_episodes", "0"], "expected 1 or more"),
     "nan noise": (["--noise", "nan"], "--noise nan: expected a number"),
-    "negative human": (["--human.delay", "-1"], "--human.delay: expected a finite number >= 0"),
+    "negative human": (["--human.delay", "-1"], "--human delay: expected a number >= 0"),
     "seed": (["--seed", "-3"], "--seed -3: expected a whole number"),
     "image size": (["--image_size", "33"], "expected an even number"),
     "robot": (["--robot", "spot"], "unknown robot 'spot'"),

@@ -4,7 +4,7 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from handrail.controllers.errors import HandrailError
+from handrail.controllers.typed import NonNegative, Positive, check_settings
 
 _WIDEST = 2.0  # a person is at most this many standard deviations from the average
 
@@ -31,27 +31,22 @@ class HumanSettings:
             `briskness · gain / ln 2` [bit/s] (`Gains`); no weakness, so noise, persons and moods leave it.
     """
 
-    delay: float = 0.2
-    refractory: float = 0.35
-    threshold: float = 0.03
-    noise: float = 0.1
-    drift: float = 0.02
-    correlation: float = 0.5
-    switch_time: float = 0.3
-    movement: float = 0.15
-    misjudgement: float = 0.05
-    persons: float = 0.15
-    moods: float = 0.08
-    briskness: float = 1.0
+    delay: NonNegative = 0.2
+    refractory: NonNegative = 0.35
+    threshold: NonNegative = 0.03
+    noise: NonNegative = 0.1
+    drift: NonNegative = 0.02
+    correlation: NonNegative = 0.5
+    switch_time: NonNegative = 0.3
+    movement: NonNegative = 0.15
+    misjudgement: NonNegative = 0.05
+    persons: NonNegative = 0.15
+    moods: NonNegative = 0.08
+    briskness: Positive = 1.0
 
     def __post_init__(self) -> None:
         """Check the numbers."""
-        for entry in fields(self):
-            value = getattr(self, entry.name)
-            if not np.isfinite(value) or value < 0:
-                raise HandrailError(f"--human.{entry.name}: expected a finite number >= 0, got {value}")
-        if not self.briskness:
-            raise HandrailError("--human.briskness: expected a number > 0, got 0")
+        check_settings(self, "--human")
 
     def scaled(self, factor: float) -> "HumanSettings":
         """Return the settings with every weakness but the correlation time multiplied by a factor."""
@@ -68,7 +63,7 @@ class HumanSettings:
 
     def _drawn(self, spread: float, rng: np.random.Generator) -> "HumanSettings":
         names = _weaknesses()
-        factors = np.exp(spread * np.clip(rng.standard_normal(len(names)), -_WIDEST, _WIDEST))
+        factors = np.exp(spread * np.clip(rng.standard_normal(len(names)), -_WIDEST, _WIDEST)).tolist()
         values = {name: getattr(self, name) * factor for name, factor in zip(names, factors, strict=True)}
         return replace(self, **values | {"persons": self.persons, "moods": self.moods})
 

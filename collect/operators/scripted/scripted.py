@@ -69,7 +69,6 @@ class Script(Protocol):
 
     def reset(self, view: View) -> None:
         """Look at the scene and make up the mind."""
-        ...
 
     def motion_goal(self, view: View) -> MotionGoal:
         """Return what is wanted now."""

@@ -169,7 +169,7 @@ def _row(outcome: Outcome, malformed: int) -> Row:
     row: Row = {
         "seed": outcome.seed,
         "success": outcome.success,
-        "contacts": outcome.contacts,
+        "contacts": outcome.contact_onsets,
         "contact_time": round(period * outcome.contact_periods, 6),
         "length": round(outcome.seconds, 6),
         "brakes": outcome.brakes,

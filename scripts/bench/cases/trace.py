@@ -68,7 +68,7 @@ class CaseTrace:
             "channels": list(self.case.channels),
             "seconds": self.outcome.seconds,
             "frames": self.outcome.frames,
-            "contacts": self.outcome.contacts,
+            "contacts": self.outcome.contact_onsets,
             "brakes": self.outcome.brakes,
             "tracking": {
                 **_mean_and_max(error),

@@ -28,9 +28,7 @@ from handrail.scripts.bench.report import report
 
 _PRELOAD = ("handrail.scripts.bench.operators.trials",)
 _FPS = 20  # [Hz]
-_OF_OUTCOME = (
-    *("success", "failure_reason", "seconds", "frames", "contacts", "smallest_distance", "brakes"),
-)
+_OF_OUTCOME = (*("success", "failure_reason", "seconds", "frames", "smallest_distance", "brakes"),)
 
 
 HEADINGS = (
@@ -102,7 +100,7 @@ def run_trial(config: TrialsConfig, task: str, mode: str, episode: int) -> Opera
     person = episode % config.persons
     session, hands = _watched(config, task, mode, person)
     outcome = session.run(episode_seed(config.seed, episode))
-    went = {name: getattr(outcome, name) for name in _OF_OUTCOME}
+    went = {name: getattr(outcome, name) for name in _OF_OUTCOME} | {"contacts": outcome.contact_onsets}
     own = {"switches": hands.switches, "switching": hands.away / _FPS}
     return OperatorTrial(task, mode, episode, person, **went, **own)
 

@@ -22,7 +22,7 @@ def recorded(tmp_path_factory):
     folder = tmp_path_factory.mktemp("lerobot")
     seen: list[list[dict]] = [[], []]
     with steered(folder) as (robot, teleop):
-        while len(seen[0]) < 300 and not robot.stepwise.loop.success:
+        while len(seen[0]) < 300 and not robot.stepwise.loop.now.success:
             seen[0].append(robot.get_observation())
             robot.send_action(teleop.get_action())
         seen[0].append(robot.get_observation())

@@ -70,7 +70,7 @@ def test_lerobot_leads_the_robot_back_and_the_next_scene_begins(mode, tmp_path, 
         now, joints = robot.stepwise.view.state.q, robot.stepwise.env.model.joints
         assert max(abs(away[f"{name}.pos"] - start[f"{name}.pos"]) for name in joints) > 0.1
         np.testing.assert_allclose(now, [start[f"{name}.pos"] for name in joints], atol=0.02)
-        assert not robot.stepwise.loop.success
+        assert not robot.stepwise.loop.now.success
         following = robot.get_observation()
         assert (following["scene"], robot.get_observation()) == (1, following)
         RolloutStrategy._return_to_initial_position(hardware)  # as before an episode that is recorded again

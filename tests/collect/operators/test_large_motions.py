@@ -128,4 +128,4 @@ def test_an_expert_by_joints_turns_the_hand_over_without_touching_himself(episod
     with closing(build_env(config, 20)) as env:
         outcome = build_session(config, env).run(episode_seed(900, episode))
     assert outcome.success
-    assert outcome.contacts == 0
+    assert outcome.contact_onsets == 0

@@ -68,7 +68,7 @@ def test_persons_differ_and_a_perfect_one_does_not():
 def test_briskness_is_no_weakness():
     brisk, rng = HumanSettings(briskness=1.5), np.random.default_rng(0)
     assert brisk.scaled(3.0).briskness == brisk.person(rng).briskness == brisk.episode(rng).briskness == 1.5
-    with pytest.raises(HandrailError, match="briskness: expected a number > 0"):
+    with pytest.raises(HandrailError, match="briskness: expected a number >="):
         HumanSettings(briskness=0.0)
 
 

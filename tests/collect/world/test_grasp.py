@@ -109,7 +109,7 @@ def test_a_session_tells_the_controller_what_is_held_until_it_is_let_go():
     finally:
         env.close()
     assert outcome.success
-    assert outcome.contacts == 0
+    assert outcome.contact_onsets == 0
     assert watch.told[0] == ("tray",)
     assert watch.told[-1] == ()  # told once that nothing is held any more
     assert watch.told.count(()) < 5  # the fingers may lose it for a moment while they open
@@ -156,7 +156,7 @@ def test_the_operator_closes_the_gripper_around_the_cube(robot, mode):
         session = build_session(config, env, [watch])
         outcome = session.run(100)
         assert outcome.success
-        assert mode == "direct" or not outcome.contacts
+        assert mode == "direct" or not outcome.contact_onsets
     finally:
         env.close()
     tips = {"ridgeback_ur10": 0.015, "ridgeback_panda": 0.0095}[robot]  # beyond the tool point

@@ -111,7 +111,7 @@ def test_a_scripted_operator_steers_only_the_hand_to_a_goal():
     outcome = build_session(config, env).run(1)
     env.close()
     assert outcome.success, outcome
-    assert outcome.contacts == 0
+    assert outcome.contact_onsets == 0
 
 
 @pytest.mark.parametrize("task", [Tray, Drawer])

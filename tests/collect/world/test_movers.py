@@ -118,7 +118,7 @@ def test_a_robot_that_nobody_steers_steps_aside(kind, touched):
     env = HandrailEnv(Meeting())
     outcome = Session(env, kind(env.model), Idle()).run(0)
     env.close()
-    assert (outcome.contacts > 0) == touched
+    assert (outcome.contact_onsets > 0) == touched
     assert (outcome.smallest_distance < 0.0) == touched
 
 

@@ -212,11 +212,7 @@ WRONG = {
     "protection": ({"protection": "prayer"}, ("chase",), "unknown protection 'prayer'"),
     "perturbation": ({"perturbation": "rain"}, ("chase",), "unknown perturbation 'rain'"),
     "size": ({"perturbation": "push:-1"}, ("chase",), "--perturbation push:-1: expected a number above 0"),
-    "half a period": (
-        {"perturbation": "delay:1.5"},
-        ("chase",),
-        "expected a whole number of control periods",
-    ),
+    "half a period": ({"perturbation": "delay:1.5"}, ("chase",), "delay: expected a whole number"),
     "twice": ({"perturbation": "push+push"}, ("chase",), "expected each of push, shift, delay once"),
     "filter": ({"protection": "filter"}, ("chase",), "expected a policy of joint velocities"),
     "rests": ({"protection": "mpc"}, ("single",), "expected a policy of joint velocities"),
