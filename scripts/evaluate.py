@@ -1,7 +1,7 @@
 """`handrail-evaluate`: run trained policies on declared seeds, protected or not, disturbed or not."""
 
+from handrail.policies.imitation.config import check_installed
 from handrail.policies.imitation.evaluation.config import EvaluateConfig
-from handrail.policies.imitation.training.installed import check_installed
 from handrail.scripts import cli
 
 

@@ -1,7 +1,6 @@
 """`handrail-train`: train an imitation policy with LeRobot's own training."""
 
-from handrail.policies.imitation.config import TrainConfig
-from handrail.policies.imitation.training.installed import check_installed
+from handrail.policies.imitation.config import TrainConfig, check_installed
 from handrail.scripts import cli
 
 

@@ -1,25 +1,21 @@
 """Settings of imitation training; light to import."""
 
 from dataclasses import dataclass, field
+from importlib.util import find_spec
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
+
+from msgspec import Meta
 
 from handrail.collect.config import StoredConfig
-from handrail.controllers.errors import HandrailError
+from handrail.controllers.errors import HandrailError, not_installed
+from handrail.controllers.typed import AtLeastOne, Count, NonNegative, check_settings
 from handrail.datasets.lists import Words
 
-ACTION_SPACES = ("realised", "intent", "recorded")
 FREE_ON_RESUME = (
-    "output",
-    "save_freq",
-    "threads",
-    "device",
-    "resume",
-    "overwrite",
-    "steps",
-    "dataset",
-    "verify",
+    *("output", "save_freq", "threads", "device", "resume", "overwrite", "steps", "dataset", "verify"),
 )
+_OF_POLICY = {"diffusion": ("diffusers",)}
 
 
 @dataclass(frozen=True)
@@ -46,33 +42,33 @@ class TrainConfig:
     """Only episodes of this teleop mode."""
     success_only: bool = False
     """Only episodes that succeeded, as the task's judge says; where there is none, as the operator says."""
-    episodes: int = 0
+    episodes: Count = 0
     """Only so many of them, drawn at random; 0 for all."""
-    minutes: float = 0.0
+    minutes: NonNegative = 0.0
     """Only what fits into so much of the operator's time, failed attempts included [min]; 0 for all."""
-    draw: int = 0
+    draw: Count = 0
     """Seed of the order in which episodes are drawn; more episodes or minutes only add to the fewer."""
-    steps: int = 0
+    steps: Count = 0
     """Updates of the policy; 0 for the preset's. With --patience the most that there may be."""
-    eval_split: float = 0.0
+    eval_split: Annotated[float, Meta(ge=0, lt=1)] = 0.0
     """Share of the episodes that the policy does not learn from, 5 at least: the loss is measured on them."""
-    eval_steps: int = 500
+    eval_steps: AtLeastOne = 500
     """Updates between two such measurements."""
-    patience: int = 0
+    patience: Count = 0
     """End when that loss is flat: so many measurements brought too little; 0 makes all updates."""
-    improvement: float = 0.02
+    improvement: Annotated[float, Meta(ge=0, lt=1)] = 0.02
     """Share by which the best of these measurements has to be below the best before them."""
-    batch_size: int = 0
+    batch_size: Count = 0
     """Samples an update; 0 for the preset's."""
-    lr: float = 0.0
+    lr: NonNegative = 0.0
     """Highest learning rate; 0 for the preset's."""
-    seed: int = 0
+    seed: Count = 0
     """Of the policy's first weights and the order of the samples."""
-    threads: int = 1
+    threads: AtLeastOne = 1
     """Of PyTorch; two trainings with one thread each are faster than one after the other with two."""
     device: str = ""
     """cpu, cuda, cuda:1, mps; the preset's when empty."""
-    save_freq: int = 2000
+    save_freq: AtLeastOne = 2000
     """Updates between checkpoints; there is always one at the end."""
     policy_options: Words = ()
     """More of LeRobot's settings of the policy, `key=value` each: chunk_size=50 use_vae=true."""
@@ -90,17 +86,7 @@ class TrainConfig:
 
     def check(self) -> None:
         """Check what can be checked without reading the dataset."""
-        for name in ("episodes", "minutes", "draw", "steps", "batch_size", "lr", "seed"):
-            if not 0 <= getattr(self, name) < float("inf"):
-                raise HandrailError(f"--{name} {getattr(self, name)}: expected 0 or more")
-        for name in ("threads", "save_freq", "eval_steps"):
-            if getattr(self, name) < 1:
-                raise HandrailError(f"--{name} {getattr(self, name)}: expected 1 or more")
-        for name in ("eval_split", "improvement"):
-            if not 0.0 <= getattr(self, name) < 1.0:
-                raise HandrailError(f"--{name} {getattr(self, name)}: expected 0 to below 1")
-        if self.patience < 0:
-            raise HandrailError(f"--patience {self.patience}: expected 0 or more")
+        check_settings(self, "--")
         if self.patience and not self.eval_split:
             raise HandrailError("--patience: expected --eval_split too, the share of episodes to measure on")
         if not self.scene and not self.images:
@@ -117,3 +103,17 @@ class TrainConfig:
             if not key.strip() or not sign:
                 raise HandrailError(f"--policy_options {option}: expected key=value, as in chunk_size=50")
         return {key.strip(): value.strip() for key, _, value in pairs}
+
+
+def check_installed(command: str, modules: tuple[str, ...], policy: str = "", extra: str = "train") -> None:
+    """Check that modules can be imported, and those of a policy.
+
+    Args:
+        command: that needs them.
+        modules: that every policy needs.
+        policy: its name in LeRobot.
+        extra: of Handrail that brings them.
+    """
+    for module in (*modules, *_OF_POLICY.get(policy, ())):
+        if find_spec(module) is None:
+            raise not_installed(command, module, extra)

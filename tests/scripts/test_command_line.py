@@ -22,7 +22,7 @@ from rich.console import Console
 from handrail.controllers.errors import HandrailError, not_installed
 from handrail.datasets.lists import Names, Numbers, Words, split_list
 from handrail.datasets.presentation.table import Table
-from handrail.policies.imitation.training.installed import check_installed
+from handrail.policies.imitation.config import check_installed
 from handrail.scripts import cli
 
 SOURCES = [

@@ -3,50 +3,62 @@
 import hashlib
 import itertools
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict
 
 from handrail.collect.operators.modes import MODES
 from handrail.collect.session.perturbations import Perturbation
 from handrail.collect.world.tasks.catalogue import TASKS
 from handrail.controllers.baselines.catalogue import CONTROLLERS
-from handrail.controllers.entries import is_count
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.regular_file import open_regular
 from handrail.controllers.robot.catalogue import ROBOTS
+from handrail.controllers.typed import Count, check
+from handrail.datasets.reading.reader import read_episodes, read_info
 from handrail.datasets.storage.strict_json import load_json, read_json
 from handrail.policies.imitation.evaluation.config import EvaluateConfig
-from handrail.policies.imitation.evaluation.features import pictures, place_of
-from handrail.policies.imitation.interface.checkpoint import NAME, PolicyMeta, model_folder, read_meta
+from handrail.policies.imitation.evaluation.features import movers_of, pictures
+from handrail.policies.imitation.interface.checkpoint import (
+    NAME,
+    PolicyMeta,
+    model_folder,
+    origin_of,
+    read_meta,
+)
 from handrail.policies.imitation.interface.interface import PolicyInterface
 from handrail.policies.imitation.interface.trust import check_policy_folder
 
 _TRAINED = "train_config.json"  # of LeRobot's: how a policy was trained, not how it drives
 
 
+class _Dataset(TypedDict, total=False):
+    root: str | None
+
+
+class _Trained(TypedDict, total=False):
+    seed: Count | None
+    dataset: _Dataset | None
+
+
 @dataclass(frozen=True)
 class Checkpoint:
-    """A trained policy on the disk.
-
-    Attributes:
-        folder: its files.
-        meta: what it says of itself.
-        interface: what it reads and writes; None if that is what was recorded.
-        pictures: height and width of what it sees, by camera [px].
-        movers: how many moving obstacles it knows of.
-        joined: whether it reads robot and scene as one vector.
-        digest: of all that decides how it drives; not of where and when it was trained.
-    """
+    """A trained policy on the disk."""
 
     folder: Path
     meta: PolicyMeta
     interface: PolicyInterface | None
+    """What it reads and writes; None if that is what was recorded."""
     pictures: Mapping[str, tuple[int, int]]
+    """Height and width of what it sees, by camera [px]."""
     movers: int
+    """Number of moving obstacles that it knows of."""
     joined: bool
+    """Whether it reads robot and scene as one vector."""
     digest: str
+    """Of all that decides how it drives; not of where and when it was trained."""
 
     @property
     def intent_mode(self) -> str:
@@ -108,34 +120,38 @@ def read_checkpoint(folder: Path, config: EvaluateConfig) -> Checkpoint:
     MODES.admit(meta.mode, (config.mode,))
     ROBOTS.admit(meta.robot, (config.robot,))
     if interface is not None:
-        if not TASKS.accepts(meta.environment):
-            raise HandrailError(
-                f"{where}: expected one trained for one of {', '.join(TASKS)}, got {meta.environment!r}"
-            )
         movers = len({n.split(".")[0] for n in interface.environment_names if n.startswith("mover_")})
         joined = False
     else:
         robot = meta.robot if meta.robot in ROBOTS else config.robot
         task = meta.environment if meta.environment in TASKS else config.task
-        known = place_of(settings, where, robot, task, meta.mode if meta.actions == "intent" else "")
-        meta, movers = replace(meta, environment=known.task, robot=known.robot), known.movers
-        joined = known.joined
+        if not (robot and task):
+            raise HandrailError(f"{where}: expected --robot and --task: neither it nor its dataset says them")
+        meta = replace(meta, environment=task, robot=robot)
+        mode = meta.mode if meta.actions == "intent" else ""
+        movers, joined = movers_of(settings, where, robot, task, mode)
+    if not TASKS.accepts(meta.environment):
+        raise HandrailError(
+            f"{where}: expected one trained for one of {', '.join(TASKS)}, got {meta.environment!r}"
+        )
     return Checkpoint(place, meta, interface, pictures(settings, where), movers, joined, _digest(place))
 
 
 def _plain(place: Path, settings: Mapping[str, Any], config: EvaluateConfig) -> PolicyMeta:
-    """Return what is known of a policy of plain `lerobot-train`."""
-    path = place / _TRAINED
-    training = load_json(path, "settings of LeRobot") if path.is_file() else {}
-    seed = training.get("seed") if isinstance(training, dict) else None
-    step = place.parent.name
+    """Return what is known of a policy of plain `lerobot-train`: from its training and its dataset."""
+    path, step = place / _TRAINED, place.parent.name
+    content = load_json(path, "settings of LeRobot") if path.is_file() else {}
+    training = check(content, _Trained, repr(str(path)))
+    root, task, robot = Path((training.get("dataset") or {}).get("root") or place), "", ""
+    with suppress(HandrailError, OSError):  # it need not be here
+        task, _, robot = origin_of(read_info(root), read_episodes(root))
     return PolicyMeta(
-        environment="",
+        environment=task,
         mode=config.mode,
-        robot="",
+        robot=robot,
         fps=config.fps,
         actions="intent" if config.mode else "recorded",
-        training_seed=seed if is_count(seed) else 0,
+        training_seed=training.get("seed") or 0,
         dataset_draw=0,
         trained_on={},
         policy=settings["type"],
@@ -146,19 +162,19 @@ def _plain(place: Path, settings: Mapping[str, Any], config: EvaluateConfig) -> 
 def policy_conditions(config: EvaluateConfig) -> tuple[list[PolicyCondition], list[str]]:
     """Return every checkpoint under every condition of the settings, and why some cannot be."""
     refused: list[str] = []
-    checkpoints = [
-        each
-        for folder in config.folders
-        if (each := _tried(refused, lambda f=folder: read_checkpoint(f, config)))
-    ]
+    checkpoints, found = [], dict[tuple[str, tuple[int, int]], PolicyCondition]()
+    for folder in config.folders:
+        with _noted(refused):
+            checkpoints.append(read_checkpoint(folder, config))
     environments = {checkpoint.meta.environment for checkpoint in checkpoints}
     if len(environments) > 1:
         raise HandrailError(
             f"--policy: expected policies for one task, got {', '.join(sorted(environments))}"
         )
-    found: dict[tuple[str, tuple[int, int]], PolicyCondition] = {}
     for settings in itertools.product(config.perturbations, config.protections, checkpoints):
-        condition = _tried(refused, lambda s=settings: _condition(*s, config))
+        condition = None
+        with _noted(refused):
+            condition = _condition(*settings, config)
         if condition is None:
             continue
         checkpoint = condition.checkpoint
@@ -175,12 +191,12 @@ def policy_conditions(config: EvaluateConfig) -> tuple[list[PolicyCondition], li
     return list(found.values()), refused
 
 
-def _tried[Value](refused: list[str], make: Callable[[], Value]) -> Value | None:
+@contextmanager
+def _noted(refused: list[str]) -> Iterator[None]:
     try:
-        return make()
+        yield
     except HandrailError as error:
         refused.append(str(error))
-        return None
 
 
 def _condition(
@@ -215,12 +231,9 @@ def _digest(folder: Path) -> str:
         if path.is_file() and path.name != _TRAINED:
             digest.update(path.name.encode())
             if path.name == NAME:
-                digest.update(_without_training(path))
+                kept = {key: value for key, value in read_json(path).items() if key != "training"}
+                digest.update(json.dumps(kept).encode())
                 continue
             with open_regular(path) as file:
                 hashlib.file_digest(file, lambda: digest)  # adds the file to it
     return digest.hexdigest()[:16]
-
-
-def _without_training(path: Path) -> bytes:
-    return json.dumps({key: value for key, value in read_json(path).items() if key != "training"}).encode()

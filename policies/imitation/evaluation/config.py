@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Annotated
 
 import tyro
+from msgspec import Meta
 
 from handrail.collect.config import FPS_RANGE, MOST_TIME
 from handrail.collect.execution.config import ExecutionConfig
@@ -13,6 +14,7 @@ from handrail.collect.seeds import MOST_ROLLOUTS, evaluation_seed
 from handrail.collect.session.perturbations import Perturbation
 from handrail.collect.world.tasks.catalogue import TASKS
 from handrail.controllers.errors import HandrailError, unknown_name
+from handrail.controllers.typed import check_settings
 from handrail.datasets.lists import Names, Words
 
 PROTECTIONS = ("own", "none", "mpc", "filter")
@@ -26,9 +28,9 @@ class EvaluateConfig(ExecutionConfig):
     """The same as FOLDER …"""
     json: str = ""
     """Write every rollout to this file; what is in it already is not run again."""
-    episodes: int = 100
+    episodes: Annotated[int, Meta(ge=1, le=MOST_ROLLOUTS)] = 100
     """Rollouts of each policy under each condition."""
-    seed: int = 0
+    seed: Annotated[int, Meta(ge=0, le=10**9)] = 0
     """Of the evaluation: which beginnings and disturbances; never those of a recording."""
     protection: Names = "own"
     """What stands between policy and robot, one or more: own (an intent's own controller; none for joint
@@ -45,9 +47,9 @@ class EvaluateConfig(ExecutionConfig):
     it is imported only if you say it too."""
     robot: str = ""
     """The robot of policies that do not say it, or that say a module:name."""
-    fps: int = 20
+    fps: Annotated[int, Meta(ge=FPS_RANGE[0], le=FPS_RANGE[1])] = 20
     """Decisions a second of such policies: the rate of their dataset [Hz]."""
-    time_limit: float = 0.0
+    time_limit: Annotated[float, Meta(ge=0, le=MOST_TIME)] = 0.0
     """Time after which a rollout is given up [s]; when 0, that of the demonstrations, or the task's own."""
     video: str = ""
     """Also film the first rollout to this .mp4 file (needs OpenGL)."""
@@ -82,15 +84,7 @@ class EvaluateConfig(ExecutionConfig):
 
     def check(self) -> None:
         """Check what can be checked without loading anything heavy."""
-        for name, least, most in (
-            ("episodes", 1, MOST_ROLLOUTS),
-            ("seed", 0, 10**9),
-            ("fps", *FPS_RANGE),
-        ):
-            if not least <= getattr(self, name) <= most:
-                raise HandrailError(
-                    f"--{name} {getattr(self, name)}: expected a whole number from {least} to {most}"
-                )
+        check_settings(self, "--")
         self.check_execution()
         if self.task:
             TASKS.check(self.task)
@@ -100,17 +94,10 @@ class EvaluateConfig(ExecutionConfig):
         for flag, given in (("protection", self.protections), ("perturbation", self.perturbations)):
             if not given or len(set(given)) != len(given):
                 raise HandrailError(f"--{flag} {getattr(self, flag)}: expected one or more, each once")
-        if not 0.0 <= self.time_limit <= MOST_TIME:
-            raise HandrailError(
-                f"--time_limit {self.time_limit}: expected 0 (that of the demonstrations) to {MOST_TIME} s"
-            )
         if not self.folders:
             raise HandrailError(
                 "policy: expected one checkpoint folder or more, such as outputs/act; got none"
             )
-        self._check_files()
-
-    def _check_files(self) -> None:
         for flag, path, ending in (("json", self.json, ".json"), ("video", self.video, ".mp4")):
             file = Path(path).expanduser()
             if path and not (path.endswith(ending) and file.absolute().parent.is_dir()):

@@ -13,7 +13,7 @@ from handrail.policies.imitation.evaluation.conditions import PolicyCondition, p
 from handrail.policies.imitation.evaluation.config import EvaluateConfig
 from handrail.policies.imitation.evaluation.file import EvaluationFile
 from handrail.policies.imitation.evaluation.rollout import Load, run_rollout
-from handrail.policies.imitation.interface.checkpoint import load_policy
+from handrail.policies.imitation.interface.trained import load_policy
 
 Rollout = tuple[PolicyCondition, int]  # and the seed of its episode
 _PRELOAD = ("handrail.policies.imitation.evaluation.rollout",)

@@ -9,8 +9,8 @@ from handrail.collect.operators.operator import View
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.intent import Intent, decided_gripper
-from handrail.policies.imitation.interface.checkpoint import TrainedPolicy
 from handrail.policies.imitation.interface.interface import PolicyInterface
+from handrail.policies.imitation.interface.trained import TrainedPolicy
 
 if TYPE_CHECKING:
     from handrail.collect.lerobot.mode_action import ModeAction

@@ -26,8 +26,8 @@ from handrail.datasets.recording.frames import Frame
 from handrail.policies.imitation.evaluation.conditions import Checkpoint, PolicyCondition, own_protection
 from handrail.policies.imitation.evaluation.features import action_of
 from handrail.policies.imitation.evaluation.operator import AsRecorded, AsSteered, PolicyOperator
-from handrail.policies.imitation.interface.checkpoint import TrainedPolicy
 from handrail.policies.imitation.interface.torch_state import repeatable, threads
+from handrail.policies.imitation.interface.trained import TrainedPolicy
 
 Load = Callable[[Path], TrainedPolicy]
 Row = dict[str, Any]

@@ -10,7 +10,7 @@ from handrail.datasets.recording.frames import Frame
 from handrail.policies.imitation.evaluation.conditions import policy_conditions
 from handrail.policies.imitation.evaluation.config import EvaluateConfig
 from handrail.policies.imitation.evaluation.rollout import Load, run_rollout
-from handrail.policies.imitation.interface.checkpoint import load_policy
+from handrail.policies.imitation.interface.trained import load_policy
 
 
 def film(config: EvaluateConfig, content: Mapping[str, Any], load: Load = load_policy) -> str:

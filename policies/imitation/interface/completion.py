@@ -16,46 +16,37 @@ from lerobot.configs import FeatureType, PipelineFeatureType, PolicyFeature
 from lerobot.lerobot_types import EnvTransition, TransitionKey
 from lerobot.processor import ProcessorStep, ProcessorStepRegistry
 
-from handrail.collect.config import FPS_RANGE
 from handrail.collect.operators.modes import MODES
+from handrail.collect.session.build import build_controller
 from handrail.collect.world.observation import from_numbers
 from handrail.collect.world.tasks.catalogue import TASKS
 from handrail.controllers.arrays import FloatArray
-from handrail.controllers.entries import Entry, is_count
 from handrail.controllers.errors import HandrailError
-from handrail.controllers.fields import check_fields
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import State
 from handrail.controllers.interface.intent import Intent
 from handrail.controllers.robot.catalogue import ROBOTS
+from handrail.controllers.robot.model import load_model
+from handrail.controllers.typed import Name, decoded
+from handrail.policies.imitation.interface.checkpoint import Fps
 from handrail.policies.imitation.interface.interface import ACTION, PolicyInterface
 from handrail.policies.imitation.interface.view_step import Features, asked, policy_rows, seen_by
 
 COMPLETE = "handrail_policy_mpc"
 TIME, SENT, OBSTACLES = (f"observation.{name}" for name in ("time", "sent", "obstacles"))
-_LOW, _HIGH = FPS_RANGE
-_CHECKED = {
-    "fps": Entry(
-        f"a whole number from {_LOW} to {_HIGH}", lambda value: is_count(value) and _LOW <= value <= _HIGH
-    ),
-}
 
 
 @dataclass(frozen=True)
 class Completion:
-    """What completes the intents of a policy.
+    """What completes the intents of a policy."""
 
-    Attributes:
-        robot: its name.
-        task: its name; the controller knows the objectives that it brings.
-        mode: teleop mode, whose controller it is.
-        fps: intents a second [Hz].
-    """
-
-    robot: str
-    task: str
-    mode: str
-    fps: int
+    robot: Name
+    task: Name
+    """The controller knows the objectives that it brings."""
+    mode: Name
+    """Teleop mode, whose controller it is."""
+    fps: Fps
+    """Intents a second [Hz]."""
 
     @property
     def is_installed(self) -> bool:
@@ -84,8 +75,7 @@ class PolicyCompletionStep(ProcessorStep):
     def __post_init__(self) -> None:
         """Read the settings, and find the step that sees: that of the preprocessor loaded just before."""
         self.seen = PolicyInterface.from_dict(self.interface)
-        check_fields(self.completion, Completion, f"step {COMPLETE}", **_CHECKED)
-        self._by = Completion(**self.completion)
+        self._by = decoded(self.completion, Completion, f"step {COMPLETE}")
         self.view = seen_by(self.interface)
 
     def __call__(self, transition: EnvTransition) -> EnvTransition:
@@ -117,9 +107,6 @@ class _Body:
     """One robot and its controller; an environment of several has as many."""
 
     def __init__(self, seen: PolicyInterface, by: Completion) -> None:
-        from handrail.collect.session.build import build_controller
-        from handrail.controllers.robot.model import load_model
-
         for registry, name in ((ROBOTS, by.robot), (TASKS, by.task), (MODES, by.mode)):
             registry.admit(name)
         self._seen, self._mode, self._period = seen, by.mode, 1.0 / by.fps

@@ -7,56 +7,49 @@ the base's axes like what the policy sees. Whatever comes out, the robot's limit
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray
-from handrail.controllers.entries import Entry, is_text, lists
-from handrail.controllers.errors import HandrailError, unknown_name
-from handrail.controllers.fields import check_fields
+from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.intent import Intent, decided_gripper
+from handrail.controllers.typed import Text, decoded
 from handrail.datasets.format.schema import Feature
 from handrail.policies.imitation.interface.relative import RelativeView
 
 Columns = Mapping[str, np.ndarray]
 Mask = tuple[bool, ...]
-ACTIONS = ("realised", "intent")
 STATE, ENVIRONMENT, ACTION = "observation.state", "observation.environment_state", "action"
 MASK = "teleop.mask"
 COLUMNS = (STATE, ENVIRONMENT, ACTION, "teleop.values", MASK)
 _GRIPPER = "gripper"
-_CHANNELS = Entry("names of channels", lists(is_text))
-_MASKS = Entry("lists of true and false", lambda value: value == [] or lists(lists(_is_bool))(value))
 
 
 @dataclass(frozen=True)
 class PolicyInterface:
-    """Between what is recorded and what a policy reads and writes; saved beside every checkpoint.
+    """Between what is recorded and what a policy reads and writes; saved beside every checkpoint."""
 
-    Attributes:
-        actions: `realised`, the joint velocities that came about, or `intent`, the operator's own command.
-        state_names: of `observation.state` as recorded, (s,).
-        environment_names: of `observation.environment_state` as recorded, (e,).
-        channels: names of the command channels as recorded, (m,).
-        masks: the sets of channels that the operator owned, (m,) each; of `intent` alone.
-        base_pose: whether it sees where the base is; older checkpoints do not say, and do not.
-    """
-
-    actions: str
-    state_names: tuple[str, ...]
-    environment_names: tuple[str, ...]
-    channels: tuple[str, ...]
+    actions: Literal["realised", "intent"]
+    """The joint velocities that came about, or the operator's own command."""
+    state_names: tuple[Text, ...]
+    """Of `observation.state` as recorded, (s,)."""
+    environment_names: tuple[Text, ...]
+    """Of `observation.environment_state` as recorded, (e,)."""
+    channels: tuple[Text, ...]
+    """Names of the command channels as recorded, (m,)."""
     masks: tuple[Mask, ...] = ()
+    """The sets of channels that the operator owned, (m,) each; of `intent` alone."""
     base_pose: bool = False
+    """Whether it sees where the base is; older checkpoints do not say, and do not."""
 
     @classmethod
     def of_dataset(
         cls,
         features: Mapping[str, Feature],
         episodes: Iterable[Columns],
-        actions: str,
+        actions: Literal["realised", "intent"],
         base_pose: bool = True,
     ) -> "PolicyInterface":
         """Return the interface of a policy that is trained on some episodes.
@@ -64,11 +57,9 @@ class PolicyInterface:
         Args:
             features: of the dataset.
             episodes: `MASK` of each; read only where the operator's own commands are learnt.
-            actions: one of `ACTIONS`.
+            actions: what it writes.
             base_pose: whether it shall see where the base is.
         """
-        if actions not in ACTIONS:
-            raise unknown_name("action space", actions, ACTIONS)
         state, environment, asked = (_names(features, key) for key in (STATE, ENVIRONMENT, "teleop.values"))
         names = tuple(name for name in asked if name != _GRIPPER)
         masks = _masks_of(_channels(names), episodes) if actions == "intent" else ()
@@ -100,7 +91,12 @@ class PolicyInterface:
     def encode(self, columns: Columns) -> FloatArray:
         """Return the actions of a recorded episode, (T, a) float32, from its `COLUMNS`."""
         state = columns[STATE].astype(float)
-        values, gripper = self._asked(columns) if self.masks else self._realised(state, columns)
+        if self.masks:
+            values, gripper = np.split(columns["teleop.values"].astype(float), [-1], axis=1)
+        else:  # the next frame's joint velocities, the last frame's its own
+            velocities, gripper = self._view.velocities(state), columns[ACTION][:, -1]
+            values = np.zeros((len(state), len(self.channels)))
+            values[:, self._known.joint_slice] = np.concatenate([velocities[1:], velocities[-1:]])
         pose = self._view.pose(state)
         for pair in self._pairs:
             values[:, pair] = pose.turned(values[:, pair])
@@ -132,33 +128,14 @@ class PolicyInterface:
     @classmethod
     def from_dict(cls, content: Mapping[str, Any]) -> "PolicyInterface":
         """Return the interface that JSON describes."""
-        check_fields(content, cls, "policy interface", channels=_CHANNELS, masks=_MASKS)
-        if content["actions"] not in ACTIONS:
-            raise unknown_name("action space", content["actions"], ACTIONS)
-        state, environment, channels = (
-            tuple(content[name]) for name in ("state_names", "environment_names", "channels")
-        )
-        masks = tuple(map(tuple, content["masks"]))
-        if {len(mask) for mask in masks} != ({len(channels)} if content["actions"] == "intent" else set()):
+        interface = decoded(content, cls, "policy interface")
+        count = len(interface.channels)
+        if {len(mask) for mask in interface.masks} != ({count} if interface.actions == "intent" else set()):
             raise HandrailError(
-                f"policy interface: expected masks of {len(channels)} channels for an intent and none else,"
-                f" got {content['masks']!r:.80} for {content['actions']}"
+                f"policy interface: expected masks of {count} channels for an intent and none else,"
+                f" got {content.get('masks')!r:.80} for {interface.actions}"
             )
-        return cls(
-            content["actions"], state, environment, channels, masks, bool(content.get("base_pose", False))
-        )
-
-    def _asked(self, columns: Columns) -> tuple[FloatArray, FloatArray]:
-        """Return what the operator asked for, (T, m), and of the gripper, (T,)."""
-        values = columns["teleop.values"].astype(float)
-        return values[:, :-1].copy(), values[:, -1]
-
-    def _realised(self, state: FloatArray, columns: Columns) -> tuple[FloatArray, FloatArray]:
-        """Return the next frame's joint velocities, (T, m), the last frame's its own; and the gripper."""
-        velocities = self._view.velocities(state)
-        values = np.zeros((len(state), len(self.channels)))
-        values[:, self._known.joint_slice] = np.concatenate([velocities[1:], velocities[-1:]])
-        return values, columns[ACTION][:, -1]
+        return interface
 
     @cached_property
     def _known(self) -> Channels:
@@ -171,7 +148,7 @@ class PolicyInterface:
             self.state_names, self.environment_names, joints, bool(self._known.base), self.base_pose
         )
 
-    @property
+    @cached_property
     def _sets(self) -> tuple[Mask, ...]:
         """Every set of channels that is commanded."""
         return self.masks or (tuple(self._known.mask("joint").tolist()),)
@@ -199,10 +176,6 @@ def _masks_of(channels: Channels, episodes: Iterable[Columns]) -> tuple[Mask, ..
     if not any(map(any, masks)):
         raise HandrailError("intent as action: expected episodes in which an operator steers, got none")
     return tuple(sorted(masks))
-
-
-def _is_bool(value: Any) -> bool:
-    return isinstance(value, bool)
 
 
 def _channels(names: Sequence[str]) -> Channels:

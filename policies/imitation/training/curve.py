@@ -4,8 +4,9 @@ import math
 import os
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Literal
 
-from handrail.controllers.entries import Entry, check_entries, lists
+from handrail.controllers.typed import check
 from handrail.datasets.storage.atomic import write_whole
 from handrail.datasets.storage.strict_json import load_json, write_json
 
@@ -13,7 +14,7 @@ NAME = "curve.csv"
 COLUMNS = ("step", "loss", "grad_norm", "lr", "update_s", "dataloading_s")
 Row = Mapping[str, float]
 _SUMS = "training_state/curve.json"  # in a checkpoint: of the row that is not whole yet
-_SUM = Entry("a sum and a count", lists(lambda value: isinstance(value, int | float), 2), needed=False)
+_Sums = dict[Literal[COLUMNS], tuple[float, float]]  # type: ignore[valid-type]
 
 
 class Curve:
@@ -48,9 +49,7 @@ def read_sums(checkpoint: Path | None) -> dict[str, tuple[float, float]]:
     """Return sum and count of columns as a checkpoint has them; an older one has none."""
     if checkpoint is None or not (path := checkpoint / _SUMS).exists():
         return {}
-    content = load_json(path, "sums of a training's curve")
-    check_entries(content, dict.fromkeys(COLUMNS, _SUM), repr(str(path)))
-    return {name: (total, count) for name, (total, count) in content.items()}
+    return check(load_json(path, "sums of a training's curve"), _Sums, repr(str(path)))
 
 
 def _line(row: Row) -> str:

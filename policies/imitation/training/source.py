@@ -5,7 +5,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import torch
@@ -196,7 +196,7 @@ def _check_one_mode(selection: Selection, said: str) -> None:
 
 
 def _interpreted(
-    info: DatasetInfo, selection: Selection, actions: str, base_pose: bool
+    info: DatasetInfo, selection: Selection, actions: Literal["realised", "intent"], base_pose: bool
 ) -> tuple[PolicyInterface, dict[str, dict[str, Any]], Columns]:
     missing = [key for key in COLUMNS if key not in info.features]
     if missing:

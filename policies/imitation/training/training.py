@@ -7,21 +7,27 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any, cast
+
+from lerobot.configs.default import DatasetConfig
+from lerobot.configs.train import TrainPipelineConfig
+from lerobot.optim.schedulers import CosineAnnealingWithWarmupSchedulerConfig as Cosine
 
 from handrail.collect.session.build import build_task
 from handrail.collect.session.recorded import COLUMN, recorded_settings
-from handrail.controllers.entries import is_name
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.versions import TRAINING, versions
 from handrail.policies.imitation.config import TrainConfig
 from handrail.policies.imitation.interface.checkpoint import (
     MODEL,
     PolicyMeta,
+    TrainingSizes,
     last_checkpoint,
+    origin_of,
     read_meta,
     write_meta,
 )
+from handrail.policies.imitation.interface.completion import Completion
 from handrail.policies.imitation.interface.torch_state import threads
 from handrail.policies.imitation.interface.trust import check_links, check_policy_folder
 from handrail.policies.imitation.training.curve import NAME as CURVE
@@ -29,12 +35,9 @@ from handrail.policies.imitation.training.plateau import Plateau
 from handrail.policies.imitation.training.presets import policy_config, resolved
 from handrail.policies.imitation.training.refusal import in_one_line
 from handrail.policies.imitation.training.resume import as_json, check_data, check_settings
+from handrail.policies.imitation.training.run import TrainingRun
 from handrail.policies.imitation.training.source import TrainingSource, read_source
-
-if TYPE_CHECKING:
-    from lerobot.configs.train import TrainPipelineConfig
-
-    from handrail.policies.imitation.interface.completion import Completion
+from handrail.policies.imitation.training.validation import Validation
 
 _LOG_EVERY = 50  # updates
 _WARMUP = 500  # updates in which the learning rate rises, or a tenth of all if that is fewer
@@ -78,11 +81,7 @@ def _plateau(config: TrainConfig, steps: int, losses: Mapping[int, float]) -> Pl
     """Return what ends a training where the loss on held-out episodes is flat; None where nothing does."""
     if not config.patience:
         return None
-    return Plateau(losses, config.patience, config.improvement, steps, _warmup(steps))
-
-
-def _warmup(steps: int) -> int:
-    return min(_WARMUP, steps // 10)
+    return Plateau(losses, config.patience, config.improvement, steps, min(_WARMUP, steps // 10))
 
 
 def _run(
@@ -94,13 +93,11 @@ def _run(
     losses: dict[int, float],
     plateau: Plateau | None,
 ) -> None:
-    from handrail.policies.imitation.training.run import TrainingRun
-    from handrail.policies.imitation.training.validation import Validation
-
     settings = _settings(config, steps)
     assert settings.policy is not None
     learnt, held_out = (source.only(rows).dataset(settings.policy) if rows else None for rows in source.split)
     assert learnt is not None
+    task, mode, robot = origin_of(source.info, source.selection.rows)
     TrainingRun(
         settings,
         learnt,
@@ -108,19 +105,15 @@ def _run(
         lambda folder, step: write_meta(folder, source.interface, _meta(source, step, losses)),
         quiet,
         source.interface,
-        _completion(_meta(source, steps)),
+        Completion(robot, task, mode, source.info.fps),
         Validation(held_out, config.eval_steps, losses) if held_out else None,
         plateau,
     ).train()
 
 
-def _settings(config: TrainConfig, steps: int) -> "TrainPipelineConfig":
-    from lerobot.configs.default import DatasetConfig
-    from lerobot.configs.train import TrainPipelineConfig
-    from lerobot.optim.schedulers import CosineAnnealingWithWarmupSchedulerConfig as Cosine
-
+def _settings(config: TrainConfig, steps: int) -> TrainPipelineConfig:
     sizes, policy = resolved(config), policy_config(config)
-    schedule = Cosine(_warmup(steps)) if sizes.cosine else policy.get_scheduler_preset()
+    schedule = Cosine(min(_WARMUP, steps // 10)) if sizes.cosine else policy.get_scheduler_preset()
     return TrainPipelineConfig(
         dataset=DatasetConfig(config.dataset.name, root=str(config.dataset.folder), video_backend="pyav"),
         policy=policy,
@@ -174,9 +167,7 @@ def _is_checkpoint(path: Path) -> bool:
 def _meta(source: TrainingSource, steps: int, losses: Mapping[int, float] | None = None) -> PolicyMeta:
     config, rows = source.config, source.selection.rows
     return PolicyMeta(
-        environment=_common([str(row.get("environment") or "") for row in rows]),
-        mode=_common([str(row.get("mode") or "") for row in rows]),
-        robot=_robot(source),
+        *origin_of(source.info, rows),
         fps=source.info.fps,
         actions=config.actions,
         training_seed=config.seed,
@@ -186,8 +177,8 @@ def _meta(source: TrainingSource, steps: int, losses: Mapping[int, float] | None
         steps=steps,
         training=asdict(config),
         versions=versions(*TRAINING),
-        sizes=as_json(resolved(config)),
-        episodes=[int(row["episode_index"]) for row in rows],
+        sizes=cast(TrainingSizes, as_json(resolved(config))),
+        episodes=tuple(int(row["episode_index"]) for row in rows),
         data=source.digest,
         time_limit=_time_limit(rows),
         validation={str(step): loss for step, loss in (losses or {}).items()},
@@ -203,22 +194,6 @@ def _time_limit(rows: Sequence[Mapping[str, Any]]) -> float:
         return float(max(build_task(each).horizon for each in settings))
     except HandrailError:
         return 0.0
-
-
-def _completion(meta: PolicyMeta) -> "Completion":
-    from handrail.policies.imitation.interface.completion import Completion
-
-    return Completion(meta.robot, meta.environment, meta.mode, meta.fps)
-
-
-def _robot(source: TrainingSource) -> str:
-    """Return the name that finds the robot again, not the path of a file; else what the dataset calls it."""
-    said = _common([str(row.get("robot") or "") for row in source.selection.rows])
-    return said if said and is_name(said) else source.info.robot_type
-
-
-def _common(values: list[str]) -> str:
-    return values[0] if len(set(values)) == 1 else "mixed"
 
 
 @contextmanager

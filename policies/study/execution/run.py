@@ -11,7 +11,7 @@ from handrail.datasets.presentation.markdown import read_page, with_part
 from handrail.datasets.presentation.terminal import Terminal
 from handrail.datasets.storage.atomic import explained
 from handrail.datasets.storage.lock import DatasetLock
-from handrail.policies.imitation.training.installed import check_installed
+from handrail.policies.imitation.config import check_installed
 from handrail.policies.study.config import StudyConfig
 from handrail.policies.study.design.design import StudyDesign
 from handrail.policies.study.design.designs import check_cell, note_design

@@ -6,7 +6,7 @@ from pathlib import Path
 from handrail.collect.flags import check_whole
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.lists import Numbers
-from handrail.policies.imitation.training.installed import check_installed
+from handrail.policies.imitation.config import check_installed
 
 _FREE_ON_RESUME = (
     *("output_dir", "steps", "learning_rate", "save_every", "final_goals", "average"),

@@ -208,7 +208,7 @@ def test_a_policy_of_another_size_moves_nothing(folder):
 WRONG = {
     "nobody": ({}, (), "policy: expected one checkpoint folder or more"),
     "no checkpoint": ({}, ("nothing",), "expected a checkpoint with a config.json, found none"),
-    "episodes": ({"episodes": 0}, ("chase",), "--episodes 0: expected a whole number"),
+    "episodes": ({"episodes": 0}, ("chase",), "--episodes: expected a whole number"),
     "protection": ({"protection": "prayer"}, ("chase",), "unknown protection 'prayer'"),
     "perturbation": ({"perturbation": "rain"}, ("chase",), "unknown perturbation 'rain'"),
     "size": ({"perturbation": "push:-1"}, ("chase",), "--perturbation push:-1: expected a number above 0"),
@@ -220,7 +220,7 @@ WRONG = {
     "the same policy": ({}, ("chase", "nan"), "expected each dataset draw and training seed once"),
     "json": ({"json": "no/such/folder/e.json"}, ("chase",), "expected a .json file in an existing folder"),
     "video": ({"video": "film.gif"}, ("chase",), "expected a .mp4 file in an existing folder"),
-    "time": ({"time_limit": -1.0}, ("chase",), "--time_limit -1.0: expected 0"),
+    "time": ({"time_limit": -1.0}, ("chase",), "--time_limit: expected a number >= 0"),
 }
 
 

@@ -14,7 +14,8 @@ from training_helpers import TINY, tiny, weights, write_dataset
 from handrail.datasets.reading.reader import read_episodes, read_frames
 from handrail.policies.imitation.evaluation.config import EvaluateConfig
 from handrail.policies.imitation.evaluation.evaluation import evaluate
-from handrail.policies.imitation.interface.checkpoint import load_policy, read_meta
+from handrail.policies.imitation.interface.checkpoint import read_meta
+from handrail.policies.imitation.interface.trained import load_policy
 from handrail.policies.imitation.training.curve import read_curve
 from handrail.policies.imitation.training.training import train
 from handrail.policies.study.config import StudyConfig

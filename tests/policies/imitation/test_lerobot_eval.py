@@ -28,12 +28,13 @@ from handrail.datasets.reading.reader import read_episodes, read_frames, read_in
 from handrail.policies.imitation.evaluation.conditions import policy_conditions
 from handrail.policies.imitation.evaluation.config import EvaluateConfig
 from handrail.policies.imitation.evaluation.rollout import run_rollout
-from handrail.policies.imitation.interface.checkpoint import load_policy
+from handrail.policies.imitation.interface.trained import load_policy
 from handrail.policies.imitation.training.training import train
 
 pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("default")]
 SEED, SECONDS = 3, 2.0
 PERIODS = int(SECONDS * 20)
+TASK = {"task": "reach", "robot": "ridgeback_ur10"}
 LAST = Path("checkpoints", "last", "pretrained_model")
 ROBOT = ("--robot.discover_packages_path=handrail.policies.lerobot", "--robot.type=handrail_sim")
 
@@ -199,7 +200,7 @@ def trained(root, output, actions):
 
 def both(folder, environment, **settings):
     """Return the robot's states with a policy in LeRobot's evaluation, and in ours."""
-    config = EvaluateConfig(policy=(str(folder),), episodes=1, time_limit=SECONDS, task="reach", **settings)
+    config = EvaluateConfig(policy=(str(folder),), episodes=1, time_limit=SECONDS, **TASK, **settings)
     (condition,), _ = policy_conditions(config)
     trace = Trace()
     run_rollout(condition, FIRST_SEED + SEED, load_policy, [trace])

@@ -8,7 +8,8 @@ from training_helpers import cut
 from handrail.controllers.errors import HandrailError
 from handrail.policies.imitation.evaluation.config import EvaluateConfig
 from handrail.policies.imitation.evaluation.evaluation import evaluate
-from handrail.policies.imitation.interface.checkpoint import load_policy, model_folder
+from handrail.policies.imitation.interface.checkpoint import model_folder
+from handrail.policies.imitation.interface.trained import load_policy
 from handrail.policies.imitation.training.training import train
 
 pytestmark = pytest.mark.filterwarnings("ignore:.*(torchcodec|pin_memory|video).*")

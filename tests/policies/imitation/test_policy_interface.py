@@ -189,8 +189,6 @@ def test_json_round_trip(actions):
 
 def test_wrong_inputs_are_named():
     columns = episode(np.random.default_rng(6), [("ee",)])
-    with pytest.raises(HandrailError, match=r"action space.*intent, realised"):
-        PolicyInterface.of_dataset(FEATURES, [columns], "torques")
     with pytest.raises(HandrailError, match=r"observation\.environment_state"):
         PolicyInterface.of_dataset(
             {"observation.state": Feature("float32", (1,), ("a",))}, [columns], "intent"

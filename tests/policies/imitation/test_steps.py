@@ -13,10 +13,10 @@ from lerobot.policies.factory import get_policy_class, make_pre_post_processors
 from training_helpers import CHANNELS, ENVIRONMENT, STATE, frame, tiny, write_dataset
 
 from handrail.controllers.errors import HandrailError
-from handrail.policies.imitation.interface.checkpoint import load_policy
 from handrail.policies.imitation.interface.completion import PolicyCompletionStep
 from handrail.policies.imitation.interface.interface import PolicyInterface
 from handrail.policies.imitation.interface.steps import PolicyActionStep, with_steps
+from handrail.policies.imitation.interface.trained import load_policy
 from handrail.policies.imitation.interface.view_step import PolicyViewStep
 from handrail.policies.imitation.training.training import train
 
@@ -96,7 +96,7 @@ def test_what_was_not_seen_or_does_not_fit_is_said():
         act({"action": torch.zeros(1, 10)})
     with pytest.raises(HandrailError, match=rf"expected observation\.state with {len(STATE)} numbers"):
         view({"observation": {"observation.state": torch.zeros(1, 3)}})
-    with pytest.raises(HandrailError, match="action space"):
+    with pytest.raises(HandrailError, match="actions: expected one of realised, intent"):
         PolicyViewStep(described | {"actions": "none"})
 
 

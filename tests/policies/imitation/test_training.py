@@ -18,8 +18,9 @@ from handrail.collect.config import StoredConfig
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.reading.reader import read_episodes, read_frames
 from handrail.policies.imitation.config import TrainConfig
-from handrail.policies.imitation.interface.checkpoint import load_policy, read_meta
+from handrail.policies.imitation.interface.checkpoint import read_meta
 from handrail.policies.imitation.interface.interface import PolicyInterface
+from handrail.policies.imitation.interface.trained import load_policy
 from handrail.policies.imitation.training import presets
 from handrail.policies.imitation.training.columns import steadied
 from handrail.policies.imitation.training.presets import policy_config
@@ -209,8 +210,8 @@ def test_a_file_in_the_place_of_the_training_is_one_line(resume, recorded, tmp_p
         ({"device": "tpu"}, "expected one of cpu"),
         ({"images": True}, "expected cameras"),
         ({"scene": False}, "--no_scene: expected --images too"),
-        ({"steps": -1}, "expected 0 or more"),
-        ({"threads": 0}, "expected 1 or more"),
+        ({"steps": -1}, "--steps: expected a whole number >= 0"),
+        ({"threads": 0}, "--threads: expected a whole number >= 1"),
         ({"resume": True, "overwrite": True}, "expected one of them"),
         ({"dataset": StoredConfig(root="nowhere")}, "expected a folder"),
     ],

@@ -9,7 +9,8 @@ from training_helpers import TINY, tiny, write_dataset
 
 from handrail.collect.config import StoredConfig
 from handrail.controllers.errors import HandrailError
-from handrail.policies.imitation.interface.checkpoint import load_policy, read_meta
+from handrail.policies.imitation.interface.checkpoint import read_meta
+from handrail.policies.imitation.interface.trained import load_policy
 from handrail.policies.imitation.training.source import read_source
 from handrail.policies.imitation.training.training import train
 

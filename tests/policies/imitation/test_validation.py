@@ -131,10 +131,10 @@ def test_cut_off_anywhere_it_ends_the_same_to_the_bit(flat, tmp_path):
     ("settings", "said"),
     [
         ({"patience": 2}, "expected --eval_split too"),
-        ({"eval_split": 1.0}, "--eval_split 1.0: expected 0 to below 1"),
-        ({"eval_split": 0.1, "patience": -1}, "--patience -1"),
-        ({"eval_split": 0.1, "eval_steps": 0}, "--eval_steps 0"),
-        ({"eval_split": 0.1, "improvement": float("nan")}, "--improvement nan"),
+        ({"eval_split": 1.0}, "--eval_split: expected a number < 1"),
+        ({"eval_split": 0.1, "patience": -1}, "--patience: expected"),
+        ({"eval_split": 0.1, "eval_steps": 0}, "--eval_steps: expected"),
+        ({"eval_split": 0.1, "improvement": float("nan")}, "--improvement: expected"),
     ],
 )
 def test_wrong_settings_are_one_line(settings, said, recorded, tmp_path):
