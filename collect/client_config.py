@@ -22,7 +22,7 @@ class ClientConfig:
     port_zmq_observations: int = 5556
     """Where it sends observations."""
     simulated: bool = False
-    """It is handrail-lekiwi-host: let it begin every episode anew, in the episode's own scene."""
+    """It is handrail-lekiwi host: let it begin every episode anew, in the episode's own scene."""
 
     def check(self, robot: str, operator: str) -> None:
         """Check the settings.

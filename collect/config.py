@@ -19,6 +19,7 @@ from handrail.collect.teleop_config import TeleopConfig
 from handrail.collect.world.tasks.catalogue import TASKS
 from handrail.controllers.errors import HandrailError, unknown_name
 from handrail.controllers.robot.catalogue import ROBOTS
+from handrail.datasets.advanced import Advanced
 from handrail.datasets.lists import Names
 
 REPO_ID = "handrail/demo"  # of a dataset whose name nobody says
@@ -48,18 +49,18 @@ class SessionConfig:
     """What to do."""
     mode: Annotated[str, one_of(MODES)] = "ee"
     """Teleop mode: what the operator steers, and what becomes of it."""
-    mask: str = ""
+    mask: Advanced[str] = ""
     """A mask of your own instead of the mode's: 0 or 1 for each channel (base twist, tool twist, joints)."""
     operator: Annotated[str, one_of(OPERATORS)] = "scripted"
     """Who steers."""
-    noise: float = 1.0
+    noise: Advanced[float] = 1.0
     """How human the scripted hand is: 0 perfect, 1 the default, partly from studies of people."""
-    human: HumanSettings = field(default_factory=HumanSettings)
-    person: int = 0
+    human: Advanced[HumanSettings] = field(default_factory=HumanSettings)
+    person: Advanced[int] = 0
     """Which person the scripted operator is; persons differ in delay, noise and all the rest."""
     time_limit: float = 0.0
     """Time after which an episode is given up [s]; the task's own when 0."""
-    moving_obstacles: int = 0
+    moving_obstacles: Advanced[int] = 0
     """Obstacles that cross the robot's way at up to 0.5 m/s, 0 to 4; task reach only."""
     robot: Annotated[str, one_of(ROBOTS)] = "ridgeback_ur10"
     """A robot, or a description file (.toml)."""
@@ -67,15 +68,15 @@ class SessionConfig:
     """Of scenes and operator: the same seed and versions give the same data."""
     cameras: Names = ""
     """Cameras to record: wrist, scene or both; none by default."""
-    image_size: int = 128
+    image_size: Advanced[int] = 128
     """Height and width of the pictures [pixels]."""
-    realtime: bool = False
+    realtime: Advanced[bool] = False
     """Pace the loop by the wall clock."""
-    physics: bool = True
+    physics: Advanced[bool] = True
     """MuJoCo; without, an ideal robot does exactly as it is told (task reach, no cameras)."""
-    robot_fps: int = 0
+    robot_fps: Advanced[int] = 0
     """How often the robot is sent a command [Hz], a multiple of the recording rate; that rate when 0."""
-    control_fps: int = 0
+    control_fps: Advanced[int] = 0
     """How often the controller is asked [Hz], a divisor of the robot's rate; the recording rate when 0."""
 
     @property
@@ -148,9 +149,9 @@ class DatasetConfig(StoredConfig):
 
     num_episodes: int = 10
     """Episodes to record."""
-    fps: int = 20
+    fps: Advanced[int] = 20
     """Control and recording rate [Hz], 10 to 100."""
-    single_task: str = ""
+    single_task: Advanced[str] = ""
     """What is done, in words; the task's own sentence when empty."""
 
     def check(self) -> None:
@@ -193,20 +194,20 @@ class RecordConfig(SessionConfig, ExecutionConfig):
     dataset: DatasetConfig = field(default_factory=DatasetConfig)
     resume: bool = False
     """Add to the dataset that is there; what a crash left behind is cleared first."""
-    verify: bool = False
+    verify: Advanced[bool] = False
     """With --resume: read every file anew, not only those that have changed since they were checked."""
     overwrite: bool = False
     """Remove the dataset that is there, if Handrail recorded it."""
-    cockpit: CockpitConfig = field(default_factory=CockpitConfig)
-    teleop: TeleopConfig = field(default_factory=TeleopConfig)
-    robot_client: str = ""
+    cockpit: Advanced[CockpitConfig] = field(default_factory=CockpitConfig)
+    teleop: Advanced[TeleopConfig] = field(default_factory=TeleopConfig)
+    robot_client: Advanced[str] = ""
     """Drive this robot of LeRobot's through its client instead of a simulation: lekiwi."""
-    client: ClientConfig = field(default_factory=ClientConfig)
+    client: Advanced[ClientConfig] = field(default_factory=ClientConfig)
     display_data: bool = False
     """Show robot, cameras, intent and distances in rerun's viewer (needs a screen)."""
-    display_web: bool = False
+    display_web: Advanced[bool] = False
     """Show that in a browser on this machine instead."""
-    display_save: str = ""
+    display_save: Advanced[str] = ""
     """Save what rerun would show to this .rrd file."""
 
     def check(self) -> None:
@@ -269,9 +270,19 @@ class DriveConfig(RecordConfig):
 
     task: Annotated[str, one_of(TASKS)] = "reach"
     """What to do."""
-    operator: Annotated[str, one_of(OPERATORS)] = "browser"
-    """Who steers."""
     dataset: FoundDatasetConfig = field(default_factory=FoundDatasetConfig)
+    cockpit: CockpitConfig = field(default_factory=CockpitConfig)
+
+    # no flags: they mean nothing where a person at a browser drives a simulation
+    operator: tyro.conf.Suppress[str] = "browser"
+    noise: tyro.conf.Suppress[float] = 1.0
+    human: tyro.conf.Suppress[HumanSettings] = field(default_factory=HumanSettings)
+    person: tyro.conf.Suppress[int] = 0
+    teleop: tyro.conf.Suppress[TeleopConfig] = field(default_factory=TeleopConfig)
+    robot_client: tyro.conf.Suppress[str] = ""
+    client: tyro.conf.Suppress[ClientConfig] = field(default_factory=ClientConfig)
+    workers: tyro.conf.Suppress[int] = field(default=0, kw_only=True)
+    ray: tyro.conf.Suppress[str] = field(default="", kw_only=True)
 
 
 def check_fps(fps: int) -> None:

@@ -1,8 +1,11 @@
 """The device in a person's hand, as typed settings; light to import."""
 
+import math
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
+
+import tyro
 
 from handrail.collect.flags import one_of
 from handrail.controllers.errors import HandrailError
@@ -81,6 +84,28 @@ class CalibrateConfig:
 
     def check(self) -> None:
         """Check the settings."""
-        self.teleop.check_type("handrail-calibrate")
+        self.teleop.check_type("handrail-devices calibrate")
         if self.unit not in UNITS:
             raise HandrailError(f"--unit {self.unit}: expected {', '.join(UNITS[:-1])} or {UNITS[-1]}")
+
+
+@dataclass(frozen=True)
+class ListDevicesConfig:
+    """Print which devices can be driven with at this computer, and what the others lack."""
+
+
+@dataclass(frozen=True)
+class ShowDeviceConfig:
+    """Show what a device says, until Ctrl-C; no robot moves."""
+
+    device: tyro.conf.Positional[Literal["gamepad", "spacemouse", "keyboard", "leader_arm"]]
+    """Which device."""
+    teleop: TeleopConfig = field(default_factory=TeleopConfig)
+    seconds: float = 0.0
+    """How long; until Ctrl-C when 0."""
+
+    def check(self) -> None:
+        """Check the settings."""
+        self.teleop.check(self.device)
+        if not 0.0 <= self.seconds < math.inf:
+            raise HandrailError(f"--seconds {self.seconds}: expected 0 (until Ctrl-C) or more")

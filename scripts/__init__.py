@@ -1,4 +1,4 @@
-"""One thin command a file; Ctrl-C and SIGTERM end it with one line and 130 while it loads, too."""
+"""The commands, one table of them; Ctrl-C and SIGTERM end one with one line and 130 while it loads, too."""
 
 import atexit
 import os
@@ -20,7 +20,7 @@ def _is_command() -> bool:
     """Return whether this process is a command, and no worker of one, nor a program that imports this."""
     name, processes = os.path.basename(sys.argv[0]), sys.modules.get("multiprocessing.process")
     is_worker = processes is not None and processes.parent_process() is not None
-    return not is_worker and (name == "-m" or name.startswith("handrail-"))
+    return not is_worker and (name in ("-m", "handrail") or name.startswith("handrail-"))
 
 
 if _is_command():  # here, for all that a command needs is imported after this

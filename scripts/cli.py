@@ -2,8 +2,6 @@
 
 import contextlib
 import ctypes
-import functools
-import importlib.metadata
 import inspect
 import io
 import os
@@ -12,34 +10,41 @@ import sys
 from collections.abc import Callable, Sequence
 from typing import NoReturn
 
-import tyro
-
 from handrail.controllers.errors import BAD_INPUT, FAILED, INTERRUPTED, HandrailError, message_of
 from handrail.controllers.interrupts import Interrupts
 from handrail.controllers.numerics.first_use import tell_when_compiling
+from handrail.datasets.advanced import without_advanced
 from handrail.datasets.printable import printable
 
-VERSION = "--version"
+HELP_ALL, VERSION = "--help-all", "--version"
 STARTING = "Starting; this takes some seconds …"
 COMPILING = "Compiling the controller for this machine, once; this can take a minute …"
 
 
-def parse[Config](config: Callable[..., Config], prog: str, arguments: Sequence[str] | None = None) -> Config:
+def parse[Config](config: type[Config], prog: str, arguments: Sequence[str]) -> Config:
     """Return the config of a command line; `--flag=true` and `--flag` both work, as do `_` and `-`.
 
-    Exits with 0 after `--help` and `--version`, and with 2 and one line on standard error after bad input.
+    Exits with 0 after `--help`, `--help-all` and `--version`, and with 2 and one line on standard error after
+    bad input. `--help` leaves out the flags that are `Advanced`.
     """
-    arguments = [_checked(argument) for argument in (sys.argv[1:] if arguments is None else arguments)]
+    import tyro
+
+    arguments = [_checked(argument) for argument in arguments]
     if VERSION in arguments:
-        print(f"{prog} {importlib.metadata.version('handrail')}")
-        sys.exit(0)
+        sys.exit(print_version(prog))
+    shown = config
+    if HELP_ALL in arguments:
+        arguments = ["--help"]
+    elif {"-h", "--help"} & set(arguments):
+        shown = without_advanced(config)
+    more = "" if shown is config else f" {HELP_ALL} shows all flags,"
     said = io.StringIO()
     try:
         with contextlib.redirect_stderr(said):
             return tyro.cli(
-                config,
+                shown,
                 prog=prog,
-                description=f"{inspect.getdoc(config)} {VERSION} prints the version.",
+                description=f"{inspect.getdoc(config)}{more} {VERSION} prints the version.",
                 args=arguments,
                 config=(tyro.conf.OmitSubcommandPrefixes,),
                 use_underscores=True,
@@ -50,20 +55,12 @@ def parse[Config](config: Callable[..., Config], prog: str, arguments: Sequence[
         raise
 
 
-def command[Config](
-    prog: str, config: type[Config]
-) -> Callable[[Callable[[Config], int | None]], Callable[[], NoReturn]]:
-    """Make a command of what is done with a config: it reads the command line first.
+def print_version(prog: str) -> int:
+    """Print the version of Handrail; return the exit code."""
+    import importlib.metadata
 
-    Args:
-        prog: name of the command.
-        config: what its command line says.
-    """
-
-    def of(body: Callable[[Config], int | None]) -> Callable[[], NoReturn]:
-        return functools.wraps(body)(lambda: run(lambda: body(parse(config, prog))))
-
-    return of
+    print(f"{prog} {importlib.metadata.version('handrail')}")
+    return 0
 
 
 def run(main: Callable[[], int | None]) -> NoReturn:

@@ -48,7 +48,8 @@ TIMED = {
 
 def run(name: str, *words: str) -> str:
     """Run a command of Handrail's; return what it printed."""
-    words = (sys.executable, "-m", f"handrail.scripts.{name}", *words)
+    module = ("handrail.scripts.bench",) if name == "bench" else ("handrail.scripts", name)
+    words = (sys.executable, "-m", *module, *words)
     done = subprocess.run(words, capture_output=True, text=True, env=os.environ | {"HF_HUB_OFFLINE": "1"})
     if done.returncode:
         raise SystemExit(f"{' '.join(words)}\n{done.stdout}{done.stderr}")

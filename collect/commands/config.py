@@ -10,6 +10,7 @@ import tyro
 from handrail.collect.config import StoredConfig
 from handrail.collect.flags import only_one
 from handrail.controllers.errors import HandrailError
+from handrail.datasets.advanced import Advanced
 
 
 @dataclass(frozen=True)
@@ -23,13 +24,13 @@ class ReplayConfig:
     """Also write a contact sheet of the episode to this .png file (needs OpenGL)."""
     video: str = ""
     """Also film the episode to this .mp4 file (needs OpenGL)."""
-    task: str = ""
+    task: Advanced[str] = ""
     """The recorded task where it is a module:name: a dataset alone does not make Handrail import it."""
-    mode: str = ""
+    mode: Advanced[str] = ""
     """The same of the teleop mode."""
-    operator: str = ""
+    operator: Advanced[str] = ""
     """The same of the operator."""
-    robot: str = ""
+    robot: Advanced[str] = ""
     """The same of the robot."""
 
     @property
@@ -64,7 +65,7 @@ class InspectConfig:
 
     dataset: StoredConfig = field(default_factory=StoredConfig)
     repair: bool = False
-    """Repair first what a crash left behind, as handrail-repair does."""
+    """Repair first what a crash left behind, as handrail-edit repair does."""
     check: bool = False
     """Read every byte and compare it with the checksums; exit code 1 if anything is not as it was saved."""
     quality: bool = False

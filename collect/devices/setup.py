@@ -27,4 +27,4 @@ def how_to_calibrate(teleop: LeaderConfig, robot: str) -> str:
         ("--teleop.options", teleop.options),
         ("--robot", robot),
     )
-    return " ".join(["handrail-calibrate", *(f"{flag}={value}" for flag, value in given if value)])
+    return " ".join(["handrail-devices calibrate", *(f"{flag}={value}" for flag, value in given if value)])

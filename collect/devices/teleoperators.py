@@ -3,6 +3,7 @@
 import contextlib
 import importlib
 import pkgutil
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from handrail.collect.teleop_config import LeaderConfig
@@ -18,13 +19,9 @@ def make_teleoperator(config: LeaderConfig) -> "Teleoperator":
     Also of installed packages whose names begin with `lerobot_teleoperator_`.
     """
     import draccus
-    from lerobot.teleoperators.config import TeleoperatorConfig
     from lerobot.teleoperators.utils import make_teleoperator_from_config
-    from lerobot.utils.import_utils import register_third_party_plugins
 
-    _import_all()
-    register_third_party_plugins()
-    known = TeleoperatorConfig.get_known_choices()
+    known = leader_types()
     if config.type not in known:
         raise unknown_name("--teleop.type", config.type, known)
     try:
@@ -32,6 +29,16 @@ def make_teleoperator(config: LeaderConfig) -> "Teleoperator":
         return make_teleoperator_from_config(settings)
     except Exception as error:  # whatever a driver's code raises
         raise HandrailError(f"--teleop.type {config.type}: {message_of(error)}") from error
+
+
+def leader_types() -> Mapping[str, Any]:
+    """Return the settings of every type of LeRobot's teleoperators, by its name."""
+    from lerobot.teleoperators.config import TeleoperatorConfig
+    from lerobot.utils.import_utils import register_third_party_plugins
+
+    _import_all()
+    register_third_party_plugins()
+    return TeleoperatorConfig.get_known_choices()
 
 
 def _import_all() -> None:

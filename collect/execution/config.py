@@ -7,6 +7,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from handrail.controllers.errors import HandrailError, not_installed
+from handrail.datasets.advanced import Advanced
 
 MOST_WORKERS = 256
 _CGROUP = Path("/sys/fs/cgroup")
@@ -19,7 +20,7 @@ class ExecutionConfig:
 
     workers: int = 0
     """Processes that share the work, one core each; 0 for as many as there are cores."""
-    ray: str = ""
+    ray: Advanced[str] = ""
     """Share the work over a Ray cluster instead: auto, or the cluster's address (see docs/cluster.md)."""
 
     @property

@@ -32,7 +32,7 @@ class HostSockets:
     """
 
     def __init__(self, config: HostConfig) -> None:
-        zmq = import_zmq("handrail-lekiwi-host")
+        zmq = import_zmq("handrail-lekiwi host")
         self._again, self._nowait = zmq.Again, zmq.NOBLOCK
         self._context = zmq.Context()
         self._commands = self._context.socket(zmq.PULL)

@@ -7,6 +7,7 @@ from handrail.collect.flags import check_json, names, one_of
 from handrail.collect.world.tasks.catalogue import TASKS
 from handrail.controllers.errors import HandrailError, unknown_name
 from handrail.controllers.robot.catalogue import ROBOTS
+from handrail.datasets.advanced import Advanced
 from handrail.datasets.lists import Names
 
 _CAMERAS = ("front", "wrist")
@@ -30,21 +31,21 @@ class HostConfig:
     """Where observations leave."""
     cameras: Names = ""
     """What it sees: front, wrist or both; none by default (needs OpenGL)."""
-    camera_fps: float = 10.0
+    camera_fps: Advanced[float] = 10.0
     """New pictures a second; in between it sends the last one again."""
-    watchdog_timeout_ms: float = 500.0
+    watchdog_timeout_ms: Advanced[float] = 500.0
     """Without a command for so long, the base stops."""
-    max_loop_freq_hz: float = 30.0
+    max_loop_freq_hz: Advanced[float] = 30.0
     """Rounds a second."""
-    latency: float = 0.0
+    latency: Advanced[float] = 0.0
     """How late commands and observations arrive, each [s]."""
-    drop: float = 0.0
+    drop: Advanced[float] = 0.0
     """Share of the messages that get lost, 0 to 1."""
-    lost_camera: str = ""
+    lost_camera: Advanced[str] = ""
     """A camera that says nothing."""
     seconds: float = 0.0
     """How long it runs; until Ctrl-C when 0."""
-    json: str = ""
+    json: Advanced[str] = ""
     """Write what it saw to this file at the end: commands, ages, stops, episodes."""
 
     @property

@@ -1,4 +1,4 @@
-"""Settings of `handrail-study-session`; light to import."""
+"""Settings of `handrail-user-study`; light to import."""
 
 from dataclasses import dataclass, field
 from pathlib import Path

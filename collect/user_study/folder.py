@@ -67,7 +67,7 @@ class StudyFolder:
         """Return the study: as it is frozen, or else as it is written."""
         if not self._frozen.exists():
             return parse_study(self._content(), f"study {self._written}")
-        content = load_json(self._frozen, "a study of handrail-study-session")
+        content = load_json(self._frozen, "a study of handrail-user-study")
         check_entries(content, _FROZEN, str(self._frozen))
         if self._written.exists() and self._content() != content["study"]:
             raise HandrailError(
@@ -88,7 +88,7 @@ class StudyFolder:
     def lock(self) -> DatasetLock:
         """Return the right to change the study."""
         with explained(f"cannot write {str(self.root)!r}"):
-            return DatasetLock(self.root / ".handrail", "study", "handrail-study-session")
+            return DatasetLock(self.root / ".handrail", "study", "handrail-user-study")
 
     def participants(self) -> list[Participant]:
         """Return everybody who has begun, by id."""
@@ -166,6 +166,6 @@ class StudyFolder:
         if not self._written.exists():
             raise HandrailError(
                 f"{str(self.root)!r}: expected a folder with study.toml, found none;"
-                f" write one: handrail-study-session new {self.root}"
+                f" write one: handrail-user-study new {self.root}"
             )
         return read_toml(self._written, "study")

@@ -1,4 +1,4 @@
-"""What `handrail-study-session` does, verb by verb."""
+"""What `handrail-user-study` does, verb by verb."""
 
 import time
 import webbrowser
@@ -82,7 +82,7 @@ def study_session(config: StudySessionConfig) -> int:
     folder, say = StudyFolder(config.folder), Terminal(stderr=True).print
     if config.verb == "new":
         say(f"Written: {folder.write_example()}")
-        say(f"Change it, then: handrail-study-session run {folder.root} P001")
+        say(f"Change it, then: handrail-user-study run {folder.root} P001")
         return 0
     if config.verb == "status":
         return _status(folder)
@@ -129,6 +129,6 @@ def _run(config: StudySessionConfig, folder: StudyFolder, study: UserStudy, say:
         say(f"{who.name} does not take part: nothing is kept")
         return 0
     export(folder, study)
-    again = f"; go on: handrail-study-session run {folder.root} {who.name}"
+    again = f"; go on: handrail-user-study run {folder.root} {who.name}"
     say(f"{who.name}: {ending}" + (again if ending is Ending.PAUSED else f"; tables in {folder.exports}"))
     return 0

@@ -8,6 +8,7 @@ from typing import Annotated
 import tyro
 
 from handrail.controllers.errors import HandrailError
+from handrail.datasets.advanced import Advanced
 from handrail.datasets.lists import Words
 from handrail.datasets.reading.columns import ColumnNames
 
@@ -30,17 +31,17 @@ class CompareConfig:
     """JSON files of what policies trained on the datasets did."""
     success_only: bool = False
     """Measure quality on episodes that did not fail."""
-    margin: float = 0.1
+    margin: Advanced[float] = 0.1
     """Distance to keep, for the time within it [m]."""
-    pictures: bool = True
+    pictures: Advanced[bool] = True
     """Show first pictures of the cameras."""
-    seed: int = 0
+    seed: Advanced[int] = 0
     """Of the resampling: the same seed gives the same report."""
-    verify: bool = False
+    verify: Advanced[bool] = False
     """Read every file of the datasets anew, not only those that have changed since they were checked."""
     study: str = ""
     """The folder of a user study: its conditions are compared, paired by participant."""
-    columns: ColumnNames = field(default_factory=ColumnNames)
+    columns: Advanced[ColumnNames] = field(default_factory=ColumnNames)
 
     @property
     def folder(self) -> Path:

@@ -1,105 +1,141 @@
-"""Settings of `handrail-edit`; light to import."""
+"""Settings of `handrail-edit`, a class for each verb that changes episodes; light to import."""
 
-import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import ClassVar, Literal
 
 import tyro
 
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.lists import Words
 
-Verb = Literal["delete", "keep", "split", "merge", "trim", "relabel", "rename"]
-_NEEDED = {
-    "delete": ("episodes",),
-    "keep": ("episodes",),
-    "split": ("parts", "output"),
-    "merge": ("output",),
-    "trim": (),
-    "relabel": ("episodes", "label"),
-    "rename": ("task",),
-}
-_TAKEN = {
-    "delete": (),
-    "keep": (),
-    "split": (),
-    "merge": (),
-    "trim": ("episodes",),
-    "relabel": ("reason",),
-    "rename": ("episodes", "old_task"),
-}
-_SOME = ("episodes", "parts", "label", "reason", "task", "old_task")  # that only some verbs take
 
-
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class EditConfig:
-    """Delete, keep, split, merge, trim or rename episodes that Handrail recorded; every column stays."""
+    """What all of these verbs need."""
 
-    verb: tyro.conf.Positional[Verb]
-    """delete or keep: --episodes. split: into --parts. merge: all folders into one. trim: cut off what is
-    idle at both ends. relabel: say with --label how --episodes ended. rename: give the task --task."""
-    folders: Annotated[tyro.conf.Positional[Words], tyro.conf.arg(metavar="FOLDER [FOLDER …]")]
-    """Folder of the dataset; of several to merge."""
+    verb: ClassVar[str]
+    needed: ClassVar[tuple[str, ...]] = ()
+    """Settings that may not be empty."""
+
+    folder: tyro.conf.Positional[str]
+    """Folder of the dataset."""
     output: str = ""
     """Folder of the new dataset; of split, the folder for the parts."""
     in_place: bool = False
     """Write the dataset anew in its own place, instead of --output; what is left out is gone."""
-    episodes: Words = ()
-    """Which episodes: 3, 0-4, failed, succeeded; trim and rename take all when empty."""
-    parts: Words = ()
-    """The parts of split: NAME=SHARE, such as train=0.8 test=0.2; or NAME=EPISODES, such as test=3,5-7."""
-    label: Literal["", "success", "failure"] = ""
-    """How the episodes of relabel ended."""
-    reason: str = ""
-    """Why they failed, in words."""
-    task: str = ""
-    """The sentence that rename gives a task."""
-    old_task: str = ""
-    """The sentence that it replaces; all of them when empty."""
-    margin: float = 0.25
-    """Time that trim leaves before the first motion and after the last [s]."""
     name: str = ""
-    """Name of the new dataset, owner/name; that of the first folder when empty."""
+    """Name of the new dataset, owner/name; that of the old one when empty."""
     verify: bool = False
-    """Read every file of the datasets anew, not only those that have changed since they were checked."""
+    """Read every file of the dataset anew, not only those that have changed since they were checked."""
 
     @property
-    def roots(self) -> tuple[Path, ...]:
-        """The folders of the datasets."""
-        return tuple(Path(folder).expanduser().absolute() for folder in self.folders)
+    def root(self) -> Path:
+        """The folder of the dataset."""
+        return Path(self.folder).expanduser().absolute()
 
     @property
     def target(self) -> Path:
         """The folder of what is written."""
-        return Path(self.output).expanduser().absolute() if self.output else self.roots[0]
+        return Path(self.output).expanduser().absolute() if self.output else self.root
 
     def check(self) -> None:
         """Check what can be checked without reading anything."""
-        self._check_folders()
-        for name in _NEEDED[self.verb]:
-            if not getattr(self, name):
-                raise HandrailError(f"{self.verb}: expected --{name}, got none")
-        for name in _SOME:
-            if getattr(self, name) and name not in (*_NEEDED[self.verb], *_TAKEN[self.verb]):
-                raise HandrailError(f"--{name}: expected it not with {self.verb}, got both")
-        if self.reason and self.label != "failure":
-            raise HandrailError("--reason: expected it with --label failure")
-        if not (math.isfinite(self.margin) and self.margin >= 0.0):
-            raise HandrailError(f"--margin {self.margin}: expected a time of 0 or more [s]")
-
-    def _check_folders(self) -> None:
-        count, several = len(self.folders), self.verb == "merge"
-        if count < 2 if several else count != 1:
-            what = "two folders or more" if several else "one folder"
-            raise HandrailError(f"{self.verb}: expected {what}, got {count}")
-        if self.in_place and self.verb in ("split", "merge"):
-            raise HandrailError(f"--in_place: expected --output with {self.verb}")
         if bool(self.output) == self.in_place:
             got = "both" if self.in_place else "neither"
             raise HandrailError(
                 f"{self.verb}: expected --output FOLDER for a new dataset, or --in_place; got {got}"
             )
-        for root in self.roots if self.output else ():
-            if self.target == root or root in self.target.parents or self.target in root.parents:
-                raise HandrailError(f"--output {self.output}: expected a folder apart from {root}")
+        root, target = self.root, self.target
+        if self.output and (target == root or root in target.parents or target in root.parents):
+            raise HandrailError(f"--output {self.output}: expected a folder apart from {root}")
+        for name in self.needed:
+            if not getattr(self, name):
+                raise HandrailError(f"{self.verb}: expected --{name}, got none")
+
+
+@dataclass(frozen=True, kw_only=True)
+class DeleteConfig(EditConfig):
+    """Write a dataset without some of its episodes; every column stays."""
+
+    verb = "delete"
+    needed = ("episodes",)
+    episodes: Words = ()
+    """Which episodes to leave out: 3, 0-4, failed, succeeded."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class KeepConfig(EditConfig):
+    """Write a dataset with only some of its episodes; every column stays."""
+
+    verb = "keep"
+    needed = ("episodes",)
+    episodes: Words = ()
+    """Which episodes to keep: 3, 0-4, failed, succeeded."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SplitConfig(EditConfig):
+    """Write the parts of a dataset into folders of their own; every column stays."""
+
+    verb = "split"
+    needed = ("parts", "output")
+    parts: Words = ()
+    """NAME=SHARE, such as train=0.8 test=0.2; or NAME=EPISODES, such as test=3,5-7."""
+
+    def check(self) -> None:
+        """Check what can be checked without reading anything."""
+        if self.in_place:
+            raise HandrailError("--in_place: expected --output with split")
+        super().check()
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrimConfig(EditConfig):
+    """Cut off what is idle at both ends of episodes; every column stays."""
+
+    verb = "trim"
+    episodes: Words = ()
+    """Which episodes: 3, 0-4, failed, succeeded; all when empty."""
+    margin: float = 0.25
+    """Time to leave before the first motion and after the last [s]."""
+
+    def check(self) -> None:
+        """Check what can be checked without reading anything."""
+        super().check()
+        if not 0.0 <= self.margin < float("inf"):
+            raise HandrailError(f"--margin {self.margin}: expected a time of 0 or more [s]")
+
+
+@dataclass(frozen=True, kw_only=True)
+class RelabelConfig(EditConfig):
+    """Say how episodes ended; every column stays."""
+
+    verb = "relabel"
+    needed = ("episodes", "label")
+    episodes: Words = ()
+    """Which episodes: 3, 0-4, failed, succeeded."""
+    label: Literal["", "success", "failure"] = ""
+    """How they ended."""
+    reason: str = ""
+    """Why they failed, in words."""
+
+    def check(self) -> None:
+        """Check what can be checked without reading anything."""
+        super().check()
+        if self.reason and self.label != "failure":
+            raise HandrailError("--reason: expected it with --label failure")
+
+
+@dataclass(frozen=True, kw_only=True)
+class RenameConfig(EditConfig):
+    """Give the task of episodes another sentence; every column stays."""
+
+    verb = "rename"
+    needed = ("task",)
+    task: str = ""
+    """The new sentence."""
+    old_task: str = ""
+    """The sentence that it replaces; all of them when empty."""
+    episodes: Words = ()
+    """Which episodes: 3, 0-4, failed, succeeded; all when empty."""

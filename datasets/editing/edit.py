@@ -13,8 +13,16 @@ import pyarrow as pa
 
 from handrail.controllers.arrays import BoolArray, FloatArray
 from handrail.controllers.errors import HandrailError, unknown_name
-from handrail.datasets.editing.config import EditConfig
-from handrail.datasets.editing.pack import Edited, check_free, merge_datasets, taken
+from handrail.datasets.editing.config import (
+    DeleteConfig,
+    EditConfig,
+    KeepConfig,
+    RelabelConfig,
+    RenameConfig,
+    SplitConfig,
+    TrimConfig,
+)
+from handrail.datasets.editing.pack import Edited, check_free, taken
 from handrail.datasets.editing.source import EditSource
 from handrail.datasets.format.columns import ColumnTypes
 from handrail.datasets.format.video import GROUP
@@ -160,25 +168,17 @@ def edit(config: EditConfig) -> list[Edited]:
     """Do what a config says and return the datasets that were written."""
     config.check()
     with explained(f"{config.verb}: cannot write {str(config.target)!r}"):
-        return [_in_place(config)] if config.in_place else _anew(config)
+        if config.in_place:
+            with taken(config.target, config.verify) as source:
+                return [_write(config, config.target, source, _pieces(config, source))]
+        check_free(config.target)
+        source = EditSource.open(config.root, config.verify)
+        if isinstance(config, SplitConfig):
+            return _split(config, source)
+        return [_write(config, config.target, source, _pieces(config, source))]
 
 
-def _in_place(config: EditConfig) -> Edited:
-    with taken(config.target, config.verify) as source:
-        return _write(config, config.target, source, _pieces(config, source))
-
-
-def _anew(config: EditConfig) -> list[Edited]:
-    if config.verb == "merge":
-        return [merge_datasets(config.roots, config.target, config.name, config.verify)]
-    check_free(config.target)
-    source = EditSource.open(config.roots[0], config.verify)
-    if config.verb == "split":
-        return _split(config, source)
-    return [_write(config, config.target, source, _pieces(config, source))]
-
-
-def _split(config: EditConfig, source: EditSource) -> list[Edited]:
+def _split(config: SplitConfig, source: EditSource) -> list[Edited]:
     """Write the parts, which are there all together or none of them."""
     with drafted(config.target) as draft:
         edited = [
@@ -193,35 +193,46 @@ def _write(
 ) -> Edited:
     manifest = source.manifest.named((config.name or source.manifest.repo_id) + suffix)
     manifest.check()
-    types = _types(config, source)
+    types: ColumnTypes = source.types
+    if isinstance(config, RelabelConfig):
+        types = {**_LABELS, **types}
+    if isinstance(config, TrimConfig):
+        types = {**types, TRIMMED: pa.int64()}
     totals = write_anew(root, manifest, pieces, types, source.encodings, config.in_place)
     return Edited(root, totals.episodes, totals.frames, source.info.frames)
 
 
-def _types(config: EditConfig, source: EditSource) -> ColumnTypes:
-    if config.verb == "relabel":
-        return {**_LABELS, **source.types}
-    return {**source.types, **({TRIMMED: pa.int64()} if config.verb == "trim" else {})}
-
-
 def _pieces(config: EditConfig, source: EditSource) -> Iterator[Piece]:
     """Yield what one dataset's episodes become."""
-    count = len(source.rows)
-    chosen = chosen_episodes("--episodes", config.episodes, source.successes)
-    if config.verb in ("delete", "keep"):
-        kept = [each for each in range(count) if (each in set(chosen)) == (config.verb == "keep")]
-        return source.pieces(kept)
-    if config.old_task and config.old_task not in source.tasks:
+    everything = range(len(source.rows))
+    words: Sequence[str] = getattr(config, "episodes", ())
+    chosen = set(chosen_episodes("--episodes", words, source.successes))
+    if isinstance(config, DeleteConfig):
+        return source.pieces([each for each in everything if each not in chosen])
+    if isinstance(config, KeepConfig):
+        return source.pieces(sorted(chosen))
+    if isinstance(config, RenameConfig) and config.old_task and config.old_task not in source.tasks:
         raise unknown_name("task", config.old_task, source.tasks)
-    touched = set(chosen if config.episodes else range(count))
-    change = {"trim": _trimmed, "relabel": _relabelled, "rename": _renamed}[config.verb]
+    touched = chosen if words else set(everything)
     return (
-        change(config, source, piece) if piece.record.episode in touched else piece
+        _changed(config, source, piece) if piece.record.episode in touched else piece
         for piece in source.pieces()
     )
 
 
-def _trimmed(config: EditConfig, source: EditSource, piece: Piece) -> Piece:
+def _changed(config: EditConfig, source: EditSource, piece: Piece) -> Piece:
+    if isinstance(config, TrimConfig):
+        return _trimmed(config, source, piece)
+    if isinstance(config, RelabelConfig):
+        success = config.label == "success"
+        said = piece.saying(success=success, failure_reason="" if success else config.reason or "relabelled")
+        return said.ending(success)
+    assert isinstance(config, RenameConfig)
+    old = {task for task in piece.record.tasks if not config.old_task or task == config.old_task}
+    return piece.renamed(dict.fromkeys(old, config.task))
+
+
+def _trimmed(config: TrimConfig, source: EditSource, piece: Piece) -> Piece:
     number = piece.record.episode
     columns = [name for name in (STATE, SUCCESS) if name in source.info.features]
     frames = read_rows_of(source.info, source.rows[number], columns)
@@ -229,15 +240,3 @@ def _trimmed(config: EditConfig, source: EditSource, piece: Piece) -> Piece:
     first, length = moving_stretch(episode, config.margin)
     before = piece.columns.get(TRIMMED) or 0
     return piece.stretch(first, length).saying(**{TRIMMED: int(before) + first})
-
-
-def _relabelled(config: EditConfig, source: EditSource, piece: Piece) -> Piece:
-    success = config.label == "success"
-    said = piece.saying(success=success, failure_reason="" if success else config.reason or "relabelled")
-    return said.ending(success)
-
-
-def _renamed(config: EditConfig, source: EditSource, piece: Piece) -> Piece:
-    old = piece.record.tasks
-    known = {task for task in old if not config.old_task or task == config.old_task}
-    return piece.renamed(dict.fromkeys(known, config.task))

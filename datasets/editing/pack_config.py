@@ -1,4 +1,4 @@
-"""Settings of `handrail-pack` and `handrail-merge`; light to import."""
+"""Settings of `handrail-edit pack` and `handrail-edit merge`; light to import."""
 
 import os
 import shlex
@@ -76,7 +76,7 @@ class MergeConfig:
 def packing_advice(root: Path) -> str:
     """Return how to pack a dataset that is slow to open, or that LeRobot cannot stream yet, or ""."""
     count, cameras, videos = (len(list(root.glob(each))) for each in ("data/*/*", "videos/*", "videos/*/*/*"))
-    command = f"handrail-pack {shlex.quote(str(root))}"
+    command = f"handrail-edit pack {shlex.quote(str(root))}"
     if count > MANY:
         return f"{count} files of rows are slow to open: {command} makes few of them"
     if videos > cameras:

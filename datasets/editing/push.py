@@ -31,7 +31,7 @@ from handrail.datasets.storage.atomic import explained, write_whole
 
 CARD = "README.md"
 TAGS = ("handrail", "teleoperation")
-_MARK = "<!-- written by handrail-push -->"
+_MARK = "<!-- written by handrail-edit push -->"
 _COUNTED = ("environment", "robot", "operator", "mode", "task")
 _NOTES = (
     "The operator steered a part of the motion (`teleop.mode`, `teleop.mask`); a controller completed the"
@@ -62,8 +62,8 @@ def write_card(root: Path, repo_id: str, license_id: str) -> str:
     path = root / CARD
     if path.exists() and _MARK not in regular(path).read_text(encoding="utf-8", errors="replace"):
         raise HandrailError(
-            f"{str(path)!r}: expected none, or one that handrail-push wrote; found another, which LeRobot's"
-            " upload would replace: give it another name"
+            f"{str(path)!r}: expected none, or one that handrail-edit push wrote; found another, which"
+            " LeRobot's upload would replace: give it another name"
         )
     from lerobot.datasets.io_utils import load_info
     from lerobot.datasets.utils import create_lerobot_dataset_card

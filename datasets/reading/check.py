@@ -59,7 +59,7 @@ def check_report(root: str | Path) -> list[str]:
     if found is None:
         return [*_unread(info), *_statistics(info)]
     differing = dict.fromkeys(name for state in found.rewritten for name in state.rewritten)
-    advice = f"if another tool wrote it on purpose, handrail-repair {info.root} takes it as it is"
+    advice = f"if another tool wrote it on purpose, handrail-edit repair {info.root} takes it as it is"
     return [
         *found.faults(),
         *(f"{name}: other content than was saved, but the right frames; {advice}" for name in differing),

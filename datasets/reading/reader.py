@@ -241,7 +241,7 @@ def _info_content(layout: Layout) -> dict[str, Any]:
         if not isinstance(content, dict):
             raise ValueError("no JSON object")
     except _UNREADABLE as error:
-        advice = f" handrail-repair {root} rebuilds it" if layout.manifest.is_file() else _DAMAGED
+        advice = f" handrail-edit repair {root} rebuilds it" if layout.manifest.is_file() else _DAMAGED
         raise _torn(layout.info, error, advice) from error
     return content
 
@@ -253,4 +253,4 @@ def _torn(path: Path, error: Exception, advice: str = _DAMAGED) -> HandrailError
 
 def _advice(info: DatasetInfo) -> str:
     again = " copy it again"
-    return f"{again}, or see what handrail-repair {info.root} says" if info.from_handrail else again
+    return f"{again}, or see what handrail-edit repair {info.root} says" if info.from_handrail else again

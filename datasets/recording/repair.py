@@ -5,7 +5,7 @@ asked (`set_aside`), whereupon those after it move up. What a crash leaves behin
 files of the one episode that was never saved) is removed. `info.json`, `stats.json` and `tasks.parquet` are
 rebuilt if they are not, to the byte, what the episodes say.
 
-    handrail-repair path/to/dataset
+    handrail-edit repair path/to/dataset
 """
 
 from dataclasses import dataclass
@@ -141,7 +141,7 @@ def require_whole(layout: Layout, found: Survey) -> None:
     raise HandrailError(
         f"dataset {str(layout.root)!r} {what}: {len(found.damaged) + found.absent} of {count} episodes are"
         f" not whole ({shortened(faults)}); nothing has been changed; copy it again, see what"
-        f" handrail-repair {layout.root} can mend, or go on without them with its --set_aside"
+        f" handrail-edit repair {layout.root} can mend, or go on without them with its --set_aside"
     )
 
 

@@ -10,6 +10,7 @@ from msgspec import Meta
 from handrail.collect.config import StoredConfig
 from handrail.controllers.errors import HandrailError, not_installed
 from handrail.controllers.typed import AtLeastOne, Count, NonNegative, check_settings
+from handrail.datasets.advanced import Advanced
 from handrail.datasets.lists import Words
 
 FREE_ON_RESUME = (
@@ -32,11 +33,11 @@ class TrainConfig:
     actions: Literal["realised", "intent", "recorded"] = "realised"
     """What the policy writes: the joint velocities that came about; the operator's own command, which the
     controller completes when the policy drives; or `recorded`, all columns as they are in any dataset."""
-    base_pose: bool = True
+    base_pose: Advanced[bool] = True
     """Let the policy see where the base is, as operators do who plan where to stand."""
     images: bool = False
     """Let the policy see the cameras too."""
-    scene: bool = True
+    scene: Advanced[bool] = True
     """Let the policy see where things are; with --no_scene it has to find them in the pictures."""
     mode: str = ""
     """Only episodes of this teleop mode."""
@@ -44,39 +45,39 @@ class TrainConfig:
     """Only episodes that succeeded, as the task's judge says; where there is none, as the operator says."""
     episodes: Count = 0
     """Only so many of them, drawn at random; 0 for all."""
-    minutes: NonNegative = 0.0
+    minutes: Advanced[NonNegative] = 0.0
     """Only what fits into so much of the operator's time, failed attempts included [min]; 0 for all."""
-    draw: Count = 0
+    draw: Advanced[Count] = 0
     """Seed of the order in which episodes are drawn; more episodes or minutes only add to the fewer."""
     steps: Count = 0
     """Updates of the policy; 0 for the preset's. With --patience the most that there may be."""
-    eval_split: Annotated[float, Meta(ge=0, lt=1)] = 0.0
+    eval_split: Advanced[Annotated[float, Meta(ge=0, lt=1)]] = 0.0
     """Share of the episodes that the policy does not learn from, 5 at least: the loss is measured on them."""
-    eval_steps: AtLeastOne = 500
+    eval_steps: Advanced[AtLeastOne] = 500
     """Updates between two such measurements."""
-    patience: Count = 0
+    patience: Advanced[Count] = 0
     """End when that loss is flat: so many measurements brought too little; 0 makes all updates."""
-    improvement: Annotated[float, Meta(ge=0, lt=1)] = 0.02
+    improvement: Advanced[Annotated[float, Meta(ge=0, lt=1)]] = 0.02
     """Share by which the best of these measurements has to be below the best before them."""
-    batch_size: Count = 0
+    batch_size: Advanced[Count] = 0
     """Samples an update; 0 for the preset's."""
-    lr: NonNegative = 0.0
+    lr: Advanced[NonNegative] = 0.0
     """Highest learning rate; 0 for the preset's."""
     seed: Count = 0
     """Of the policy's first weights and the order of the samples."""
-    threads: AtLeastOne = 1
+    threads: Advanced[AtLeastOne] = 1
     """Of PyTorch; two trainings with one thread each are faster than one after the other with two."""
     device: str = ""
     """cpu, cuda, cuda:1, mps; the preset's when empty."""
-    save_freq: AtLeastOne = 2000
+    save_freq: Advanced[AtLeastOne] = 2000
     """Updates between checkpoints; there is always one at the end."""
-    policy_options: Words = ()
+    policy_options: Advanced[Words] = ()
     """More of LeRobot's settings of the policy, `key=value` each: chunk_size=50 use_vae=true."""
     resume: bool = False
     """Go on from the last checkpoint in the folder; begin if there is none."""
-    overwrite: bool = False
+    overwrite: Advanced[bool] = False
     """Remove the training that is there."""
-    verify: bool = False
+    verify: Advanced[bool] = False
     """Read every file of the dataset anew, not only those that have changed since they were checked."""
 
     @property

@@ -1,7 +1,6 @@
 """Commands, run as their entry points run them but without a new interpreter that imports everything."""
 
 import contextlib
-import importlib
 import io
 import sys
 from dataclasses import dataclass
@@ -11,6 +10,9 @@ from unittest import mock
 import pytest
 
 from handrail.scripts import cli
+from handrail.scripts.__main__ import main as handrail_main
+from handrail.scripts.bench.__main__ import main as bench_main
+from handrail.scripts.commands import COMMANDS
 
 
 @dataclass(frozen=True)
@@ -23,10 +25,10 @@ class Done:
 
 
 def command(*arguments: Any, name: str = "record") -> Done:
-    """Run `handrail-<name>`, or `bench <name>`, with its command line, without its words about starting."""
-    _, is_bench, last = name.rpartition("bench ")
-    main = importlib.import_module(f"handrail.scripts.{'bench.__main__' if is_bench else name}").main
-    words = [f"handrail-{name}", *([last] if is_bench else []), *map(str, arguments)]
+    """Run `handrail-<name>`, or `bench <name>`, without its words about starting; verbs of edit are names."""
+    first, *verb = (f"edit {name}" if name in COMMANDS["edit"].verbs else name).split()
+    main = bench_main if first == "bench" else handrail_main
+    words = [f"handrail-{first}", *verb, *map(str, arguments)]
     out, error = io.StringIO(), io.StringIO()
     with (
         mock.patch.object(sys, "argv", words),

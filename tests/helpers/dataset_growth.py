@@ -154,7 +154,7 @@ MEASURED = {
     "compare with itself": lambda root: lambda: report(root),
     "handrail-train, to the first update": lambda root: lambda: train(ours(root)),
     "lerobot-train, to the first update": lambda root: lambda: train(theirs(root)),
-    f"handrail-merge of shards of {SHARD}": merge,
+    f"handrail-edit merge of shards of {SHARD}": merge,
     f"LeRobot's aggregate of shards of {SHARD}": aggregate,
     "LeRobotDataset of the aggregate": of_lerobot,
 }

@@ -4,7 +4,6 @@ A change is an `open` for writing, a rename, a removal, a link or a new folder. 
 server that has loaded LeRobot and PyTorch once, as those of a study are.
 """
 
-import importlib
 import multiprocessing
 import os
 import signal
@@ -13,6 +12,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 from datasets_guillotine import CHANGES, WRITING
+
+from handrail.scripts.__main__ import main
 
 _PRELOAD = "handrail.policies.study.execution.preload"
 
@@ -35,10 +36,10 @@ def killed(folder: Path, change: int, function: Callable[..., object], *argument
     return process.exitcode != 0
 
 
-def run_command(module: str, *flags: object) -> None:
-    """Run the command of a module."""
-    sys.argv = [module, *map(str, flags)]
-    importlib.import_module(module).main()
+def run_command(name: str, *flags: object) -> None:
+    """Run a command of Handrail's."""
+    sys.argv = [f"handrail-{name}", *map(str, flags)]
+    main()
 
 
 def _call(folder: str, remaining: int, log: str, function: Callable[..., object], arguments: tuple) -> None:

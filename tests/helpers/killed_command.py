@@ -6,7 +6,6 @@ With K = 0 it lives, and says on stderr last how many changes there were.
 """
 
 import contextlib
-import importlib
 import os
 import signal
 import sys
@@ -14,9 +13,11 @@ from pathlib import Path
 
 from datasets_guillotine import is_change
 
+from handrail.scripts.__main__ import main as handrail_main
+from handrail.scripts.commands import COMMANDS
+
 
 def main(folder: str, k: int, name: str, arguments: list[str]) -> None:
-    run = importlib.import_module(f"handrail.scripts.{name}").main
     changes = 0
 
     def audit(event: str, details: tuple) -> None:
@@ -27,9 +28,10 @@ def main(folder: str, k: int, name: str, arguments: list[str]) -> None:
                 os.kill(os.getpid(), signal.SIGKILL)
 
     sys.addaudithook(audit)
-    sys.argv = [f"handrail-{name}", *arguments]
+    command, *verb = ("edit", name) if name in COMMANDS["edit"].verbs else (name,)
+    sys.argv = [f"handrail-{command}", *verb, *arguments]
     with contextlib.suppress(SystemExit):
-        run()
+        handrail_main()
     print(changes, file=sys.stderr)
 
 

@@ -18,7 +18,7 @@ _PERIOD = 0.05  # of a frame [s]
 @contextlib.contextmanager
 def recording(folder, *flags, cwd=None):
     """Run `handrail-cockpit` for a folder, or with none; give its process and address."""
-    command = [sys.executable, "-m", "handrail.scripts.cockpit", *([str(folder)] if folder else [])]
+    command = [sys.executable, "-m", "handrail.scripts", "cockpit", *([str(folder)] if folder else [])]
     command += ["--cockpit.no_open", "--cockpit.port", "0", *map(str, flags)]
     process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, cwd=cwd)
     try:

@@ -5,6 +5,8 @@ import shlex
 
 from places import ROOT
 
+from handrail.scripts.commands import COMMANDS
+
 _READ_ON = ("recording", "large_datasets", "training", "evaluation", "comparison")
 MAIN = ("README.md", *(f"docs/{name}.md" for name in _READ_ON))
 _BESIDE = ("cluster", "concepts", "lekiwi", "study", "benchmark", "api")
@@ -47,6 +49,7 @@ NOT_RUN = {
     "apt-get": "needs the network and the administrator",
     "tensorboard": "runs until Ctrl-C",
 }
+WITH_VERBS = [f"handrail-{name}" for name, command in COMMANDS.items() if command.verbs]
 BENCH = ["python", "-m", "handrail.scripts.bench"]
 MINUTES = (
     "lerobot-",
@@ -77,8 +80,10 @@ def page_commands(page: str) -> list[list[str]]:
 
 
 def joined(words: list[str]) -> list[str]:
-    """Return the words of a command; `python -m handrail.scripts.bench NAME` is one of them, `bench NAME`."""
-    return [f"bench {words[3]}", *words[4:]] if words[:3] == BENCH else words
+    """Return the words of a command; its verb is of its name, and a bench is `bench NAME`."""
+    if words[:3] == BENCH:
+        return [f"bench {words[3]}", *words[4:]]
+    return [" ".join(words[:2]), *words[2:]] if words and words[0] in WITH_VERBS else words
 
 
 def small_study() -> str:

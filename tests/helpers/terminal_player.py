@@ -31,7 +31,7 @@ class TerminalPlayer:
     def __init__(self, *arguments: str, name: str = "record") -> None:
         self._master, slave = pty.openpty()
         fcntl.ioctl(slave, termios.TIOCSWINSZ, _SIZE)
-        command = [sys.executable, "-m", f"handrail.scripts.{name}", *arguments]
+        command = [sys.executable, "-m", "handrail.scripts", name, *arguments]
         self._child = subprocess.Popen(
             command, stdin=slave, stdout=slave, stderr=slave, preexec_fn=_own_terminal
         )

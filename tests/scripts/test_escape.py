@@ -107,7 +107,6 @@ COMMANDS = {
     "relabel": ("edit", "relabel", "{}", "--episodes", "0", "--label", "success", "--output", "{out}"),
     "rename": ("edit", "rename", "{}", "--task", "x", "--output", "{out}"),
     "rename what": ("edit", "rename", "{}", "--task", "x", "--old_task", "y", "--output", "{out}"),
-    "edit merge": ("edit", "merge", "{}", "{plain}", "--output", "{out}"),
     "merge": ("merge", "{}", "{plain}", "--output", "{out}"),
     "pack": ("pack", "{}", "--output", "{out}"),
     "pack in place": ("pack", "{}"),
@@ -181,7 +180,7 @@ def test_a_terminal_that_takes_colours_is_steered_by_nobody_else(recorded, monke
 
 def test_a_dataset_s_card_has_the_shape_of_a_plain_one(sets):
     for root in sets:
-        assert command(root, "--dataset.repo_id", "me/x", name="push").returncode == 0
+        assert command(root, "--dataset.repo_id", "me/x", name="edit push").returncode == 0
     plain, strange = ((root / "README.md").read_text() for root in sets)
     assert markdown_shape(strange) == markdown_shape(plain)
     assert "alert(1)" in strange  # it is told, as text

@@ -2,14 +2,13 @@
 
 import ast
 import re
-import tomllib
 from collections.abc import Iterator
 from dataclasses import fields
 from pathlib import Path
 
 import pytest
 from command_helpers import command
-from configs import BENCH_CONFIGS
+from configs import BENCH_CONFIGS, CONFIGS
 from lerobot.configs.dataset import DatasetRecordConfig
 from lerobot.configs.default import EvalConfig
 from lerobot.envs.configs import EnvConfig
@@ -19,7 +18,6 @@ from places import ROOT
 
 import handrail.collect.lerobot  # noqa: F401  (registers our plugins)
 
-SCRIPTS = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["scripts"]
 FLAG = re.compile(r"(?<![\w(-])--[a-z][\w.]*(?:-[a-z]\w*)*")
 STYLE = ("var(--", 'style="')  # of a page: what begins with "--" there is a colour
 OTHERS = {  # flags of other programs, by the word that the same text must say
@@ -48,15 +46,15 @@ type Function = ast.FunctionDef | ast.AsyncFunctionDef | ast.Module
 
 def flags_of(name: str) -> set[str]:
     """Return the flags of a command, from its own help."""
-    shown = command("--help", name=name.removeprefix("handrail-").replace("-", "_")).stdout
+    shown = command("--help-all", name=name.removeprefix("handrail-")).stdout
     rows = re.findall(r"^[│ ] ((?:-[\w.-]+(?:, )?)+)", shown, re.MULTILINE)
     return {flag for row in rows for flag in row.split(", ") if flag.startswith("--")}
 
 
 @pytest.fixture(scope="module")
 def known() -> set[str]:
-    own = map(flags_of, [*SCRIPTS, *BENCH_CONFIGS])
-    return {"--version"}.union(*own) | flags_of_lerobot()
+    own = map(flags_of, [*CONFIGS, *BENCH_CONFIGS])
+    return {"--version", "--help-all"}.union(*own) | flags_of_lerobot()
 
 
 def flags_of_lerobot() -> set[str]:

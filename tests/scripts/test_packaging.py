@@ -1,6 +1,5 @@
 """The package's laws: it leaves nothing out, shadows nobody, pins everything, imports downwards."""
 
-import importlib
 import os
 import re
 import shutil
@@ -11,10 +10,14 @@ from importlib import metadata
 from pathlib import Path
 
 import pytest
+from configs import JOBS
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 from places import ROOT
 from rooms import FLOORS, imported, named, sources
+
+from handrail.controllers.registry import resolved
+from handrail.scripts.commands import COMMANDS, ENTRY
 
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
 SETUPTOOLS = PROJECT["tool"]["setuptools"]
@@ -65,14 +68,12 @@ def test_datasets_stays_hugging_face_s(path):
     assert "site-packages" in done.stdout
 
 
-def test_every_command_is_there():
-    files = {path.stem for path in (ROOT / "scripts").glob("*.py") if "\ndef main(" in path.read_text()}
-    assert PROJECT["project"]["scripts"] == {
-        f"handrail-{name.replace('_', '-')}": f"handrail.scripts.{name}:main" for name in files
-    }
-    for entry in PROJECT["project"]["scripts"].values():
-        module, function = entry.split(":")
-        assert callable(getattr(importlib.import_module(module), function))
+def test_the_entry_points_are_those_of_the_table():
+    names = ("handrail", *(f"handrail-{name}" for name in COMMANDS))
+    assert PROJECT["project"]["scripts"] == dict.fromkeys(names, ENTRY)
+    assert callable(resolved(ENTRY))
+    for job in JOBS.values():
+        assert callable(resolved(f"handrail.{job.body}"))
 
 
 def requirements() -> list[Requirement]:

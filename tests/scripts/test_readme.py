@@ -17,7 +17,7 @@ _DRAW = ("--cameras", "--video")
 def run(words: list[str]) -> None:
     """Run one command; it must end well."""
     if words[0].startswith(("handrail-", "bench ")):
-        done = command(*words[1:], name=words[0].removeprefix("handrail-").replace("-", "_"))
+        done = command(*words[1:], name=words[0].removeprefix("handrail-"))
     else:
         beside = Path(sys.executable).parent / words[0]
         program = [str(beside) if beside.exists() else words[0], *words[1:]]

@@ -15,6 +15,7 @@ from handrail.collect.session.perturbations import Perturbation
 from handrail.collect.world.tasks.catalogue import TASKS
 from handrail.controllers.errors import HandrailError, unknown_name
 from handrail.controllers.typed import check_settings
+from handrail.datasets.advanced import Advanced
 from handrail.datasets.lists import Names, Words
 
 PROTECTIONS = ("own", "none", "mpc", "filter")
@@ -30,7 +31,7 @@ class EvaluateConfig(ExecutionConfig):
     """Write every rollout to this file; what is in it already is not run again."""
     episodes: Annotated[int, Meta(ge=1, le=MOST_ROLLOUTS)] = 100
     """Rollouts of each policy under each condition."""
-    seed: Annotated[int, Meta(ge=0, le=10**9)] = 0
+    seed: Advanced[Annotated[int, Meta(ge=0, le=10**9)]] = 0
     """Of the evaluation: which beginnings and disturbances; never those of a recording."""
     protection: Names = "own"
     """What stands between policy and robot, one or more: own (an intent's own controller; none for joint
@@ -38,18 +39,18 @@ class EvaluateConfig(ExecutionConfig):
     perturbation: Names = "none"
     """What disturbs, one or more: none, push, shift, delay, with a size such as push:2 or delay:5, joined
     by + to have several at once."""
-    label: str = ""
+    label: Advanced[str] = ""
     """Name of the condition; the teleop mode, and what is special about it, when empty."""
-    task: Annotated[str, one_of(TASKS)] = ""
+    task: Advanced[Annotated[str, one_of(TASKS)]] = ""
     """Of policies that do not say it, such as lerobot-train's, or that say a module:name."""
-    mode: str = ""
+    mode: Advanced[str] = ""
     """The teleop mode whose channels a policy of lerobot-train writes. Of policies that say a module:name:
     it is imported only if you say it too."""
-    robot: str = ""
+    robot: Advanced[str] = ""
     """The robot of policies that do not say it, or that say a module:name."""
-    fps: Annotated[int, Meta(ge=FPS_RANGE[0], le=FPS_RANGE[1])] = 20
+    fps: Advanced[Annotated[int, Meta(ge=FPS_RANGE[0], le=FPS_RANGE[1])]] = 20
     """Decisions a second of such policies: the rate of their dataset [Hz]."""
-    time_limit: Annotated[float, Meta(ge=0, le=MOST_TIME)] = 0.0
+    time_limit: Advanced[Annotated[float, Meta(ge=0, le=MOST_TIME)]] = 0.0
     """Time after which a rollout is given up [s]; when 0, that of the demonstrations, or the task's own."""
     video: str = ""
     """Also film the first rollout to this .mp4 file (needs OpenGL)."""

@@ -103,7 +103,7 @@ def measure(config: LatencyConfig) -> dict[str, Any]:
 @contextlib.contextmanager
 def _recording(root: Path, config: LatencyConfig, episodes: int) -> Iterator[tuple[Any, str]]:
     """Run `handrail-cockpit`; give its process and address."""
-    command = [sys.executable, "-m", "handrail.scripts.cockpit", str(root), "--task", "reach"]
+    command = [sys.executable, "-m", "handrail.scripts", "cockpit", str(root), "--task", "reach"]
     command += ["--mode", "base", "--time_limit", str(config.seconds + 600), "--cockpit.no_open"]
     command += ["--cockpit.port", "0", "--dataset.num_episodes", str(episodes), "--dataset.fps", str(FPS)]
     if config.image_size:

@@ -17,7 +17,7 @@ from handrail.datasets.reading.reader import read_episodes
 from handrail.scripts.bench.report import machine, report
 from handrail.scripts.bench.scaling.config import ScalingConfig
 
-_COMMAND = "from handrail.scripts.record import main; main()"
+_COMMAND = "from handrail.scripts.__main__ import main; main()"
 
 
 def measure(config: ScalingConfig) -> dict[str, Any]:
@@ -77,7 +77,9 @@ def _run(config: ScalingConfig, place: ExecutionConfig, root: Path) -> dict[str,
         *(("--cameras", config.cameras) if config.cameras else ()),
     )
     start = time.monotonic()
-    done = subprocess.run([sys.executable, "-c", _COMMAND, *map(str, flags)], capture_output=True, text=True)
+    done = subprocess.run(
+        [sys.executable, "-c", _COMMAND, "record", *map(str, flags)], capture_output=True, text=True
+    )
     seconds = time.monotonic() - start
     if done.returncode:
         raise HandrailError(f"{where[0]} {where[1]}: recording failed: {done.stderr.strip()[-300:]}")

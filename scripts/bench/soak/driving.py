@@ -217,7 +217,7 @@ class DrivenHours:
         complaints = [] if code == 130 else [f"exit code {code}: {self._child.last_line}"]
         complaints += [f"{orphans} processes were left behind"] if orphans else []
         complaints += ["a traceback"] if "Traceback" in self._child.output else []
-        repair = Child([command("repair"), str(self._root)], self._out, f"{self._root.name}-repair")
+        repair = Child([command("edit"), "repair", str(self._root)], self._out, f"{self._root.name}-repair")
         if repair.end(_PATIENCE * 5) != 0 or "nothing to repair" not in repair.output:
             complaints.append(repair.last_line)
         self._note(

@@ -18,7 +18,7 @@ ROUNDS, DRIVING, MEMORY = "rounds.jsonl", "driving.jsonl", "memory.jsonl"
 Row = dict[str, Any]
 _HEADINGS = (
     *("fault", "how often", "during", "the command then", "saved before", "lost", "complaints"),
-    *("mended by handrail-repair", "finished by the same command", "seconds"),
+    *("mended by handrail-edit repair", "finished by the same command", "seconds"),
 )
 _PLACES = (  # on the computer where it was done
     r"(?:/[\w./-]*/)?round-[\d-]+/disk/\w+/|/[\w./-]*/(?=round-|driven-|workshop|scripts/bench/soak)"

@@ -83,7 +83,7 @@ class _Round:
         orphans = self._judge_end(child, code, fault.codes if struck else {0})
         after = self._look(before, "after the fault")
         if work.root and self._rng.random() < 0.5:
-            repairing = self._begin([command("repair"), str(work.root)])
+            repairing = self._begin([command("edit"), "repair", str(work.root)])
             self._judge_end(repairing, repairing.end(_PATIENCE), {0})
             mended = "" if "nothing to repair" in repairing.output else repairing.last_line
         goes, last = self._go_on()

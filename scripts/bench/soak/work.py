@@ -31,10 +31,10 @@ _RECIPES = {  # recordings, by name
     "pictures": "--task reach --time_limit 1.0 --seed 6 --cameras wrist --image_size 64",
 }
 _EDITS = {  # command, `{}` for the folder; the name there of its result
-    "pack in place": ("pack {}/d", "d"),
-    "pack into another folder": ("pack {}/d --output {}/n", "n"),
-    "merge": ("merge {}/d {}/e --output {}/n", "n"),
-    "merge into the first": ("merge {}/d {}/e --output {}/d", "d"),
+    "pack in place": ("edit pack {}/d", "d"),
+    "pack into another folder": ("edit pack {}/d --output {}/n", "n"),
+    "merge": ("edit merge {}/d {}/e --output {}/n", "n"),
+    "merge into the first": ("edit merge {}/d {}/e --output {}/d", "d"),
     "edit delete": ("edit delete {}/d --episodes 1 3 --in_place", "d"),
     "edit trim": ("edit trim {}/d --in_place", "d"),
     "edit keep": ("edit keep {}/d --episodes 2-5 --output {}/n", "n"),
@@ -61,7 +61,7 @@ class Workshop:
     def packed(self, recipe: str, episodes: int) -> Path:
         """Return such a dataset, packed."""
         source = {"d": self.recorded(recipe, episodes)}
-        return self.made(f"{recipe}-{episodes}-packed", "pack {}/d --output {}/n", source, "n")
+        return self.made(f"{recipe}-{episodes}-packed", "edit pack {}/d --output {}/n", source, "n")
 
     def policy(self) -> Path:
         """Return a policy, trained for a moment."""

@@ -78,7 +78,7 @@ class Recording:
 
     def __init__(self, folder):
         self.root, log = folder / "dataset", folder / "log"
-        command = [sys.executable, "-m", "handrail.scripts.cockpit", str(self.root), "--task", "reach"]
+        command = [sys.executable, "-m", "handrail.scripts", "cockpit", str(self.root), "--task", "reach"]
         command += ["--mode", "direct", "--time_limit", "3000", "--dataset.num_episodes", "1"]
         command += ["--cockpit.host", "127.0.0.2", "--cockpit.port", "0"]
         with log.open("w") as file:

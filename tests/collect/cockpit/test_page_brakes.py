@@ -41,7 +41,7 @@ class Recording:
 
     def __init__(self, folder):
         self.root = folder / "dataset"
-        command = [sys.executable, "-m", "handrail.scripts.cockpit", str(self.root), "--task", "reach"]
+        command = [sys.executable, "-m", "handrail.scripts", "cockpit", str(self.root), "--task", "reach"]
         command += ["--cockpit.no_open", "--cockpit.port", "0", "--dataset.num_episodes", "100"]
         command += ["--time_limit", "600"]
         self.log = folder / "log"

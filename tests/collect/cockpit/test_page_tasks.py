@@ -111,7 +111,7 @@ def test_what_was_driven_is_a_dataset_like_any_other(reached, tmp_path):
     assert plain.num_episodes == 5
     assert len(plain) == sum(len(each["action"]) for each in saved(reached))
     replay = subprocess.run(
-        [sys.executable, "-m", "handrail.scripts.replay", reached], capture_output=True, text=True
+        [sys.executable, "-m", "handrail.scripts", "replay", reached], capture_output=True, text=True
     )
     assert replay.returncode == 0, replay.stderr
     assert [line.split()[1] for line in replay.stdout.splitlines()[3:8]] == ["0.00e+00"] * 5

@@ -84,7 +84,7 @@ def test_episodes_are_added_to_those_that_one_core_recorded(alone, tmp_path):
 
 
 def begin(root, *flags):
-    words = [sys.executable, "-m", "handrail.scripts.record", str(root), *FLAGS, *map(str, flags)]
+    words = [sys.executable, "-m", "handrail.scripts", "record", str(root), *FLAGS, *map(str, flags)]
     return subprocess.Popen(
         [*words, "--dataset.num_episodes", str(EPISODES)],
         stderr=subprocess.PIPE,

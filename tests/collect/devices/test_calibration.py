@@ -132,7 +132,7 @@ def test_a_wrong_file_is_refused_in_one_line(tmp_path, change, said):
     path = tmp_path / "leader.json"
     path.write_text(json.dumps({"joints": {}, **change}))
     with pytest.raises(HandrailError) as error:
-        load_calibration(path, UR10, "handrail-calibrate")
+        load_calibration(path, UR10, "handrail-devices calibrate")
     assert said in str(error.value)
     assert "\n" not in str(error.value)
 
@@ -140,8 +140,8 @@ def test_a_wrong_file_is_refused_in_one_line(tmp_path, change, said):
 def test_no_file_or_no_json_says_how_to_make_one(tmp_path):
     advice = setup.how_to_calibrate(LeaderConfig(type="so101_leader", port="/dev/ttyACM0"), "ridgeback_ur10")
     assert (
-        advice
-        == "handrail-calibrate --teleop.type=so101_leader --teleop.port=/dev/ttyACM0 --robot=ridgeback_ur10"
+        advice == "handrail-devices calibrate --teleop.type=so101_leader --teleop.port=/dev/ttyACM0 "
+        "--robot=ridgeback_ur10"
     )
     for content in (None, "{", '{"joints": 1e999}'):
         path = tmp_path / "leader.json"

@@ -97,7 +97,7 @@ def test_a_computer_that_is_lost_in_the_middle_costs_no_episode_and_makes_none_t
 
 def test_an_interrupt_ends_all_at_once_and_one_core_goes_on(cluster, alone, tmp_path):
     root, shards = tmp_path / "d", tmp_path / ".d.shards"
-    words = [sys.executable, "-m", "handrail.scripts.record", str(root), *FLAGS, "--ray", cluster.address]
+    words = [sys.executable, "-m", "handrail.scripts", "record", str(root), *FLAGS, "--ray", cluster.address]
     process = subprocess.Popen(
         [*words, "--dataset.num_episodes", str(EPISODES)],
         stderr=subprocess.PIPE,

@@ -147,7 +147,7 @@ def test_cameras_say_jpegs_of_lekiwis_sizes_and_a_lost_one_says_nothing(monkeypa
     ],
 )
 def test_wrong_settings_are_named(words, said):
-    done = command(*words, name="lekiwi_host")
+    done = command(*words, name="lekiwi host")
     assert done.returncode == 2
     assert said in done.stderr
     assert done.stderr.count("\n") == 1

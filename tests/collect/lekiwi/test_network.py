@@ -64,7 +64,7 @@ class Host:
     def __init__(self, folder: Path, *flags: str) -> None:
         self.ports, self.json = free_ports(), folder / "host.json"
         ports = ("--port_zmq_cmd", self.ports[0], "--port_zmq_observations", self.ports[1])
-        words = ["-m", "handrail.scripts.lekiwi_host", *ports, "--json", self.json, *flags]
+        words = ["-m", "handrail.scripts", "lekiwi", "host", *ports, "--json", self.json, *flags]
         self.process = subprocess.Popen([sys.executable, *map(str, words)], stdout=subprocess.PIPE, text=True)
         assert self.process.stdout
         assert "LeKiwi (simulated)" in self.process.stdout.readline()

@@ -44,7 +44,7 @@ def test_without_a_screen_the_viewer_is_refused_at_once(screen, tmp_path, monkey
         monkeypatch.delenv(name, raising=False)
     if screen:
         monkeypatch.setenv("DISPLAY", screen)
-        program = [sys.executable, "-m", "handrail.scripts.record", *words]
+        program = [sys.executable, "-m", "handrail.scripts", "record", *words]
         done = subprocess.run(program, capture_output=True, text=True, timeout=120)
     else:
         done = command(*words)

@@ -38,7 +38,7 @@ when = "end"
 @contextmanager
 def running(root, name):
     """Run a participant's session; give its process and address."""
-    words = [sys.executable, "-m", "handrail.scripts.study_session", "run", str(root), name]
+    words = [sys.executable, "-m", "handrail.scripts", "user-study", "run", str(root), name]
     words += ["--cockpit.no_open", "--cockpit.port", "0"]
     process = subprocess.Popen(words, stderr=subprocess.PIPE, text=True)
     try:

@@ -21,7 +21,7 @@ from handrail.datasets.quality.catalogue import METRICS
 from handrail.datasets.quality.measure import measure
 from handrail.datasets.reading.load import read_demonstrations
 from handrail.scripts import cli
-from handrail.scripts.compare import main
+from handrail.scripts.__main__ import main
 
 pytestmark = pytest.mark.usefixtures("few_resamples")
 

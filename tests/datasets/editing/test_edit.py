@@ -164,7 +164,7 @@ MISTAKES = {
     "delete --episodes 0-3 --in_place": "expected at least one episode",
     "delete --episodes x --in_place": "expected a number, a range",
     "delete --episodes 1": "expected --output",
-    "delete --episodes 1 --task x --in_place": "--task: expected it not with delete",
+    "delete --episodes 1 --task x --in_place": "Unrecognized options: --task",
     "split --parts a=0.7 b=0.7 --output OUT": "shares up to 1",
     "split --parts a=0,1 b=1 --output OUT": "episode 1 in two",
     "split --parts a/b=0.5 --output OUT": "expected a name",

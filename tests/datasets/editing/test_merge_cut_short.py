@@ -10,7 +10,7 @@ from datasets_helpers import TINY_FEATURES, record, tree
 from editing_helpers import content, part
 
 from handrail.controllers.errors import HandrailError
-from handrail.datasets.editing.config import EditConfig
+from handrail.datasets.editing.config import SplitConfig
 from handrail.datasets.editing.edit import edit
 from handrail.datasets.editing.pack import merge_datasets
 from handrail.datasets.format.layout import Layout
@@ -63,16 +63,16 @@ def test_a_merge_killed_at_changes_to_the_disk(tmp_path, in_place, step):
 def test_a_split_killed_at_changes_to_the_disk_is_run_again(tmp_path, step):
     """The parts are there all together, or none of them is, and the same line does it."""
     root = record(tmp_path / "set", 4, features=TINY_FEATURES)
-    line = ["split", root, "--parts", "train=0-2", "test=3", "--output"]
+    line = [root, "--parts", "train=0-2", "test=3", "--output"]
     lived, k = False, 1 - step
     while not lived:
         k += step
         out = tmp_path / str(k) / "parts"
         out.parent.mkdir()
-        config = cli.parse(EditConfig, "handrail-edit", [*map(str, line), str(out)])
+        config = cli.parse(SplitConfig, "handrail-edit split", [*map(str, line), str(out)])
         lived = GUILLOTINE.run(out.parent, k, lambda config=config: edit(config))
         if not out.exists():
-            assert command(*line, out, name="edit").returncode == 0
+            assert command(*line, out, name="split").returncode == 0
         assert [path.name for path in out.parent.iterdir()] == ["parts"]
         assert [len(content(out / name)) for name in ("train", "test")] == [3, 1]
     assert k > 8
@@ -87,11 +87,10 @@ def test_a_merge_of_a_folder_with_itself_or_into_one_of_its_own_asks(tmp_path):
         (("merge", root, tmp_path / "link", "--output", tmp_path / "new"), "expected each folder once"),
         (("merge", root, other, "--output", root), "another folder, or --in_place to replace it"),
         (("merge", root, other, "--output", tmp_path / "new", "--in_place"), "one of the folders"),
-        (("edit", "merge", root, root, "--output", tmp_path / "new"), "expected each folder once"),
     ):
         done = command(*line[1:], name=line[0])
         assert (done.returncode, done.stderr.count("\n")) == (2, 1), done.stderr
         assert said in done.stderr
         assert tree(tmp_path) == before
-    assert command(root, other, "--output", root, "--in_place", name="merge").returncode == 0
+    assert command(root, other, "--output", root, "--in_place", name="edit merge").returncode == 0
     assert len(content(root)) == 4

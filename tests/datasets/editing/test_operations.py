@@ -23,7 +23,6 @@ OURS = {
     "delete": "delete SET --episodes 1 --output NEW",
     "keep": "keep SET --episodes 0,2 --output NEW",
     "split": "split SET --parts part=0.7 --output NEW",
-    "merge": "merge SET MORE --output NEW",
     "trim": "trim SET --output NEW",
     "relabel": "relabel SET --episodes 0 --label failure --output NEW",
     "rename": "rename SET --task touch --output NEW",
@@ -117,7 +116,7 @@ def used(use: str, root: Path, original: Path, output: Path):
 def table() -> str:
     """Return what works after which operation, as the page shows it."""
     tools = (
-        ("packed", "handrail-{}", PACKED),
+        ("packed", "handrail-edit {}", PACKED),
         ("ours", "handrail-edit {}", OURS),
         ("lerobot's", "lerobot-edit-dataset {}", LEROBOTS),
     )

@@ -226,12 +226,12 @@ def test_datasets_without_an_episode_add_none(whole, tmp_path):
 
 
 def test_the_commands_say_what_they_wrote(whole, tmp_path):
-    done = command(whole, "--output", tmp_path / "packed", name="pack")
+    done = command(whole, "--output", tmp_path / "packed", name="edit pack")
     assert done.stdout == f"{tmp_path / 'packed'}: 7 episodes, 74 frames (of 74)\n"
     root = part(tmp_path / "set", 0, 3)
-    assert command(root, name="pack").returncode == 0
+    assert command(root, name="edit pack").returncode == 0
     assert len(list(root.glob("data/*/*"))) == 1
-    done = command(root, whole, "--output", tmp_path / "both", name="merge")
+    done = command(root, whole, "--output", tmp_path / "both", name="edit merge")
     assert done.returncode == 0, done.stderr
     assert len(read_episodes(tmp_path / "both")) == 10
     for words, said in (
@@ -240,6 +240,6 @@ def test_the_commands_say_what_they_wrote(whole, tmp_path):
         ((root, whole, "--output", root / "in"), "apart"),
         ((root, whole, "--output", tmp_path / "both"), "in use"),
     ):
-        done = command(*words, name="merge")
+        done = command(*words, name="edit merge")
         assert (done.returncode, done.stderr.count("\n")) == (2, 1)
         assert said in done.stderr

@@ -62,7 +62,7 @@ def root(tmp_path):
 
 
 def push(root, *words, code=0):
-    done = command(root, "--dataset.repo_id", "me/reach", *words, name="push")
+    done = command(root, "--dataset.repo_id", "me/reach", *words, name="edit push")
     assert done.returncode == code, done.stderr
     return done
 
@@ -184,7 +184,7 @@ def test_links_are_not_followed(root, hub, tmp_path):
 )
 def test_wrong_settings_are_one_line(root, words, told):
     done = command(
-        root, *(("--dataset.repo_id", "me/x") if "--license" in words else ()), *words, name="push"
+        root, *(("--dataset.repo_id", "me/x") if "--license" in words else ()), *words, name="edit push"
     )
     assert (done.returncode, done.stderr.count("\n")) == (2, 1)
     assert told in done.stderr

@@ -40,7 +40,7 @@ def _shades(item) -> tuple[int, int, list[float]]:
 
 def test_a_recording_says_to_pack_before_streaming_and_packed_it_streams_right(tmp_path, monkeypatch):
     root = record(tmp_path / "set", EPISODES, cameras=True)
-    assert f"handrail-pack {root} before streaming" in packing_advice(root)
+    assert f"handrail-edit pack {root} before streaming" in packing_advice(root)
     assert "\n" not in packing_advice(root)
     with pytest.raises(Exception, match=r"tolerance|[Ii]nvalid frame|index"):
         streamed(root, monkeypatch)  # no longer: then LeRobot's issue 4524 is closed, and the advice may go

@@ -231,7 +231,7 @@ def test_reading_what_is_not_there(tmp_path):
     _fails(lambda: read_frames(root, 2), "episode 2", "0 to 1")
     _fails(lambda: read_frames(root, 0, ["speed"]), "speed", "action")
     Layout(root).data(1).write_bytes(b"no parquet")
-    _fails(lambda: read_frames(root, 1), "file-001.parquet", "handrail-repair")
+    _fails(lambda: read_frames(root, 1), "file-001.parquet", "handrail-edit repair")
     Layout(root).row(1).unlink()
     _fails(lambda: read_episodes(root), "expected 2", "repair")
     Layout(root).info.write_text('{"codebase_version": "v2.1"}')

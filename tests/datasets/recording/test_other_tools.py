@@ -42,7 +42,7 @@ def test_what_lerobot_encoded_anew_is_whole(root):
     assert json.loads(Layout(root).info.read_bytes())["features"][CAMERAS[0]]["info"] == info
     checked = command("--dataset.root", root, "--check", name="inspect")
     assert checked.stdout.count("but the right frames") == 8
-    done = command(root, name="repair")
+    done = command(root, name="edit repair")
     assert done.returncode == 0
     assert "another tool" in done.stdout
     assert command("--dataset.root", root, "--check", name="inspect").returncode == 0
@@ -115,6 +115,6 @@ def test_resume_says_what_it_put_in_order(tmp_path):
 def test_the_command_takes_a_folder_in_two_ways(tmp_path):
     root = record(tmp_path / "set", 1)
     for place in ([root], ["--dataset.root", root]):
-        assert "nothing to repair" in command(*place, name="repair").stdout
-    done = command(tmp_path, name="repair")
+        assert "nothing to repair" in command(*place, name="edit repair").stdout
+    done = command(tmp_path, name="edit repair")
     assert (done.returncode, done.stderr.count("\n")) == (2, 1)

@@ -106,14 +106,14 @@ def test_a_damaged_episode_is_named_and_costs_no_other(root, stream, harm):
     assert path.relative_to(root).as_posix() in checked.stdout
     if "but the right frames" in checked.stdout:
         return  # it decodes to what was saved: noticed, and no damage
-    with pytest.raises(HandrailError, match=r"\A[^\n]*episode 1[^\n]*handrail-repair[^\n]*\Z"):
+    with pytest.raises(HandrailError, match=r"\A[^\n]*episode 1[^\n]*handrail-edit repair[^\n]*\Z"):
         resume(root, cameras=True)
     assert tree(root) == before
-    done = command(root, name="repair")
+    done = command(root, name="edit repair")
     assert (done.returncode, done.stdout.count("\n")) == (1, 1)
     assert path.relative_to(root).as_posix() in done.stdout
     assert tree(root) == before  # nothing that was saved is moved without being asked
-    done = command(root, "--set_aside", name="repair")
+    done = command(root, "--set_aside", name="edit repair")
     assert (done.returncode, done.stdout.count("\n")) == (1, 1)
     _check_is(root, [0, 2, 3])
     assert not path.exists() or path.read_bytes() != before.get(path.relative_to(root).as_posix())

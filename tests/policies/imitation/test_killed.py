@@ -63,7 +63,7 @@ def test_a_training_killed_while_it_writes(tmp_path):
             output,
             change,
             run_command,
-            "handrail.scripts.train",
+            "train",
             *flags,
             "--resume",
             "--policy_options",
@@ -106,9 +106,7 @@ def test_an_evaluation_killed_while_it_writes(tmp_path):
     flags = ["--policy", policy, "--episodes", count, "--time_limit", 0.2, "--json", file, "--workers", 1]
     kept: list[dict] = []
     for _ in range(KILLS):
-        assert killed(
-            tmp_path / ".e.json", int(rng.integers(1, 8)), run_command, "handrail.scripts.evaluate", *flags
-        )
+        assert killed(tmp_path / ".e.json", int(rng.integers(1, 8)), run_command, "evaluate", *flags)
         rows = rows_of(file)
         assert rows[: len(kept)] == kept
         kept = rows

@@ -109,7 +109,7 @@ def test_a_killed_training_goes_on(recorded, tmp_path):
     flags = ["--dataset.root", recorded, "--output", killed.output, "--steps", steps, "--batch_size", 8]
     flags += ["--save_freq", 20, "--resume", "--policy_options", *TINY]
     process = subprocess.Popen(
-        [sys.executable, "-m", "handrail.scripts.train", *map(str, flags)],
+        [sys.executable, "-m", "handrail.scripts", "train", *map(str, flags)],
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
     )

@@ -263,7 +263,7 @@ def test_the_command_says_bad_input_in_one_line():
 )
 def test_several_processes_train_one_policy(launcher, processes, recorded, tmp_path):
     options = f"--dataset.root {recorded} --output {tmp_path / 'policy'} --steps 6 --batch_size 4"
-    words = ["-m", *launcher.split(), "-m", "handrail.scripts.train", *options.split()]
+    words = ["-m", *launcher.split(), "-m", "handrail.scripts", "train", *options.split()]
     done = subprocess.run([sys.executable, *words, "--policy_options", *TINY], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr[-2000:]
     assert load_policy(tmp_path / "policy").meta.steps == 6

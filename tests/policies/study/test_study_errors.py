@@ -20,7 +20,7 @@ from handrail.policies.study.design.design import (
     TaskDesign,
 )
 from handrail.policies.study.design.load import load_design
-from handrail.scripts.study import main
+from handrail.scripts.__main__ import main
 
 FACTORS = "[factors]\n" + "".join(
     f"{cell} = '{mode}'\n"

@@ -1,14 +1,22 @@
-"""`handrail-evaluate`: run trained policies on declared seeds, protected or not, disturbed or not."""
+"""Commands that train policies and let them drive; PyTorch is loaded only where it is installed."""
 
-from handrail.policies.imitation.config import check_installed
+from handrail.controllers.errors import FAILED
+from handrail.policies.imitation.config import TrainConfig, check_installed
 from handrail.policies.imitation.evaluation.config import EvaluateConfig
-from handrail.scripts import cli
 
 
-@cli.command("handrail-evaluate", EvaluateConfig)
-def main(config: EvaluateConfig) -> int:
-    """Run the command."""
-    config.check()
+def train(config: TrainConfig) -> int:
+    """Train a policy; return the exit code."""
+    check_installed("handrail-train", ("torch", "accelerate"), config.policy)
+    from handrail.datasets.presentation.terminal import Terminal
+    from handrail.policies.imitation.training import training
+
+    Terminal().print(f"written: {training.train(config)}")
+    return 0
+
+
+def evaluate(config: EvaluateConfig) -> int:
+    """Run trained policies on declared seeds; return the exit code."""
     check_installed("handrail-evaluate", ("torch",))
     from handrail.datasets.presentation.terminal import Terminal
     from handrail.policies.imitation.evaluation.evaluation import UnevaluatedError, evaluate
@@ -29,8 +37,4 @@ def main(config: EvaluateConfig) -> int:
         console.print(f"Without a video: {trouble}" if trouble else f"Video: {config.video}")
     for reason in reasons:
         Terminal(stderr=True).print(f"error: {reason}")
-    return cli.FAILED if reasons else 0
-
-
-if __name__ == "__main__":
-    main()
+    return FAILED if reasons else 0

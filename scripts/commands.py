@@ -1,0 +1,178 @@
+"""The commands, by what a person wants to do; a command imports its own parts alone."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from handrail.controllers.registry import resolved
+
+ENTRY = "handrail.scripts.__main__:main"  # of all commands
+
+
+@dataclass(frozen=True)
+class Job:
+    """What a command, or one of its verbs, does."""
+
+    help: str
+    """One line."""
+    settings: str
+    """`module:name` of the dataclass that its command line becomes; light to import."""
+    body: str
+    """`module:name` of `(settings) -> exit code or None`."""
+
+    @property
+    def config(self) -> type[Any]:
+        """The class of its settings."""
+        return resolved(f"handrail.{self.settings}")
+
+    def run(self, config: Any) -> int | None:
+        """Do it as configured; return the exit code."""
+        if callable(check := getattr(config, "check", None)):
+            check()
+        return resolved(f"handrail.{self.body}")(config)
+
+
+@dataclass(frozen=True)
+class Command:
+    """One command: `handrail-NAME`, or `handrail NAME`."""
+
+    help: str
+    """One line."""
+    job: Job | None = None
+    """What it does, if it has no verbs."""
+    verbs: Mapping[str, Job] = field(default_factory=dict)
+    """What it does, by the word that says it."""
+
+
+def _alone(help: str, settings: str, body: str) -> Command:
+    return Command(help, Job(help, settings, body))
+
+
+def _edit(config: str, help: str) -> Job:
+    return Job(help, f"datasets.editing.config:{config}", "scripts.dataset:edit")
+
+
+GROUPS: Mapping[str, Mapping[str, Command]] = {
+    "try it": {
+        "demo": _alone(
+            "record five episodes and show what came out",
+            "collect.commands.config:DemoConfig",
+            "collect.commands.demo:demo",
+        ),
+        "cockpit": _alone(
+            "drive a robot in a browser, and record it",
+            "collect.config:DriveConfig",
+            "scripts.session:record",
+        ),
+    },
+    "record": {
+        "record": _alone(
+            "record demonstrations as a LeRobot dataset",
+            "collect.config:RecordConfig",
+            "scripts.session:record",
+        ),
+        "replay": _alone(
+            "run a recorded episode again, and measure the deviation",
+            "collect.commands.config:ReplayConfig",
+            "scripts.session:replay",
+        ),
+        "devices": Command(
+            "gamepad, SpaceMouse, keyboard and leader arms at this computer",
+            verbs={
+                "list": Job(
+                    "what is plugged in",
+                    "collect.teleop_config:ListDevicesConfig",
+                    "collect.commands.devices:list_devices",
+                ),
+                "test": Job(
+                    "show what a device says",
+                    "collect.teleop_config:ShowDeviceConfig",
+                    "collect.commands.devices:show_device",
+                ),
+                "calibrate": Job(
+                    "which joint of a leader arm drives which joint of a robot",
+                    "collect.teleop_config:CalibrateConfig",
+                    "collect.devices.guided_calibration:calibrate",
+                ),
+            },
+        ),
+        "lekiwi": Command(
+            "a LeKiwi on the network",
+            verbs={
+                "host": Job(
+                    "simulate one, in LeRobot's own protocol",
+                    "collect.lekiwi.host_config:HostConfig",
+                    "collect.lekiwi.host:serve",
+                ),
+            },
+        ),
+    },
+    "look after datasets": {
+        "inspect": _alone(
+            "print the episodes, check them, find the worst",
+            "collect.commands.config:InspectConfig",
+            "scripts.dataset:inspect",
+        ),
+        "edit": Command(
+            "change, repair, pack and send datasets; every column stays",
+            verbs={
+                "delete": _edit("DeleteConfig", "leave out some --episodes"),
+                "keep": _edit("KeepConfig", "leave out all but some --episodes"),
+                "split": _edit("SplitConfig", "write --parts into folders of their own"),
+                "merge": Job(
+                    "write several datasets into one",
+                    "datasets.editing.pack_config:MergeConfig",
+                    "scripts.dataset:pack",
+                ),
+                "trim": _edit("TrimConfig", "cut off what is idle at both ends"),
+                "relabel": _edit("RelabelConfig", "say with --label how --episodes ended"),
+                "rename": _edit("RenameConfig", "give the task another sentence, --task"),
+                "pack": Job(
+                    "write a dataset into few large files",
+                    "datasets.editing.pack_config:PackConfig",
+                    "scripts.dataset:pack",
+                ),
+                "repair": Job(
+                    "mend what a crash or a disk did",
+                    "collect.commands.config:RepairConfig",
+                    "scripts.dataset:repair",
+                ),
+                "push": Job(
+                    "write its card, and send it to the hub or elsewhere",
+                    "collect.commands.config:PushConfig",
+                    "scripts.dataset:push",
+                ),
+            },
+        ),
+    },
+    "train policies": {
+        "train": _alone(
+            "train an imitation policy on a dataset",
+            "policies.imitation.config:TrainConfig",
+            "scripts.policy:train",
+        ),
+        "evaluate": _alone(
+            "let trained policies drive, protected and disturbed",
+            "policies.imitation.evaluation.config:EvaluateConfig",
+            "scripts.policy:evaluate",
+        ),
+    },
+    "compare": {
+        "compare": _alone(
+            "compare datasets, teleop modes or people, and write a report",
+            "datasets.comparison.config:CompareConfig",
+            "scripts.dataset:compare",
+        ),
+        "study": _alone(
+            "collect, train, evaluate and compare, from one design",
+            "policies.study.config:StudyConfig",
+            "policies.study.execution.run:run_study",
+        ),
+        "user-study": _alone(
+            "lead people through trials and forms",
+            "collect.user_study.config:StudySessionConfig",
+            "scripts.session:user_study",
+        ),
+    },
+}
+COMMANDS = {name: command for group in GROUPS.values() for name, command in group.items()}

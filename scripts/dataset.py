@@ -1,0 +1,122 @@
+"""Commands that look at datasets, change them and compare them."""
+
+from handrail.collect.commands.config import InspectConfig, PushConfig, RepairConfig
+from handrail.collect.commands.tables import quality_table, summary_table, worst_table
+from handrail.controllers.errors import FAILED
+from handrail.datasets.comparison.config import CompareConfig
+from handrail.datasets.editing.config import EditConfig
+from handrail.datasets.editing.pack_config import MergeConfig, PackConfig, packing_advice
+from handrail.datasets.presentation.terminal import Terminal
+from handrail.datasets.quality.worst import deletion, ranking_metric, worst_episodes
+from handrail.datasets.reading.check import check_report
+from handrail.datasets.reading.reader import read_info
+from handrail.datasets.recording import repair as mending
+
+
+def inspect(config: InspectConfig) -> int:
+    """Print a dataset's episodes as a table; return the exit code."""
+    console, root = Terminal(), config.dataset.folder
+    faults: list[str] = []
+    if config.repair:
+        report = mending.repair(root)
+        faults += report.damage
+        console.print(str(report))
+    if config.check:
+        found = check_report(root)
+        faults += found
+        console.print(*(found or ["checked: everything is as it was saved"]), sep="\n")
+    if faults:
+        return FAILED
+    if config.worst:
+        metric = ranking_metric(config.worst)
+        worst = worst_episodes(root, metric, config.count)
+        console.print(worst_table(root, metric, worst))
+        leave_out = deletion(read_info(root), [each.episode.number for each in worst])
+        console.print(f"Without them: {leave_out}")
+        return 0
+    console.print(summary_table(root))
+    if config.quality:
+        console.print(quality_table(root))
+    return 0
+
+
+def edit(config: EditConfig) -> None:
+    """Edit a dataset's episodes."""
+    from handrail.datasets.editing.edit import edit
+
+    Terminal().print(*map(str, edit(config)), sep="\n")
+
+
+def pack(config: PackConfig | MergeConfig) -> None:
+    """Write one dataset, or several, into few large files."""
+    roots, target = config.roots, config.target
+    from handrail.datasets.editing.pack import merge_datasets
+
+    Terminal().print(str(merge_datasets(roots, target, config.name, config.verify)))
+
+
+def repair(config: RepairConfig) -> int:
+    """Mend a dataset; return 0 only if everything that was saved is in it and whole."""
+    report = mending.repair(config.dataset.folder, config.set_aside)
+    Terminal().print(str(report))
+    return 0 if report.complete else FAILED
+
+
+def push(config: PushConfig) -> None:
+    """Write a dataset's card, print what would be sent, and send it when asked."""
+    from handrail.datasets.editing.push import prepare, upload
+    from handrail.datasets.editing.store import copy
+
+    dataset = config.dataset
+    settings = config.license, config.private, config.verify, config.to
+    push = prepare(dataset.folder, dataset.repo_id, *settings)
+    say = Terminal().print
+    say(str(push))
+    if advice := packing_advice(dataset.folder):
+        say(advice)
+    if config.upload:
+        send = copy if config.to else upload
+        send(push)
+        say(f"sent to {config.to}" if config.to else f"sent as {push.repo_id}")
+    else:
+        say("nothing was sent; --upload sends it")
+
+
+def compare(config: CompareConfig) -> int:
+    """Compare datasets, or people, and write a report; return the exit code."""
+    console = Terminal()
+    if config.study:
+        return _compare_people(config, console)
+    from handrail.datasets.comparison.cautions import cautions
+    from handrail.datasets.comparison.compare import compare
+    from handrail.datasets.comparison.headline import headline
+    from handrail.datasets.comparison.report.report import write_report
+    from handrail.datasets.comparison.report.tables import answer_tables
+
+    comparison = compare(config)
+    files = write_report(comparison)
+    console.print(headline(comparison))
+    console.print()
+    for table in answer_tables(comparison):
+        console.print(table)
+    for text in cautions(comparison):
+        console.print(f"! {text}")
+    console.print()
+    console.print("Written: " + ", ".join(map(str, files)))
+    return 0
+
+
+def _compare_people(config: CompareConfig, console: Terminal) -> int:
+    from handrail.datasets.comparison.people.people import compare_people
+    from handrail.datasets.comparison.people.report import write_people_report
+    from handrail.datasets.comparison.people.tables import people_tables
+
+    comparison = compare_people(config)
+    for table in people_tables(comparison):
+        console.print(table)
+    for text in comparison.cautions:
+        console.print(f"! {text}")
+    files = write_people_report(comparison)
+    console.print()
+    console.print("Written: " + ", ".join(map(str, files)))
+    return 0
