@@ -166,7 +166,7 @@ GROUPS: Mapping[str, Mapping[str, Command]] = {
         "study": _alone(
             "collect, train, evaluate and compare, from one design",
             "policies.study.config:StudyConfig",
-            "policies.study.execution.run:run_study",
+            "policies.study.run:run_study",
         ),
         "user-study": _alone(
             "lead people through trials and forms",

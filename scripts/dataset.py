@@ -86,37 +86,25 @@ def compare(config: CompareConfig) -> int:
     """Compare datasets, or people, and write a report; return the exit code."""
     console = Terminal()
     if config.study:
-        return _compare_people(config, console)
-    from handrail.datasets.comparison.cautions import cautions
-    from handrail.datasets.comparison.compare import compare
-    from handrail.datasets.comparison.headline import headline
-    from handrail.datasets.comparison.report.report import write_report
-    from handrail.datasets.comparison.report.tables import answer_tables
+        from handrail.datasets.comparison.people import compare_people, write_people_report
 
-    comparison = compare(config)
-    files = write_report(comparison)
-    console.print(headline(comparison))
-    console.print()
-    for table in answer_tables(comparison):
+        people = compare_people(config)
+        tables, cautions, files = people.tables, people.cautions, write_people_report(people)
+    else:
+        from handrail.datasets.comparison import headline
+        from handrail.datasets.comparison.compare import compare
+        from handrail.datasets.comparison.page import write_comparison
+        from handrail.datasets.comparison.tables import answer_tables
+
+        comparison = compare(config)
+        tables, cautions = answer_tables(comparison), headline.cautions(comparison)
+        files = write_comparison(comparison)
+        console.print(headline.headline(comparison))
+        console.print()
+    for table in tables:
         console.print(table)
-    for text in cautions(comparison):
+    for text in cautions:
         console.print(f"! {text}")
-    console.print()
-    console.print("Written: " + ", ".join(map(str, files)))
-    return 0
-
-
-def _compare_people(config: CompareConfig, console: Terminal) -> int:
-    from handrail.datasets.comparison.people.people import compare_people
-    from handrail.datasets.comparison.people.report import write_people_report
-    from handrail.datasets.comparison.people.tables import people_tables
-
-    comparison = compare_people(config)
-    for table in people_tables(comparison):
-        console.print(table)
-    for text in comparison.cautions:
-        console.print(f"! {text}")
-    files = write_people_report(comparison)
     console.print()
     console.print("Written: " + ", ".join(map(str, files)))
     return 0

@@ -8,15 +8,14 @@ import numpy as np
 
 from handrail.controllers.arrays import FloatArray, IntArray
 from handrail.datasets.comparison.groups import Group
+from handrail.datasets.statistics.contrast import RATIO, SHARE, Contrast, Measure
 from handrail.datasets.statistics.paired import wilson
-from handrail.datasets.statistics.proportions import (
-    LEVEL,
-    ShareDifference,
-    holm,
-    paired_shares,
-    unpaired_shares,
-)
+from handrail.datasets.statistics.proportions import paired_shares, unpaired_shares
 from handrail.datasets.statistics.resampling import FEWEST, Interval, bootstrap, permutation_p
+
+COLLECTING = "collecting"
+SUCCESS = Measure("success", "success while collecting", SHARE)
+HOURLY = Measure("successes_an_hour", "successes an operator hour", RATIO)
 
 
 @dataclass(frozen=True)
@@ -24,13 +23,10 @@ class Collected:
     """One group.
 
     Attributes:
-        label: Its name.
-        episodes: Number recorded.
         successes: How many succeeded; None where success was not recorded for all.
         success_interval: Wilson, 95 %.
         operator_time: Of all episodes, failures included: frames over frames a second [s]. Resets between
             episodes are not recorded.
-        frames: Number.
         reasons: Why episodes failed, and how many of each.
     """
 
@@ -94,16 +90,19 @@ def _starts(group: Group) -> dict[tuple[str, int], int]:
     return {key: place for place, key in enumerate(keys)}
 
 
-def success_difference(group: Group, baseline: Group) -> ShareDifference | None:
-    """Return how success in collection differs from the baseline's; None where it was not recorded."""
+def success_difference(group: Group, baseline: Group) -> Contrast:
+    """Return how success in collection differs from the baseline's."""
+    names = {"measure": SUCCESS, "label": group.label, "baseline": baseline.label}
+    names |= {"scope": COLLECTING, "family": SUCCESS.title}
     results = [[episode.success for episode in each.episodes] for each in (group, baseline)]
     if any(result is None for each in results for result in each):
-        return None
+        return Contrast(**names, reason="success was not recorded for all")
     one, other = [list(map(bool, each)) for each in results]
-    pairs = shared_seeds(group, baseline)
-    if pairs:
-        return paired_shares([one[i] for i, _ in pairs], [other[j] for _, j in pairs])
-    return unpaired_shares(one, other)
+    if pairs := shared_seeds(group, baseline):
+        return Contrast(
+            **names, **vars(paired_shares([one[i] for i, _ in pairs], [other[j] for _, j in pairs]))
+        )
+    return Contrast(**names, **vars(unpaired_shares(one, other)))
 
 
 def matched_number(groups: Sequence[Group]) -> list[Group]:
@@ -118,21 +117,6 @@ def matched_time(groups: Sequence[Group]) -> list[Group]:
     return [group.within(seconds) for group in groups]
 
 
-@dataclass(frozen=True)
-class RateRatio:
-    """Successes an hour of a group over those of the baseline.
-
-    Attributes:
-        estimate: The ratio.
-        interval: 95 %, bootstrap over episodes.
-        p: Permutation test, two-sided.
-    """
-
-    estimate: float
-    interval: Interval
-    p: float
-
-
 def rate_interval(group: Group, rng: np.random.Generator) -> Interval | None:
     """Return the 95 % bootstrap interval of successes an hour; None where it cannot be told."""
     successes, seconds = _numbers(group)
@@ -141,20 +125,17 @@ def rate_interval(group: Group, rng: np.random.Generator) -> Interval | None:
     return bootstrap((successes, seconds), _rate, True, rng)
 
 
-def rate_ratio(group: Group, baseline: Group, rng: np.random.Generator) -> RateRatio | None:
-    """Return how many times as many successes an hour there are; None where it cannot be told.
+def rate_ratio(group: Group, baseline: Group, rng: np.random.Generator) -> Contrast:
+    """Return how many times as many successes an hour there are.
 
     Σ success / Σ time of one over that of the other, episodes resampled, as pairs where all began alike.
-
-    Args:
-        group: One group.
-        baseline: The other.
-        rng: Of the resampling.
     """
+    names = {"measure": HOURLY, "label": group.label, "baseline": baseline.label, "null": 1.0}
+    names |= {"scope": COLLECTING, "family": HOURLY.title}
     pairs, counts = shared_seeds(group, baseline), (len(group.episodes), len(baseline.episodes))
     numbers = [_numbers(group), _numbers(baseline)]
     if min(counts) < FEWEST or not all(np.isfinite(s).all() and s.any() for s, _ in numbers):
-        return None
+        return Contrast(**names, reason="too few episodes, or none that is known to have succeeded")
     successes, seconds = (np.concatenate(each) for each in zip(*numbers, strict=True))
     places = np.arange(counts[0]), counts[0] + np.arange(counts[1])
     if pairs:
@@ -173,19 +154,14 @@ def rate_ratio(group: Group, baseline: Group, rng: np.random.Generator) -> RateR
 
     low, high = bootstrap(places, share, bool(pairs), rng)  # of both, which is finite even without successes
     one, other = rates(places, -1)
-    interval = low * _over(1.0 - low), high * _over(1.0 - high)
-    return RateRatio(float(one / other), interval, permutation_p(places, difference, bool(pairs), rng))
-
-
-def adjusted(found: Mapping[str, ShareDifference | RateRatio | None]) -> dict[str, float]:
-    """Return p after Holm over the groups that have one, by label."""
-    known = {label: each.p for label, each in found.items() if each}
-    return dict(zip(known, holm(list(known.values())), strict=True))
-
-
-def detected(interval: Interval, p: float, none: float = 0.0) -> bool:
-    """Return whether an interval leaves `none` out and an adjusted p is below 0.05."""
-    return p < LEVEL and not interval[0] <= none <= interval[1]
+    return Contrast(
+        **names,
+        estimate=float(one / other),
+        interval=(low * _over(1.0 - low), high * _over(1.0 - high)),
+        p=permutation_p(places, difference, bool(pairs), rng),
+        counts=counts,
+        paired=bool(pairs),
+    )
 
 
 def _numbers(group: Group) -> tuple[FloatArray, FloatArray]:

@@ -1,4 +1,4 @@
-"""The whole comparison: read, measure, judge."""
+"""The comparison of datasets, and of the policies that were trained on them: read, measure, judge."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -8,7 +8,6 @@ import numpy as np
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.comparison.collection import (
     Collected,
-    RateRatio,
     collected,
     matched_number,
     matched_time,
@@ -17,17 +16,16 @@ from handrail.datasets.comparison.collection import (
     success_difference,
 )
 from handrail.datasets.comparison.config import CompareConfig
-from handrail.datasets.comparison.differences import Difference, differences
+from handrail.datasets.comparison.episodes import MetricContrast, differences
 from handrail.datasets.comparison.evaluations import Condition, read_evaluations
 from handrail.datasets.comparison.groups import Group, baseline_of, group_of, load_groups, unlike
-from handrail.datasets.comparison.outcomes import LIKE_FOR_LIKE, Outcomes, Pair, judge_pairs
-from handrail.datasets.quality.group_reading import GroupReading
+from handrail.datasets.comparison.policies import Outcomes, judge_pairs, pairs_between
 from handrail.datasets.quality.measure import Measurements, measured, read
 from handrail.datasets.reading.check import check_whole
-from handrail.datasets.statistics.proportions import ShareDifference
+from handrail.datasets.statistics.contrast import Contrast, adjusted
 from handrail.datasets.statistics.resampling import Interval
 
-MIXED = "mixed"  # family of policies that differ in more than their data
+ALL = "all episodes"
 _SAME_NUMBER = "the same number of episodes"
 
 
@@ -47,7 +45,7 @@ class EpisodeChoice:
     groups: Sequence[Group]
     collected: Sequence[Collected]
     measurements: Measurements
-    differences: Sequence[Difference]
+    differences: Sequence[MetricContrast]
 
 
 @dataclass(frozen=True)
@@ -55,10 +53,9 @@ class Comparison:
     """What was found.
 
     Attributes:
-        config: What was asked.
         baseline: The label that the others are compared with.
         views: All episodes, as many of each, as much operator time of each.
-        success: In collection: each group's difference to the baseline, None where it was not recorded.
+        success: In collection, each group against the baseline, by label.
         rates: Each group's interval of successes an hour, None where it cannot be told.
         ratios: Successes an hour of each group over those of the baseline.
         outcomes: Of trained policies, if evaluations were given.
@@ -67,20 +64,15 @@ class Comparison:
     config: CompareConfig
     baseline: str
     views: Sequence[EpisodeChoice]
-    success: Mapping[str, ShareDifference | None]
+    success: Mapping[str, Contrast]
     rates: Mapping[str, Interval | None]
-    ratios: Mapping[str, RateRatio | None]
+    ratios: Mapping[str, Contrast]
     outcomes: Outcomes | None
 
     @property
     def everything(self) -> EpisodeChoice:
         """The view of all episodes."""
         return self.views[0]
-
-    @property
-    def same_number(self) -> EpisodeChoice:
-        """The view of as many episodes of each group."""
-        return self.views[1]
 
     @property
     def labels(self) -> list[str]:
@@ -91,6 +83,17 @@ class Comparison:
     def unlike(self) -> tuple[str, ...]:
         """What differs so that nothing is ranked: tasks, robots."""
         return unlike(self.everything.groups)
+
+    @property
+    def metric_contrasts(self) -> list[MetricContrast]:
+        """Differences of every metric in every view."""
+        return [each for view in self.views for each in view.differences]
+
+    @property
+    def contrasts(self) -> list[Contrast]:
+        """All that is compared."""
+        policies = self.outcomes.differences if self.outcomes else ()
+        return [*policies, *self.success.values(), *self.ratios.values(), *self.metric_contrasts]
 
 
 def compare(config: CompareConfig) -> Comparison:
@@ -104,7 +107,7 @@ def compare(config: CompareConfig) -> Comparison:
     pairs = pairs_between(list(conditions), baseline, [group.label for group in groups])
     rng = np.random.default_rng(config.seed)
     chosen = {
-        "all episodes": groups,
+        ALL: groups,
         _SAME_NUMBER: matched_number(groups),
         "the same operator time": matched_time(groups),
     }
@@ -112,17 +115,20 @@ def compare(config: CompareConfig) -> Comparison:
     readings = read(
         [{group.label: group.episodes for group in each} for each in counted.values()], config.margin
     )
-    views = [
-        _view(title, chosen[title], counted[title], each, baseline, rng)
-        for title, each in zip(chosen, readings, strict=True)
-    ]
+    views = []
+    for title, reading in zip(chosen, readings, strict=True):
+        measurements = measured(reading, rng)
+        found = differences(title, counted[title], measurements, baseline, rng)
+        numbers = [collected(group) for group in chosen[title]]
+        views.append(EpisodeChoice(title, counted[title], numbers, measurements, found))
     (base,) = [group for group in groups if group.label == baseline]
     others = [group for group in groups if group is not base]
-    success = {group.label: success_difference(group, base) for group in others}
+    success = adjusted(success_difference(group, base) for group in others)
     rates = {group.label: rate_interval(group, rng) for group in groups}
-    ratios = {group.label: rate_ratio(group, base, rng) for group in others}
+    ratios = adjusted([rate_ratio(group, base, rng) for group in others])
     outcomes = judge_pairs(conditions, pairs, rng) if conditions else None
-    return Comparison(config, baseline, views, success, rates, ratios, outcomes)
+    by_label = [{each.label: each for each in found} for found in (success, ratios)]
+    return Comparison(config, baseline, views, by_label[0], rates, by_label[1], outcomes)
 
 
 def _counted(title: str, groups: Sequence[Group], config: CompareConfig) -> list[Group]:
@@ -136,19 +142,6 @@ def _counted(title: str, groups: Sequence[Group], config: CompareConfig) -> list
     return counted
 
 
-def _view(
-    title: str,
-    groups: Sequence[Group],
-    counted: Sequence[Group],
-    readings: Mapping[str, GroupReading],
-    baseline: str,
-    rng: np.random.Generator,
-) -> EpisodeChoice:
-    measurements = measured(readings, rng)
-    found = differences(counted, measurements, baseline, rng)
-    return EpisodeChoice(title, counted, [collected(group) for group in groups], measurements, found)
-
-
 def _conditions(config: CompareConfig, groups: Sequence[Group]) -> dict[str, Condition]:
     """Return the evaluations' conditions; each must say which group its policies were trained on."""
     conditions = read_evaluations(config.evaluations)
@@ -160,29 +153,3 @@ def _conditions(config: CompareConfig, groups: Sequence[Group]) -> dict[str, Con
                 " or one of these with more after a space"
             )
     return conditions
-
-
-def pairs_between(conditions: Sequence[str], baseline: str, labels: Sequence[str]) -> list[Pair]:
-    """Return each condition of another group with that of the baseline's group it is compared with.
-
-    That is the one that shares most of the words after the label and has none of its own: `ee intent same
-    number` is set against `direct same number`, not `direct`. Like for like are those with the same words. A
-    single condition is compared with nothing.
-    """
-    words = {
-        condition: set(condition.removeprefix(group_of(condition, labels)).strip(" /").split())
-        for condition in conditions
-    }
-    candidates = [condition for condition in conditions if group_of(condition, labels) == baseline]
-    found = []
-    for condition in conditions if len(conditions) > 1 else ():
-        fitting = [each for each in candidates if words[each] <= words[condition]]
-        if condition not in candidates and not fitting:
-            raise HandrailError(
-                f"evaluations: expected a condition {baseline!r} to compare {condition!r} with, got "
-                f"{', '.join(conditions)}; name another --baseline"
-            )
-        if condition not in candidates:
-            other = max(fitting, key=lambda each: len(words[each]))
-            found.append(Pair(condition, other, LIKE_FOR_LIKE if words[other] == words[condition] else MIXED))
-    return found

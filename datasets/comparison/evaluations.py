@@ -3,7 +3,7 @@
     {
       "format": "handrail.evaluations/1",
       "task": "reach",                              what was evaluated, optional
-      "arms": {
+      "arms": {                                      the conditions
         "ee": [                                     a dataset's or a mode's label
           {
             "training_seed": 0,
@@ -19,19 +19,43 @@ A rollout needs `seed` and `success`; other numbers (`contacts`, `length` [s], â
 where every rollout of a condition has them. Several files add up; the same rollout twice is an error.
 """
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
+import msgspec
 import numpy as np
+from msgspec import Meta
 
 from handrail.controllers.errors import HandrailError
+from handrail.controllers.typed import check
 from handrail.datasets.statistics.resampling import Run
-from handrail.datasets.storage.strict_json import read_json
+from handrail.datasets.storage.strict_json import load_json
 
 FORMAT = "handrail.evaluations/1"
 SUCCESS = "success"
+Rollout = Mapping[str, Any]
+OUTCOMES: Mapping[str, Callable[[Rollout], float]] = {
+    "contact": lambda row: row.get("contacts", 0) > 0,
+    "clean": lambda row: row[SUCCESS] and not row.get("contacts", 0) > 0,
+}
+"""What follows from what a rollout's line says."""
+
+
+class _Rollout(msgspec.Struct):
+    seed: int
+    success: bool
+
+
+class _Policy(msgspec.Struct):
+    training_seed: int
+    rollouts: Annotated[list[dict[str, Any]], Meta(min_length=1)]
+    dataset_draw: int = 0
+    trained_on: dict[str, float] | None = None
+
+
+_Policies = Annotated[list[_Policy], Meta(min_length=1)]
 
 
 @dataclass(frozen=True)
@@ -42,105 +66,75 @@ class Policy:
         draw: Which draw of the dataset it was trained on.
         training_seed: Of its training.
         trained_on: Numbers about the data, such as `episodes` and `operator_time`.
-        rollouts: By evaluation seed, each outcome's value by name.
+        rollouts: Lines of the file, by evaluation seed.
     """
 
     draw: int
     training_seed: int
     trained_on: Mapping[str, float]
-    rollouts: Mapping[int, Mapping[str, float]]
+    rollouts: Mapping[int, Rollout]
 
-    @property
-    def key(self) -> tuple[int, int]:
-        """Draw of the dataset and training seed."""
-        return self.draw, self.training_seed
+    def run(self, outcome: str = SUCCESS) -> Run:
+        """Return one outcome of all rollouts."""
+        read = OUTCOMES.get(outcome, lambda row: row[outcome])
+        seeds = tuple(sorted(self.rollouts))
+        values = np.array([float(read(self.rollouts[seed])) for seed in seeds])
+        return Run(self.draw, self.training_seed, seeds, values)
 
 
 @dataclass(frozen=True)
 class Condition:
-    """All policies of one dataset or mode.
-
-    Attributes:
-        label: Its name.
-        policies: In the order of the files.
-    """
+    """All policies of one dataset or mode, in the order of the files."""
 
     label: str
     policies: tuple[Policy, ...]
 
     @property
+    def rollouts(self) -> list[Rollout]:
+        """The lines of all rollouts."""
+        return [rollout for policy in self.policies for rollout in policy.rollouts.values()]
+
+    @property
     def outcomes(self) -> tuple[str, ...]:
         """Outcomes that every rollout has, success first."""
-        rollouts = [rollout for policy in self.policies for rollout in policy.rollouts.values()]
-        common = set.intersection(*(set(rollout) for rollout in rollouts))
-        return (SUCCESS, *sorted(common - {SUCCESS}))
+        numbers = [
+            {name for name, value in rollout.items() if isinstance(value, bool | int | float)}
+            for rollout in self.rollouts
+        ]
+        return (SUCCESS, *sorted(set.intersection(*numbers) - {SUCCESS, "seed"}))
 
     def runs(self, outcome: str = SUCCESS) -> list[Run]:
         """Return one outcome of all policies."""
-        found = []
-        for policy in self.policies:
-            seeds = tuple(sorted(policy.rollouts))
-            values = np.array([policy.rollouts[seed][outcome] for seed in seeds], float)
-            found.append(Run(*policy.key, seeds, values))
-        return found
+        return [policy.run(outcome) for policy in self.policies]
 
 
 def read_evaluations(paths: Iterable[str | Path]) -> dict[str, Condition]:
     """Return the conditions of evaluation files by label, in the order in which they come."""
-    policies: dict[str, dict[tuple[int, int], Policy]] = {}
+    found: dict[str, dict[tuple[int, int], Policy]] = {}
     for path in map(Path, paths):
-        for label, entries in _content(path)["arms"].items():
-            where = f"evaluations {str(path)!r}: condition {label!r}"
-            _add_all(policies.setdefault(label, {}), entries, where)
-    return {label: Condition(label, tuple(known.values())) for label, known in policies.items()}
+        where = f"evaluations {str(path)!r}"
+        content = load_json(path.expanduser(), "evaluations of policies")
+        given = content.get("format") if isinstance(content, dict) else None
+        if given != FORMAT:
+            raise HandrailError(f"{where}: expected the format {FORMAT!r}, got {given!r}")
+        arms = content.get("arms")
+        if not isinstance(arms, dict) or not arms:
+            raise HandrailError(f"{where}: expected 'arms' with one label or more")
+        for label, entries in arms.items():
+            of = f"{where}: condition {label!r}"
+            for entry in check(entries, _Policies, of):
+                _add(found.setdefault(label, {}), entry, of)
+    return {label: Condition(label, tuple(known.values())) for label, known in found.items()}
 
 
-def _add_all(known: dict[tuple[int, int], Policy], entries: Any, where: str) -> None:
-    if not isinstance(entries, list) or not entries:
-        raise HandrailError(f"{where}: expected a list of trained policies, got {type(entries).__name__}")
-    try:
-        for entry in entries:
-            _add(known, entry, where)
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise HandrailError(
-            f"{where}: expected 'training_seed' and 'rollouts' with 'seed' and 'success', got {error!r}"
-        ) from error
-
-
-def _add(known: dict[tuple[int, int], Policy], entry: dict[str, Any], where: str) -> None:
+def _add(known: dict[tuple[int, int], Policy], entry: _Policy, where: str) -> None:
     """Add a policy's rollouts to those known of it."""
-    trained_on = {name: float(value) for name, value in (entry.get("trained_on") or {}).items()}
-    policy = Policy(int(entry.get("dataset_draw", 0)), int(entry["training_seed"]), trained_on, {})
-    rollouts = dict(known.get(policy.key, policy).rollouts)
-    for rollout in entry["rollouts"]:
-        seed = int(rollout["seed"])
+    key = entry.dataset_draw, entry.training_seed
+    rollouts = dict(known[key].rollouts) if key in known else {}
+    for row in entry.rollouts:
+        seed = check(row, _Rollout, f"{where}, a rollout").seed
         if seed in rollouts:
-            raise HandrailError(
-                f"{where}, training seed {policy.training_seed}: the rollout with seed {seed} comes twice"
-            )
-        rollouts[seed] = _outcomes(rollout, where)
-    if not entry["rollouts"]:
-        raise HandrailError(f"{where}: expected one rollout or more, got none")
-    known[policy.key] = replace(known.get(policy.key, policy), rollouts=rollouts)
-
-
-def _outcomes(rollout: Mapping[str, Any], where: str) -> dict[str, float]:
-    if not isinstance(rollout[SUCCESS], bool):
-        raise HandrailError(f"{where}: expected 'success' true or false, got {rollout[SUCCESS]!r}")
-    numbers = {name: value for name, value in rollout.items() if isinstance(value, bool | int | float)}
-    return {name: float(value) for name, value in numbers.items() if name != "seed"}
-
-
-def _content(path: Path) -> dict[str, Any]:
-    try:
-        content = read_json(path.expanduser())
-    except FileNotFoundError as error:
-        raise HandrailError(f"evaluations {str(path)!r}: expected a JSON file, found none") from error
-    except (OSError, ValueError) as error:
-        raise HandrailError(f"evaluations {str(path)!r}: expected a JSON file, got {error}") from error
-    given = content.get("format") if isinstance(content, dict) else None
-    if given != FORMAT:
-        raise HandrailError(f"evaluations {str(path)!r}: expected the format {FORMAT!r}, got {given!r}")
-    if not isinstance(content.get("arms"), dict) or not content["arms"]:
-        raise HandrailError(f"evaluations {str(path)!r}: expected 'arms' with one label or more")
-    return content
+            raise HandrailError(f"{where}, training seed {key[1]}: the rollout with seed {seed} comes twice")
+        rollouts[seed] = row
+    trained_on = known[key].trained_on if key in known else entry.trained_on or {}
+    known[key] = Policy(*key, trained_on, rollouts)

@@ -39,14 +39,14 @@ def percent_span(interval: tuple[float, float] | None) -> str:
     return DASH if interval is None else f"{100 * interval[0]:.0f} to {100 * interval[1]:.0f} %"
 
 
-def points(difference: float) -> str:
-    """Return a difference of shares in percentage points."""
-    return f"{100 * difference:+.0f}".replace("-", "−")
+def points(difference: float | None) -> str:
+    """Return a difference of shares in percentage points, or a dash."""
+    return DASH if difference is None else f"{100 * difference:+.0f}".replace("-", "−")
 
 
-def points_span(interval: tuple[float, float]) -> str:
+def points_span(interval: tuple[float, float] | None) -> str:
     """Return an interval of a difference of shares in percentage points."""
-    return f"{points(interval[0])} to {points(interval[1])}"
+    return DASH if interval is None else f"{points(interval[0])} to {points(interval[1])}"
 
 
 def p_value(p: float) -> str:

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -132,6 +133,12 @@ class Measured:
     def mean(self) -> float | None:
         """Over the episodes to which it applies; None without any."""
         return float(self.known.mean()) if self.applies else None
+
+    @property
+    def content(self) -> dict[str, Any]:
+        """What a report's JSON has."""
+        numbers = {"count": len(self.known), "mean": self.mean, "interval": self.interval}
+        return numbers | {"reason": self.reason}
 
 
 @dataclass(frozen=True)

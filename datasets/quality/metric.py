@@ -10,6 +10,7 @@ from handrail.controllers.arrays import FloatArray
 from handrail.datasets.quality.pool import ObservationPool
 from handrail.datasets.quality.sample import Sample
 from handrail.datasets.reading.demonstration import Demonstration
+from handrail.datasets.statistics.contrast import Measure
 
 Needs = Literal["", "motion", "position", "action", "controller", "pool"]
 OfEpisode = Callable[[Demonstration, ObservationPool], float]
@@ -17,27 +18,17 @@ OfGroup = Callable[[Sample, ObservationPool, np.random.Generator], FloatArray]
 
 
 @dataclass(frozen=True)
-class Metric:
+class Metric(Measure):
     """A measure of quality.
 
     Attributes:
-        name: Its name in JSON and CSV.
-        title: What people call it.
-        unit: Of its values; "" for a pure number.
-        good: "higher" or "lower" where everything else being equal that is better; "" where it is not so.
-        meaning: One sentence.
         needs: What its unit hangs on, see `units.why_not`; "" where it has a unit of its own; "pool" for
             whatever looks at more of the pool than its margin.
         measure: Its value for one episode, or None.
-        measure_group: Its values for frames that stand for a group, for what needs the other episodes; or
+        measure_group: Its values for frames that stand for a dataset, for what needs the other episodes; or
             None. Such values depend on how many there are and, through shared neighbours, on each other.
     """
 
-    name: str
-    title: str
-    unit: str
-    good: str
-    meaning: str
     needs: Needs = ""
     measure: OfEpisode | None = None
     measure_group: OfGroup | None = None

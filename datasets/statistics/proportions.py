@@ -6,58 +6,14 @@ data" (2635–2650), method 10 of each.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from scipy import stats
 
 from handrail.controllers.arrays import FloatArray, IntArray
+from handrail.datasets.statistics.contrast import Estimate
 from handrail.datasets.statistics.paired import paired_success, wilson
 from handrail.datasets.statistics.resampling import Interval
-
-LEVEL = 0.05  # below which a p that is adjusted for their number counts
-POWER = 0.8
-
-
-@dataclass(frozen=True)
-class ShareDifference:
-    """How two shares differ, first minus second.
-
-    Attributes:
-        estimate: Of the difference, −1 to 1.
-        interval: 95 %, Newcombe's method 10; trials of one scene count for as many as they are worth.
-        p: Two-sided, exact: McNemar's where paired, else Boschloo's; trials of one scene are one observation.
-        paired: Whether the same trials were made under both.
-        trials: Pairs, or trials of the first and of the second.
-        error: Standard error of the difference if there were none, of shares that are never quite 0 or 1.
-    """
-
-    estimate: float
-    interval: Interval
-    p: float
-    paired: bool
-    trials: tuple[int, ...]
-    error: float
-
-    def detectable(self, tests: int = 1) -> float:
-        """Return the difference that would be seen as one in 80 % of such experiments.
-
-        Args:
-            tests: Number of comparisons that the p is adjusted for.
-        """
-        return min(1.0, reach(tests) * self.error)
-
-
-def reach(tests: int = 1, freedom: float = np.inf) -> float:
-    """Return how many standard errors a difference has to have, to be detected in 80 % of experiments.
-
-    t_{1 − α/2m} + t_{0.8}, of the t distribution; m tests, of which Holm gives the smallest p the level α/m.
-
-    Args:
-        tests: m.
-        freedom: Degrees of freedom with which the standard error is known; ∞ is the normal distribution.
-    """
-    return float(stats.t.ppf(1.0 - 0.5 * LEVEL / max(1, tests), freedom) + stats.t.ppf(POWER, freedom))
 
 
 def independent_trials(values: FloatArray, scenes: Sequence[int]) -> float:
@@ -82,7 +38,7 @@ def independent_trials(values: FloatArray, scenes: Sequence[int]) -> float:
 
 def paired_shares(
     first: Sequence[bool], second: Sequence[bool], scenes: Sequence[int] | None = None
-) -> ShareDifference:
+) -> Estimate:
     """Compare successes of the same trials under two conditions.
 
     Args:
@@ -99,13 +55,14 @@ def paired_shares(
     cells = [worth * count for count in (both, found.only_first, found.only_second, neither)]
     pairs = sum(cells)
     discordant = (cells[1] + cells[2] + 2.0) / (pairs + 4.0)
-    return ShareDifference(
+    return Estimate(
         estimate=(found.only_first - found.only_second) / found.pairs,
         interval=newcombe_paired(*cells),
         p=mcnemar_by_scene(differences, scenes),
+        counts=(found.pairs,),
+        errors=((float(np.sqrt(discordant / pairs)), np.inf),),
         paired=True,
-        trials=(found.pairs,),
-        error=float(np.sqrt(discordant / pairs)),
+        largest=1.0,
     )
 
 
@@ -134,7 +91,7 @@ def unpaired_shares(
     first: Sequence[bool],
     second: Sequence[bool],
     scenes: tuple[Sequence[int], Sequence[int]] | None = None,
-) -> ShareDifference:
+) -> Estimate:
     """Compare successes of different trials under two conditions.
 
     Args:
@@ -152,13 +109,13 @@ def unpaired_shares(
     table = [hits, [count - hit for count, hit in zip(trials, hits, strict=True)]]
     share = (one[0] + other[0] + 2) / (one[1] + other[1] + 4)
     spread = np.sqrt(share * (1 - share) * (1 / worth[0] + 1 / worth[1]))
-    return ShareDifference(
+    return Estimate(
         estimate=shares[0] - shares[1],
         interval=newcombe((shares[0] * worth[0], worth[0]), (shares[1] * worth[1], worth[1])),
         p=float(stats.boschloo_exact(table).pvalue),
-        paired=False,
-        trials=(one[1], other[1]),
-        error=float(spread),
+        counts=(one[1], other[1]),
+        errors=((float(spread), np.inf),),
+        largest=1.0,
     )
 
 
@@ -194,22 +151,6 @@ def newcombe(first: tuple[float, float], second: tuple[float, float], phi: float
         difference - _combined(share_1 - low_1, high_2 - share_2, phi),
         difference + _combined(high_1 - share_1, share_2 - low_2, phi),
     )
-
-
-def holm(p: Sequence[float]) -> list[float]:
-    """Return p-values adjusted for there being several (Holm 1979): p'_(i) = max_{j ≤ i} (m − j + 1) p_(j).
-
-    Args:
-        p: `(m,)`.
-
-    Returns:
-        In the same order, at most 1.
-    """
-    order = np.argsort(p)
-    steps = np.arange(len(p), 0, -1) * np.asarray(p, float)[order]
-    adjusted = np.empty(len(p))
-    adjusted[order] = np.minimum(1.0, np.maximum.accumulate(steps))
-    return adjusted.tolist()
 
 
 def _correlation(both: float, only_first: float, only_second: float, neither: float) -> float:

@@ -10,6 +10,7 @@ import numpy as np
 from scipy import stats
 
 from handrail.controllers.arrays import FloatArray
+from handrail.datasets.statistics.contrast import Estimate
 from handrail.datasets.statistics.resampling import Interval, Run
 
 _SUCCESSES, _TRIALS = 2.0, 4.0  # added, so that a share is never quite 0 or 1 (Agresti and Coull)
@@ -79,3 +80,34 @@ def welch_p(first: Sequence[Run], second: Sequence[Run]) -> float:
     error, freedom = standard_error((first, second))
     difference = float(replicates(first).mean() - replicates(second).mean())
     return 2.0 * float(stats.t.sf(abs(difference) / error, freedom))
+
+
+def student(values: FloatArray | Sequence[float], least: float) -> Estimate:
+    """Return the mean of replicates, with error √(max(s², v) / n) and n − 1 degrees of freedom.
+
+    Args:
+        values: of each replicate, `(n,)`.
+        least: v, the variance that a replicate has at least: a few may agree by chance.
+    """
+    values = np.asarray(values, float)
+    mean, count = float(values.mean()), len(values)
+    if count < 2:
+        return Estimate(estimate=mean, counts=(count,))
+    error = float(np.sqrt(max(float(values.var(ddof=1)), least) / count))
+    p = 2.0 * float(stats.t.sf(abs(mean) / error, count - 1)) if error else float(mean == 0.0)
+    interval = t_interval(mean, error, count - 1)
+    return Estimate(
+        estimate=mean, interval=interval, p=p, counts=(count,), errors=((error, count - 1),), paired=True
+    )
+
+
+def variance_of_share(successes: float, trials: int, each: int) -> float:
+    """Return the variance of a share of so many trials `each`, p (1 − p) / R, p = (s + 2) / (n + 4).
+
+    Args:
+        successes: s of all trials.
+        trials: n, all.
+        each: R, of one replicate.
+    """
+    share = (successes + _SUCCESSES) / (trials + _TRIALS)
+    return share * (1.0 - share) / each

@@ -14,7 +14,7 @@ class StudyConfig(ExecutionConfig):
 
     preset: str = "quick"
     """Which study: quick, factors, pictures, protected, or a file of your own that ends in .toml (see
-    policies/study/design/presets)."""
+    policies/study/presets)."""
     output: str = "outputs/study"
     """Folder of datasets, policies, evaluations and report; what is done there is not done again."""
     page: str = ""

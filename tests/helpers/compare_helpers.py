@@ -7,7 +7,7 @@ import numpy as np
 from datasets_helpers import REPO, create
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-from handrail.datasets.comparison.outcomes import Pair, judge_pairs
+from handrail.datasets.comparison.policies import Pair, judge_pairs
 from handrail.datasets.format.schema import Feature
 
 JOINTS = [f"{name}.pos" for name in ("pan", "lift", "elbow", "flex", "roll", "gripper")]

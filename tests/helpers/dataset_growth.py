@@ -27,7 +27,7 @@ import numpy as np
 
 from handrail.datasets.comparison.compare import compare
 from handrail.datasets.comparison.config import CompareConfig
-from handrail.datasets.comparison.report.report import write_report
+from handrail.datasets.comparison.page import write_comparison
 from handrail.datasets.editing.pack import merge_datasets
 from handrail.datasets.editing.source import EditSource
 from handrail.datasets.format.data_file import data_files
@@ -139,7 +139,7 @@ def theirs(root: Path) -> list[str]:
 def report(root: Path) -> None:
     """Compare a dataset with itself and write the report."""
     output = str(Path(os.environ["HF_DATASETS_CACHE"]) / "report")
-    write_report(compare(CompareConfig((str(root),) * 2, output, labels=("a", "b"))))
+    write_comparison(compare(CompareConfig((str(root),) * 2, output, labels=("a", "b"))))
 
 
 MEASURED = {

@@ -15,7 +15,7 @@ from datasets_guillotine import CHANGES, WRITING
 
 from handrail.scripts.__main__ import main
 
-_PRELOAD = "handrail.policies.study.execution.preload"
+_PRELOAD = "handrail.policies.study.preload"
 
 
 def killed(folder: Path, change: int, function: Callable[..., object], *arguments: object) -> bool:

@@ -1,6 +1,6 @@
 """A study of made-up rollouts: a 2 × 2, two tasks, four draws, and everything beside."""
 
-from handrail.policies.study.design.design import Beside, Factors, Flat, StudyDesign, TaskDesign
+from handrail.policies.study.design import Beside, Factors, Flat, StudyDesign, TaskDesign
 
 TASK = TaskDesign(minutes=1.0, episodes=5, steps=10)
 MODES = ("ee", "decoupled", "joints", "direct")

@@ -38,7 +38,7 @@ MORE = {  # what is added where a page leaves it out
         "--layers": "8",
     },
 }
-SMALL = "policies/study/design/presets/quick.toml"  # where the test has put a smaller design:
+SMALL = "policies/study/presets/quick.toml"  # where the test has put a smaller design:
 INSTEAD = {"quick": SMALL, "factors": SMALL, "protected": SMALL}
 LESS_STUDY = {"rollouts": "2", "persons": "1", "episodes": "2", "minutes": "0.3", "steps": "4"}
 NOT_RUN = {

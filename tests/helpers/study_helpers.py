@@ -12,11 +12,11 @@ from datasets_helpers import create, frame_of
 
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.comparison.evaluations import FORMAT
-from handrail.policies.study.design.jobs import StudyLayout, jobs
-from handrail.policies.study.design.load import load_design
-from handrail.policies.study.design.progress import write_json
-from handrail.policies.study.design.settings import evaluations, fingerprint
-from handrail.policies.study.execution.run import run_study
+from handrail.policies.study.jobs import StudyLayout, jobs
+from handrail.policies.study.load import load_design
+from handrail.policies.study.progress import write_json
+from handrail.policies.study.run import run_study
+from handrail.policies.study.settings import evaluations, fingerprint
 
 DESIGN = """
 modes = ["ee", "direct"]

@@ -11,7 +11,7 @@ from training_helpers import TINY
 
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.reading.reader import read_episodes, read_frames
-from handrail.policies.study.design.design import StudyDesign, TaskDesign
+from handrail.policies.study.design import StudyDesign, TaskDesign
 
 NAMED = {
     flag: f"press_kit:{entry}"

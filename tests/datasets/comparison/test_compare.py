@@ -11,12 +11,11 @@ import pytest
 from compare_helpers import JOINTS, handrail_dataset, lerobot_dataset, quick_and_slow
 
 from handrail.controllers.errors import HandrailError
-from handrail.datasets.comparison.cautions import cautions
 from handrail.datasets.comparison.compare import compare
 from handrail.datasets.comparison.config import CompareConfig
 from handrail.datasets.comparison.evaluations import FORMAT
-from handrail.datasets.comparison.headline import headline
-from handrail.datasets.comparison.report.report import as_json, write_report
+from handrail.datasets.comparison.headline import cautions, headline
+from handrail.datasets.comparison.page import write_comparison
 from handrail.datasets.quality.catalogue import METRICS
 from handrail.datasets.quality.measure import measure
 from handrail.datasets.reading.load import read_demonstrations
@@ -56,8 +55,20 @@ def mixed_report(foreign, ours, few_resamples, tmp_path_factory):
 
 def report(arguments, folder, **options):
     comparison = compare(CompareConfig(tuple(arguments), str(folder), **options))
-    files = write_report(comparison)
+    files = write_comparison(comparison)
     return comparison, json.loads((folder / "report.json").read_text(), parse_constant=_no_constant), files
+
+
+def of_all(content):
+    """Return the contrasts of metrics of all episodes."""
+    return [each for each in content["contrasts"] if each["view"] == "all episodes"]
+
+
+def metrics_of(content):
+    """Return the metrics of all episodes, by name and group."""
+    groups = content["conditions"]["all episodes"]
+    (names, *_) = (group["metrics"] for group in groups.values())
+    return {name: {label: group["metrics"][name] for label, group in groups.items()} for name in names}
 
 
 def _no_constant(name):
@@ -67,7 +78,7 @@ def _no_constant(name):
 def test_two_datasets_that_handrail_did_not_make(foreign_report):
     (_, content, files), page = foreign_report
     assert [file.name for file in files] == ["report.html", "report.json", "episodes.csv", "differences.csv"]
-    metrics = content["views"]["all episodes"]["metrics"]
+    metrics = metrics_of(content)
     applies = {name for name, groups in metrics.items() if groups["calm"]["mean"] is not None}
     never = {"contacts", "impulse", "smallest_distance", "time_within_margin", "slack_used", "input_effort"}
     never |= {"input_reversals", "active_axes", "mode_switches", "input_idle"}
@@ -78,7 +89,7 @@ def test_two_datasets_that_handrail_did_not_make(foreign_report):
         (metric,) = [metric for metric in METRICS if metric.name == name]
         assert re.search(rf"{metric.title}</td><td>calm, shaky</td><td>no column", page)
     assert metrics["tracking_error"]["calm"]["mean"] == pytest.approx(0.0, abs=1e-6)
-    found = {d["metric"]: d for d in content["views"]["all episodes"]["differences"]}
+    found = {each["metric"]: each for each in of_all(content)}
     assert found["ldlj"]["estimate"] < 0 < found["action_variance"]["estimate"]
     assert "calm" in page
     assert "wave" in page
@@ -113,9 +124,7 @@ def test_what_does_not_apply_is_empty_and_never_zero(mixed_report):
 
 def test_different_columns_are_not_put_on_one_scale(mixed_report):
     content, _ = mixed_report
-    reasons = {
-        d["metric"]: d.get("does_not_apply", "") for d in content["views"]["all episodes"]["differences"]
-    }
+    reasons = {each["metric"]: each.get("does_not_apply", "") for each in of_all(content)}
     assert "no common scale" in reasons["state_coverage"]
     assert reasons["length"] == ""
     assert any("units may differ" in text for text in content["cautions"])
@@ -147,13 +156,14 @@ def evaluations(path: Path, **shares) -> Path:
 
 def test_policies_come_first(ours, tmp_path):
     given = evaluations(tmp_path / "evaluations.json", quick=0.9, slow=0.5)
-    comparison = compare(CompareConfig(tuple(ours), evaluations=(str(given),)))
-    content = as_json(comparison)
+    comparison = compare(CompareConfig(tuple(ours), str(tmp_path), evaluations=(str(given),)))
+    write_comparison(comparison)
+    content = json.loads((tmp_path / "report.json").read_text())
     assert content["headline"] == headline(comparison)
     assert content["headline"].startswith("Success of policies: slow")
-    assert content["outcomes"]["differences"][0]["nested"][1] < 0
+    assert content["contrasts"][0]["nested"][1] < 0
     assert any("training seeds" in text for text in content["cautions"])
-    assert content["outcomes"]["conditions"][0]["label"] == "quick"
+    assert content["policies"][0]["label"] == "quick"
     wrong = evaluations(tmp_path / "wrong.json", telepathy=0.9)
     with pytest.raises(HandrailError, match="unknown condition 'telepathy', expected one of quick, slow"):
         compare(CompareConfig(tuple(ours), evaluations=(str(wrong),)))
@@ -169,12 +179,9 @@ def test_columns_may_be_named(foreign):
 def test_one_episode_is_enough_to_say_that_it_is_too_few(tmp_path):
     roots = [handrail_dataset(tmp_path / name, 100, name, 1) for name in ("a", "b")]
     comparison, content, _ = report(roots, tmp_path / "out")
-    reasons = [d["does_not_apply"] for d in content["views"]["all episodes"]["differences"]]
+    reasons = [each["does_not_apply"] for each in of_all(content)]
     assert "fewer than 5 episodes of a group have a value" in reasons
-    assert (
-        content["views"]["all episodes"]["metrics"]["action_variance"]["a"]["reason"]
-        == "there is only one episode"
-    )
+    assert metrics_of(content)["action_variance"]["a"]["reason"] == "there is only one episode"
     assert not any(each.detected for each in comparison.everything.differences)
     assert headline(comparison).count("no difference detected") == 1
 
@@ -198,7 +205,10 @@ WRONG = {
         ["{quick}", "{slow}", "--output", "{quick}/meta/info.json"],
         "expected a folder, found a file",
     ),
-    "evaluations": (["{quick}", "{slow}", "--evaluations", "no.json"], "expected a JSON file, found none"),
+    "evaluations": (
+        ["{quick}", "{slow}", "--evaluations", "no.json"],
+        "no.json': expected evaluations",
+    ),
     "flag": (["{quick}", "{slow}", "--speed", "9"], "--speed"),
 }
 

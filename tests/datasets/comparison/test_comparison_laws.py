@@ -10,11 +10,11 @@ from handrail.controllers.errors import HandrailError
 from handrail.datasets.comparison import compare as comparing
 from handrail.datasets.comparison.collection import collected, success_difference
 from handrail.datasets.comparison.config import CompareConfig
-from handrail.datasets.comparison.differences import differences
+from handrail.datasets.comparison.episodes import differences
 from handrail.datasets.comparison.evaluations import Condition, Policy
 from handrail.datasets.comparison.groups import Group
-from handrail.datasets.comparison.outcomes import LIKE_FOR_LIKE, Pair, in_families, judge_pairs
-from handrail.datasets.comparison.report.tables import metrics_table
+from handrail.datasets.comparison.policies import LIKE_FOR_LIKE, MIXED, Pair, judge_pairs, pairs_between
+from handrail.datasets.comparison.tables import metrics_table
 from handrail.datasets.format.schema import Feature
 from handrail.datasets.quality.catalogue import METRICS
 from handrail.datasets.quality.measure import measure
@@ -22,9 +22,9 @@ from handrail.datasets.quality.sample import frames_of
 from handrail.datasets.reading.demonstration import Demonstration
 from handrail.datasets.reading.reader import DatasetInfo
 from handrail.datasets.statistics import resampling
+from handrail.datasets.statistics.contrast import adjusted, holm
 from handrail.datasets.statistics.paired import wilson
 from handrail.datasets.statistics.proportions import (
-    holm,
     independent_trials,
     paired_shares,
     unpaired_shares,
@@ -61,7 +61,7 @@ def group(label, count, generator, **meta):
 
 def compared(groups, generator):
     measured = measure({each.label: each.episodes for each in groups}, generator, metrics=METRICS)
-    return measured, differences(groups, measured, groups[-1].label, generator)
+    return measured, differences("all", groups, measured, groups[-1].label, generator)
 
 
 @pytest.fixture
@@ -78,10 +78,10 @@ def test_more_episodes_of_the_same_are_no_difference(quick, counts):
         groups = [group(label, count, generator) for label, count in zip("ab", counts, strict=True)]
         _, found = compared(groups, generator)
         assert not any(each.detected for each in found)
-        told = [each for each in found if each.metric.of_group]
-        assert [each.metric for each in told] == OF_GROUP
+        told = [each for each in found if each.measure.of_group]
+        assert [each.measure for each in told] == OF_GROUP
         for each in told:
-            assert (each.tested, each.p_adjusted) == (False, 1.0)
+            assert (each.tested, each.p, each.p_adjusted) == (False, None, None)
             assert bool(each.reason) == (counts[0] != counts[1])
 
 
@@ -89,7 +89,7 @@ def test_what_is_not_tested_costs_no_power(quick):
     """Holm's family is what has a p: as many as there are differences of single episodes."""
     generator = rng(3)
     _, found = compared([group("a", 12, generator), group("b", 12, generator)], generator)
-    tested = [each for each in found if each.tested and not each.reason]
+    tested = [each for each in found if each.tested]
     assert [each.p_adjusted for each in tested] == pytest.approx(holm([each.p for each in tested]))
 
 
@@ -171,7 +171,7 @@ def test_what_is_called_detectable_is_detected_four_times_in_five(quick, policie
         ]
         return judge({each.label: each for each in arms}, "b", generator).differences[0]
 
-    claimed = np.median([experiment(0.2).detectable for _ in range(20)])
+    claimed = np.median([experiment(0.2).seen for _ in range(20)])
     assert 0.6 <= np.mean([experiment(claimed).detected for _ in range(60)]) <= 0.95
 
 
@@ -179,9 +179,9 @@ def test_more_comparisons_see_less(quick):
     generator = rng(10)
     arms = {x: arm(x, 0.5, 3, generator, luck=0.1) for x in "abcd"}
     (alone,) = judge_pairs(arms, [Pair("a", "d")], generator).differences
-    family = in_families([alone, *judge(arms, "d", generator).differences])
+    family = adjusted([alone, *judge(arms, "d", generator).differences])
     assert family[0].tests == 4
-    assert family[0].detectable > alone.detectable
+    assert family[0].seen > alone.seen
     assert [each.p_adjusted for each in family] == holm([each.p for each in family])
 
 
@@ -222,7 +222,7 @@ def test_the_same_rollouts_three_times_say_no_more(paired):
         once, again = unpaired_shares(one, other), unpaired_shares(*twice, (scenes, scenes))
     assert again.estimate == pytest.approx(once.estimate)
     assert again.interval == pytest.approx(once.interval, abs=2e-3)
-    assert again.error == pytest.approx(once.error, rel=0.03)
+    assert again.errors[0][0] == pytest.approx(once.errors[0][0], rel=0.03)
     assert again.p == pytest.approx(once.p, rel=1e-6 if paired else 0.1)
 
 
@@ -235,17 +235,17 @@ def test_how_many_trials_scenes_are_worth():
     assert 750 < alike <= 900
 
 
-def test_an_arm_is_compared_with_the_baseline_of_its_own_kind():
+def test_a_condition_is_compared_with_the_baseline_of_its_own_kind():
     labels = ["ee", "direct"]
     arms = ["ee", "ee intent", "direct", "ee intent same number", "direct same number", "ee filter"]
-    assert comparing.pairs_between(arms, "direct", labels) == [
+    assert pairs_between(arms, "direct", labels) == [
         Pair("ee", "direct"),
-        Pair("ee intent", "direct", comparing.MIXED),
-        Pair("ee intent same number", "direct same number", comparing.MIXED),
-        Pair("ee filter", "direct", comparing.MIXED),
+        Pair("ee intent", "direct", MIXED),
+        Pair("ee intent same number", "direct same number", MIXED),
+        Pair("ee filter", "direct", MIXED),
     ]
-    assert comparing.pairs_between(["ee"], "direct", labels) == []
+    assert pairs_between(["ee"], "direct", labels) == []
     with pytest.raises(
         HandrailError, match="expected a condition 'direct' to compare 'ee' with, got ee, direct same"
     ):
-        comparing.pairs_between(["ee", "direct same number"], "direct", labels)
+        pairs_between(["ee", "direct same number"], "direct", labels)

@@ -12,10 +12,9 @@ from figure_helpers import drawn_numbers, shows
 
 from handrail.datasets.comparison.compare import compare
 from handrail.datasets.comparison.config import CompareConfig
-from handrail.datasets.comparison.differences import Difference
+from handrail.datasets.comparison.episodes import MetricContrast
 from handrail.datasets.comparison.evaluations import FORMAT
-from handrail.datasets.comparison.headline import headline
-from handrail.datasets.comparison.report.figures import (
+from handrail.datasets.comparison.figures import (
     answer_panels,
     draw_effect,
     effects_panels,
@@ -23,8 +22,9 @@ from handrail.datasets.comparison.report.figures import (
     trajectory_panels,
     turned,
 )
-from handrail.datasets.comparison.report.page import report_page
-from handrail.datasets.comparison.report.tables import collection_differences_table
+from handrail.datasets.comparison.headline import headline
+from handrail.datasets.comparison.page import report_page
+from handrail.datasets.comparison.tables import collection_differences_table
 from handrail.datasets.presentation.drawing import new_figure, short
 from handrail.datasets.quality.catalogue import METRICS
 
@@ -64,12 +64,15 @@ def _another(groups):
     return [one, replace(other, info=replace(other.info, robot_type="other"), episodes=episodes)]
 
 
+def contrast(metric, estimate, low, high, spread=1.0, **more):
+    names = {"measure": metric, "label": "a", "baseline": "b"}
+    return MetricContrast(**names, estimate=estimate, interval=(low, high), spread=spread, **more)
+
+
 def drawn(metric, estimate, low, high, spread=1.0, sign=1.0):
     """Return the markers of a difference, left to right, with where each stands."""
     axes = new_figure(4.0, 1.0).subplots()
-    each = Difference(
-        metric, "a", "b", estimate=estimate, interval=(low, high), spread=spread, p_adjusted=0.001
-    )
+    each = contrast(metric, estimate, low, high, spread, p_adjusted=0.001)
     draw_effect(axes, each, 0.0, "#000000", sign)
     marks = [(line.get_marker(), line.get_xdata()) for line in axes.lines if line.get_marker() != "None"]
     return sorted((float(np.ravel(x)[0]), mark) for mark, x in marks)
@@ -77,7 +80,7 @@ def drawn(metric, estimate, low, high, spread=1.0, sign=1.0):
 
 def test_a_difference_without_spread_is_an_arrow_and_not_at_zero():
     """Every episode of one group has 5 and of the other 2: infinitely many standard deviations."""
-    each = Difference(LENGTH, "a", "b", estimate=3.0, interval=(3.0, 3.0), spread=0.0)
+    each = contrast(LENGTH, 3.0, 3.0, 3.0, 0.0)
     assert each.effect == (np.inf, np.inf, np.inf)
     assert {mark for _, mark in drawn(LENGTH, 3.0, 3.0, 3.0, spread=0.0)} == {">"}
     assert {mark for _, mark in drawn(LENGTH, -3.0, -3.0, -3.0, spread=0.0)} == {"<"}
@@ -105,7 +108,7 @@ def test_figures_show_what_was_measured(alike):
         for found in everything.measurements.values[metric].values():
             if found.applies:
                 assert shows(panel.figure, [found.mean, *found.known])
-    tested = [each for each in everything.differences if each.tested and not each.reason]
+    tested = [each for each in everything.differences if each.tested]
     near = [abs(each.effect[0]) for each in tested if abs(each.effect[0]) < 4.0]
     pictures = np.abs(np.concatenate([drawn_numbers(panel.figure) for panel in effects_panels(alike)]))
     assert near
@@ -114,7 +117,7 @@ def test_figures_show_what_was_measured(alike):
 
 def shown_metrics(comparison):
     values = comparison.everything.measurements.values
-    names = dict.fromkeys(each.metric.name for each in comparison.everything.differences)
+    names = dict.fromkeys(each.measure.name for each in comparison.everything.differences)
     return [name for name in names if any(found.applies for found in values[name].values())]
 
 
@@ -136,7 +139,7 @@ def test_metrics_are_turned_so_that_right_is_better(alike):
 
 def test_what_has_no_better_direction_stands_apart(alike):
     ratio = next(metric for metric in METRICS if metric.name == "variation_ratio")
-    each = Difference(ratio, LONG[1], LONG[0], estimate=1.0, interval=(0.5, 1.5), spread=1.0)
+    each = replace(contrast(ratio, 1.0, 0.5, 1.5), label=LONG[1], baseline=LONG[0])
     view = replace(alike.everything, differences=[*alike.everything.differences, each])
     judged, rest = effects_panels(replace(alike, views=[view, *alike.views[1:]]))
     rows = [[label.get_text() for label in each.figure.axes[0].get_yticklabels()] for each in (judged, rest)]
@@ -181,8 +184,9 @@ def test_the_headline_has_the_numbers_of_the_tables(ours):
         said = headline(comparison)
         success, hourly = said.split(". ")
         assert success.startswith("Success while collecting: ")
-        (row,) = collection_differences_table(comparison).rows
-        name, difference, interval, _, _, ratio, ratios, _ = row
+        (_, name, difference, interval, *_), (_, _, ratio, ratios, *_) = collection_differences_table(
+            comparison
+        ).rows
         assert (name, str(difference)) == (f"{other} against {base}", f"{share:+d} points".replace("-", "−"))
         assert f"difference {interval} points" in success
         assert f"ratio {ratios}" in hourly
@@ -200,7 +204,7 @@ def test_policies_come_first_and_the_page_names_their_family(ours, tmp_path):
         assert re.match(rf"Success of policies: .*; difference \{sign}\d+ to \{sign}\d+ points", said)
         assert said.endswith("detected.")
     page = report_page(comparison)
-    assert page.index(said) < page.index("over 1 like-for-like")
+    assert page.index(said) < page.index("1 like-for-like")
 
 
 def evaluated(folder: Path, **shares) -> str:

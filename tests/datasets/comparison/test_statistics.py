@@ -8,10 +8,10 @@ from compare_helpers import judge
 from scipy.stats import fisher_exact
 
 from handrail.controllers.errors import HandrailError
-from handrail.datasets.comparison.differences import at_equal_length
+from handrail.datasets.comparison.episodes import at_equal_length
 from handrail.datasets.comparison.evaluations import FORMAT, read_evaluations
+from handrail.datasets.statistics.contrast import holm
 from handrail.datasets.statistics.proportions import (
-    holm,
     newcombe,
     newcombe_paired,
     paired_shares,
@@ -65,7 +65,7 @@ def test_boschloo_is_symmetric_and_sees_more_than_fisher():
     """7 of 12 against 1 of 12: uniformly more powerful than Fisher's test."""
     found = unpaired_shares([True] * 7 + [False] * 5, [True] + [False] * 11)
     swapped = unpaired_shares([True] + [False] * 11, [True] * 7 + [False] * 5)
-    assert (found.paired, found.trials) == (False, (12, 12))
+    assert (found.paired, found.counts) == (False, (12, 12))
     assert found.estimate == pytest.approx(0.5)
     assert swapped.p == pytest.approx(found.p)
     assert 0.005 < found.p < float(np.asarray(fisher_exact([[7, 1], [5, 11]]))[1])
@@ -169,7 +169,7 @@ def test_a_clear_difference_is_detected_and_chance_is_not(tmp_path):
     outcomes = judge(found, "a", rng())
     clear, none = outcomes.differences
     assert (clear.label, clear.detected, none.label, none.detected) == ("b", True, "c", False)
-    assert clear.rollouts.paired
+    assert clear.paired
     assert clear.nested[1] < 0
     assert clear.p <= clear.p_adjusted
     assert outcomes.conditions[0].means["contacts"][0] == pytest.approx(0.5)
@@ -184,7 +184,7 @@ def test_training_seeds_are_not_taken_for_a_difference_of_data():
         both = {label: runs(shares, 200, generator) for label, shares in drawn.items()}
         outcome = judge({label: FakeArm(label, each) for label, each in both.items()}, "a", generator)
         (difference,) = outcome.differences
-        low, high = difference.rollouts.interval
+        low, high = difference.interval
         rollouts += not low <= 0 <= high
         nested += difference.detected
     assert rollouts > 9
@@ -215,7 +215,7 @@ def test_two_training_seeds_are_too_few_where_they_differ_much(tmp_path):
     outcomes = judge(read_evaluations([arms(tmp_path, a=[0.95, 0.75], b=[0.6, 0.4])]), "a", rng())
     (difference,) = outcomes.differences
     assert difference.nested[1] > 0
-    assert difference.rollouts.p < 0.001
+    assert difference.interval[1] < 0.0
     assert not difference.detected
 
 
@@ -225,16 +225,16 @@ WRONG = {
     "no arms": ({"format": FORMAT, "arms": {}}, "expected 'arms' with one label or more"),
     "no policies": (
         {"format": FORMAT, "arms": {"a": []}},
-        "condition 'a': expected a list of trained policies",
+        "condition 'a': expected a list of length >= 1",
     ),
     "no seed": ({"format": FORMAT, "arms": {"a": [{"rollouts": []}]}}, "condition 'a': expected"),
     "no rollouts": (
         {"format": FORMAT, "arms": {"a": [GOOD | {"rollouts": []}]}},
-        "expected one rollout or more, got none",
+        "condition 'a': expected a list of length >= 1 at .*rollouts",
     ),
     "half a success": (
         {"format": FORMAT, "arms": {"a": [GOOD | {"rollouts": [{"seed": 1, "success": 0.5}]}]}},
-        "expected 'success' true or false, got 0.5",
+        "expected true or false at .success",
     ),
     "twice": (
         {"format": FORMAT, "arms": {"a": [GOOD, GOOD]}},
@@ -253,8 +253,8 @@ def test_wrong_evaluations(tmp_path, content, message):
 
 
 def test_evaluations_that_are_not_there(tmp_path):
-    with pytest.raises(HandrailError, match="expected a JSON file, found none"):
+    with pytest.raises(HandrailError, match="expected evaluations of policies, got"):
         read_evaluations([tmp_path / "none.json"])
     (tmp_path / "torn.json").write_text('{"format": ')
-    with pytest.raises(HandrailError, match="expected a JSON file, got"):
+    with pytest.raises(HandrailError, match="expected evaluations of policies, got"):
         read_evaluations([tmp_path / "torn.json"])

@@ -19,10 +19,10 @@ from handrail.policies.imitation.interface.trained import load_policy
 from handrail.policies.imitation.training.curve import read_curve
 from handrail.policies.imitation.training.training import train
 from handrail.policies.study.config import StudyConfig
-from handrail.policies.study.design.jobs import StudyLayout, jobs
-from handrail.policies.study.design.load import load_design
-from handrail.policies.study.execution.run import run_study
-from handrail.policies.study.execution.work import do
+from handrail.policies.study.jobs import StudyLayout, jobs
+from handrail.policies.study.load import load_design
+from handrail.policies.study.run import run_study
+from handrail.policies.study.work import do
 
 pytestmark = [
     pytest.mark.slow,

@@ -4,9 +4,9 @@ import pytest
 from made_study import DESIGN, SHARES
 from study_helpers import make
 
-from handrail.policies.study.design.jobs import StudyLayout, jobs
-from handrail.policies.study.design.progress import StudyProgress
-from handrail.policies.study.report.results import gather
+from handrail.policies.study.jobs import StudyLayout, jobs
+from handrail.policies.study.progress import StudyProgress
+from handrail.policies.study.results import gather
 
 
 @pytest.fixture

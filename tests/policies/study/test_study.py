@@ -10,11 +10,11 @@ from study_helpers import DESIGN, Starter, run_here
 
 from handrail.controllers.errors import HandrailError
 from handrail.policies.study.config import StudyConfig
-from handrail.policies.study.design.design import Pictures
-from handrail.policies.study.design.jobs import jobs
-from handrail.policies.study.design.load import design_names, load_design
-from handrail.policies.study.design.progress import read_json, write_json
-from handrail.policies.study.design.settings import fingerprint, recording, training
+from handrail.policies.study.design import Pictures
+from handrail.policies.study.jobs import jobs
+from handrail.policies.study.load import design_names, load_design
+from handrail.policies.study.progress import read_json, write_json
+from handrail.policies.study.settings import fingerprint, recording, training
 
 
 @pytest.fixture
@@ -69,10 +69,8 @@ def test_report_says_what_is_in_the_files(tmp_path, preset):
     arms = {each["label"]: each for each in found if not each["treatment"]}
     assert set(arms) == {"ee", "ee intent", "direct"}
     assert all(arm["rollouts"] == 80 for arm in arms.values())
-    (ee,) = [each for each in content["contrasts"] if each["name"] == "ee − direct"]
-    assert ee["estimate"]["value"] == pytest.approx(
-        (arms["ee"]["successes"] - arms["direct"]["successes"]) / 80
-    )
+    (ee,) = [each for each in content["contrasts"] if each["group"] == "ee − direct"]
+    assert ee["estimate"] == pytest.approx((arms["ee"]["successes"] - arms["direct"]["successes"]) / 80)
     pushed = {each["label"]: each for each in found if each["treatment"] == "pushed"}
     assert set(pushed) == set(arms)
     assert pushed["ee"]["touched"] == pytest.approx(0.5)

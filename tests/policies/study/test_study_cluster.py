@@ -8,7 +8,7 @@ from shared_helpers import content
 from study_helpers import SMALLEST
 
 from handrail.policies.study.config import StudyConfig
-from handrail.policies.study.execution.run import run_study
+from handrail.policies.study.run import run_study
 
 pytest.importorskip("ray.cluster_utils", reason="needs Ray: pip install '.[cluster]'")
 pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("ignore")]

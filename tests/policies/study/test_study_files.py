@@ -8,7 +8,7 @@ from study_helpers import DESIGN
 from toml_helpers import mutated
 
 from handrail.controllers.errors import HandrailError
-from handrail.policies.study.design.load import load_design
+from handrail.policies.study.load import load_design
 
 QUICK = settings(max_examples=200, suppress_health_check=[HealthCheck.function_scoped_fixture])
 

@@ -10,14 +10,14 @@ from study_helpers import COLLECTED, DESIGN, Starter, changed, everything, run_h
 
 from handrail.controllers.errors import HandrailError
 from handrail.policies.imitation.training import presets
+from handrail.policies.study import work as work_module
 from handrail.policies.study.config import StudyConfig
-from handrail.policies.study.design.design import Flat
-from handrail.policies.study.design.jobs import jobs
-from handrail.policies.study.design.load import load_design
-from handrail.policies.study.design.progress import StudyProgress, is_done, read_json, write_json
-from handrail.policies.study.design.settings import evaluations, fingerprint, recording
-from handrail.policies.study.execution import work as work_module
-from handrail.policies.study.execution.work import begin, do, work
+from handrail.policies.study.design import Flat
+from handrail.policies.study.jobs import jobs
+from handrail.policies.study.load import load_design
+from handrail.policies.study.progress import StudyProgress, is_done, read_json, write_json
+from handrail.policies.study.settings import evaluations, fingerprint, recording
+from handrail.policies.study.work import begin, do, work
 
 
 @pytest.fixture

@@ -9,13 +9,13 @@ import pytest
 from made_study import DESIGN, FACTORS, MODES, SHARES
 from scipy import stats
 
-from handrail.datasets.statistics.proportions import holm
-from handrail.datasets.statistics.student import student, variance_of_share
-from handrail.policies.study.design.power import detectable, plan, weights
-from handrail.policies.study.report import tables
-from handrail.policies.study.report.contrasts import DECLARED, EXPLORATORY, SYSTEM, WORDS, contrasts
-from handrail.policies.study.report.results import MEASURES
-from handrail.policies.study.report.words import answer, cautions
+from handrail.datasets.statistics.contrast import holm
+from handrail.datasets.statistics.replicates import student, variance_of_share
+from handrail.policies.study import tables
+from handrail.policies.study.contrasts import DECLARED, EXPLORATORY, SYSTEM, WORDS, contrasts
+from handrail.policies.study.power import detectable, plan, weights
+from handrail.policies.study.report import answer, cautions
+from handrail.policies.study.results import MEASURES
 
 
 def shares_of(results, task, label):
@@ -24,7 +24,7 @@ def shares_of(results, task, label):
 
 def test_a_contrast_is_what_its_words_say_draw_by_draw(gathered):
     results = gathered()
-    found = {(each.name, each.tasks, each.measure): each for each in contrasts(results)}
+    found = {(each.label, each.scope, each.measure.name): each for each in contrasts(results)}
     for scope in (("reach", "tray"), ("reach",), ("tray",)):
         ee, hand, joints, direct = (
             np.mean([shares_of(results, task, mode) for task in scope], axis=0) for mode in MODES
@@ -35,13 +35,13 @@ def test_a_contrast_is_what_its_words_say_draw_by_draw(gathered):
             "interaction": (ee - hand) - (joints - direct),
         }
         for name, values in expected.items():
-            estimate = found[WORDS[name], scope, "success"].estimate
-            assert estimate.value == pytest.approx(values.mean())
-            assert estimate.replicates == 4
+            estimate = found[WORDS[name], ", ".join(scope), "success"]
+            assert estimate.estimate == pytest.approx(values.mean())
+            assert estimate.counts == (4,)
             by_scipy: Any = stats.ttest_1samp(values, 0.0)
-            wider = estimate.error >= values.std(ddof=1) / 2 - 1e-12
+            wider = estimate.errors[0][0] >= values.std(ddof=1) / 2 - 1e-12
             assert wider
-            if estimate.error == pytest.approx(values.std(ddof=1) / 2):
+            if estimate.errors[0][0] == pytest.approx(values.std(ddof=1) / 2):
                 assert estimate.p == pytest.approx(by_scipy.pvalue)
                 interval = by_scipy.confidence_interval()
                 assert estimate.interval == pytest.approx((interval.low, interval.high))
@@ -49,17 +49,17 @@ def test_a_contrast_is_what_its_words_say_draw_by_draw(gathered):
 
 def test_only_what_is_declared_is_tested_over_all_tasks(gathered):
     found: Any = contrasts(gathered())
-    declared = [each for each in found if each.kind == DECLARED]
-    assert [each.name for each in declared] == [WORDS[name] for name in FACTORS.primary]
-    assert all(each.tasks == ("reach", "tray") for each in declared)
-    assert [each.p_adjusted for each in declared] == holm([each.estimate.p for each in declared])
-    others = [each for each in found if each.kind != DECLARED]
+    declared = [each for each in found if each.family == DECLARED]
+    assert [each.label for each in declared] == [WORDS[name] for name in FACTORS.primary]
+    assert all(each.scope == "reach, tray" for each in declared)
+    assert [each.p_adjusted for each in declared] == holm([each.p for each in declared])
+    others = [each for each in found if each.family != DECLARED]
     assert others
     assert all(each.p_adjusted is None and not each.detected for each in others)
     fewer: Any = contrasts(gathered(replace(DESIGN, factors=replace(FACTORS, primary=("controller",)))))
-    (one,) = [each for each in fewer if each.kind == DECLARED]
-    assert one.p_adjusted == one.estimate.p
-    same = {each.name for each in fewer if each.kind == EXPLORATORY and each.tasks == ("reach", "tray")}
+    (one,) = [each for each in fewer if each.family == DECLARED]
+    assert one.p_adjusted == one.p
+    same = {each.label for each in fewer if each.family == EXPLORATORY and each.scope == "reach, tray"}
     assert {WORDS["input"], WORDS["interaction"]} <= same
 
 
@@ -72,7 +72,7 @@ def test_a_success_without_contact_is_both_in_the_same_rollout(gathered):
     }
     (driven, *_) = gathered().find("reach", "ee").draws.values()
     driven = replace(driven, rollouts=rows)
-    assert {name: driven.values(name).tolist() for name in MEASURES} == {
+    assert {name: driven.run(name).values.tolist() for name in MEASURES} == {
         "success": [0, 1, 0, 1],
         "contact": [1, 1, 0, 0],
         "clean": [0, 0, 0, 1],
@@ -81,9 +81,9 @@ def test_a_success_without_contact_is_both_in_the_same_rollout(gathered):
 
 def test_only_draws_that_are_whole_count(gathered):
     results = gathered(missing=lambda job: job.cell.name == "tray/joints/2")
-    found = {(each.name, each.tasks): each for each in contrasts(results) if each.measure == "success"}
-    assert found[WORDS["input"], ("reach", "tray")].estimate.replicates == 3
-    assert found[WORDS["input"], ("reach",)].estimate.replicates == 4
+    found = {(e.label, e.scope): e for e in contrasts(results) if e.measure is MEASURES["success"]}
+    assert found[WORDS["input"], "reach, tray"].counts == (3,)
+    assert found[WORDS["input"], "reach"].counts == (4,)
     assert all(each.p_adjusted is None for each in found.values())  # nobody stops where it suits
     assert "not tested before all draws are done" in answer(contrasts(results), DESIGN)[0]
     assert any("jobs are not done yet" in text for text in cautions(results))
@@ -95,9 +95,9 @@ def test_draws_that_agree_by_chance_are_not_sure(gathered):
     for shares in (same, sure):
         found: Any = contrasts(gathered(shares=shares))
         for each in found:
-            low, high = each.estimate.interval
+            low, high = each.interval
             assert high - low > 0.05
-            assert 0.0 < each.estimate.p <= 1.0
+            assert 0.0 < each.p <= 1.0
 
 
 @pytest.mark.parametrize("contrast", ["input", "controller", "interaction"])
@@ -130,30 +130,30 @@ def test_a_plan_says_what_can_be_detected_before_anything_is_there():
 
 def test_a_system_is_compared_with_the_best_policy_alone_and_named_so(gathered):
     results = gathered()
-    found = [each for each in contrasts(results) if each.kind == SYSTEM]
-    assert {each.measure for each in found} == {"success", "contact"}
-    succeeded = [each for each in found if each.measure == "success"]
-    assert all(each.name.startswith("ee intent + MPC − ee,") for each in succeeded)
-    for each in (each for each in found if each.measure == "contact"):  # the rival that touches the least
-        conditions = [[results.find(task, mode) for task in each.tasks] for mode in MODES]
+    found = [each for each in contrasts(results) if each.family == SYSTEM]
+    assert {each.measure.name for each in found} == {"success", "contact"}
+    succeeded = [each for each in found if each.measure.name == "success"]
+    assert all(each.label.startswith("ee intent + MPC − ee,") for each in succeeded)
+    for each in (each for each in found if each.measure.name == "contact"):
+        conditions = [[results.find(task, mode) for task in each.scope.split(", ")] for mode in MODES]
         touched = [np.mean([one.rolled("contact").mean() for one in some]) for some in conditions]
         assert each.sides[1] == pytest.approx(min(touched))
-        assert f"− {MODES[int(np.argmin(touched))]}," in each.name
+        assert f"− {MODES[int(np.argmin(touched))]}," in each.label
     worse = gathered(shares=dict(SHARES, ee=(0.1,) * 4))
     rivals = {"success": "joints", "contact": "ee"}  # all touch alike: the first of them
-    for each in (each for each in contrasts(worse) if each.kind == SYSTEM):
-        assert f"− {rivals[each.measure]}," in each.name
+    for each in (each for each in contrasts(worse) if each.family == SYSTEM):
+        assert f"− {rivals[each.measure.name]}," in each.label
 
 
 def test_the_answer_is_what_was_declared_and_claims_no_more_than_was_detected(gathered):
     with_mpc = {label: (0.95 if label in ("ee", "joints") else 0.3,) * 4 for label in SHARES}
     found = contrasts(gathered(shares=with_mpc))
     said = answer(found, DESIGN)
-    assert [each.name for each in found if each.detected] == [WORDS["controller"]]
+    assert [each.label for each in found if each.detected] == [WORDS["controller"]]
     assert [sentence.split(":")[0] for sentence in said] == ["Interaction", "Controller", "Input"]
     assert [", a difference detected." in sentence for sentence in said] == [False, True, False]
     assert [", no difference detected." in sentence for sentence in said] == [True, False, True]
-    values = {each.name: each.estimate.value for each in found if each.kind == DECLARED}
+    values = {each.label: each.estimate for each in found if each.family == DECLARED}
     assert f"{100 * values[WORDS['controller']]:+.0f} points (95 %" in said[1]
     nothing = answer(contrasts(gathered(shares=dict.fromkeys(SHARES, (0.5,) * 4))), DESIGN)
     assert all("no difference detected" in sentence for sentence in nothing)
@@ -162,21 +162,21 @@ def test_the_answer_is_what_was_declared_and_claims_no_more_than_was_detected(ga
 def test_without_factors_or_with_one_draw_nothing_is_claimed(gathered):
     plain = gathered(replace(DESIGN, factors=None))
     found = contrasts(plain)
-    assert not [each for each in found if each.kind == DECLARED]
-    assert "ee − direct" in {each.name for each in found}
+    assert not [each for each in found if each.family == DECLARED]
+    assert "ee − direct" in {each.label for each in found}
     assert "No contrast was declared" in answer(found, plain.progress.design)[0]
     open_ended = gathered(replace(DESIGN, factors=replace(FACTORS, primary=())))
     found = contrasts(open_ended)
-    assert {each.kind for each in found} == {EXPLORATORY, SYSTEM}
-    assert {(WORDS[name], ("reach", "tray"), "success") for name in WORDS} <= {
-        (each.name, each.tasks, each.measure) for each in found
+    assert {each.family for each in found} == {EXPLORATORY, SYSTEM}
+    assert {(WORDS[name], "reach, tray", "success") for name in WORDS} <= {
+        (each.label, each.scope, each.measure.name) for each in found
     }
     assert all(each.p_adjusted is None for each in found)
     assert "No contrast was declared" in answer(found, open_ended.progress.design)[0]
     assert "Nothing is declared" in plan(open_ended.progress.design)
     single = gathered(replace(DESIGN, draws=1, beside=None))
     found = contrasts(single)
-    assert all(each.estimate.interval is None and each.p_adjusted is None for each in found)
+    assert all(each.interval is None and each.p_adjusted is None for each in found)
     assert "one draw tests nothing" in answer(found, single.progress.design)[0]
     assert any("One draw" in text for text in cautions(single))
     assert tables.contrasts_table(found, DECLARED, single).rows
@@ -185,4 +185,4 @@ def test_without_factors_or_with_one_draw_nothing_is_claimed(gathered):
 def test_a_share_of_few_is_never_certain():
     assert variance_of_share(0, 50, 50) > 0.0
     assert student([0.5], least=0.0).interval is None
-    assert json.dumps(student([0.5, 0.7], least=0.0).value)
+    assert json.dumps(student([0.5, 0.7], least=0.0).estimate)

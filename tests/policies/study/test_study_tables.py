@@ -6,12 +6,12 @@ from compare_helpers import check_texts
 from figure_helpers import shows
 from made_study import DESIGN, MODES, TASK
 
-from handrail.policies.study.design.design import Flat, Robustness
-from handrail.policies.study.design.power import plan
-from handrail.policies.study.report import tables
-from handrail.policies.study.report.contrasts import DECLARED, contrasts
-from handrail.policies.study.report.figures import figures
-from handrail.policies.study.report.words import cautions, how
+from handrail.policies.study import tables
+from handrail.policies.study.contrasts import DECLARED, contrasts
+from handrail.policies.study.design import Flat, Robustness
+from handrail.policies.study.figures import figures
+from handrail.policies.study.power import plan
+from handrail.policies.study.report import cautions, how
 
 
 def test_what_ended_before_its_loss_was_flat_is_told(gathered):
@@ -69,8 +69,8 @@ def test_figures_show_what_was_found_and_no_text_covers_another(gathered):
     found = contrasts(results)
     made = figures(results, found)
     assert made.keys() == {"contrasts", "answer", "training", "robustness"}
-    assert shows(made["answer"], [100 * each.success.value for each in results.of_task("reach")])
-    declared = [100 * each.estimate.value for each in found if each.kind == DECLARED]
+    assert shows(made["answer"], [100 * each.success.estimate for each in results.of_task("reach")])
+    declared = [100 * each.estimate for each in found if each.family == DECLARED]
     assert shows(made["contrasts"], declared)
     assert shows(made["training"], [0.4, 0.3])
     assert not shows(made["answer"], 12.345)

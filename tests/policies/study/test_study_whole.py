@@ -7,7 +7,7 @@ import pytest
 from study_helpers import SMALLEST
 
 from handrail.policies.study.config import StudyConfig
-from handrail.policies.study.execution.run import run_study
+from handrail.policies.study.run import run_study
 
 
 @pytest.fixture(scope="module")

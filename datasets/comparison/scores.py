@@ -9,22 +9,22 @@ from pathlib import Path
 
 from handrail.controllers.errors import HandrailError, message_of, shown
 from handrail.controllers.regular_file import open_regular
-from handrail.datasets.quality.metric import Metric
+from handrail.datasets.statistics.contrast import Measure
 
 COLUMNS = ("participant", "condition", "score", "value")
 SOURCE = "source"  # may stand behind them: people, or `DEMO`
 PEOPLE, DEMO = "people", "demo data: no people took part"
 MOST_BYTES = 4 * 1024 * 1024
 SCORES = (
-    Metric("tlx_raw", "workload (raw TLX)", "0–100", "lower", "mean of NASA-TLX's six scales"),
-    Metric(
+    Measure("tlx_raw", "workload (raw TLX)", "0–100", "lower", "mean of NASA-TLX's six scales"),
+    Measure(
         "tlx_weighted",
         "workload (weighted TLX)",
         "0–100",
         "lower",
         "NASA-TLX's scales, weighted by how often each was chosen of a pair",
     ),
-    Metric("sus", "usability (SUS)", "0–100", "higher", "System Usability Scale"),
+    Measure("sus", "usability (SUS)", "0–100", "higher", "System Usability Scale"),
 )
 
 

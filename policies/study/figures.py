@@ -6,8 +6,9 @@ from typing import Any
 import numpy as np
 
 from handrail.datasets.presentation.drawing import COLOURS, GREY, INK, new_figure, tidy
-from handrail.policies.study.report.contrasts import DECLARED, Contrast
-from handrail.policies.study.report.results import Condition, Results
+from handrail.datasets.statistics.contrast import Contrast
+from handrail.policies.study.contrasts import DECLARED
+from handrail.policies.study.results import Results, StudyCondition
 
 _WIDTH = 10.4  # [inch]
 
@@ -16,7 +17,7 @@ def figures(results: Results, found: Sequence[Contrast]) -> dict[str, Any]:
     """Return matplotlib figures by name; those for which there is something to show."""
     tasks = [task for task in results.progress.design.tasks if results.of_task(task)]
     made: dict[str, Any] = {}
-    if any(each.estimate.interval and each.kind == DECLARED for each in found):
+    if any(each.interval and each.family == DECLARED for each in found):
         made["contrasts"] = _contrasts(found)
     if tasks:
         made["answer"] = _answer(tasks, results)
@@ -31,24 +32,24 @@ def figures(results: Results, found: Sequence[Contrast]) -> dict[str, Any]:
 
 def _contrasts(found: Sequence[Contrast]) -> Any:
     """The declared contrasts over all tasks, and beneath them the same of each task, which explore."""
-    declared = [each for each in found if each.kind == DECLARED and each.estimate.interval]
+    declared = [each for each in found if each.family == DECLARED and each.interval]
     rows: list[tuple[str, Contrast]] = []
     for each in declared:
-        rows.append((each.name, each))
-        same = (c for c in found if (c.name, c.measure) == (each.name, each.measure) and c is not each)
-        rows += [(f"{', '.join(c.tasks)} (exploratory)", c) for c in same if c.estimate.interval]
+        rows.append((each.label, each))
+        same = (c for c in found if (c.label, c.measure) == (each.label, each.measure) and c is not each)
+        rows += [(f"{c.scope} (exploratory)", c) for c in same if c.interval]
     figure = new_figure(_WIDTH, 0.9 + 0.34 * len(rows))
     axes = figure.subplots()
     for row, (_, each) in enumerate(rows):
-        first = each.kind == DECLARED
+        first = each.family == DECLARED
         colour = INK if first else GREY
         axes.plot(
-            np.multiply(100, each.estimate.interval or (0, 0)),
+            np.multiply(100, each.interval or (0, 0)),
             [row, row],
             color=colour,
             lw=2.4 if first else 1.2,
         )
-        axes.plot(100 * each.estimate.value, row, "o", color=colour, ms=7 if first else 4)
+        axes.plot(np.multiply(100, each.estimate or 0.0), row, "o", color=colour, ms=7 if first else 4)
     axes.axvline(0.0, color=GREY, lw=0.8)
     axes.set(yticks=range(len(rows)), yticklabels=[name for name, _ in rows], ylim=(len(rows) - 0.4, -0.6))
     axes.set_xlabel("difference in policy success [points], 95 %")
@@ -56,15 +57,15 @@ def _contrasts(found: Sequence[Contrast]) -> Any:
     return figure
 
 
-def _style(condition: Condition, results: Results) -> dict[str, Any]:
+def _style(condition: StudyCondition, results: Results) -> dict[str, Any]:
     """Return how a condition is drawn: the mode's colour, the action's mark."""
-    modes, policy = results.progress.design.modes, next(iter(condition.draws.values())).policy
+    modes, policy = results.progress.design.modes, condition.learners[0]
     mark = "D" if policy.actions == "intent" else "s" if policy.budget == "number" else "o"
     colour = COLOURS[modes.index(policy.cell.mode) % len(COLOURS)]
     return {"color": colour, "marker": mark, "label": _name(condition)}
 
 
-def _name(condition: Condition) -> str:
+def _name(condition: StudyCondition) -> str:
     """Return what a condition is called: an intent is no policy alone."""
     return condition.label.replace(" intent", ":\nintent through MPC").replace(" same", ",\nsame")
 
@@ -80,7 +81,7 @@ def _answer(tasks: Sequence[str], results: Results) -> Any:
             axes.plot(np.multiply(100, each.interval), [row, row], color=style["color"], lw=1.6)
             shares = [100 * share for share in each.shares.values()]
             axes.plot(shares, np.full(len(shares), row + 0.26), "|", color=style["color"], ms=6)
-            axes.plot(100 * each.success.value, row, **style)
+            axes.plot(np.multiply(100, each.success.estimate or 0.0), row, **style)
         axes.set(title=task.replace("_", " "), xlabel="policy success [%]", xlim=(-3, 103))
         axes.set(ylim=(len(conditions) - 0.4, -0.6), yticks=range(len(conditions)))
         axes.set_yticklabels([_name(each) for each in conditions])
@@ -88,7 +89,7 @@ def _answer(tasks: Sequence[str], results: Results) -> Any:
     return figure
 
 
-def _curves(condition: Condition, results: Results) -> list[tuple[list[int], list[float]]]:
+def _curves(condition: StudyCondition, results: Results) -> list[tuple[list[int], list[float]]]:
     """Return updates and loss on held-out episodes of each policy."""
     found = [each["validation"] for each in results.trained(condition) if each.get("validation")]
     return [(steps := sorted(map(int, each)), [each[str(step)] for step in steps]) for each in found]
@@ -129,7 +130,7 @@ def _robustness(tasks: Sequence[str], results: Results) -> Any:
             ]
             shift = 0.5 * ((place + 0.5) / len(labels) - 0.5)
             xs = [names.index(each.treatment or names[0]) + shift for each in shown]
-            values = np.array([each.success.value for each in shown])
+            values = np.array([each.success.estimate for each in shown])
             errors = np.abs(np.array([each.interval for each in shown]).T - values) * 100
             style = _style(shown[0], results) | {"ls": "", "elinewidth": 1.2, "ms": 5}
             axes.errorbar(xs, 100 * values, yerr=errors, **style)

@@ -2,17 +2,15 @@
 
 import io
 from collections.abc import Iterable, Sequence
+from dataclasses import asdict
+from pathlib import Path
 from typing import Any
 
 from handrail.controllers.regular_file import regular
-from handrail.datasets.comparison.cautions import cautions
+from handrail.datasets.comparison import tables
 from handrail.datasets.comparison.collection import Collected
-from handrail.datasets.comparison.compare import Comparison
-from handrail.datasets.comparison.groups import Group, group_of
-from handrail.datasets.comparison.headline import headline
-from handrail.datasets.comparison.outcomes import Outcomes
-from handrail.datasets.comparison.report import tables
-from handrail.datasets.comparison.report.figures import (
+from handrail.datasets.comparison.compare import Comparison, EpisodeChoice
+from handrail.datasets.comparison.figures import (
     TURNED,
     answer_panels,
     colours,
@@ -20,6 +18,10 @@ from handrail.datasets.comparison.report.figures import (
     metrics_panels,
     trajectory_panels,
 )
+from handrail.datasets.comparison.groups import Group, group_of
+from handrail.datasets.comparison.headline import cautions, headline
+from handrail.datasets.comparison.policies import Outcomes
+from handrail.datasets.comparison.report import write_report
 from handrail.datasets.format.path_pattern import fill
 from handrail.datasets.format.schema import video_keys
 from handrail.datasets.presentation.drawing import Panel, address, svg
@@ -51,6 +53,7 @@ from handrail.datasets.quality.worst import RANKING, deletion, ranked
 from handrail.datasets.reading.episode import Episode
 from handrail.datasets.reading.reader import DatasetInfo
 
+FORMAT = "handrail.comparison/3"
 _HOW = (
     "Every interval is 95 %. Shares: Wilson; their differences: Newcombe's method 10, exact McNemar test"
     " where the same seeds were tried under both, Boschloo's where not. Several trained policies that met the"
@@ -81,26 +84,14 @@ _EFFECTS = (
     "Filled: detected; hollow: not. An arrow: beyond what is shown, or a difference where nothing varies."
 )
 _TURNED = f" {TURNED}: less is better, so the metric is drawn the other way round."
-
-
-_EPISODES = 3  # shown of each group
-_WIDTH = 240  # [pixels]
-
-
 _SHOWN = 3  # episodes of a group
+_WIDTH = 240  # of a picture [pixels]
 
 
-def worst_folds(comparison: Comparison) -> str:
-    """Return a table for each group that opens when asked for."""
-    return "".join(
-        folded(group.label, table(worst_table(comparison, group))) for group in comparison.everything.groups
-    )
-
-
-def worst_table(comparison: Comparison, group: Group) -> Table:
-    """Return the worst episodes of a group by every metric of which one end is better."""
+def _worst_episodes(comparison: Comparison, group: Group) -> str:
+    """Return the worst episodes of a group by every metric of which one end is better, folded."""
     rows = [row for metric in RANKING.values() if (row := _row(comparison, group, metric))]
-    return Table(("metric", "episodes (value)", "without them"), rows)
+    return folded(group.label, table(Table(("metric", "episodes (value)", "without them"), rows)))
 
 
 def _row(comparison: Comparison, group: Group, metric: Metric) -> list[Cell | str]:
@@ -117,10 +108,10 @@ def _row(comparison: Comparison, group: Group, metric: Metric) -> list[Cell | st
     ]
 
 
-def first_pictures(group: Group) -> list[tuple[str, str]]:
+def _first_pictures(group: Group) -> list[tuple[str, str]]:
     """Return captions and pictures, as addresses that hold all of them; unreadable videos are left out."""
     shown = []
-    for episode in group.episodes[:_EPISODES]:
+    for episode in group.episodes[:_SHOWN]:
         for key in video_keys(group.info.features):
             picture = _first_frame(group.info, key, episode)
             if picture:
@@ -158,6 +149,47 @@ def _address(frame: Any) -> str:
     return address(stream.getvalue(), "image/jpeg")
 
 
+def write_comparison(comparison: Comparison) -> list[Path]:
+    """Write the report into the folder of its config and return the files."""
+    content = {
+        "format": FORMAT,
+        "baseline": comparison.baseline,
+        "unlike": comparison.unlike,
+        "config": asdict(comparison.config),
+        "headline": headline(comparison),
+        "cautions": cautions(comparison),
+        "successes_an_hour": comparison.rates,
+        "conditions": {view.title: _conditions(view) for view in comparison.views},
+        "policies": list(map(asdict, comparison.outcomes.conditions)) if comparison.outcomes else [],
+    }
+    units = {"episodes.csv": _episode_rows(comparison)}
+    page = report_page(comparison)
+    return write_report(comparison.config.folder, page, content, comparison.contrasts, units)
+
+
+def _conditions(view: EpisodeChoice) -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    for each in view.collected:
+        metrics = {name: groups[each.label] for name, groups in view.measurements.values.items()}
+        found[each.label] = asdict(each) | {
+            "successes_an_hour": each.successes_an_hour,
+            "metrics": {name: metric.content for name, metric in metrics.items()},
+        }
+    return found
+
+
+def _episode_rows(comparison: Comparison) -> list[dict[str, Any]]:
+    """Return a row an episode: which, how it ended, every metric; empty where one does not apply."""
+    view, rows = comparison.everything, []
+    values = view.measurements.values
+    for group in view.groups:
+        for place, episode in enumerate(group.episodes):
+            row = {"group": group.label, "dataset": group.info.root.name, "episode": episode.number}
+            row |= {"success": episode.success}
+            rows.append(row | {m.name: values[m.name][group.label].values[place] for m in METRICS})
+    return rows
+
+
 def report_page(comparison: Comparison) -> str:
     """Return the page."""
     said = items(("caution", text) for text in cautions(comparison))
@@ -171,7 +203,8 @@ def report_page(comparison: Comparison) -> str:
         section("Trajectories", _drawn(trajectory_panels(comparison)), _pictures(comparison)),
     ]
     missing = tables.not_applicable_table(comparison)
-    parts.append(section("Episodes to look at first", paragraph(_WORST, "quiet"), worst_folds(comparison)))
+    worst = [_worst_episodes(comparison, group) for group in comparison.everything.groups]
+    parts.append(section("Episodes to look at first", paragraph(_WORST, "quiet"), *worst))
     parts += [section("What does not apply, or is not comparable", missing)] if missing else []
     meanings = items(("quiet", f"{metric.title}: {metric.meaning}.") for metric in METRICS)
     parts.append(section("How to read this", paragraph(_HOW), folded("What every metric means", meanings)))
@@ -249,5 +282,5 @@ def _quality(comparison: Comparison) -> list[str | Table]:
 def _pictures(comparison: Comparison) -> str:
     if not comparison.config.pictures:
         return ""
-    shown = [(group.label, gallery(first_pictures(group))) for group in comparison.everything.groups]
+    shown = [(group.label, gallery(_first_pictures(group))) for group in comparison.everything.groups]
     return "".join(paragraph(label, "quiet") + pictures for label, pictures in shown if pictures)

@@ -1,51 +1,22 @@
 """What is compared: the contrasts that were declared before the run, and all others, which only explore."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
-from handrail.datasets.statistics.proportions import holm
-from handrail.datasets.statistics.student import Estimate, student
-from handrail.policies.study.design.design import CONTRASTS, StudyDesign
-from handrail.policies.study.design.power import weights
-from handrail.policies.study.report.results import Condition, Results
+from handrail.datasets.statistics.contrast import Contrast, adjusted
+from handrail.datasets.statistics.replicates import student
+from handrail.policies.study.design import CONTRASTS, StudyDesign
+from handrail.policies.study.power import weights
+from handrail.policies.study.results import MEASURES, Results, StudyCondition
 
 DECLARED, EXPLORATORY, SYSTEM = "declared", "exploratory", "system"
-_LEVEL = 0.05
 WORDS = {
     "input": "input: hand − joints",
     "controller": "controller: MPC − none",
     "interaction": "interaction: what the MPC adds with the hand − with the joints",
 }
-
-
-@dataclass(frozen=True)
-class Contrast:
-    """A weighted sum of one measure of conditions, over the draws that all of them have.
-
-    Attributes:
-        name: what is compared.
-        kind: `declared` before the run and tested, `exploratory`, or a claim about a `system`.
-        tasks: over which, with equal weight.
-        measure: one of `MEASURES`.
-        estimate: over draws, each draw's conditions met the same scenes.
-        sides: the mean of what is added, and of what is taken off.
-        p_adjusted: by Holm over what is declared; None where nothing is tested, or not yet.
-    """
-
-    name: str
-    kind: str
-    tasks: tuple[str, ...]
-    measure: str
-    estimate: Estimate
-    sides: tuple[float, float]
-    p_adjusted: float | None = None
-
-    @property
-    def detected(self) -> bool:
-        """Whether a declared contrast differs from 0."""
-        return self.p_adjusted is not None and self.p_adjusted < _LEVEL
 
 
 def contrasts(results: Results) -> list[Contrast]:
@@ -54,17 +25,12 @@ def contrasts(results: Results) -> list[Contrast]:
     Nothing is tested before all draws are there: who looks in between and stops where it suits finds more.
     """
     design = results.progress.design
-    declared = [each for each in _declared(results, design) if each]
-    tested = [each for each in declared if each.estimate.replicates == design.draws > 1]
-    adjusted = holm([each.estimate.p for each in tested if each.estimate.p is not None])
-    by_name = {each.name: p for each, p in zip(tested, adjusted, strict=True)}
-    found = [replace(each, p_adjusted=by_name.get(each.name)) for each in declared]
+    names = design.factors.primary if design.factors else ()
+    declared = [_factor(results, design, name, tuple(design.tasks), DECLARED) for name in names]
+    whole = [each for each in declared if each and each.counts == (design.draws,) != (1,)]
+    tested = {each.label: each for each in adjusted(whole)}
+    found = [replace(tested.get(each.label, each), tests=len(names)) for each in declared if each]
     return found + [each for each in _exploratory(results, design) if each]
-
-
-def _declared(results: Results, design: StudyDesign) -> Iterator[Contrast | None]:
-    for name in design.factors.primary if design.factors else ():
-        yield _factor(results, design, name, tuple(design.tasks), DECLARED)
 
 
 def _exploratory(results: Results, design: StudyDesign) -> Iterator[Contrast | None]:
@@ -143,12 +109,12 @@ def _systems(results: Results, design: StudyDesign, tasks: tuple[str, ...]) -> I
                 yield _contrast(results, title, SYSTEM, tasks, parts, measure)
 
 
-def _mean(conditions: Sequence[Condition | None], draws: set[int], measure: str) -> float | None:
+def _mean(conditions: Sequence[StudyCondition | None], draws: set[int], measure: str) -> float | None:
     """Return the mean of a measure over conditions and some draws; None where one is missing."""
     known = [each for each in conditions if each and draws <= each.draws.keys()]
     if len(known) < len(conditions):
         return None
-    return float(np.mean([each.draws[draw].values(measure).mean() for each in known for draw in draws]))
+    return float(np.mean([each.share(draw, measure) for each in known for draw in draws]))
 
 
 def _contrast(
@@ -167,21 +133,23 @@ def _contrast(
     draws = sorted(set.intersection(*(set(each.draws) for each, _ in conditions)))
     if not draws:
         return None
-    values = [
-        sum(weight * float(each.draws[draw].values(measure).mean()) for each, weight in conditions)
-        for draw in draws
-    ]
+    values = [sum(weight * each.share(draw, measure) for each, weight in conditions) for draw in draws]
     least = sum(weight**2 * each.least(measure) for each, weight in conditions)
     sides = _side(conditions, draws, measure, 1.0), _side(conditions, draws, measure, -1.0)
-    return Contrast(name, kind, tasks, measure, student(values, least), sides)
+    return Contrast(
+        measure=MEASURES[measure],
+        label=name,
+        scope=", ".join(tasks),
+        family=kind,
+        sides=sides,
+        **vars(student(values, least)),
+    )
 
 
 def _side(
-    conditions: Sequence[tuple[Condition, float]], draws: Sequence[int], measure: str, sign: float
+    conditions: Sequence[tuple[StudyCondition, float]], draws: Sequence[int], measure: str, sign: float
 ) -> float:
     """Return the mean over the conditions whose weights have a sign."""
     side = [(each, abs(weight)) for each, weight in conditions if weight * sign > 0.0]
-    total = sum(
-        weight * float(each.draws[draw].values(measure).mean()) for each, weight in side for draw in draws
-    )
+    total = sum(weight * each.share(draw, measure) for each, weight in side for draw in draws)
     return total / (len(draws) * sum(weight for _, weight in side))

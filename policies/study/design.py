@@ -46,27 +46,31 @@ rollouts = 50                   under each condition
 draws = 1                       the first so many
 """
 
-import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated
+
+from msgspec import Meta
 
 from handrail.collect.operators.modes import MODES
 from handrail.collect.world.tasks.catalogue import TASKS
 from handrail.controllers.errors import HandrailError, unknown_name
+from handrail.controllers.typed import AtLeastOne, Count
 
 CONTRASTS = ("input", "controller", "interaction")
 MOST_DRAWS = 1000
+_Few = Annotated[int, Meta(ge=1, le=MOST_DRAWS)]
+_Draws = Annotated[int, Meta(ge=0, le=MOST_DRAWS)]
 
 
 @dataclass(frozen=True)
 class TaskDesign:
     """One task of a study; its settings are explained above."""
 
-    minutes: float
-    episodes: int = 2
-    steps: int = 4000
-    batch_size: int = 0
+    minutes: Annotated[float, Meta(gt=0, le=1e6)]
+    episodes: Annotated[int, Meta(ge=2, le=10**6)] = 2
+    steps: AtLeastOne = 4000
+    batch_size: Count = 0
     rollout_limit: float = 0.0
 
 
@@ -113,8 +117,8 @@ class Beside:
     """More policies than the main design has; explained above."""
 
     intents: tuple[str, ...] = ()
-    draws: int = 0
-    same_number: int = 0
+    draws: _Draws = 0
+    same_number: _Draws = 0
 
 
 @dataclass(frozen=True)
@@ -131,8 +135,8 @@ class Robustness:
 
     perturbations: tuple[str, ...] = ("push", "shift", "delay")
     protections: tuple[str, ...] = ("filter",)
-    rollouts: int = 50
-    draws: int = 1
+    rollouts: Count = 50
+    draws: _Draws = 1
 
     def protections_of(self, actions: str) -> tuple[str, ...]:
         """Return what else stands between robot and policies of some actions."""
@@ -153,10 +157,10 @@ class StudyDesign:
     tasks: Mapping[str, TaskDesign]
     baseline: str
     policy: str = "act"
-    draws: int = 3
-    rollouts: int = 100
-    persons: int = 5
-    seed: int = 0
+    draws: _Few = 3
+    rollouts: Count = 100
+    persons: _Few = 5
+    seed: Annotated[int, Meta(ge=0, le=10**5)] = 0
     flat: Flat | None = None
     factors: Factors | None = None
     beside: Beside | None = None
@@ -165,63 +169,42 @@ class StudyDesign:
     digest: str = ""
 
     def check(self) -> None:
-        """Check every name, and what only a study asks; `check_jobs` checks the settings of its jobs."""
+        """Check names, and how the settings fit each other; `check_jobs` checks the settings of its jobs."""
         if len(self.modes) < 2 or not self.tasks:
             raise HandrailError(
                 f"study {self.name}: expected two modes or more and a task, "
                 f"got {', '.join(self.modes) or 'no mode'}; {', '.join(self.tasks) or 'no task'}"
             )
-        _known("mode", self.modes, MODES)
-        _known("task", self.tasks, TASKS)
-        _known("baseline", (self.baseline,), self.modes)
+        check_known("mode", self.modes, MODES)
+        check_known("task", self.tasks, TASKS)
+        check_known("baseline", (self.baseline,), self.modes)
+        self._check_once("modes", self.modes)
         if self.factors:
-            _known("mode of the factors", self.factors.modes, self.modes)
-            _known("contrast", self.factors.primary, CONTRASTS)
+            check_known("mode of the factors", self.factors.modes, self.modes)
+            check_known("contrast", self.factors.primary, CONTRASTS)
+            self._check_once("factors", self.factors.modes)
+            self._check_once("factors.primary", self.factors.primary or CONTRASTS)
         if self.beside:
             completed = [mode for mode in self.modes if MODES[mode].controller == "mpc"]
-            _known("mode of intents, which the MPC completes", self.beside.intents, completed)
-        for name, chosen in self._chosen():
-            if not chosen or len(set(chosen)) < len(chosen):
-                raise HandrailError(f"study {self.name}: {name} expected some, each once, got {chosen}")
-        for name, count, least, most in self._counts():
-            if not least <= count <= most:
-                raise HandrailError(
-                    f"study {self.name}: {name} expected a whole number from {least} to {most}, got {count}"
-                )
-        for task, design in self.tasks.items():
-            self._check_task(task, design)
-
-    def _chosen(self) -> Iterator[tuple[str, tuple[Any, ...]]]:
-        """Yield what there has to be one of, by name."""
-        yield "modes", self.modes
-        if self.factors:
-            yield from (
-                ("factors", self.factors.modes),
-                ("factors.primary", self.factors.primary or CONTRASTS),
-            )
+            check_known("mode of intents, which the MPC completes", self.beside.intents, completed)
+            self._check_draws("beside.draws", self.beside.draws)
+            self._check_draws("beside.same_number", self.beside.same_number)
         if self.robustness:
-            yield "robustness", (*self.robustness.perturbations, *self.robustness.protections)
+            chosen = (*self.robustness.perturbations, *self.robustness.protections)
+            self._check_once("robustness", chosen)
+            self._check_draws("robustness.draws", self.robustness.draws)
 
-    def _counts(self) -> Iterator[tuple[str, int, int, int]]:
-        """Yield how many there are of something, by name, with the least and the most there may be."""
-        yield from (("draws", self.draws, 1, MOST_DRAWS), ("persons", self.persons, 1, MOST_DRAWS))
-        yield "seed", self.seed, 0, 10**5
-        if self.beside:
-            yield "beside.draws", self.beside.draws, 0, self.draws
-            yield "beside.same_number", self.beside.same_number, 0, self.draws
-        if self.robustness:
-            yield "robustness.draws", self.robustness.draws, 0, self.draws
+    def _check_once(self, name: str, chosen: tuple[str, ...]) -> None:
+        if not chosen or len(set(chosen)) < len(chosen):
+            raise HandrailError(f"study {self.name}: {name} expected some, each once, got {chosen}")
 
-    def _check_task(self, name: str, task: TaskDesign) -> None:
-        """Check what only a study asks of a task; its jobs check the rest."""
-        if task.episodes < 2 or task.steps < 1 or not 0.0 < task.minutes < math.inf:
-            raise HandrailError(
-                f"study {self.name}, task {name}: expected episodes ≥ 2, steps ≥ 1, minutes above 0, "
-                f"got {task.episodes}, {task.steps}, {task.minutes}"
-            )
+    def _check_draws(self, name: str, count: int) -> None:
+        if count > self.draws:
+            raise HandrailError(f"study {self.name}: {name} expected at most {self.draws} draws, got {count}")
 
 
-def _known(what: str, names: Any, choices: Any) -> None:
+def check_known(what: str, names: Iterable[str], choices: Iterable[str]) -> None:
+    """Check that names are among the choices."""
     for name in names:
         if name not in choices:
             raise unknown_name(what, name, choices)

@@ -10,9 +10,9 @@ import numpy as np
 
 from handrail.datasets.comparison.collection import Collected
 from handrail.datasets.comparison.compare import Comparison
-from handrail.datasets.comparison.differences import Difference
+from handrail.datasets.comparison.episodes import MetricContrast
 from handrail.datasets.comparison.groups import Group, group_of
-from handrail.datasets.comparison.outcomes import ConditionOutcome
+from handrail.datasets.comparison.policies import ConditionOutcome
 from handrail.datasets.presentation.drawing import COLOURS, GREY, INK, Panel, new_figure, rows, short, tidy
 from handrail.datasets.quality.measure import Measured
 from handrail.datasets.quality.metric import Metric
@@ -104,9 +104,9 @@ def _called(metric: Metric, ranked: bool) -> str:
 
 def effects_panels(comparison: Comparison) -> list[Panel]:
     """Return every metric's difference in standard deviations: those that can be better, then the others."""
-    found = [each for each in comparison.everything.differences if each.tested and not each.reason]
+    found = [each for each in comparison.everything.differences if each.tested]
     ranked, base = not comparison.unlike, comparison.baseline
-    judged = [each for each in found if each.metric.good and ranked]
+    judged = [each for each in found if each.measure.good and ranked]
     rest = [each for each in found if each not in judged]
     drawn = (
         (f"Right is better than {base}, left is worse", judged),
@@ -116,21 +116,21 @@ def effects_panels(comparison: Comparison) -> list[Panel]:
     return [Panel(title, _effects(each, known, ranked, comparison)) for title, each in drawn if each]
 
 
-def _effects(found: Sequence[Difference], known: Colours, ranked: bool, comparison: Comparison) -> Any:
-    metrics = list({each.metric.name: each.metric for each in found}.values())
+def _effects(found: Sequence[MetricContrast], known: Colours, ranked: bool, comparison: Comparison) -> Any:
+    metrics = list({each.measure.name: each.measure for each in found}.values())
     places, labels = [metric.name for metric in metrics], list(comparison.success)
     axes = new_figure(8.4, 0.6 + 0.28 * len(places)).subplots()
     axes.axvline(0.0, color=GREY, lw=1.0)
     for each in found:
         shift = 0.5 * ((labels.index(each.label) + 0.5) / len(labels) - 0.5)
-        row = places.index(each.metric.name) + shift
-        draw_effect(axes, each, row, known[each.label], -1.0 if turned(each.metric, ranked) else 1.0)
+        row = places.index(each.measure.name) + shift
+        draw_effect(axes, each, row, known[each.label], -1.0 if turned(each.measure, ranked) else 1.0)
     axes.set(xlim=(-_WIDEST - 0.15, _WIDEST + 0.15), xlabel="difference in standard deviations, 95 %")
     rows(axes, [_called(metric, ranked) for metric in metrics])
     return axes.figure
 
 
-def draw_effect(axes: Any, each: Difference, row: float, colour: str, sign: float) -> None:
+def draw_effect(axes: Any, each: MetricContrast, row: float, colour: str, sign: float) -> None:
     """Draw a difference with its interval; what lies outside, or is infinite, is an arrow at the edge."""
     estimate, *ends = (sign * value for value in each.effect)
     low, high = sorted(ends)
@@ -148,14 +148,14 @@ def draw_effect(axes: Any, each: Difference, row: float, colour: str, sign: floa
 def metrics_panels(comparison: Comparison) -> list[Panel]:
     """Return each metric's values, one dot an episode, with mean and interval."""
     view, ranked = comparison.everything, not comparison.unlike
-    metrics = {each.metric.name: each.metric for each in view.differences}.values()
+    metrics = {each.measure.name: each.measure for each in view.differences}.values()
     shown = [m for m in metrics if any(v.applies for v in view.measurements.values[m.name].values())]
     return [_metric(comparison, metric, ranked) for metric in shown]
 
 
 def _metric(comparison: Comparison, metric: Metric, ranked: bool) -> Panel:
     known, view = colours(comparison), comparison.everything
-    apart = {each.label for each in view.differences if each.metric is metric and each.incomparable}
+    apart = {each.label for each in view.differences if each.measure is metric and each.incomparable}
     axes = new_figure(2.7, 0.42 + 0.3 * len(view.groups)).subplots()
     rng = np.random.default_rng(0)
     for row, (label, found) in enumerate(view.measurements.values[metric.name].items()):

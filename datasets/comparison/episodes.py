@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from scipy import stats
@@ -12,7 +13,7 @@ from handrail.datasets.comparison.groups import Group
 from handrail.datasets.quality.catalogue import METRICS
 from handrail.datasets.quality.measure import Measured, Measurements
 from handrail.datasets.quality.metric import Metric
-from handrail.datasets.statistics.proportions import LEVEL, holm
+from handrail.datasets.statistics.contrast import Contrast, adjusted
 from handrail.datasets.statistics.resampling import (
     FEWEST,
     Interval,
@@ -23,69 +24,50 @@ from handrail.datasets.statistics.resampling import (
 
 FOLLOWS = 0.5  # |Spearman's ρ| with length from which a metric counts as following it
 _NO_SPREAD = 1e-9  # of a value: a standard deviation below is rounding
-
 _TOO_FEW = f"fewer than {FEWEST} episodes of a group have a value"
 
 
-@dataclass(frozen=True)
-class Difference:
+@dataclass(frozen=True, kw_only=True)
+class MetricContrast(Contrast):
     """Mean of a metric in a group minus that in the baseline, over episodes.
 
+    A metric whose unit is the dataset has an estimate alone: the values of its episodes share neighbours, and
+    resampling would take them for independent.
+
     Attributes:
-        metric: Which.
-        label: The group.
-        baseline: The other one.
-        reason: Why there is no difference to speak of; "" if there is one.
-        incomparable: That reason, where both have values whose units are not known to be the same.
-        paired: Whether episodes with the same start were compared.
-        counts: Episodes of both that count.
-        tested: Whether there are interval and p. Not for a metric of a group: the values of its episodes
-            share neighbours, and resampling would take them for independent.
-        estimate: In the metric's unit.
-        interval: 95 %, bootstrap.
+        incomparable: The reason, where both have values whose units are not known to be the same.
         spread: Standard deviation within groups, pooled.
-        p: Permutation test, two-sided.
-        p_adjusted: By Holm, over all metrics and groups that are tested.
         at_length: The estimate with the metric's linear dependence on length, within groups, taken off.
         at_length_interval: 95 %, bootstrap.
         follows_length: Spearman's ρ with episode length within groups.
     """
 
-    metric: Metric
-    label: str
-    baseline: str
-    reason: str = ""
+    measure: Metric
     incomparable: str = ""
-    paired: bool = False
-    counts: tuple[int, int] = (0, 0)
-    tested: bool = True
-    estimate: float = float("nan")
-    interval: Interval = (float("nan"), float("nan"))
-    spread: float = float("nan")
-    p: float = 1.0
-    p_adjusted: float = 1.0
-    at_length: float = float("nan")
-    at_length_interval: Interval = (float("nan"), float("nan"))
-    follows_length: float = float("nan")
+    spread: float | None = None
+    at_length: float | None = None
+    at_length_interval: Interval | None = None
+    follows_length: float | None = None
 
     @property
-    def detected(self) -> bool:
-        """Whether the interval leaves zero out and the adjusted p is below 0.05."""
-        if self.reason or not self.tested:
-            return False
-        return self.p_adjusted < LEVEL and not self.interval[0] <= 0.0 <= self.interval[1]
+    def tested(self) -> bool:
+        """Whether there are interval and p."""
+        return self.interval is not None
 
     @property
     def effect(self) -> tuple[float, float, float]:
         """Estimate and interval in standard deviations; infinite for a difference where nothing varies."""
-        low, high = (_in_spreads(end, self.spread) for end in self.interval)
-        return _in_spreads(self.estimate, self.spread), low, high
+        estimate, low, high = (
+            _in_spreads(each, self.spread or 0.0)
+            for each in (self.estimate or 0.0, *(self.interval or (0, 0)))
+        )
+        return estimate, low, high
 
     @property
     def at_equal_length(self) -> bool:
         """Whether what was detected, in its direction, is also there at equal length."""
-        low, high = self.at_length_interval
-        return self.detected and (low > 0.0 if self.estimate > 0.0 else high < 0.0)
+        low, high = self.at_length_interval or (0.0, 0.0)
+        return self.detected and (low > 0.0 if (self.estimate or 0.0) > 0.0 else high < 0.0)
 
 
 def _in_spreads(value: float, spread: float) -> float:
@@ -95,11 +77,12 @@ def _in_spreads(value: float, spread: float) -> float:
 
 
 def differences(
-    groups: Sequence[Group], measurements: Measurements, baseline: str, rng: np.random.Generator
-) -> list[Difference]:
+    scope: str, groups: Sequence[Group], measurements: Measurements, baseline: str, rng: np.random.Generator
+) -> list[MetricContrast]:
     """Return every metric's difference between every group and the baseline.
 
     Args:
+        scope: Of which episodes.
         groups: What was measured.
         measurements: Of these groups.
         baseline: The label that the others are compared with.
@@ -108,50 +91,46 @@ def differences(
     (base,) = [group for group in groups if group.label == baseline]
     others = [group for group in groups if group.label != baseline]
     found = [_difference(metric, group, base, measurements, rng) for group in others for metric in METRICS]
-    adjusted = iter(holm([d.p for d in found if d.tested and not d.reason]))
-    return [replace(d, p_adjusted=next(adjusted)) if d.tested and not d.reason else d for d in found]
+    return adjusted(replace(each, scope=scope, family=f"metrics, {scope}") for each in found)
 
 
 def _difference(
     metric: Metric, group: Group, base: Group, measurements: Measurements, rng: np.random.Generator
-) -> Difference:
+) -> MetricContrast:
     measured = [measurements.values[metric.name][each.label] for each in (group, base)]
-    names = {"metric": metric, "label": group.label, "baseline": base.label}
+    found = MetricContrast(measure=metric, label=group.label, baseline=base.label)
     for each, values in zip((group, base), measured, strict=True):
         if not values.applies:
-            return Difference(**names, reason=f"{each.label}: {values.reason}")
+            return replace(found, reason=f"{each.label}: {values.reason}")
     apart = measurements.why_not(metric, group.label, base.label)
     if apart:
-        return Difference(**names, reason=f"not comparable: {apart}", incomparable=apart)
-    if metric.of_group:
-        return _described(Difference(**names, tested=False), measured[0], measured[1])
+        return replace(found, reason=f"not comparable: {apart}", incomparable=apart)
     one, other = (np.isfinite(each.values) for each in measured)
+    if min(one.sum(), other.sum()) < FEWEST:
+        return replace(found, reason=_TOO_FEW)
+    if metric.of_group:
+        return _described(found, *measured)
     pairs = [(i, j) for i, j in shared_seeds(group, base) if one[i] and other[j]]
     chosen = np.array(pairs).T if pairs else (np.flatnonzero(one), np.flatnonzero(other))
     if min(map(len, chosen)) < FEWEST:
-        return Difference(**names, reason=_TOO_FEW)
+        return replace(found, reason=_TOO_FEW)
     values = [each.values[places] for each, places in zip(measured, chosen, strict=True)]
-    lengths = [
-        np.array([episode.seconds for episode in each.episodes])[places]
-        for each, places in zip((group, base), chosen, strict=True)
-    ]
-    return replace(Difference(**names), **_compared(values, lengths, bool(pairs), rng))
+    seconds = [np.array([episode.seconds for episode in each.episodes]) for each in (group, base)]
+    lengths = [each[places] for each, places in zip(seconds, chosen, strict=True)]
+    return replace(found, **_compared(values, lengths, bool(pairs), rng))
 
 
-def _described(difference: Difference, one: Measured, other: Measured) -> Difference:
-    """Return how a metric of a group differs, without a test, where the groups have as many episodes."""
-    counts = int(np.isfinite(one.values).sum()), int(np.isfinite(other.values).sum())
-    if min(counts) < FEWEST:
-        return replace(difference, reason=_TOO_FEW)
+def _described(found: MetricContrast, one: Measured, other: Measured) -> MetricContrast:
+    """Return how a measure of whole datasets differs, where they have as many episodes."""
     if len(one.values) != len(other.values):
-        return replace(difference, reason="it depends on the number of episodes: see the same number")
+        return replace(found, reason="it depends on the number of episodes: see the same number")
     estimate = float(np.nanmean(one.values) - np.nanmean(other.values))
-    return replace(difference, counts=counts, estimate=estimate)
+    return replace(found, estimate=estimate, counts=(len(one.known), len(other.known)))
 
 
 def _compared(
     values: Sequence[FloatArray], lengths: Sequence[FloatArray], paired: bool, rng: np.random.Generator
-) -> dict[str, object]:
+) -> dict[str, Any]:
     def at_length(first: IntArray, second: IntArray, axis: int = -1) -> FloatArray:
         chosen = (first, second)
         return at_equal_length(

@@ -1,21 +1,22 @@
 """How a study stands: which jobs were done with its present settings, and what came of them."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from handrail.controllers.errors import HandrailError
+from handrail.controllers.errors import HandrailError, unknown_name
 from handrail.datasets.comparison.evaluations import read_evaluations
 from handrail.datasets.reading.reader import read_info
 from handrail.datasets.storage import strict_json
 from handrail.datasets.storage.atomic import write_whole
 from handrail.policies.imitation.evaluation.config import EvaluateConfig
-from handrail.policies.study.design.design import StudyDesign
-from handrail.policies.study.design.jobs import StudyJob, StudyLayout, jobs
-from handrail.policies.study.design.settings import evaluations, fingerprint
+from handrail.policies.study.design import StudyDesign
+from handrail.policies.study.jobs import StudyJob, StudyLayout, jobs
+from handrail.policies.study.settings import evaluations, fingerprint
 
 
 @dataclass(frozen=True)
@@ -121,9 +122,27 @@ def read_json(path: Path) -> dict[str, Any]:
 
 
 def write_json(path: Path, content: Mapping[str, Any]) -> None:
-    """Write a JSON object under its name at once.
-
-    Raises:
-        OSError: the disk does not take it.
-    """
+    """Write a JSON object under its name at once."""
     write_whole(path, (json.dumps(content, indent=1) + "\n").encode())
+
+
+def note_design(layout: StudyLayout, design: StudyDesign) -> None:
+    """Note that the folder is run with a design, unless it was the last one already."""
+    known = designs(layout)
+    if not known or known[-1]["digest"] != design.digest:
+        entry = {"digest": design.digest, "since": datetime.now(UTC).isoformat(timespec="seconds")}
+        write_json(layout.designs, {"designs": [*known, entry]})
+
+
+def designs(layout: StudyLayout) -> list[dict[str, str]]:
+    """Return the designs that the folder was run with, the first one first: `digest`, `since`."""
+    found = read_json(layout.designs).get("designs", [])
+    listed = found if isinstance(found, list) else []
+    return [each for each in listed if isinstance(each, dict) and {"digest", "since"} <= each.keys()]
+
+
+def check_cell(name: str, jobs: Sequence[StudyJob]) -> None:
+    """Check that a study has a cell of a name; none is all."""
+    cells = dict.fromkeys(job.cell.name for job in jobs)
+    if name and name not in cells:
+        raise unknown_name("cell of the study", name, cells)

@@ -13,16 +13,15 @@ from handrail.datasets.storage.atomic import explained
 from handrail.datasets.storage.lock import DatasetLock
 from handrail.policies.imitation.config import check_installed
 from handrail.policies.study.config import StudyConfig
-from handrail.policies.study.design.design import StudyDesign
-from handrail.policies.study.design.designs import check_cell, note_design
-from handrail.policies.study.design.jobs import StudyJob, StudyLayout
-from handrail.policies.study.design.load import load_design
-from handrail.policies.study.design.power import plan
-from handrail.policies.study.design.progress import StudyProgress
-from handrail.policies.study.design.settings import check_policies
-from handrail.policies.study.execution.work import do
+from handrail.policies.study.design import StudyDesign
+from handrail.policies.study.jobs import StudyJob, StudyLayout
+from handrail.policies.study.load import load_design
+from handrail.policies.study.power import plan
+from handrail.policies.study.progress import StudyProgress, check_cell, note_design
+from handrail.policies.study.settings import check_policies
+from handrail.policies.study.work import do
 
-_PRELOAD = ("handrail.policies.study.execution.preload",)
+_PRELOAD = ("handrail.policies.study.preload",)
 
 
 def run_study(
@@ -58,7 +57,7 @@ def run_study(
             ):
                 for result in execution.run(_todo(progress, work, config.only)):
                     failed |= bool(result.error)
-        from handrail.policies.study.report.report import write_study
+        from handrail.policies.study.report import write_study
 
         files = write_study(config, StudyProgress(design, progress.layout))
     console.print("Written: " + ", ".join(map(str, files)))

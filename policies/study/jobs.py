@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from handrail.policies.study.design.design import StudyDesign
+from handrail.policies.study.design import StudyDesign
 
 Actions = Literal["realised", "intent"]
 Budget = Literal["time", "number"]

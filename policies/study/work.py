@@ -20,10 +20,10 @@ from handrail.datasets.reading.load import recorded_episodes
 from handrail.datasets.reading.reader import read_episodes
 from handrail.datasets.storage.atomic import remove
 from handrail.policies.imitation.interface.checkpoint import last_checkpoint, read_meta
-from handrail.policies.study.design.design import StudyDesign
-from handrail.policies.study.design.jobs import CONDITIONS, StudyCell, StudyJob, StudyLayout, StudyPolicy
-from handrail.policies.study.design.progress import note_of, read_json, write_json
-from handrail.policies.study.design.settings import evaluations, fingerprint, recording, training
+from handrail.policies.study.design import StudyDesign
+from handrail.policies.study.jobs import CONDITIONS, StudyCell, StudyJob, StudyLayout, StudyPolicy
+from handrail.policies.study.progress import note_of, read_json, write_json
+from handrail.policies.study.settings import evaluations, fingerprint, recording, training
 
 _MOST_ATTEMPTS = 6  # for each success that is wanted
 

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from handrail.datasets.statistics.proportions import reach
-from handrail.policies.study.design.design import CONTRASTS, Factors, StudyDesign
+from handrail.datasets.statistics.contrast import reach
+from handrail.policies.study.design import CONTRASTS, Factors, StudyDesign
 
 _WORST = 0.25  # variance of a rollout's success: of one that succeeds in half of all cases
 

@@ -1,12 +1,13 @@
-"""The tables of the page."""
+"""The tables of a comparison of datasets."""
 
 from collections.abc import Sequence
 
-from handrail.datasets.comparison.collection import Collected, adjusted, detected
+from handrail.datasets.comparison.collection import Collected
 from handrail.datasets.comparison.compare import Comparison, EpisodeChoice
-from handrail.datasets.comparison.differences import FOLLOWS, Difference
+from handrail.datasets.comparison.episodes import FOLLOWS, MetricContrast
 from handrail.datasets.comparison.groups import Group
-from handrail.datasets.comparison.outcomes import ConditionOutcome, Outcomes
+from handrail.datasets.comparison.policies import ConditionOutcome, Outcomes
+from handrail.datasets.comparison.report import contrast_table, difference_cell, measure_cell
 from handrail.datasets.presentation.table import Cell, Table
 from handrail.datasets.presentation.wording import (
     DASH,
@@ -15,11 +16,8 @@ from handrail.datasets.presentation.wording import (
     duration,
     number,
     p_alone,
-    p_value,
     percent,
     percent_span,
-    points,
-    points_span,
     signed,
     span,
 )
@@ -36,38 +34,20 @@ def answer_tables(comparison: Comparison) -> list[Table]:
     """Return what a terminal shows: the policies if they were evaluated, what was collected, what differs."""
     outcomes = comparison.outcomes
     policies = [conditions_table(outcomes), outcome_differences_table(outcomes)] if outcomes else []
+    found = [each for each in comparison.everything.differences if each.detected]
+    detected = contrast_table(found, ("measure", "group", "difference", "95 %", "p, Holm"), caption=_REST)
     collecting = collection_table(comparison.everything), collection_differences_table(comparison)
-    return [*policies, *collecting, _detected_table(comparison)]
-
-
-def _detected_table(comparison: Comparison) -> Table:
-    """Return the metrics in which a difference was detected."""
-    view, base = comparison.everything, comparison.baseline
-    means = view.measurements.values
-    rows = [
-        [
-            Cell(each.metric.title, below=_below(each.metric, ranked=not comparison.unlike)),
-            _mean(means[each.metric.name][base]),
-            each.label,
-            _mean(means[each.metric.name][each.label]),
-            p_alone(each.p_adjusted),
-        ]
-        for each in view.differences
-        if each.detected
-    ]
-    return Table(("differs", base, "", "mean, 95 %", "p, Holm"), rows, caption=_REST)
+    return [*policies, *collecting, detected]
 
 
 def collection_table(view: EpisodeChoice) -> Table:
     """Return what each group consists of."""
     headings = ("", "episodes", "success", "95 %", "operator time", "successes / h", "why not")
     headings += ("task", "robot")
-    rows = [_collected(*each) for each in zip(view.groups, view.collected, strict=True)]
-    return Table(headings, rows)
+    return Table(headings, [_collected(*each) for each in zip(view.groups, view.collected, strict=True)])
 
 
 def _collected(group: Group, each: Collected) -> list[str]:
-    reasons = ", ".join(f"{reason} ({count})" for reason, count in each.reasons.items())
     return [
         each.label,
         str(each.episodes),
@@ -75,7 +55,7 @@ def _collected(group: Group, each: Collected) -> list[str]:
         percent_span(each.success_interval),
         duration(each.operator_time),
         number(each.successes_an_hour),
-        reasons or DASH,
+        ", ".join(f"{reason} ({count})" for reason, count in each.reasons.items()) or DASH,
         shown_tasks(group.tasks),
         group.info.robot_type or DASH,
     ]
@@ -88,26 +68,8 @@ def shown_tasks(tasks: Sequence[str]) -> str:
 
 def collection_differences_table(comparison: Comparison) -> Table:
     """Return how each group differs from the baseline in success and in successes an hour."""
-    headings = ("while collecting", "success", "95 %", "p, Holm", "detectable")
-    headings += ("successes / h", "95 %", "p, Holm")
-    rows = [_collection_difference(comparison, label) for label in comparison.success]
-    return Table(headings, rows)
-
-
-def _collection_difference(comparison: Comparison, label: str) -> list[Cell | str]:
-    success, ratio = comparison.success[label], comparison.ratios[label]
-    row: list[Cell | str] = [f"{label} against {comparison.baseline}", *[DASH] * 7]
-    if success:
-        p = adjusted(comparison.success)[label]
-        look = "detected" if detected(success.interval, p) else ""
-        seen = f"{100 * success.detectable(len(comparison.success)):.0f} points"
-        estimate = Cell(f"{points(success.estimate)} points", look)
-        row[1:5] = estimate, points_span(success.interval), p_alone(p), seen
-    if ratio:
-        p = adjusted(comparison.ratios)[label]
-        look = "detected" if detected(ratio.interval, p, 1.0) else ""
-        row[5:] = Cell(f"× {number(ratio.estimate)}", look), span(ratio.interval), p_alone(p)
-    return row
+    found = [*comparison.success.values(), *comparison.ratios.values()]
+    return contrast_table(found, ("measure", "group", "difference", "95 %", "p, Holm", "detectable"))
 
 
 def views_table(comparison: Comparison) -> Table:
@@ -119,15 +81,8 @@ def views_table(comparison: Comparison) -> Table:
 def conditions_table(outcomes: Outcomes) -> Table:
     """Return how each condition's policies fared."""
     names = list(dict.fromkeys(name for condition in outcomes.conditions for name in condition.means))
-    headings = (
-        "trained on",
-        "success",
-        THESE_POLICIES,
-        WITH_TRAINING,
-        "each training seed",
-        "data",
-        *map(_heading, names),
-    )
+    headings = ("trained on", "success", THESE_POLICIES, WITH_TRAINING, "each training seed", "data")
+    headings += tuple(f"{name} / 100 rollouts" if name == "contacts" else name for name in names)
     rows = [
         [
             condition.label,
@@ -143,10 +98,6 @@ def conditions_table(outcomes: Outcomes) -> Table:
     return Table(headings, rows)
 
 
-def _heading(name: str) -> str:
-    return f"{name} / 100 rollouts" if name == "contacts" else name
-
-
 def _outcome(condition: ConditionOutcome, name: str) -> Cell | str:
     if name not in condition.means:
         return Cell(DASH, "quiet", "not every rollout has it")
@@ -157,21 +108,8 @@ def _outcome(condition: ConditionOutcome, name: str) -> Cell | str:
 
 def outcome_differences_table(outcomes: Outcomes) -> Table:
     """Return how conditions differ in success."""
-    headings = ("", "difference", THESE_POLICIES, WITH_TRAINING, "test", "p after Holm", "detectable")
-    rows = [
-        [
-            f"{each.label} − {each.baseline}",
-            Cell(f"{points(each.rollouts.estimate)} points", "detected" if each.detected else ""),
-            points_span(each.rollouts.interval),
-            points_span(each.nested) if each.nested else DASH,
-            ("McNemar" if each.rollouts.paired else "Boschloo")
-            + (" by scene, bootstrap, Welch" if each.nested else ""),
-            Cell(p_value(each.p_adjusted), below=f"over {each.tests} {each.family}"),
-            f"{100 * each.detectable:.0f} points",
-        ]
-        for each in outcomes.differences
-    ]
-    return Table(headings, rows)
+    columns = ("group", "difference", "95 %", WITH_TRAINING, "p, Holm", "family", "detectable")
+    return contrast_table(outcomes.differences, columns, "Success of policies", f"95 %: {THESE_POLICIES}")
 
 
 def metrics_table(comparison: Comparison, label: str) -> Table:
@@ -187,34 +125,23 @@ def _metric(comparison: Comparison, metric: Metric, label: str) -> list[Cell | s
     one, other = means[label], means[comparison.baseline]
     if one.mean is None and other.mean is None:
         return []
-    every, number_, time = (_of(view, metric, label) for view in comparison.views)
+    views = [each for each in comparison.metric_contrasts if (each.measure, each.label) == (metric, label)]
+    every = views[0]
     reason = Cell(DASH, "quiet", every.reason or _UNTESTED)
-    untested = bool(every.reason) or not every.tested
-    follows = abs(every.follows_length) >= FOLLOWS and metric.name != "length"
-    name = metric.title + (" ↔" if follows else "")
+    follows = abs(every.follows_length or 0.0) >= FOLLOWS and metric.name != "length"
+    at_length = Cell(
+        signed(every.at_length or 0.0),
+        "detected" if every.at_equal_length else "",
+        below=span(every.at_length_interval),
+    )
     return [
-        Cell(name, "", metric.meaning, _below(metric, ranked=not comparison.unlike)),
+        measure_cell(metric, ranked=not comparison.unlike, mark=" ↔" if follows else ""),
         _mean(other),
         _mean(one),
-        *([_estimate(each) for each in (every, number_, time)]),
-        reason if untested or metric.name == "length" else _at_length(every),
-        reason if untested else p_alone(every.p_adjusted),
+        *map(_estimate, views),
+        at_length if every.tested and metric.name != "length" else reason,
+        p_alone(every.p_adjusted) if every.tested else reason,
     ]
-
-
-def _below(metric: Metric, ranked: bool) -> str:
-    judged = f"{metric.good} is better" if metric.good and ranked else ""
-    return " · ".join(part for part in (metric.unit, judged) if part)
-
-
-def _at_length(each: Difference) -> Cell:
-    look = "detected" if each.at_equal_length else ""
-    return Cell(signed(each.at_length), look, below=span(each.at_length_interval))
-
-
-def _of(view: EpisodeChoice, metric: Metric, label: str) -> Difference:
-    (found,) = [each for each in view.differences if each.metric is metric and each.label == label]
-    return found
 
 
 def _mean(mean: Measured) -> Cell:
@@ -223,13 +150,18 @@ def _mean(mean: Measured) -> Cell:
     return Cell(number(mean.mean), below=span(mean.interval) if mean.interval else "")
 
 
-def _estimate(each: Difference) -> Cell:
+def _estimate(each: MetricContrast) -> Cell:
+    if each.incomparable:
+        return Cell("not comparable", "quiet", each.reason)
     if each.reason:
-        return Cell("not comparable" if each.incomparable else DASH, "quiet", each.reason)
-    if not each.tested:
-        return Cell(signed(each.estimate), "", _UNTESTED)
-    look = "detected" if each.detected else ""
-    return Cell(signed(each.estimate), look, below=span(each.interval))
+        return Cell(DASH, "quiet", each.reason)
+    found = difference_cell(each)
+    return Cell(
+        found.text,
+        found.look,
+        "" if each.tested else _UNTESTED,
+        below=span(each.interval) if each.interval else "",
+    )
 
 
 def not_applicable_table(comparison: Comparison) -> Table | None:
@@ -239,10 +171,10 @@ def not_applicable_table(comparison: Comparison) -> Table | None:
         reasons: dict[str, list[str]] = {}
         for label, mean in comparison.everything.measurements.values[metric.name].items():
             if mean.reason:
-                who = label if mean.mean is None else f"{label} (some episodes)"
-                reasons.setdefault(mean.reason, []).append(who)
+                whose = label if mean.mean is None else f"{label} (some episodes)"
+                reasons.setdefault(mean.reason, []).append(whose)
         for each in comparison.everything.differences:
-            if each.metric is metric and each.incomparable:
+            if each.measure is metric and each.incomparable:
                 reasons.setdefault(each.reason, []).append(f"{each.label} against {each.baseline}")
         rows += [[metric.title, ", ".join(labels), reason] for reason, labels in reasons.items()]
     return Table(("metric", "whose", "why"), rows) if rows else None

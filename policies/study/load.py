@@ -6,13 +6,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import draccus
-
-from handrail.controllers.entries import Entry, is_name, is_table
-from handrail.controllers.errors import unknown_name
-from handrail.controllers.fields import check_fields
+from handrail.collect.world.tasks.catalogue import TASKS
+from handrail.controllers.errors import HandrailError, unknown_name
 from handrail.controllers.strict_toml import read_toml
-from handrail.policies.study.design.design import (
+from handrail.controllers.typed import decoded
+from handrail.policies.study.design import (
     Beside,
     Factors,
     Flat,
@@ -20,13 +18,11 @@ from handrail.policies.study.design.design import (
     Robustness,
     StudyDesign,
     TaskDesign,
+    check_known,
 )
-from handrail.policies.study.design.settings import check_jobs
+from handrail.policies.study.settings import check_jobs
 
 PRESETS = Path(__file__).parent / "presets"
-_NAME = Entry("no name: a study is called after its file", lambda _: False, needed=False)
-_DIGEST = Entry("no digest: it follows from the rest", lambda _: False, needed=False)
-_TASKS = Entry("a table of tasks", lambda value: is_table(value) and all(map(is_name, value)))
 _PARTS = {
     "flat": Flat,
     "factors": Factors,
@@ -47,14 +43,21 @@ def load_design(name: str) -> StudyDesign:
     if not path.is_file():
         raise unknown_name("study", name, [*design_names(), "a file that ends in .toml"])
     content, where = read_toml(path, "study"), f"study {name}"
-    check_fields(content, StudyDesign, where, name=_NAME, digest=_DIGEST, tasks=_TASKS)
-    for task, entries in content["tasks"].items():
-        check_fields(entries, TaskDesign, f"{where}: [tasks.{task}]")
+    own = {"name": path.stem, "digest": digest_of(content)}
+    for entry in own.keys() & content.keys():
+        raise HandrailError(
+            f"{where}: expected no {entry}: it follows from the rest, and from the file's name"
+        )
+    parts, tasks = dict[str, Any](own), content.get("tasks")
+    if isinstance(tasks, Mapping):
+        check_known("task", tasks, TASKS)
+        parts["tasks"] = {
+            each: decoded(tasks[each], TaskDesign, f"{where}: [tasks.{each}]") for each in tasks
+        }
     for part, kind in _PARTS.items():
         if part in content:
-            check_fields(content[part], kind, f"{where}: [{part}]")
-    own = {"name": path.stem, "digest": digest_of(content)}
-    design = draccus.decode(StudyDesign, {**content, **own})
+            parts[part] = decoded(content[part], kind, f"{where}: [{part}]")
+    design = decoded({**content, **parts}, StudyDesign, where)
     design.check()
     check_jobs(design)
     return design

@@ -6,16 +6,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray
+from handrail.controllers.errors import HandrailError
 from handrail.datasets.comparison.evaluations import SUCCESS, Condition
+from handrail.datasets.comparison.groups import group_of
+from handrail.datasets.statistics.contrast import SHARE, Contrast, Estimate, Measure, adjusted
 from handrail.datasets.statistics.paired import wilson
-from handrail.datasets.statistics.proportions import (
-    ShareDifference,
-    holm,
-    independent_trials,
-    paired_shares,
-    reach,
-    unpaired_shares,
-)
+from handrail.datasets.statistics.proportions import independent_trials, paired_shares, unpaired_shares
 from handrail.datasets.statistics.replicates import (
     chance_of_means,
     replicates,
@@ -26,7 +22,9 @@ from handrail.datasets.statistics.replicates import (
 )
 from handrail.datasets.statistics.resampling import Interval, Run, percentiles, resample_runs
 
-LIKE_FOR_LIKE = "like-for-like"
+LIKE_FOR_LIKE, MIXED = "like-for-like", "mixed"  # families: mixed policies differ in more than their data
+POLICIES = "policies"
+POLICY_SUCCESS = Measure("policy_success", "success of policies", SHARE, "higher", "share of rollouts")
 
 
 @dataclass(frozen=True)
@@ -34,9 +32,6 @@ class ConditionOutcome:
     """One condition.
 
     Attributes:
-        label: Its name.
-        successes: Of all rollouts.
-        rollouts: Their number.
         wilson: 95 % interval of the success of these very policies: Wilson's, of as many rollouts as those of
             several policies in the same scenes are worth.
         nested: 95 % interval over dataset draw, training seed and evaluation seed: the wider of the nested
@@ -65,11 +60,7 @@ class ConditionOutcome:
 
 @dataclass(frozen=True)
 class Pair:
-    """Labels of a condition and of what it is compared with, and which family of comparisons that belongs to.
-
-    A family is declared by the kind of comparison before anything is known of its result: Holm's correction
-    is over all of one family, and the report names it.
-    """
+    """Labels of a condition and of what it is compared with, and the family of comparisons."""
 
     label: str
     baseline: str
@@ -77,96 +68,54 @@ class Pair:
 
 
 @dataclass(frozen=True)
-class OutcomeDifference:
-    """Success of a condition minus that of the baseline.
-
-    Attributes:
-        label: The condition.
-        baseline: The other one.
-        rollouts: Over all rollouts, as if these policies were all there is.
-        family: What kind of comparison it is: p is adjusted over all of this kind.
-        nested: 95 % interval over dataset draw, training seed and evaluation seed, the wider of the nested
-            bootstrap's and Welch's t interval over replicates; None where a condition has only one replicate,
-            since then nothing is known of how much the training seed matters.
-        p: Two-sided, the largest of the exact test's, the nested bootstrap's, and Welch's t test of the
-            replicates' success; resampling a handful of training seeds alone would see too much.
-        p_adjusted: By Holm, over all differences of the family.
-        tests: Number of differences in the family.
-        training_error: Standard error over the replicates, and its degrees of freedom, as Welch has them;
-            None where a condition has only one replicate.
-        detectable: The difference that would be seen as one in 80 % of such experiments.
-    """
-
-    label: str
-    baseline: str
-    family: str
-    rollouts: ShareDifference
-    nested: Interval | None
-    p: float
-    p_adjusted: float
-    tests: int
-    training_error: tuple[float, float] | None
-    detectable: float
-
-    @property
-    def detected(self) -> bool:
-        """Whether all intervals leave zero out and the adjusted p is below 0.05."""
-        intervals = [self.rollouts.interval, *([self.nested] if self.nested else [])]
-        return self.p_adjusted < 0.05 and all(low > 0 or high < 0 for low, high in intervals)
-
-
-@dataclass(frozen=True)
 class Outcomes:
-    """All conditions, and each against the baseline."""
+    """All conditions, and each against its baseline."""
 
     conditions: tuple[ConditionOutcome, ...]
-    differences: tuple[OutcomeDifference, ...]
+    differences: tuple[Contrast, ...]
+
+
+def pairs_between(conditions: Sequence[str], baseline: str, labels: Sequence[str]) -> list[Pair]:
+    """Return each condition of another group with that of the baseline's group it is compared with.
+
+    That is the one that shares most of the words after the label and has none of its own: `ee intent same
+    number` is set against `direct same number`, not `direct`. Like for like are those with the same words. A
+    single condition is compared with nothing.
+    """
+    words = {
+        condition: set(condition.removeprefix(group_of(condition, labels)).strip(" /").split())
+        for condition in conditions
+    }
+    candidates = [condition for condition in conditions if group_of(condition, labels) == baseline]
+    found = []
+    for condition in conditions if len(conditions) > 1 else ():
+        if condition in candidates:
+            continue
+        fitting = [each for each in candidates if words[each] <= words[condition]]
+        if not fitting:
+            raise HandrailError(
+                f"evaluations: expected a condition {baseline!r} to compare {condition!r} with, got "
+                f"{', '.join(conditions)}; name another --baseline"
+            )
+        other = max(fitting, key=lambda each: len(words[each]))
+        found.append(Pair(condition, other, LIKE_FOR_LIKE if words[other] == words[condition] else MIXED))
+    return found
 
 
 def judge_pairs(
     conditions: Mapping[str, Condition], pairs: Sequence[Pair], rng: np.random.Generator
 ) -> Outcomes:
-    """Compare the success of conditions, each with a baseline of its own, family by family.
-
-    Args:
-        conditions: By label.
-        pairs: What is compared with what.
-        rng: Of the resampling.
-    """
+    """Compare the success of conditions, each with a baseline of its own, family by family."""
     runs = {label: condition.runs() for label, condition in conditions.items()}
     resampled = dict(zip(runs, resample_runs(list(runs.values()), rng), strict=True))
     found = tuple(_condition(condition, resampled[label], rng) for label, condition in conditions.items())
-    return Outcomes(found, in_families([_difference(pair, runs, resampled) for pair in pairs]))
-
-
-def in_families(differences: Sequence[OutcomeDifference]) -> tuple[OutcomeDifference, ...]:
-    """Return differences with p adjusted by Holm for all of their family, and what is detectable then."""
-    members: dict[str, list[int]] = {}
-    for place, difference in enumerate(differences):
-        members.setdefault(difference.family, []).append(place)
-    found = list(differences)
-    for places in members.values():
-        adjusted, tests = holm([differences[place].p for place in places]), len(places)
-        for place, p in zip(places, adjusted, strict=True):
-            each = differences[place]
-            found[place] = replace(each, p_adjusted=p, tests=tests, detectable=_detectable(each, tests))
-    return tuple(found)
-
-
-def _detectable(difference: OutcomeDifference, tests: int) -> float:
-    """Return what both the test of the rollouts and that of the trained policies would see."""
-    found = difference.rollouts.detectable(tests)
-    if difference.training_error:
-        error, freedom = difference.training_error
-        found = max(found, reach(tests, freedom) * error)
-    return min(1.0, found)
+    return Outcomes(found, tuple(adjusted(_difference(pair, runs, resampled) for pair in pairs)))
 
 
 def _condition(condition: Condition, resampled: FloatArray, rng: np.random.Generator) -> ConditionOutcome:
     runs = condition.runs()
     values = np.concatenate([run.values for run in runs])
     worth = independent_trials(values, [seed for run in runs for seed in run.seeds])
-    names = [name for name in condition.outcomes if name != SUCCESS]
     return ConditionOutcome(
         label=condition.label,
         successes=int(values.sum()),
@@ -175,7 +124,7 @@ def _condition(condition: Condition, resampled: FloatArray, rng: np.random.Gener
         nested=_nested(runs, resampled),
         seeds=tuple(float(run.values.mean()) for run in runs),
         draws=len({run.draw for run in runs}),
-        means={name: _mean(condition.runs(name), rng) for name in names},
+        means={name: _mean(condition.runs(name), rng) for name in condition.outcomes if name != SUCCESS},
         trained_on=condition.policies[0].trained_on,
     )
 
@@ -199,21 +148,32 @@ def _mean(runs: Sequence[Run], rng: np.random.Generator) -> tuple[float, Interva
 
 def _difference(
     pair: Pair, runs: Mapping[str, Sequence[Run]], resampled: Mapping[str, FloatArray]
-) -> OutcomeDifference:
+) -> Contrast:
+    """Compare two conditions.
+
+    `interval` is over all rollouts, as if these policies were all there is; `nested` over dataset draw,
+    training seed and evaluation seed, the wider of the nested bootstrap's and Welch's t interval over
+    replicates; None where a condition has one replicate. p is the largest of the exact test's, the nested
+    bootstrap's, and Welch's: resampling a handful of training seeds alone would see too much.
+    """
     both = runs[pair.label], runs[pair.baseline]
-    names, shares = (pair.label, pair.baseline, pair.family), compare_rollouts(*both)
+    names = {"measure": POLICY_SUCCESS, "scope": POLICIES}
+    found = Contrast(**vars(pair), **names, **vars(compare_rollouts(*both)))
     if min(len(replicates(each)) for each in both) < 2:
-        return OutcomeDifference(*names, shares, None, shares.p, shares.p, 1, None, 1.0)
+        return found
     nested = resampled[pair.label] - resampled[pair.baseline]
     tail = (1 + min(np.count_nonzero(nested <= 0), np.count_nonzero(nested >= 0))) / (len(nested) + 1)
-    p = max(shares.p, min(1.0, 2.0 * float(tail)), welch_p(*both))
     error, freedom = standard_error(both)
     estimate = float(replicates(both[0]).mean() - replicates(both[1]).mean())
-    interval = wider(percentiles(nested), t_interval(estimate, error, freedom), -1.0, 1.0)
-    return OutcomeDifference(*names, shares, interval, p, p, 1, (error, freedom), 1.0)
+    return replace(
+        found,
+        nested=wider(percentiles(nested), t_interval(estimate, error, freedom), -1.0, 1.0),
+        p=max(found.p or 0.0, min(1.0, 2.0 * float(tail)), welch_p(*both)),
+        errors=(*found.errors, (error, freedom)),
+    )
 
 
-def compare_rollouts(first: Sequence[Run], second: Sequence[Run]) -> ShareDifference:
+def compare_rollouts(first: Sequence[Run], second: Sequence[Run]) -> Estimate:
     """Compare all rollouts of two conditions, as pairs where training and evaluation seeds are the same."""
     one, other = _rollouts(first), _rollouts(second)
     scenes = [seed for *_, seed in one], [seed for *_, seed in other]

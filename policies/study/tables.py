@@ -2,64 +2,50 @@
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from handrail.datasets.comparison.outcomes import compare_rollouts
-from handrail.datasets.presentation.table import Cell, Table
+from handrail.datasets.comparison.policies import compare_rollouts
+from handrail.datasets.comparison.report import contrast_table
+from handrail.datasets.presentation.table import Table
 from handrail.datasets.presentation.wording import (
     DASH,
     duration,
     number,
-    p_alone,
     percent,
     percent_span,
     points,
     points_span,
 )
 from handrail.datasets.quality.catalogue import METRICS
-from handrail.datasets.statistics.resampling import Run
-from handrail.policies.study.design.power import detectable
-from handrail.policies.study.report.contrasts import CONTRASTS, DECLARED, EXPLORATORY, WORDS, Contrast
-from handrail.policies.study.report.results import MEASURES, Condition, Results
+from handrail.datasets.statistics.contrast import Contrast
+from handrail.policies.study.contrasts import CONTRASTS, DECLARED, EXPLORATORY, SYSTEM, WORDS
+from handrail.policies.study.power import detectable
+from handrail.policies.study.results import MEASURES, Results, StudyCondition
 
 _TITLES = {
     DECLARED: "Declared before the run: policy success",
     EXPLORATORY: "Exploratory: not declared, not tested",
+    SYSTEM: "A claim about a system, not tested: a policy and a controller, against a policy alone",
 }
 
 
 def contrasts_table(found: Sequence[Contrast], kind: str, results: Results) -> Table:
-    """Return contrasts of a kind, in percentage points."""
-    design, factors = results.progress.design, results.progress.design.factors
-    expected = {
-        WORDS[name]: f"{100 * detectable(design, name):.0f}"
-        for name in CONTRASTS
-        if factors and design.draws > 1
-    }
-    tested, rows = kind == DECLARED, []
-    for each in (each for each in found if each.kind == kind):
-        estimate = each.estimate
-        cells = [
-            each.name,
-            ", ".join(each.tasks),
-            MEASURES[each.measure],
-            Cell(points(estimate.value), "detected" if each.detected else ""),
-            points_span(estimate.interval) if estimate.interval else DASH,
-            str(estimate.replicates),
-        ]
-        seen = estimate.detectable(len(factors.primary)) if factors else None
-        p = estimate.p if each.p_adjusted is not None else None
-        tail = [p_alone(p), p_alone(each.p_adjusted), expected.get(each.name, DASH)]
-        rows.append([*cells, *(tail + [DASH if seen is None else f"{100 * seen:.0f}"] if tested else [])])
-    headings = ["contrast", "tasks", "of", "points", "95 %", "draws"]
-    headings += ["p", "p (Holm)", "detectable, planned", "detectable, from the spread seen"] if tested else []
-    title = _TITLES.get(
-        kind, "A claim about a system, not tested: a policy and a controller, against a policy alone"
-    )
-    return Table(headings, rows, title)
+    """Return contrasts of a kind; of declared ones also what was planned to be detected."""
+    design = results.progress.design
+    columns, more = ["group", "of", "measure", "difference", "95 %", "n"], {}
+    if kind == DECLARED:
+        planned = {
+            WORDS[name]: f"{100 * detectable(design, name):.0f} points"
+            for name in CONTRASTS
+            if design.factors and design.draws > 1
+        }
+        columns += ["p", "p, Holm", "detectable"]
+        more["detectable, as planned"] = lambda each: planned.get(each.label, DASH)
+    chosen = [each for each in found if each.family == kind]
+    caption = "n: draws" + ("; detectable: from the spread seen" if more else "")
+    return contrast_table(chosen, columns, _TITLES[kind], caption, more)
 
 
 def conditions_table(task: str, results: Results) -> Table:
@@ -69,8 +55,8 @@ def conditions_table(task: str, results: Results) -> Table:
         "success",
         "95 %",
         "each draw",
-        MEASURES["contact"],
-        MEASURES["clean"],
+        MEASURES["contact"].title,
+        MEASURES["clean"].title,
         "length s",
         "learnt from",
         "updates",
@@ -79,7 +65,7 @@ def conditions_table(task: str, results: Results) -> Table:
     return Table(headings, rows, "Policies, undisturbed; “intent” goes through the MPC")
 
 
-def _condition(each: Condition, results: Results) -> tuple[str, ...]:
+def _condition(each: StudyCondition, results: Results) -> tuple[str, ...]:
     learnt = results.trained(each)
     episodes = [one["trained_on"].get("episodes", 0.0) for one in learnt]
     held = [one["trained_on"].get("held_out", 0.0) for one in learnt]
@@ -87,7 +73,7 @@ def _condition(each: Condition, results: Results) -> tuple[str, ...]:
     steps, touched = sorted(one["steps"] for one in learnt), each.rolled("contact")
     return (
         each.label,
-        percent(each.success.value),
+        percent(each.success.estimate),
         percent_span(each.interval),
         ", ".join(f"{100 * share:.0f}" for share in each.shares.values()),
         f"{touched.sum():.0f} of {len(touched)}",
@@ -166,34 +152,14 @@ def treatments_table(task: str, results: Results) -> Table:
     return Table(headings, rows, title)
 
 
-def _treatment(each: Condition, results: Results) -> tuple[str, ...]:
+def _treatment(each: StudyCondition, results: Results) -> tuple[str, ...]:
     whole, shown, before = results.find(each.task, each.label), [DASH] * 3, DASH
-    if whole and (same := _same(whole, each)):
-        change = compare_rollouts(_runs(each), same)
-        share = np.concatenate([run.values for run in same]).mean()
-        shown = [percent(float(share)), points(change.estimate), points_span(change.interval)]
-        touching = _same(whole, each, "contact")
-        before = percent(float(np.concatenate([run.values for run in touching]).mean()))
+    if whole and (same := whole.beside(each)):
+        change = compare_rollouts(each.runs(), same.runs())
+        shown = [percent(float(same.rolled().mean())), points(change.estimate), points_span(change.interval)]
+        before = percent(float(same.rolled("contact").mean()))
     touched = float(each.rolled("contact").mean())
     return each.label, each.treatment, percent(float(each.rolled().mean())), *shown, percent(touched), before
-
-
-def _runs(condition: Condition) -> list[Run]:
-    return [
-        Run(draw, draw, tuple(sorted(each.rollouts)), each.values()) for draw, each in condition.draws.items()
-    ]
-
-
-def _same(whole: Condition, treated: Condition, measure: str = "success") -> list[Run]:
-    """Return the runs of a condition in the scenes of another; none where it lacks one."""
-    found = []
-    for run in _runs(treated):
-        driven = whole.draws.get(run.draw)
-        if driven is None or not set(run.seeds) <= driven.rollouts.keys():
-            return []
-        kept = replace(driven, rollouts={seed: driven.rollouts[seed] for seed in sorted(run.seeds)})
-        found.append(Run(run.draw, run.draw, run.seeds, kept.values(measure)))
-    return found
 
 
 def times_table(results: Results) -> Table:

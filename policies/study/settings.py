@@ -11,8 +11,8 @@ from handrail.policies.imitation.config import TrainConfig
 from handrail.policies.imitation.evaluation.config import EvaluateConfig
 from handrail.policies.imitation.training.presets import check_policy, resolved
 from handrail.policies.imitation.training.resume import as_json
-from handrail.policies.study.design.design import MOST_DRAWS, StudyDesign
-from handrail.policies.study.design.jobs import StudyCell, StudyJob, StudyPolicy, jobs
+from handrail.policies.study.design import MOST_DRAWS, StudyDesign
+from handrail.policies.study.jobs import StudyCell, StudyJob, StudyPolicy, jobs
 
 BATCH = 10  # episodes, until the next person has a turn
 _FPS = 20  # [Hz]

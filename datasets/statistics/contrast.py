@@ -1,0 +1,187 @@
+"""One value for every comparison: a measure under one condition against the same under another.
+
+Conditions are datasets, teleop modes, trained policies; the unit of resampling is what was drawn anew: an
+episode, a participant, a trained policy, a draw of a study. Each unit has a test of its own; the result is
+the same value, corrected for the number of tests in the same way.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+import numpy as np
+from scipy import stats
+
+from handrail.datasets.statistics.resampling import Interval
+
+LEVEL = 0.05  # below which a p that is adjusted for their number counts
+POWER = 0.8
+SHARE, RATIO = "share", "ratio"  # units that are shown as percentage points, and as a factor
+_COMPARED = ("view", "metric", "unit", "group", "baseline", "does_not_apply")
+_NUMBERS = (
+    "estimate",
+    "interval",
+    "spread",
+    "p",
+    "p_adjusted",
+    "at_length",
+    "at_length_interval",
+    "follows_length",
+)
+_HIDDEN = ("measure", "scope", "label", "baseline", "family", "reason", "incomparable", "largest", "null")
+
+
+@dataclass(frozen=True)
+class Measure:
+    """What is compared.
+
+    Attributes:
+        name: Its name in JSON and CSV.
+        title: What people call it.
+        unit: Of its values; "" for a pure number.
+        good: "higher" or "lower" where everything else being equal that is better; "" where it is not so.
+        meaning: One sentence.
+    """
+
+    name: str
+    title: str
+    unit: str = ""
+    good: str = ""
+    meaning: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Estimate:
+    """A number, or a difference, and how sure it is; None for what nothing is known of.
+
+    Attributes:
+        interval: 95 %.
+        p: Two-sided, of there being no difference.
+        counts: Units that count, of the condition and of the baseline; one number where they are pairs.
+        errors: Standard error and degrees of freedom of every test that has to agree.
+        paired: Whether the same units were measured under both.
+        largest: The largest difference that there may be.
+    """
+
+    estimate: float | None = None
+    interval: Interval | None = None
+    p: float | None = None
+    counts: tuple[int, ...] = ()
+    errors: tuple[tuple[float, float], ...] = ()
+    paired: bool = False
+    largest: float = float("inf")
+
+    def detectable(self, tests: int = 1) -> float | None:
+        """Return the difference that would be seen as one in 80 % of such experiments; None if unknown.
+
+        Args:
+            tests: Number of tests that the p is adjusted for.
+        """
+        if not self.errors:
+            return None
+        return min(self.largest, max(reach(tests, freedom) * error for error, freedom in self.errors))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Contrast(Estimate):
+    """A measure under a condition minus the same under the baseline.
+
+    Attributes:
+        scope: Of which episodes, task or tasks.
+        family: Of tests that the p is adjusted for, declared before anything is known of the results.
+        nested: 95 % with the training of policies drawn anew, too; None where that is not known.
+        p_adjusted: By Holm over the family; None where nothing is tested.
+        tests: Their number in the family.
+        null: What no difference is: 1 for a ratio.
+        reason: Why there is no difference to speak of; "" if there is one.
+        sides: Means of what is added and of what is taken off, where that is more than two conditions.
+    """
+
+    measure: Measure
+    label: str
+    baseline: str = ""
+    scope: str = ""
+    family: str = ""
+    nested: Interval | None = None
+    p_adjusted: float | None = None
+    tests: int = 1
+    null: float = 0.0
+    reason: str = ""
+    sides: tuple[float, float] | None = None
+
+    @property
+    def detected(self) -> bool:
+        """Whether every interval leaves no difference out and the adjusted p is below 0.05."""
+        if self.p_adjusted is None or self.interval is None:
+            return False
+        intervals = [self.interval, self.nested or self.interval]
+        return self.p_adjusted < LEVEL and not any(low <= self.null <= high for low, high in intervals)
+
+    @property
+    def seen(self) -> float | None:
+        """The difference that such an experiment detects in 80 % of all cases, for so many tests."""
+        return self.detectable(self.tests)
+
+    @property
+    def row(self) -> dict[str, Any]:
+        """What the CSV of every report has: what is compared, and its numbers, an interval in two columns."""
+        values = self.scope, self.measure.name, self.measure.unit, self.label, self.baseline, self.reason
+        found: dict[str, Any] = dict(zip(_COMPARED, values, strict=True))
+        for name in _NUMBERS:
+            value = getattr(self, name, None)
+            if name.endswith("interval"):
+                found[f"{name}_low"], found[f"{name}_high"] = value or (None, None)
+            else:
+                found[name] = value
+        return found
+
+    @property
+    def content(self) -> dict[str, Any]:
+        """What the JSON of every report has: what is compared, and all that is known of it."""
+        values = {each.name: getattr(self, each.name) for each in fields(self) if each.name not in _HIDDEN}
+        named = {"view": self.scope, "metric": self.measure.name, "unit": self.measure.unit}
+        named |= {"group": self.label, "baseline": self.baseline, "family": self.family}
+        if self.reason:
+            return named | {"does_not_apply": self.reason}
+        return named | values | {"detected": self.detected, "detectable": self.seen}
+
+
+def adjusted[C: Contrast](contrasts: Iterable[C]) -> list[C]:
+    """Return contrasts with p adjusted by Holm over those of their family that are tested."""
+    found, members = list(contrasts), dict[str, list[int]]()
+    for place, each in enumerate(found):
+        if each.p is not None:
+            members.setdefault(each.family, []).append(place)
+    for places in members.values():
+        after = holm([p for place in places if (p := found[place].p) is not None])
+        for place, p in zip(places, after, strict=True):
+            found[place] = replace(found[place], p_adjusted=p, tests=len(places))
+    return found
+
+
+def holm(p: Sequence[float]) -> list[float]:
+    """Return p-values adjusted for there being several (Holm 1979): p'_(i) = max_{j ≤ i} (m − j + 1) p_(j).
+
+    Args:
+        p: `(m,)`.
+
+    Returns:
+        In the same order, at most 1.
+    """
+    order = np.argsort(p)
+    steps = np.arange(len(p), 0, -1) * np.asarray(p, float)[order]
+    found = np.empty(len(p))
+    found[order] = np.minimum(1.0, np.maximum.accumulate(steps))
+    return found.tolist()
+
+
+def reach(tests: int = 1, freedom: float = np.inf) -> float:
+    """Return how many standard errors a difference has to have, to be detected in 80 % of experiments.
+
+    t_{1 − α/2m} + t_{0.8}, of the t distribution; m tests, of which Holm gives the smallest p the level α/m.
+
+    Args:
+        tests: m.
+        freedom: Degrees of freedom with which the standard error is known; ∞ is the normal distribution.
+    """
+    return float(stats.t.ppf(1.0 - 0.5 * LEVEL / max(1, tests), freedom) + stats.t.ppf(POWER, freedom))
