@@ -5,7 +5,7 @@ a file (TOML, JSON, a message) becomes a dataclass by `decoded`. Both refuse wha
 """
 
 from collections.abc import Mapping
-from dataclasses import MISSING, Field, fields, is_dataclass
+from dataclasses import MISSING, Field, dataclass, fields, is_dataclass
 from difflib import get_close_matches
 from functools import cache
 from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
@@ -13,6 +13,7 @@ from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
 import msgspec
 from msgspec import Meta
 
+from handrail.controllers.arrays import frozen
 from handrail.controllers.errors import HandrailError, shown
 
 Number = Annotated[float, Meta(ge=-1e6, le=1e6)]
@@ -25,8 +26,20 @@ Count = Annotated[int, Meta(ge=0, le=2**63 - 1)]
 AtLeastOne = Annotated[int, Meta(ge=1, le=2**63 - 1)]
 Name = Annotated[str, Meta(max_length=200, pattern=r"\A[\w+:,.\- ]*\Z")]
 """A name that can be shown and is no path, as `base+ee` or `mask:0101`."""
-Text = Annotated[str, Meta(min_length=1, max_length=200, pattern=r"\A[^\x00-\x1f\x7f-\x9f\u2028\u2029]+\Z")]
-"""A text in one line, not empty."""
+_HIDDEN = (  # controls, spaces that are no space, marks without a width, halves of a pair, private characters
+    r"\x00-\x1f\x7f-\xa0\xad\u0600-\u0605\u061c\u06dd\u070f\u1680\u180e\u2000-\u200f\u2028-\u202f"
+    r"\u205f-\u206f\u3000\ud800-\uf8ff\ufeff\ufff9-\ufffb\U000e0000-\U0010ffff"
+)
+Text = Annotated[str, Meta(min_length=1, max_length=200, pattern=rf"\A[^{_HIDDEN}]+\Z")]
+"""A text in one line that can be seen, not empty."""
+
+
+@dataclass(frozen=True)
+class Listed:
+    """A field's list in a file, of some type, that becomes a read-only array of floats."""
+
+    kind: Any
+
 
 _WORDS = {
     "`float`": "a number",
@@ -100,7 +113,10 @@ def decoded[T](content: Any, kind: type[T], where: str) -> T:
         raise HandrailError(f"{where}: expected an entry {missing[0]!r}, found none")
     types = _types(kind)
     values = {name: _value(content[name], types[name], f"{where}: {name}") for name in content}
-    return kind(**values)
+    try:
+        return kind(**values)
+    except HandrailError as error:
+        raise HandrailError(f"{where}: {error}") from error
 
 
 def check_names(content: Mapping[Any, Any], known: Mapping[str, Any], where: str) -> None:
@@ -119,9 +135,13 @@ def _is_needed(field: Field[Any]) -> bool:
 
 
 def _value(value: Any, kind: Any, where: str) -> Any:
-    if is_dataclass(kind):
-        return decoded(value, kind, where)  # type: ignore[arg-type]
-    parts = get_args(kind)
-    if get_origin(kind) is tuple and parts and is_dataclass(parts[0]) and isinstance(value, list | tuple):
-        return tuple(decoded(each, parts[0], f"{where}[{index}]") for index, each in enumerate(value))  # type: ignore
-    return check(value, kind, where)
+    inner, *marks = get_args(kind) if get_origin(kind) is Annotated else (kind,)
+    if marks and isinstance(marks[0], Listed):
+        return frozen(check(value, marks[0].kind, where))
+    tables = [each for each in (inner, *get_args(inner)) if is_dataclass(each)]
+    if not tables or (value is None and type(None) in get_args(inner)):
+        return check(value, kind, where)
+    if get_origin(inner) is not tuple:
+        return decoded(value, tables[0], where)  # type: ignore[arg-type]
+    listed = check(value, Annotated[(tuple[dict, ...], *marks)] if marks else tuple[dict, ...], where)
+    return tuple(decoded(each, tables[0], f"{where}[{index}]") for index, each in enumerate(listed))  # type: ignore[arg-type]

@@ -6,7 +6,7 @@ import pinocchio as pin
 from handrail.collect.world import geometry
 from handrail.collect.world.gl import MjsBody, MjSpec, mujoco
 from handrail.controllers.arrays import FloatArray
-from handrail.controllers.robot.description import Gripper, Jaw
+from handrail.controllers.robot.parts import Gripper, Jaw
 
 _STEEL, _RUBBER = (0.30, 0.31, 0.33, 1.0), (0.10, 0.10, 0.11, 1.0)
 _REFLECTED = 1.0  # inertia of the motor behind each finger, seen through its gear [kg]

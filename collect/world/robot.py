@@ -15,8 +15,8 @@ from handrail.collect.world.gripper import JAW, add_gripper
 from handrail.collect.world.meshes import placed_meshes
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.numerics.rotation import quaternion_from_matrix
-from handrail.controllers.robot.description import Gripper, PlacedShape, Placement
 from handrail.controllers.robot.model import RobotModel
+from handrail.controllers.robot.parts import Gripper, PlacedShape, Placement
 from handrail.controllers.robot.scene_shapes import floor_shapes
 
 BASE_BODY = "planar_base"

@@ -10,8 +10,8 @@ import pinocchio as pin
 from handrail.controllers.arrays import BoolArray, FloatArray, frozen
 from handrail.controllers.collision.motion_bounds import motion_bounds
 from handrail.controllers.errors import HandrailError
-from handrail.controllers.robot.description import PlacedShape, Placement
 from handrail.controllers.robot.model import RobotModel
+from handrail.controllers.robot.parts import PlacedShape, Placement
 from handrail.controllers.robot.scene_shapes import floor_shapes, scene_shapes
 from handrail.controllers.robot.shape import Obstacle, Shape
 

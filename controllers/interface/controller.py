@@ -9,7 +9,7 @@ from handrail.controllers.arrays import FloatArray, frozen, real
 from handrail.controllers.interface.command import Command
 from handrail.controllers.interface.intent import Intent
 from handrail.controllers.numerics.jit import are_finite, bounded
-from handrail.controllers.robot.description import Limits
+from handrail.controllers.robot.parts import Limits
 from handrail.controllers.robot.shape import Obstacle
 
 

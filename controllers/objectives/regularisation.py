@@ -6,7 +6,7 @@ from handrail.controllers.arrays import BoolArray, FloatArray
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.objectives.objective import Objective
 from handrail.controllers.objectives.ownership import commanded_joints, leaves_freedom
-from handrail.controllers.robot.description import Limits
+from handrail.controllers.robot.parts import Limits
 
 
 def velocity_regularisation(channels: Channels, weights: FloatArray) -> Objective:

@@ -7,7 +7,7 @@ import numpy as np
 from handrail.controllers.arrays import FloatArray, IntArray, frozen
 from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.ocp.motion import approach, cumulated, rollout, within
-from handrail.controllers.robot.description import Limits
+from handrail.controllers.robot.parts import Limits
 
 
 @dataclass(frozen=True)

@@ -1,167 +1,38 @@
 """A robot is data: the description file that MuJoCo, pinocchio and CasADi are all built from."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from importlib import metadata
 from pathlib import Path, PurePosixPath
-from typing import Any, Literal
+from typing import Annotated
 
 import numpy as np
+from msgspec import Meta, Struct
 
 from handrail.controllers.arrays import FloatArray, frozen
-from handrail.controllers.errors import HandrailError
-from handrail.controllers.numerics.rotation import matrix_from_rpy, matrix_to_axis
+from handrail.controllers.errors import HandrailError, unknown_name
+from handrail.controllers.numerics.rotation import matrix_to_axis
 from handrail.controllers.regular_file import is_inside
 from handrail.controllers.robot.catalogue import ROBOTS
-from handrail.controllers.robot.description_check import check_description
+from handrail.controllers.robot.parts import (
+    ZERO,
+    AtLeastZero,
+    Base,
+    EndEffector,
+    Gripper,
+    Lengths,
+    Limits,
+    Numbers,
+    PlacedShape,
+    Placement,
+    Vector,
+    WorldScale,
+)
 from handrail.controllers.robot.shape import Shape, ShapeKind
 from handrail.controllers.strict_toml import read_toml
+from handrail.controllers.typed import Fraction, Positive, Text, decoded
 
-_PLANAR = ("x", "y", "theta")
-_BEYOND = 0.01  # touching, where fingers are sent to close [m]
-_SIMPLE: tuple[ShapeKind, ...] = ("box", "sphere", "cylinder")
-
-
-@dataclass(frozen=True)
-class Placement:
-    """A rigid transform: `p_parent = rotation @ p + translation` [m]."""
-
-    translation: FloatArray  # (3,)
-    rotation: FloatArray  # (3, 3)
-
-
-@dataclass(frozen=True)
-class PlacedShape:
-    """A shape on a frame of the robot; `tool` shapes may work close to work surfaces."""
-
-    name: str
-    frame: str
-    shape: Shape
-    placement: Placement
-    tool: bool = False
-    rgba: tuple[float, ...] = (0.5, 0.5, 0.5, 1.0)
-
-
-@dataclass(frozen=True)
-class Limits:
-    """Box limits of the generalised coordinates, each (n,), in [m] or [rad] and seconds."""
-
-    position_lower: FloatArray
-    position_upper: FloatArray
-    velocity: FloatArray
-    acceleration: FloatArray
-    effort: FloatArray
-    servo: FloatArray
-
-
-@dataclass(frozen=True)
-class Jaw:
-    """A finger that turns, instead of two that slide.
-
-    Attributes:
-        frame: of the URDF's link that turns, at the joint's zero, about its z axis; more angle is more open.
-        closed: angle where it is closed [rad].
-        open: angle where it is open [rad].
-        parallel: angle at which its pad is parallel to the other finger's [rad].
-        gap: from pad to pad there [m].
-    """
-
-    frame: str
-    closed: float
-    open: float
-    parallel: float
-    gap: float
-
-
-@dataclass(frozen=True)
-class Gripper:
-    """Two fingers that slide along the x axis of a placement on a frame; lengths [m], force [N], speed [m/s].
-
-    With a `jaw` the finger to +x stands still, its inner face at x = 0, and the one to −x turns.
-    `shape` is the collision shape that encloses the fingers, open or closed: real ones stand in for it.
-    """
-
-    frame: str
-    placement: Placement
-    mass: float
-    finger_mass: float
-    finger_size: tuple[float, float, float]
-    stroke: float
-    tip: float
-    force: float
-    speed: float
-    friction: float
-    camera: tuple[float, float, float]
-    camera_tilt: float
-    shape: str = "fingers"
-    jaw: Jaw | None = None
-
-    @property
-    def travel(self) -> float:
-        """From closed to open, as its joints count it: [m] of both fingers that slide, [rad] of a jaw."""
-        return self.stroke if self.jaw is None else self.jaw.open - self.jaw.closed
-
-    @property
-    def pace(self) -> float:
-        """Its speed, as its joints count it [m/s, rad/s]."""
-        return self.speed if self.jaw is None else self.speed * self.travel / self.stroke
-
-    @property
-    def beyond(self) -> float:
-        """How far beyond touching it is sent to close, as its joints count it [m, rad]."""
-        return _BEYOND if self.jaw is None else _BEYOND * self.travel / self.stroke
-
-
-@dataclass(frozen=True)
-class EndEffector:
-    """The end of an arm: the name of its channels, the frame that its placement is on, its gripper."""
-
-    name: str
-    frame: str
-    placement: Placement
-    gripper: Gripper | None
-
-
-@dataclass(frozen=True)
-class Base:
-    """What the arm stands on: planar or fixed, its mass [kg], height, length and width [m]."""
-
-    kind: Literal["planar", "fixed"]
-    mass: float
-    height: float
-    size: tuple[float, float]
-
-    @property
-    def joints(self) -> tuple[str, ...]:
-        """Names of its coordinates; none where it is fixed."""
-        return _PLANAR if self.kind == "planar" else ()
-
-
-@dataclass(frozen=True)
-class WorldScale:
-    """How large the world is that a robot works in: tasks, sticks and margins are made to its measure.
-
-    Attributes:
-        scale: of lengths and speeds against those of a robot as large as a person.
-        pace: share of full stick's speeds and rates; less than 1 where the base is slow for its size.
-        tables: height of the lowest and of the highest table [m].
-        goals: height of the lowest and of the highest goal of the hand [m].
-        cube: edge of the cube that it carries [m].
-        pitch: of goals of a hand on an arm of fewer than six joints: 0 points ahead, π/2 down [rad].
-        roll: of such goals, about where the hand points [rad].
-    """
-
-    scale: float = 1.0
-    pace: float = 1.0
-    tables: tuple[float, float] = (0.55, 0.65)
-    goals: tuple[float, float] = (0.7, 1.0)
-    cube: float = 0.05
-    pitch: tuple[float, float] = (0.0, 1.5)
-    roll: tuple[float, float] = (-1.5, 1.5)
-
-    @property
-    def grip(self) -> float:
-        """Scale of what the hand does close to a thing: of the cube against one of 5 cm."""
-        return self.cube / 0.05
+_KINDS: tuple[ShapeKind, ...] = ("box", "capsule", "cylinder", "sphere")
 
 
 @dataclass(frozen=True)
@@ -181,7 +52,12 @@ class RobotDescription:
     self_pairs: tuple[tuple[str, str], ...]
     self_margins: FloatArray  # largest margin that each self pair can keep [m]
     visual: tuple[PlacedShape, ...]
-    world: WorldScale = WorldScale()
+    world: WorldScale
+
+    def __post_init__(self) -> None:
+        """Check that its parts fit together."""
+        _check_joints(self)
+        _check_names(self)
 
     @property
     def joints(self) -> tuple[str, ...]:
@@ -201,72 +77,173 @@ def load_description(robot: str | Path) -> RobotDescription:
         raise HandrailError(
             f"unknown robot {str(robot)!r}: expected a .toml file or one of {', '.join(robot_names())}"
         )
-    content = read_toml(path, "robot description")
-    check_description(content, f"robot description {path}")
-    return _parse(content, path.parent)
+    where = f"robot description {path}"
+    file = decoded(read_toml(path, "robot description"), _File, where)
+    urdf, mesh_root = _find_urdf(file.arm.urdf, path.parent)
+    try:
+        return _described(file, urdf, mesh_root)
+    except HandrailError as error:
+        raise HandrailError(f"{where}: {error}") from error
 
 
-def _parse(data: dict[str, Any], folder: Path) -> RobotDescription:
-    urdf, mesh_root = _find_urdf(data["arm"]["urdf"], folder)
-    gripper = data.get("gripper")
-    self_collision = data["self_collision"]
+@dataclass(frozen=True)
+class _Arm:
+    urdf: Text
+    joints: Annotated[tuple[Text, ...], Meta(min_length=1)]
+    translation: Vector = ZERO
+    rpy: Vector = ZERO
+
+
+@dataclass(frozen=True)
+class _Tool:
+    frame: Text
+    translation: Vector = ZERO
+    rpy: Vector = ZERO
+
+
+@dataclass(frozen=True)
+class _Home:
+    q: Numbers
+
+
+@dataclass(frozen=True)
+class _Shape:
+    """A shape in a file: one of four kinds; a capsule from `a` to `b`, the others `at` a place."""
+
+    frame: Text
+    name: Text = ""
+    box: Lengths | None = None
+    capsule: Positive | None = None
+    cylinder: tuple[Positive, Positive] | None = None
+    sphere: Positive | None = None
+    at: Vector | None = None
+    rpy: Vector | None = None
+    a: Vector | None = None
+    b: Vector | None = None
+    tool: bool = False
+    rgba: Annotated[tuple[Fraction, ...], Meta(min_length=3, max_length=4)] = (0.5, 0.5, 0.5, 1.0)
+
+    def __post_init__(self) -> None:
+        """Check that it is one shape, placed as such."""
+        kinds = [kind for kind in _KINDS if getattr(self, kind) is not None]
+        if len(kinds) != 1:
+            got = " and ".join(kinds) or "none"
+            raise HandrailError(f"shape {self.name}: expected one of {', '.join(_KINDS)}, got {got}")
+        ends, place = (self.a, self.b), (self.at, self.rpy)
+        if self.capsule is None and ends != (None, None):
+            raise HandrailError(f"shape {self.name}: expected a {kinds[0]} with at and rpy, got a or b")
+        if self.capsule is not None and (None in ends or place != (None, None) or self.a == self.b):
+            raise HandrailError(
+                f"shape {self.name}: expected a capsule from a to b, apart, without at and rpy; "
+                f"got {self.a} and {self.b}; a sphere has no length"
+            )
+
+    def placed(self) -> PlacedShape:
+        """Return the shape on its frame."""
+        if self.capsule is not None:
+            a, b = np.array(self.a), np.array(self.b)
+            length = float(np.linalg.norm(b - a))
+            placement = Placement(frozen((a + b) / 2), frozen(matrix_to_axis((b - a) / length)))
+            shape = Shape("capsule", np.array([self.capsule, length]))
+        else:
+            kind: ShapeKind = next(kind for kind in _KINDS if getattr(self, kind) is not None)
+            shape = Shape(kind, np.atleast_1d(getattr(self, kind)))
+            placement = Placement.of(self.at or ZERO, self.rpy or ZERO)
+        return PlacedShape(self.name, self.frame, shape, placement, self.tool, self.rgba)
+
+
+class _Pair(Struct, array_like=True, frozen=True, forbid_unknown_fields=True):
+    """Two shapes that can meet, and the largest margin that they can keep [m]."""
+
+    first: Text
+    second: Text
+    margin: AtLeastZero = np.inf
+
+
+@dataclass(frozen=True)
+class _SelfCollision:
+    pairs: tuple[_Pair, ...]
+
+
+_Shapes = Annotated[tuple[_Shape, ...], Meta(min_length=1)]
+
+
+@dataclass(frozen=True)
+class _File:
+    """The tables of a description file."""
+
+    name: Text
+    base: Base
+    arm: _Arm
+    tool: _Tool
+    home: _Home
+    limits: Limits
+    self_collision: _SelfCollision
+    collision: _Shapes
+    visual: _Shapes = ()
+    gripper: Gripper | None = None
+    world: WorldScale = field(default_factory=WorldScale)
+
+
+def _described(file: _File, urdf: Path, mesh_root: Path) -> RobotDescription:
+    pairs, tool = file.self_collision.pairs, file.tool
+    placement = Placement.of(tool.translation, tool.rpy)
     return RobotDescription(
-        name=data["name"],
-        base=Base(**_frozen_lists(data["base"])),
+        name=file.name,
+        base=file.base,
         urdf=urdf,
         mesh_root=mesh_root,
-        mount=_placement(data["arm"]),
-        arm_joints=tuple(data["arm"]["joints"]),
-        end_effector=EndEffector(
-            "ee", data["tool"]["frame"], _placement(data["tool"]), _gripper(gripper) if gripper else None
-        ),
-        home=frozen(data["home"]["q"]),
-        limits=Limits(**{name: frozen(values) for name, values in data["limits"].items()}),
-        collision=tuple(_placed_shape(entry) for entry in data["collision"]),
-        self_pairs=tuple((first, second) for first, second, *_ in self_collision["pairs"]),
-        self_margins=frozen([(*pair, np.inf)[2] for pair in self_collision["pairs"]]),
-        visual=tuple(_placed_shape(entry) for entry in data.get("visual", [])),
-        world=WorldScale(**_frozen_lists(data.get("world", {}))),
+        mount=Placement.of(file.arm.translation, file.arm.rpy),
+        arm_joints=file.arm.joints,
+        end_effector=EndEffector("ee", tool.frame, placement, file.gripper),
+        home=file.home.q,
+        limits=file.limits,
+        collision=tuple(shape.placed() for shape in file.collision),
+        self_pairs=tuple((pair.first, pair.second) for pair in pairs),
+        self_margins=frozen([pair.margin for pair in pairs]),
+        visual=tuple(shape.placed() for shape in file.visual),
+        world=file.world,
     )
 
 
-def _gripper(data: dict[str, Any]) -> Gripper:
-    apart = ("translation", "rpy", "jaw")
-    values = _frozen_lists({name: value for name, value in data.items() if name not in apart})
-    jaw = Jaw(**data["jaw"]) if "jaw" in data else None
-    return Gripper(placement=_placement(data), jaw=jaw, **values)
+def _check_joints(robot: RobotDescription) -> None:
+    """Check one number a joint, and home inside the limits."""
+    _check_once(robot.arm_joints, "arm: joints")
+    limits, size = robot.limits, len(robot.joints)
+    vectors = {f"limits: {name}": values for name, values in vars(limits).items()}
+    for name, values in ({"home: q": robot.home} | vectors).items():
+        if values.shape != (size,):
+            raise HandrailError(f"{name}: expected {size} numbers, one a joint, got {len(values)}")
+    triples = zip(robot.joints, limits.position_lower, robot.home, limits.position_upper, strict=True)
+    for name, lower, home, upper in triples:
+        if not lower < upper:
+            raise HandrailError(
+                f"limits of joint {name}: expected position_lower below position_upper, "
+                f"got {lower} and {upper}"
+            )
+        if not lower <= home <= upper:
+            raise HandrailError(f"home of joint {name}: expected {lower} to {upper}, got {home}")
 
 
-def _frozen_lists(data: dict[str, Any]) -> dict[str, Any]:
-    return {name: tuple(value) if isinstance(value, list) else value for name, value in data.items()}
+def _check_names(robot: RobotDescription) -> None:
+    """Check that collision shapes have names of their own, and that no others are used."""
+    names = [shape.name for shape in robot.collision]
+    _check_once(names, "collision")
+    if "" in names:
+        raise HandrailError(f"collision[{names.index('')}]: expected an entry 'name', found none")
+    _check_once([" and ".join(sorted(pair)) for pair in robot.self_pairs], "self_collision: pairs")
+    gripper = robot.end_effector.gripper
+    used = [name for pair in robot.self_pairs for name in pair] + ([gripper.shape] if gripper else [])
+    for name in used:
+        if name not in names:
+            raise unknown_name("collision shape", name, names)
+    if same := [first for first, second in robot.self_pairs if first == second]:
+        raise HandrailError(f"self_collision: pairs: expected two shapes, got {same[0]!r} twice")
 
 
-def _placement(data: dict[str, Any], key: str = "translation") -> Placement:
-    rotation = matrix_from_rpy(np.array(data.get("rpy", [0.0, 0.0, 0.0])))
-    return Placement(frozen(data.get(key, [0.0, 0.0, 0.0])), frozen(rotation))
-
-
-def _placed_shape(data: dict[str, Any]) -> PlacedShape:
-    if "capsule" in data:
-        shape, placement = _capsule(data)
-    else:
-        kind: ShapeKind = next(kind for kind in _SIMPLE if kind in data)
-        shape, placement = Shape(kind, np.atleast_1d(data[kind])), _placement(data, "at")
-    return PlacedShape(
-        name=data.get("name", ""),
-        frame=data["frame"],
-        shape=shape,
-        placement=placement,
-        tool=data.get("tool", False),
-        rgba=tuple(data.get("rgba", (0.5, 0.5, 0.5, 1.0))),
-    )
-
-
-def _capsule(data: dict[str, Any]) -> tuple[Shape, Placement]:
-    a, b = np.array(data["a"], dtype=float), np.array(data["b"], dtype=float)
-    length = float(np.linalg.norm(b - a))
-    placement = Placement(frozen((a + b) / 2), frozen(matrix_to_axis((b - a) / length)))
-    return Shape("capsule", np.array([data["capsule"], length])), placement
+def _check_once(names: Sequence[str], where: str) -> None:
+    if twice := [name for name in names if names.count(name) > 1]:
+        raise HandrailError(f"{where}: expected each once, got {twice[0]!r} twice")
 
 
 def _find_urdf(urdf: str, folder: Path) -> tuple[Path, Path]:

@@ -12,7 +12,8 @@ import pinocchio as pin
 
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import HandrailError, message_of
-from handrail.controllers.robot.description import PlacedShape, Placement, RobotDescription, load_description
+from handrail.controllers.robot.description import RobotDescription, load_description
+from handrail.controllers.robot.parts import PlacedShape, Placement
 from handrail.controllers.robot.urdf import check_urdf
 
 _BASE_JOINTS = {"x": pin.JointModelPX, "y": pin.JointModelPY, "theta": pin.JointModelRZ}

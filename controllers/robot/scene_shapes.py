@@ -7,8 +7,8 @@ import numpy as np
 import pinocchio as pin
 
 from handrail.controllers.arrays import FloatArray
-from handrail.controllers.robot.description import PlacedShape
 from handrail.controllers.robot.model import RobotModel
+from handrail.controllers.robot.parts import PlacedShape
 from handrail.controllers.robot.shape import Shape
 
 _UNEVEN = 0.05  # how far a floor may rise above the base's [m]

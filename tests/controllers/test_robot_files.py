@@ -179,5 +179,5 @@ def test_a_named_pipe_is_one_line(tmp_path):
 def test_a_limit_next_to_zero_is_one_line(tmp_path):
     path = tmp_path / "robot.toml"
     path.write_text(re.sub(r"(?m)^velocity = \[[^,]*", "velocity = [5e-324", TEXTS["ridgeback_ur10"]))
-    with pytest.raises(HandrailError, match="velocity: expected numbers above 0"):
+    with pytest.raises(HandrailError, match="limits: velocity: expected a number >= 1e-06 at"):
         load_description(path)

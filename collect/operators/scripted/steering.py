@@ -7,8 +7,8 @@ import numpy as np
 from handrail.collect.operators.modes import Focus
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.numerics.rotation import rotation_vector, turned
-from handrail.controllers.robot.description import WorldScale
 from handrail.controllers.robot.model import Pose
+from handrail.controllers.robot.parts import WorldScale
 
 FOLLOW = 6.0
 """k of joints that follow a target, q̇ = k (q_target − q) [1/s]: a leader arm's, sliders', LeRobot's."""

@@ -16,8 +16,8 @@ from handrail.collect.world.tasks.furniture import (
 from handrail.collect.world.tasks.task import Aim, Start, TaskState, Verdict, near_home
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.numerics.rotation import quaternion_from_matrix
-from handrail.controllers.robot.description import WorldScale
 from handrail.controllers.robot.model import RobotModel
+from handrail.controllers.robot.parts import WorldScale
 
 _MASS = 0.1  # of a cube of 5 cm [kg]
 _BIN_HEIGHT = 0.10
