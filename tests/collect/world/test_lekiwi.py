@@ -124,9 +124,9 @@ def test_a_task_for_larger_robots_says_so(task):
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ("open = 0.5", "open = 0.0", r"\[gripper.jaw\]: expected closed <= parallel < open"),
-        ("gap = 0.0235", "gap = 0.0", r"\[gripper.jaw\]: .*gap"),
-        ("scale = 0.3", "scale = 0.0", r"\[world\]: .*scale"),
+        ("open = 0.5", "open = 0.0", r"gripper: jaw: expected closed <= parallel < open"),
+        ("gap = 0.0235", "gap = 0.0", r"gripper: jaw: .*gap"),
+        ("scale = 0.3", "scale = 0.0", r"world: .*scale"),
         ("goals = [0.12, 0.26]", "goals = [0.26, 0.12]", "the lowest and the highest"),
     ],
 )
