@@ -1,6 +1,5 @@
 """Settings of a comparison; light to import."""
 
-import math
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated
@@ -8,6 +7,7 @@ from typing import Annotated
 import tyro
 
 from handrail.controllers.errors import HandrailError
+from handrail.controllers.typed import Count, Positive, check_settings
 from handrail.datasets.advanced import Advanced
 from handrail.datasets.lists import Words
 from handrail.datasets.reading.columns import ColumnNames
@@ -31,11 +31,11 @@ class CompareConfig:
     """JSON files of what policies trained on the datasets did."""
     success_only: bool = False
     """Measure quality on episodes that did not fail."""
-    margin: Advanced[float] = 0.1
+    margin: Advanced[Positive] = 0.1
     """Distance to keep, for the time within it [m]."""
     pictures: Advanced[bool] = True
     """Show first pictures of the cameras."""
-    seed: Advanced[int] = 0
+    seed: Advanced[Count] = 0
     """Of the resampling: the same seed gives the same report."""
     verify: Advanced[bool] = False
     """Read every file of the datasets anew, not only those that have changed since they were checked."""
@@ -54,10 +54,7 @@ class CompareConfig:
             self._check_study()
         elif not self.datasets:
             raise HandrailError("dataset: expected one folder or more, before the flags; got none")
-        if not (math.isfinite(self.margin) and self.margin > 0.0):
-            raise HandrailError(f"--margin {self.margin}: expected a positive distance [m]")
-        if self.seed < 0:
-            raise HandrailError(f"--seed {self.seed}: expected a whole number >= 0")
+        check_settings(self, "--")
         if self.folder.exists() and not self.folder.is_dir():
             raise HandrailError(f"--output {self.output}: expected a folder, found a file")
 

@@ -23,7 +23,7 @@ from handrail.datasets.comparison.report import (
 from handrail.datasets.comparison.scores import SCORES
 from handrail.datasets.comparison.user_study import (
     MEASURES,
-    StudyFolder,
+    StudyData,
     Trial,
     form_trials,
     is_known,
@@ -116,7 +116,7 @@ class PeopleComparison:
     """
 
     config: CompareConfig
-    study: StudyFolder
+    study: StudyData
     baseline: str
     participants: Sequence[str]
     trials: Sequence[Trial]
@@ -258,7 +258,7 @@ def _within_reach(contrasts: Sequence[Contrast]) -> bool:
 
 
 def _cautions(
-    study: StudyFolder, participants: Sequence[str], parts: Sequence[PeoplePart], left_out: int
+    study: StudyData, participants: Sequence[str], parts: Sequence[PeoplePart], left_out: int
 ) -> list[str]:
     count, strangers = len(participants), {each.participant for each in study.scores} - set(participants)
     means = [mean for part in parts for means in part.means.values() for mean in means]

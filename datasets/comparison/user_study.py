@@ -54,7 +54,7 @@ MEASURES = (success, completion_time, *(each for each in METRICS if each.name in
 
 
 @dataclass(frozen=True)
-class StudyFolder:
+class StudyData:
     """What lies in the folder.
 
     Attributes:
@@ -100,7 +100,7 @@ class Trial:
     episode: int = 0
 
 
-def read_study(root: Path) -> StudyFolder:
+def read_study(root: Path) -> StudyData:
     """Read what a study's folder holds."""
     described = load_json(root / "study.json", "the study.json of a user study")
     demo = described.get("demo", False) if isinstance(described, dict) else None
@@ -119,10 +119,10 @@ def read_study(root: Path) -> StudyFolder:
                 f"{str(path)!r}: unknown condition {score.condition!r}: expected one of {expected}"
             )
     demo |= any(score.source == DEMO for score in scores)
-    return StudyFolder(root, demo, datasets, scores)
+    return StudyData(root, demo, datasets, scores)
 
 
-def form_trials(study: StudyFolder, title: str) -> list[Trial]:
+def form_trials(study: StudyData, title: str) -> list[Trial]:
     """Return every score of the forms."""
     return [
         Trial(title, each.condition, each.participant, {each.score: each.value})
@@ -131,9 +131,7 @@ def form_trials(study: StudyFolder, title: str) -> list[Trial]:
     ]
 
 
-def read_trials(
-    study: StudyFolder, scripted: Sequence[Path], columns: ColumnNames
-) -> tuple[list[Trial], int]:
+def read_trials(study: StudyData, scripted: Sequence[Path], columns: ColumnNames) -> tuple[list[Trial], int]:
     """Return all trials of a study, and of datasets of scripted operators beside it.
 
     Args:

@@ -1,6 +1,7 @@
 """What the tests of comparisons share."""
 
 import pytest
+from compare_helpers import quick_and_slow
 
 
 @pytest.fixture(scope="module")
@@ -9,3 +10,9 @@ def few_resamples():
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("handrail.datasets.statistics.resampling.RESAMPLES", 500)
         yield
+
+
+@pytest.fixture(scope="session")
+def ours(tmp_path_factory):
+    """Two datasets that Handrail recorded: one quick, one slow that fails every other time."""
+    return quick_and_slow(tmp_path_factory.mktemp("ours"))

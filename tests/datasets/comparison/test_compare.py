@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from compare_helpers import JOINTS, handrail_dataset, lerobot_dataset, quick_and_slow
+from compare_helpers import JOINTS, handrail_dataset, lerobot_dataset
 
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.comparison.compare import compare
@@ -33,11 +33,6 @@ def foreign(tmp_path_factory):
         str(lerobot_dataset(folder / name, JOINTS, 30, jitter, name == "calm"))
         for name, jitter in (("calm", 0.01), ("shaky", 0.3))
     ]
-
-
-@pytest.fixture(scope="module")
-def ours(tmp_path_factory):
-    return quick_and_slow(tmp_path_factory.mktemp("ours"))
 
 
 @pytest.fixture(scope="module")
@@ -200,7 +195,7 @@ WRONG = {
         ["{quick}", "{slow}", "--baseline", "z"],
         "unknown baseline 'z': expected one of quick, slow",
     ),
-    "margin": (["{quick}", "{slow}", "--margin", "-1"], "--margin -1.0: expected a positive distance"),
+    "margin": (["{quick}", "{slow}", "--margin", "-1"], "--margin: expected a number >= "),
     "output": (
         ["{quick}", "{slow}", "--output", "{quick}/meta/info.json"],
         "expected a folder, found a file",

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from compare_helpers import handrail_dataset, quick_and_slow
+from compare_helpers import handrail_dataset
 from datasets_helpers import create, frame_of
 
 from handrail.controllers.errors import HandrailError
@@ -19,11 +19,6 @@ from handrail.datasets.comparison.compare import compare
 from handrail.datasets.comparison.config import CompareConfig
 from handrail.datasets.comparison.groups import load_groups
 from handrail.datasets.format.schema import Feature
-
-
-@pytest.fixture(scope="module")
-def ours(tmp_path_factory):
-    return quick_and_slow(tmp_path_factory.mktemp("ours"))
 
 
 def test_modes_of_one_dataset(tmp_path):

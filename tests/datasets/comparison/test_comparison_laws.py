@@ -149,7 +149,7 @@ def test_pairs_are_all_episodes_or_none():
     assert measured.values["length"]["a"].applies
 
 
-def arm(label, mean, policies, generator, scenes=100, luck=0.0, hard=0.0, difficulty=None):
+def condition_of(label, mean, policies, generator, scenes=100, luck=0.0, hard=0.0, difficulty=None):
     """Policies that differ by `luck` of their training, in scenes that differ by `hard`."""
     found = []
     for seed in range(policies):
@@ -165,11 +165,11 @@ def test_what_is_called_detectable_is_detected_four_times_in_five(quick, policie
     generator = rng(9, policies, int(100 * luck))
 
     def experiment(difference):
-        arms = [
-            arm(x, 0.5 + 0.5 * s * difference, policies, generator, luck=luck)
+        conditions = [
+            condition_of(x, 0.5 + 0.5 * s * difference, policies, generator, luck=luck)
             for x, s in (("a", 1), ("b", -1))
         ]
-        return judge({each.label: each for each in arms}, "b", generator).differences[0]
+        return judge({each.label: each for each in conditions}, "b", generator).differences[0]
 
     claimed = np.median([experiment(0.2).seen for _ in range(20)])
     assert 0.6 <= np.mean([experiment(claimed).detected for _ in range(60)]) <= 0.95
@@ -177,9 +177,9 @@ def test_what_is_called_detectable_is_detected_four_times_in_five(quick, policie
 
 def test_more_comparisons_see_less(quick):
     generator = rng(10)
-    arms = {x: arm(x, 0.5, 3, generator, luck=0.1) for x in "abcd"}
-    (alone,) = judge_pairs(arms, [Pair("a", "d")], generator).differences
-    family = adjusted([alone, *judge(arms, "d", generator).differences])
+    conditions = {x: condition_of(x, 0.5, 3, generator, luck=0.1) for x in "abcd"}
+    (alone,) = judge_pairs(conditions, [Pair("a", "d")], generator).differences
+    family = adjusted([alone, *judge(conditions, "d", generator).differences])
     assert family[0].tests == 4
     assert family[0].seen > alone.seen
     assert [each.p_adjusted for each in family] == holm([each.p for each in family])
@@ -187,9 +187,9 @@ def test_more_comparisons_see_less(quick):
 
 def test_every_family_is_corrected_for_itself(quick):
     generator = rng(15)
-    arms = {x: arm(x, 0.5, 3, generator, luck=0.1) for x in "abcd"}
+    conditions = {x: condition_of(x, 0.5, 3, generator, luck=0.1) for x in "abcd"}
     pairs = [Pair("a", "d"), Pair("b", "d", "mixed"), Pair("c", "d")]
-    like, mixed, also = judge_pairs(arms, pairs, generator).differences
+    like, mixed, also = judge_pairs(conditions, pairs, generator).differences
     assert [each.family for each in (like, mixed, also)] == [LIKE_FOR_LIKE, "mixed", LIKE_FOR_LIKE]
     assert [each.tests for each in (like, mixed, also)] == [2, 1, 2]
     assert [like.p_adjusted, also.p_adjusted] == holm([like.p, also.p])
@@ -202,7 +202,7 @@ def test_an_interval_over_scenes_covers(quick, hard):
     generator, covered, naive = rng(11), 0, 0
     for _ in range(200):
         difficulty = generator.choice([-1.0, 1.0], size=60)
-        found = arm("a", 0.5, 3, generator, scenes=60, hard=hard, difficulty=difficulty)
+        found = condition_of("a", 0.5, 3, generator, scenes=60, hard=hard, difficulty=difficulty)
         (outcome,) = judge({"a": found}, "a", generator).conditions
         covered += outcome.wilson[0] <= 0.5 <= outcome.wilson[1]
         low, high = wilson(outcome.successes, outcome.rollouts)
@@ -237,8 +237,8 @@ def test_how_many_trials_scenes_are_worth():
 
 def test_a_condition_is_compared_with_the_baseline_of_its_own_kind():
     labels = ["ee", "direct"]
-    arms = ["ee", "ee intent", "direct", "ee intent same number", "direct same number", "ee filter"]
-    assert pairs_between(arms, "direct", labels) == [
+    conditions = ["ee", "ee intent", "direct", "ee intent same number", "direct same number", "ee filter"]
+    assert pairs_between(conditions, "direct", labels) == [
         Pair("ee", "direct"),
         Pair("ee intent", "direct", MIXED),
         Pair("ee intent same number", "direct same number", MIXED),

@@ -33,7 +33,7 @@ def runs(shares, rollouts=100, draws=None):
     return found
 
 
-def arm(label, shares):
+def condition_of(label, shares):
     policies = [
         Policy(0, run.training_seed, {}, {k: {"success": v} for k, v in enumerate(run.values.tolist())})
         for run in runs(shares)
@@ -68,7 +68,9 @@ def test_a_draw_of_the_dataset_is_one_replicate():
 
 def test_intervals_over_three_seeds_are_as_wide_as_t():
     """Resampling three numbers never leaves their range; Student's interval of three is 4.3 errors wide."""
-    found = judge({"a": arm("a", [0.9, 0.7, 0.5]), "b": arm("b", [0.4, 0.3, 0.2])}, "b", rng(0))
+    found = judge(
+        {"a": condition_of("a", [0.9, 0.7, 0.5]), "b": condition_of("b", [0.4, 0.3, 0.2])}, "b", rng(0)
+    )
     error, freedom = found.differences[0].errors[-1]
     low, high = t_interval(0.4, error, freedom)
     assert found.differences[0].nested == pytest.approx((low, high), abs=1e-6)
@@ -77,7 +79,7 @@ def test_intervals_over_three_seeds_are_as_wide_as_t():
 
 
 def test_an_interval_over_three_seeds_covers():
-    """Of 200 arms of three policies that differ by luck, 95 % of the intervals should hold the truth."""
+    """Of 200 conditions of three policies that differ by luck, 95 % of the intervals hold the truth."""
     generator, covered = rng(1), 0
     for _ in range(200):
         shares = np.clip(0.5 + 0.15 * generator.normal(size=3), 0.0, 1.0)

@@ -14,7 +14,6 @@ from handrail.datasets.statistics.contrast import holm
 from handrail.datasets.statistics.proportions import (
     newcombe,
     newcombe_paired,
-    paired_shares,
     unpaired_shares,
 )
 from handrail.datasets.statistics.resampling import (
@@ -69,13 +68,6 @@ def test_boschloo_is_symmetric_and_sees_more_than_fisher():
     assert found.estimate == pytest.approx(0.5)
     assert swapped.p == pytest.approx(found.p)
     assert 0.005 < found.p < float(np.asarray(fisher_exact([[7, 1], [5, 11]]))[1])
-
-
-def test_mcnemar():
-    """Golden: 8 discordant pairs against 1, p = 2 · 10 / 512."""
-    pairs = paired_shares([1] * 8 + [0] + [1] * 11, [0] * 8 + [1] + [1] * 11)
-    assert pairs.p == pytest.approx(20 / 512)
-    assert pairs.estimate == pytest.approx(7 / 20)
 
 
 def test_what_is_detectable_shrinks_with_the_root_of_the_trials():
@@ -140,12 +132,12 @@ def test_training_seeds_widen_the_interval():
 
 
 def test_what_is_paired_stays_paired():
-    arm = runs([0.5])
-    one, other = resample_runs([arm, arm], rng())
+    same = runs([0.5])
+    one, other = resample_runs([same, same], rng())
     assert np.array_equal(one, other)
 
 
-def arms(directory, **shares):
+def evaluated(directory, **shares):
     content = {
         label: [
             {
@@ -165,7 +157,7 @@ def arms(directory, **shares):
 
 
 def test_a_clear_difference_is_detected_and_chance_is_not(tmp_path):
-    found = read_evaluations([arms(tmp_path, a=[0.9] * 4, b=[0.5] * 4, c=[0.88] * 4)])
+    found = read_evaluations([evaluated(tmp_path, a=[0.9] * 4, b=[0.5] * 4, c=[0.88] * 4)])
     outcomes = judge(found, "a", rng())
     clear, none = outcomes.differences
     assert (clear.label, clear.detected, none.label, none.detected) == ("b", True, "c", False)
@@ -176,13 +168,13 @@ def test_a_clear_difference_is_detected_and_chance_is_not(tmp_path):
 
 
 def test_training_seeds_are_not_taken_for_a_difference_of_data():
-    """Two arms that differ by training seeds alone: rollouts alone see a difference most of the time."""
+    """Two conditions that differ by training seeds alone: rollouts alone mostly see a difference."""
     nested = rollouts = 0
     for seed in range(25):
         generator = rng(seed)
         drawn = {label: generator.uniform(0.3, 0.9, size=5) for label in "ab"}
         both = {label: runs(shares, 200, generator) for label, shares in drawn.items()}
-        outcome = judge({label: FakeArm(label, each) for label, each in both.items()}, "a", generator)
+        outcome = judge({label: FakeCondition(label, each) for label, each in both.items()}, "a", generator)
         (difference,) = outcome.differences
         low, high = difference.interval
         rollouts += not low <= 0 <= high
@@ -191,8 +183,8 @@ def test_training_seeds_are_not_taken_for_a_difference_of_data():
     assert nested <= 4
 
 
-class FakeArm:
-    """An arm without files."""
+class FakeCondition:
+    """A condition without files."""
 
     def __init__(self, label, members):
         self.label, self._runs = label, members
@@ -204,15 +196,15 @@ class FakeArm:
 
 
 def test_one_training_seed_says_nothing_of_training(tmp_path):
-    outcomes = judge(read_evaluations([arms(tmp_path, a=[0.9], b=[0.5])]), "a", rng())
+    outcomes = judge(read_evaluations([evaluated(tmp_path, a=[0.9], b=[0.5])]), "a", rng())
     (difference,) = outcomes.differences
     assert difference.nested is None
     assert outcomes.conditions[0].nested is None
 
 
 def test_two_training_seeds_are_too_few_where_they_differ_much(tmp_path):
-    """Resampling two policies of an arm never leaves their range; Student's interval of two is 12 errors."""
-    outcomes = judge(read_evaluations([arms(tmp_path, a=[0.95, 0.75], b=[0.6, 0.4])]), "a", rng())
+    """Resampling two policies never leaves their range; Student's interval of two is 12 errors."""
+    outcomes = judge(read_evaluations([evaluated(tmp_path, a=[0.95, 0.75], b=[0.6, 0.4])]), "a", rng())
     (difference,) = outcomes.differences
     assert difference.nested[1] > 0
     assert difference.interval[1] < 0.0

@@ -2,6 +2,7 @@
 
 import pytest
 from made_study import DESIGN, SHARES
+from study_helpers import DESIGN as SMALL
 from study_helpers import make
 
 from handrail.policies.study.jobs import StudyLayout, jobs
@@ -21,3 +22,11 @@ def gathered(tmp_path):
         return gather(StudyProgress(design, layout))
 
     return found
+
+
+@pytest.fixture
+def preset(tmp_path):
+    """Return the path of a small design."""
+    path = tmp_path / "small.toml"
+    path.write_text(SMALL)
+    return str(path)

@@ -17,13 +17,6 @@ from handrail.policies.study.progress import read_json, write_json
 from handrail.policies.study.settings import fingerprint, recording, training
 
 
-@pytest.fixture
-def preset(tmp_path):
-    path = tmp_path / "small.toml"
-    path.write_text(DESIGN)
-    return str(path)
-
-
 def test_every_job_once_then_none_again(tmp_path, preset):
     config = StudyConfig(preset, str(tmp_path / "study"), workers=3)
     first, second = Starter(), Starter()
@@ -66,16 +59,16 @@ def test_report_says_what_is_in_the_files(tmp_path, preset):
     assert run_here(config, Starter()) == 0
     content = json.loads((tmp_path / "study/study.json").read_text())
     found = content["conditions"]
-    arms = {each["label"]: each for each in found if not each["treatment"]}
-    assert set(arms) == {"ee", "ee intent", "direct"}
-    assert all(arm["rollouts"] == 80 for arm in arms.values())
+    driven = {each["label"]: each for each in found if not each["treatment"]}
+    assert set(driven) == {"ee", "ee intent", "direct"}
+    assert all(each["rollouts"] == 80 for each in driven.values())
     (ee,) = [each for each in content["contrasts"] if each["group"] == "ee − direct"]
-    assert ee["estimate"] == pytest.approx((arms["ee"]["successes"] - arms["direct"]["successes"]) / 80)
+    assert ee["estimate"] == pytest.approx((driven["ee"]["successes"] - driven["direct"]["successes"]) / 80)
     pushed = {each["label"]: each for each in found if each["treatment"] == "pushed"}
-    assert set(pushed) == set(arms)
+    assert set(pushed) == set(driven)
     assert pushed["ee"]["touched"] == pytest.approx(0.5)
-    failed = arms["direct"]["rollouts"] - arms["direct"]["successes"]
-    assert arms["direct"]["failures"] == {"lift": failed}
+    failed = driven["direct"]["rollouts"] - driven["direct"]["successes"]
+    assert driven["direct"]["failures"] == {"lift": failed}
     policies = [each for name, each in content["jobs"].items() if name.startswith("policy/")]
     assert all(each["took"]["seconds"] == 10.0 for each in policies)
     assert content["seconds"] == 10.0 * len(content["jobs"])
@@ -85,10 +78,10 @@ def test_report_says_what_is_in_the_files(tmp_path, preset):
     assert text.endswith("After.\n")
     assert "old" not in text
     row = next(line for line in text.splitlines() if line.startswith("| direct | ") and " 95 %" not in line)
-    assert f"| {100 * arms['direct']['successes'] / 80:.0f} % |" in text, row
+    assert f"| {100 * driven['direct']['successes'] / 80:.0f} % |" in text, row
     assert (tmp_path / "page_small_answer.png").read_bytes().startswith(b"\x89PNG")
     html = (tmp_path / "study/report.html").read_text()
-    assert f"{100 * arms['ee intent']['successes'] / 80:.0f} %" in html
+    assert f"{100 * driven['ee intent']['successes'] / 80:.0f} %" in html
     for cell in ("reach/ee/0", "reach/direct/1"):
         assert f"handrail-study --preset {preset} --only {cell} --output outputs/again" in html
 

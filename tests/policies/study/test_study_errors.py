@@ -30,13 +30,6 @@ FACTORS = "[factors]\n" + "".join(
 )
 
 
-@pytest.fixture
-def preset(tmp_path):
-    path = tmp_path / "small.toml"
-    path.write_text(DESIGN)
-    return str(path)
-
-
 @pytest.mark.parametrize(
     ("change", "words"),
     [

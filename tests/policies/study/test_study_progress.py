@@ -20,13 +20,6 @@ from handrail.policies.study.settings import evaluations, fingerprint, recording
 from handrail.policies.study.work import begin, do, work
 
 
-@pytest.fixture
-def preset(tmp_path):
-    path = tmp_path / "small.toml"
-    path.write_text(DESIGN)
-    return str(path)
-
-
 @pytest.mark.parametrize(
     ("change", "goes"),
     [
