@@ -2,12 +2,17 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Annotated
+
+from msgspec import Meta
 
 from handrail.controllers.errors import HandrailError, unknown_name
+from handrail.controllers.typed import check_settings
 
 CLIENTS: Mapping[str, Mapping[str, str]] = {  # the robots, and what they call our cameras
     "lekiwi": {"scene": "front", "wrist": "wrist"},
 }
+Port = Annotated[int, Meta(ge=1, le=65535)]
 NO_SCREEN = "browser"  # it draws a simulation
 
 
@@ -17,9 +22,9 @@ class ClientConfig:
 
     remote_ip: str = "127.0.0.1"
     """Of the computer on the robot."""
-    port_zmq_cmd: int = 5555
+    port_zmq_cmd: Port = 5555
     """Where it takes commands."""
-    port_zmq_observations: int = 5556
+    port_zmq_observations: Port = 5556
     """Where it sends observations."""
     simulated: bool = False
     """It is handrail-lekiwi host: let it begin every episode anew, in the episode's own scene."""
@@ -39,6 +44,4 @@ class ClientConfig:
             raise unknown_name("--robot_client", robot, CLIENTS)
         if operator == NO_SCREEN:
             raise HandrailError(f"--robot_client {robot}: expected another --operator than {NO_SCREEN}")
-        for name in ("port_zmq_cmd", "port_zmq_observations"):
-            if not 1 <= getattr(self, name) <= 65535:
-                raise HandrailError(f"--client.{name} {getattr(self, name)}: expected 1 to 65535")
+        check_settings(self, "--client.")

@@ -3,8 +3,12 @@
 import ipaddress
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
+
+from msgspec import Meta
 
 from handrail.controllers.errors import HandrailError
+from handrail.controllers.typed import check_settings
 
 
 @dataclass(frozen=True)
@@ -15,7 +19,7 @@ class CockpitConfig:
     """Address to listen at; any other than 127.0.0.1 asks for a token, by HTTPS."""
     token: bool = False
     """Ask for the token on 127.0.0.1 too: without, every account of this computer can drive."""
-    port: int = 8765
+    port: Annotated[int, Meta(ge=0, le=65535)] = 8765
     """Port to listen at; the next free one where it is taken; 0 for any."""
     open: bool = True
     """Open the page in this computer's browser, unless it asks for a token."""
@@ -47,8 +51,7 @@ class CockpitConfig:
                     f"--cockpit.host {self.host}: expected an address of this computer, "
                     "such as 192.168.1.20, or 0.0.0.0 for all"
                 ) from None
-        if not 0 <= self.port < 65536:
-            raise HandrailError(f"--cockpit.port {self.port}: expected 0 to 65535")
+        check_settings(self, "--cockpit.")
         folder = Path(self.certificate).expanduser()
         if self.certificate and not all((folder / name).is_file() for name in ("cert.pem", "key.pem")):
             raise HandrailError(

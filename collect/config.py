@@ -1,12 +1,12 @@
 """What a recording session is made of, as typed settings; light to import."""
 
-import math
 import os
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated
 
 import tyro
+from msgspec import Meta
 
 from handrail.collect.client_config import ClientConfig
 from handrail.collect.cockpit_config import CockpitConfig
@@ -19,6 +19,7 @@ from handrail.collect.teleop_config import TeleopConfig
 from handrail.collect.world.tasks.catalogue import TASKS
 from handrail.controllers.errors import HandrailError, unknown_name
 from handrail.controllers.robot.catalogue import ROBOTS
+from handrail.controllers.typed import AtLeastOne, Count, check_settings
 from handrail.datasets.advanced import Advanced
 from handrail.datasets.lists import Names
 
@@ -30,15 +31,6 @@ WORTH_SHARING = 100  # episodes from which on several processes are quicker than
 MOST_MOVING = 4
 MOST_TIME = 3600.0  # [s]
 _ONE_PROCESS = ("robot_client", "realtime", "display_data", "display_web", "display_save")
-_SIZES = "an even number from 16 to 1024"
-_RANGES = {
-    "noise": (0.0, 5.0, "a number from 0 (perfect) to 5"),
-    "moving_obstacles": (0, MOST_MOVING, f"a whole number from 0 to {MOST_MOVING}"),
-    "time_limit": (0.0, MOST_TIME, f"0 (the task's own) to {MOST_TIME} s"),
-    "person": (0, math.inf, "a whole number >= 0"),
-    "seed": (0, math.inf, "a whole number >= 0"),
-    "image_size": (16, 1024, _SIZES),
-}
 
 
 @dataclass(frozen=True)
@@ -53,22 +45,22 @@ class SessionConfig:
     """A mask of your own instead of the mode's: 0 or 1 for each channel (base twist, tool twist, joints)."""
     operator: Annotated[str, one_of(OPERATORS)] = "scripted"
     """Who steers."""
-    noise: Advanced[float] = 1.0
+    noise: Advanced[Annotated[float, Meta(ge=0, le=5)]] = 1.0
     """How human the scripted hand is: 0 perfect, 1 the default, partly from studies of people."""
     human: Advanced[HumanSettings] = field(default_factory=HumanSettings)
-    person: Advanced[int] = 0
+    person: Advanced[Count] = 0
     """Which person the scripted operator is; persons differ in delay, noise and all the rest."""
-    time_limit: float = 0.0
+    time_limit: Annotated[float, Meta(ge=0, le=MOST_TIME)] = 0.0
     """Time after which an episode is given up [s]; the task's own when 0."""
-    moving_obstacles: Advanced[int] = 0
+    moving_obstacles: Advanced[Annotated[int, Meta(ge=0, le=MOST_MOVING)]] = 0
     """Obstacles that cross the robot's way at up to 0.5 m/s, 0 to 4; task reach only."""
     robot: Annotated[str, one_of(ROBOTS)] = "ridgeback_ur10"
     """A robot, or a description file (.toml)."""
-    seed: int = 0
+    seed: Count = 0
     """Of scenes and operator: the same seed and versions give the same data."""
     cameras: Names = ""
     """Cameras to record: wrist, scene or both; none by default."""
-    image_size: Advanced[int] = 128
+    image_size: Advanced[Annotated[int, Meta(ge=16, le=1024, multiple_of=2)]] = 128
     """Height and width of the pictures [pixels]."""
     realtime: Advanced[bool] = False
     """Pace the loop by the wall clock."""
@@ -99,9 +91,7 @@ class SessionConfig:
                 raise unknown_name("camera", camera, CAMERAS)
         if len(set(self.camera_names)) != len(self.camera_names):
             raise HandrailError(f"--cameras {self.cameras}: expected each camera once")
-        for name, (low, high, words) in _RANGES.items():
-            if not low <= getattr(self, name) <= high:
-                raise HandrailError(f"--{name} {getattr(self, name)}: expected {words}")
+        check_settings(self, "--")
         if self.moving_obstacles and not TASKS.find(self.task).movers:
             fit = " or ".join(spec.name for spec in TASKS.built_in if spec.movers)
             raise HandrailError(f"--moving_obstacles: expected --task {fit}, got --task {self.task}")
@@ -109,8 +99,6 @@ class SessionConfig:
             raise HandrailError(
                 "--no_physics: expected --task reach without cameras: nothing can be moved or seen"
             )
-        if self.image_size % 2:
-            raise HandrailError(f"--image_size {self.image_size}: expected {_SIZES}")
 
 
 @dataclass(frozen=True)
@@ -147,7 +135,7 @@ class StoredConfig:
 class DatasetConfig(StoredConfig):
     """Where the episodes go, how many, how fast; the flags are LeRobot's."""
 
-    num_episodes: int = 10
+    num_episodes: AtLeastOne = 10
     """Episodes to record."""
     fps: Advanced[int] = 20
     """Control and recording rate [Hz], 10 to 100."""
@@ -158,8 +146,7 @@ class DatasetConfig(StoredConfig):
         """Check the settings."""
         _ = self.folder
         check_fps(self.fps)
-        if self.num_episodes < 1:
-            raise HandrailError(f"--dataset.num_episodes {self.num_episodes}: expected 1 or more")
+        check_settings(self, "--dataset.")
 
     @property
     def is_found(self) -> bool:

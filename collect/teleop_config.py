@@ -1,19 +1,18 @@
 """The device in a person's hand, as typed settings; light to import."""
 
-import math
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Literal
 
 import tyro
+from msgspec import Meta
 
 from handrail.collect.flags import one_of
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.robot.catalogue import ROBOTS
+from handrail.controllers.typed import NonNegative, check_settings
 
 LEADER = "leader_arm"
-BESIDE = ("keyboard", "gamepad")
-UNITS = ("degrees", "radians", "other")
 _EXAMPLE = "--teleop.type=so101_leader --teleop.port=/dev/ttyACM0 --teleop.id=mine"
 
 
@@ -40,13 +39,13 @@ class LeaderConfig:
 class TeleopConfig(LeaderConfig):
     """The device in your hand, with --operator gamepad, spacemouse, keyboard or leader_arm."""
 
-    beside: str = "keyboard"
+    beside: Literal["keyboard", "gamepad"] = "keyboard"
     """What moves the base beside a leader arm, and has its clutch: keyboard or gamepad."""
     map: str = ""
     """File (.toml) that gives controls another meaning; what it does not name stays as it is."""
-    dead_zone: float = 0.12
+    dead_zone: Annotated[float, Meta(ge=0, le=0.5)] = 0.12
     """Deflection of a stick that counts as none, 0 to 0.5."""
-    exponent: float = 1.7
+    exponent: Annotated[float, Meta(ge=1, le=3)] = 1.7
     """Curve of a stick, 1 (straight) to 3 (fine near the middle)."""
 
     def check(self, operator: str) -> None:
@@ -59,17 +58,9 @@ class TeleopConfig(LeaderConfig):
             self.check_type(f"--operator {LEADER}")
         elif self.type:
             raise HandrailError(f"--teleop.type {self.type}: expected --operator {LEADER}, got {operator}")
-        shape = (
-            ("--teleop.dead_zone", self.dead_zone, 0.0, 0.5),
-            ("--teleop.exponent", self.exponent, 1.0, 3.0),
-        )
-        for flag, value, low, high in shape:
-            if not low <= value <= high:
-                raise HandrailError(f"{flag} {value}: expected a number from {low} to {high}")
+        check_settings(self, "--teleop.")
         if self.map and not Path(self.map).expanduser().is_file():
             raise HandrailError(f"--teleop.map {self.map}: expected a .toml file, found none there")
-        if self.beside not in BESIDE:
-            raise HandrailError(f"--teleop.beside {self.beside}: expected {' or '.join(BESIDE)}")
 
 
 @dataclass(frozen=True)
@@ -79,14 +70,13 @@ class CalibrateConfig:
     teleop: LeaderConfig = field(default_factory=LeaderConfig)
     robot: Annotated[str, one_of(ROBOTS)] = "ridgeback_ur10"
     """A robot, or a description file (.toml)."""
-    unit: str = "degrees"
+    unit: Literal["degrees", "radians", "other"] = "degrees"
     """Of the leader's joints: degrees, radians, or other (measured from the quarter turns that you make)."""
 
     def check(self) -> None:
         """Check the settings."""
         self.teleop.check_type("handrail-devices calibrate")
-        if self.unit not in UNITS:
-            raise HandrailError(f"--unit {self.unit}: expected {', '.join(UNITS[:-1])} or {UNITS[-1]}")
+        check_settings(self, "--")
 
 
 @dataclass(frozen=True)
@@ -101,11 +91,10 @@ class ShowDeviceConfig:
     device: tyro.conf.Positional[Literal["gamepad", "spacemouse", "keyboard", "leader_arm"]]
     """Which device."""
     teleop: TeleopConfig = field(default_factory=TeleopConfig)
-    seconds: float = 0.0
+    seconds: NonNegative = 0.0
     """How long; until Ctrl-C when 0."""
 
     def check(self) -> None:
         """Check the settings."""
         self.teleop.check(self.device)
-        if not 0.0 <= self.seconds < math.inf:
-            raise HandrailError(f"--seconds {self.seconds}: expected 0 (until Ctrl-C) or more")
+        check_settings(self, "--")

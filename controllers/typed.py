@@ -88,9 +88,9 @@ def check_settings(settings: Any, what: str = "") -> None:
 
     Args:
         settings: the dataclass.
-        what: its fields are called in the error: `MPC setting`; `--` for flags.
+        what: its fields are called in the error: `MPC setting`; `--` or `--client.` for flags.
     """
-    before = what if what in ("", "--") else f"{what} "
+    before = what if not what or what.endswith(("--", ".")) else f"{what} "
     for name, kind in _types(type(settings)).items():
         if any(isinstance(each, Meta) for each in get_args(kind)) or get_origin(kind) is Literal:
             check(getattr(settings, name), kind, before + name)

@@ -3,10 +3,14 @@
 from dataclasses import dataclass
 from typing import Annotated
 
+from msgspec import Meta
+
+from handrail.collect.client_config import Port
 from handrail.collect.flags import check_json, names, one_of
 from handrail.collect.world.tasks.catalogue import TASKS
 from handrail.controllers.errors import HandrailError, unknown_name
 from handrail.controllers.robot.catalogue import ROBOTS
+from handrail.controllers.typed import check_settings
 from handrail.datasets.advanced import Advanced
 from handrail.datasets.lists import Names
 
@@ -21,29 +25,29 @@ class HostConfig:
     """What stands around it."""
     robot: Annotated[str, one_of(ROBOTS)] = "lekiwi"
     """A LeKiwi, or its description file (.toml)."""
-    seed: int = 0
+    seed: Annotated[int, Meta(ge=0, le=2**53 - 1)] = 0
     """Of the scene, until a client of Handrail's asks for another one; and of what gets lost."""
     address: str = "127.0.0.1"
     """Where it listens; * for everybody in the network."""
-    port_zmq_cmd: int = 5555
+    port_zmq_cmd: Port = 5555
     """Where commands arrive."""
-    port_zmq_observations: int = 5556
+    port_zmq_observations: Port = 5556
     """Where observations leave."""
     cameras: Names = ""
     """What it sees: front, wrist or both; none by default (needs OpenGL)."""
-    camera_fps: Advanced[float] = 10.0
+    camera_fps: Advanced[Annotated[float, Meta(ge=0.1, le=60)]] = 10.0
     """New pictures a second; in between it sends the last one again."""
-    watchdog_timeout_ms: Advanced[float] = 500.0
+    watchdog_timeout_ms: Advanced[Annotated[float, Meta(ge=50, le=10000)]] = 500.0
     """Without a command for so long, the base stops."""
-    max_loop_freq_hz: Advanced[float] = 30.0
+    max_loop_freq_hz: Advanced[Annotated[float, Meta(ge=5, le=60)]] = 30.0
     """Rounds a second."""
-    latency: Advanced[float] = 0.0
+    latency: Advanced[Annotated[float, Meta(ge=0, le=2)]] = 0.0
     """How late commands and observations arrive, each [s]."""
-    drop: Advanced[float] = 0.0
+    drop: Advanced[Annotated[float, Meta(ge=0, le=1)]] = 0.0
     """Share of the messages that get lost, 0 to 1."""
     lost_camera: Advanced[str] = ""
     """A camera that says nothing."""
-    seconds: float = 0.0
+    seconds: Annotated[float, Meta(ge=0, le=1e6)] = 0.0
     """How long it runs; until Ctrl-C when 0."""
     json: Advanced[str] = ""
     """Write what it saw to this file at the end: commands, ages, stops, episodes."""
@@ -59,14 +63,7 @@ class HostConfig:
         for camera in filter(None, (*self.camera_names, self.lost_camera)):
             if camera not in _CAMERAS:
                 raise unknown_name("camera", camera, _CAMERAS)
-        ranges = (
-            ("port_zmq_cmd", 1, 65535), ("port_zmq_observations", 1, 65535), ("seed", 0, 2**53 - 1),
-            ("camera_fps", 0.1, 60), ("watchdog_timeout_ms", 50, 10_000), ("max_loop_freq_hz", 5, 60),
-            ("latency", 0, 2), ("drop", 0, 1), ("seconds", 0, 1e6),
-        )  # fmt: skip
-        for name, low, high in ranges:
-            if not low <= getattr(self, name) <= high:
-                raise HandrailError(f"--{name} {getattr(self, name)}: expected {low} to {high}")
+        check_settings(self, "--")
         if self.port_zmq_cmd == self.port_zmq_observations:
             raise HandrailError("--port_zmq_cmd and --port_zmq_observations: expected two ports, got one")
         check_json(self.json)

@@ -85,7 +85,7 @@ class EvaluatedEnv(gymnasium.Wrapper[Observation, NDArray[np.float32], Observati
     ) -> tuple[Observation, dict[str, Any]]:
         """Begin an episode."""
         self._loop.begin(None if seed is None else seed + self._first_seed)
-        return self._shown(self._loop.observation), _plain(self._loop.info)
+        return self._shown(self._loop.now.observation), _plain(self._loop.now.info)
 
     def step(self, action: ArrayLike) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Do what an action asks for, for one period."""

@@ -3,67 +3,60 @@
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray
-from handrail.controllers.entries import Entry, check_entries, is_number, is_table, is_text
 from handrail.controllers.errors import HandrailError, unknown_name
 from handrail.controllers.robot.description import RobotDescription
+from handrail.controllers.typed import Number, Text, decoded
 
 POSITION, VELOCITY = ".pos", ".vel"
 _DEGREE = math.pi / 180.0
 _OPEN = 35.0  # percent of the jaw's range, −0.17 to 1.75 rad: where the model of the SO-101 is open, 0.5 rad
-_UNITS = ("degrees", "radians", "metres", "range")
 _SENT = {"position": POSITION, "velocity": VELOCITY}
 
 
 @dataclass(frozen=True)
 class JointUnits:
-    """A joint of the arm: `q = q₀ + sign · s · (value − zero)`.
+    """A joint of the arm: `q = q₀ + sign · s · (value − zero)`."""
 
-    Attributes:
-        name: of its entries, without `.pos` and `.vel`.
-        unit: degrees, radians or metres, where `q₀ = 0`; or range: −100 to 100 between the joint's limits.
-        sign: 1, or −1 where it turns the other way.
-        zero: the value at `q₀`.
-        sends: position or velocity: what the robot takes.
-    """
-
-    name: str
-    unit: str = "degrees"
-    sign: float = 1.0
-    zero: float = 0.0
-    sends: str = "position"
+    name: Text
+    """Of its entries, without `.pos` and `.vel`."""
+    unit: Literal["degrees", "radians", "metres", "range"] = "degrees"
+    """`q₀ = 0`; but with range, the values are −100 to 100 between the joint's limits."""
+    sign: Literal[1, -1] = 1
+    """−1 where it turns the other way."""
+    zero: Number = 0.0
+    """The value at `q₀`."""
+    sends: Literal["position", "velocity"] = "position"
+    """What the robot takes."""
 
 
 @dataclass(frozen=True)
 class BaseUnits:
-    """The base: velocities in its own frame [m/s, unit/s]; and its pose, where the robot has odometry.
+    """The base: velocities in its own frame [m/s, unit/s]; and its pose, where the robot has odometry."""
 
-    Attributes:
-        x: name of the velocity ahead.
-        y: to the left.
-        theta: of the turn.
-        unit: of the turn: degrees or radians.
-        pose: names of x, y and heading in the world [m, unit]; none where they are to be integrated.
-    """
-
-    x: str = "x.vel"
-    y: str = "y.vel"
-    theta: str = "theta.vel"
-    unit: str = "degrees"
-    pose: tuple[str, ...] = ()
+    x: Text = "x.vel"
+    """Name of the velocity ahead."""
+    y: Text = "y.vel"
+    """Name of the velocity to the left."""
+    theta: Text = "theta.vel"
+    """Name of the velocity of the turn."""
+    unit: Literal["degrees", "radians"] = "degrees"
+    """Of the turn."""
+    pose: tuple[Text, ...] = ()
+    """Names of x, y and heading in the world [m, unit]; none where they are to be integrated."""
 
 
 @dataclass(frozen=True)
 class GripperUnits:
     """The gripper: its name, and its values when it is open and closed."""
 
-    name: str
-    opened: float
-    closed: float
+    name: Text
+    opened: Number
+    closed: Number
 
 
 class BodyReading(NamedTuple):
@@ -204,31 +197,15 @@ UNITS: Mapping[str, Callable[[RobotDescription], RobotUnits]] = {
     "so_follower": so_follower,
     "plain": plain,
 }
-_NUMBER = Entry("a finite number", is_number, needed=False)
-_JOINT = {
-    "name": Entry("LeRobot's name of a joint", is_text),
-    "unit": Entry(", ".join(_UNITS), lambda value: value in _UNITS, needed=False),
-    "sign": Entry("1 or -1", lambda value: value in (1, -1), needed=False),
-    "zero": _NUMBER,
-    "sends": Entry("position or velocity", lambda value: value in tuple(_SENT), needed=False),
-}
-_BASE = {
-    **{name: Entry("a name", is_text, needed=False) for name in ("x", "y", "theta")},
-    "unit": Entry("degrees or radians", lambda value: value in _UNITS[:2], needed=False),
-    "pose": Entry(
-        "three names", lambda value: len(value) in (0, 3) and all(map(is_text, value)), needed=False
-    ),
-}
-_GRIPPER = {
-    "name": Entry("a name", is_text),
-    "opened": Entry("a finite number", is_number),
-    "closed": Entry("a finite number", is_number),
-}
-_TABLE = {
-    "joints": Entry("a table of the arm's joints", is_table),
-    "base": Entry("a table, or nothing", lambda value: value is None or is_table(value), needed=False),
-    "gripper": Entry("a table, or nothing", lambda value: value is None or is_table(value), needed=False),
-}
+
+
+@dataclass(frozen=True)
+class _UnitsTable:
+    """A robot's names and units, as a table says them."""
+
+    joints: dict[str, Any]
+    base: BaseUnits | None = None
+    gripper: GripperUnits | None = None
 
 
 def robot_units(said: str | Mapping[str, Any], description: RobotDescription) -> RobotUnits:
@@ -237,22 +214,21 @@ def robot_units(said: str | Mapping[str, Any], description: RobotDescription) ->
         if said not in UNITS:
             raise unknown_name("units", said, UNITS)
         return UNITS[said](description)
-    check_entries(said, _TABLE, "units")
-    joints = dict(said["joints"])
-    for name, joint in joints.items():
-        check_entries(joint, _JOINT, f"units: joint {name}")
-    base, gripper = said.get("base"), said.get("gripper")
-    if base is not None:
-        check_entries(base, _BASE, "units: base")
-        base = BaseUnits(**{**base, "pose": tuple(base.get("pose", ()))})
-    if gripper is not None:
-        check_entries(gripper, _GRIPPER, "units: gripper")
-        if gripper["opened"] == gripper["closed"]:
-            raise HandrailError("units: gripper: expected opened and closed to differ")
-        gripper = GripperUnits(**gripper)
-    return RobotUnits(
-        description, {name: JointUnits(**joint) for name, joint in joints.items()}, base, gripper
-    )
+    table = dict(said) if isinstance(said, Mapping) else said
+    if isinstance(table, dict):
+        for name, kind in (("base", BaseUnits), ("gripper", GripperUnits)):
+            if table.get(name) is not None:
+                table[name] = decoded(table[name], kind, f"units: {name}")
+    units = decoded(table, _UnitsTable, "units")
+    joints = {
+        name: decoded(joint, JointUnits, f"units: joint {name}") for name, joint in units.joints.items()
+    }
+    if units.base and len(units.base.pose) not in (0, 3):
+        raise HandrailError(f"units: base: pose: expected three names, got {len(units.base.pose)}")
+    grip = units.gripper
+    if grip and grip.opened == grip.closed:
+        raise HandrailError("units: gripper: expected opened and closed to differ")
+    return RobotUnits(description, joints, units.base, grip)
 
 
 def _terms(joint: JointUnits, lower: float, upper: float) -> tuple[float, float]:

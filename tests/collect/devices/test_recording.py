@@ -174,8 +174,11 @@ def test_a_recording_with_a_leader_arm_and_a_gamepad(tmp_path, pad, listens, mon
         (("--operator", "leader_arm"), "--operator leader_arm: expected --teleop.type, such as"),
         (("--teleop.type", "so101_leader"), "expected --operator leader_arm, got scripted"),
         (("--operator", "gamepad", "--teleop.map", "no.toml"), "expected a .toml file, found none"),
-        (("--operator", "gamepad", "--teleop.dead_zone", "0.9"), "expected a number from 0.0 to 0.5"),
-        ((*LEADER, "--teleop.beside", "mouse"), "expected keyboard or gamepad"),
+        (
+            ("--operator", "gamepad", "--teleop.dead_zone", "0.9"),
+            "--teleop.dead_zone: expected a number <= 0.5, got 0.9",
+        ),
+        ((*LEADER, "--teleop.beside", "mouse"), "Expected one of ('keyboard', 'gamepad')"),
         ((*LEADER, "--mode", "ee"), "expected a mode that steers every joint of the arm: joints, direct,"),
         ((*LEADER, "--mode", "direct_single"), "leader; got direct_single"),
         (

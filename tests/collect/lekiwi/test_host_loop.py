@@ -139,7 +139,7 @@ def test_cameras_say_jpegs_of_lekiwis_sizes_and_a_lost_one_says_nothing(monkeypa
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["--drop", "2"], "--drop 2.0: expected 0 to 1"),
+        (["--drop", "2"], "--drop: expected a number <= 1.0"),
         (["--cameras", "front,back"], "unknown camera 'back'"),
         (["--port_zmq_cmd", "5556"], "expected two ports"),
         (["--task", "juggle"], "unknown task 'juggle'"),

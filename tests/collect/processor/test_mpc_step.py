@@ -218,7 +218,7 @@ def test_it_says_the_robot_s_own_action():
         ({"robot": "nobody"}, "unknown robot"),
         ({"units": "yards"}, "unknown units 'yards': expected one of lekiwi, plain, so_follower"),
         ({"units": {"joints": {}}}, "expected joints shoulder_pan_joint"),
-        ({"units": {"joints": {"a": {"name": "a", "unit": "yards"}}}}, "unit: expected degrees"),
+        ({"units": {"joints": {"a": {"name": "a", "unit": "yards"}}}}, "unit: expected one of degrees"),
         ({"inputs": {"a": ["ee.up", 1.0]}}, "'ee.up': expected one of"),
         ({"inputs": {"a": "ee.vx"}}, "how much of it"),
         ({"settings": {"horizons": 3}}, "expected numbers for some of horizon"),
