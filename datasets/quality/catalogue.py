@@ -4,7 +4,7 @@ These numbers describe a dataset; they do not rank it. In a 2026 study the best 
 policy, and five of seven metrics exploited the length of the episodes: look at them beside the outcome.
 """
 
-from handrail.datasets.quality import driving, effort, motion, safety, tracking
+from handrail.datasets.quality import effort, motion, safety, tracking
 from handrail.datasets.quality.consistency import GROUP_METRICS
 
 METRICS = (
@@ -28,7 +28,7 @@ METRICS = (
     effort.mode_switches,
     effort.active_axes,
     effort.input_idle,
-    driving.undos,
-    driving.input_age,
-    driving.round_trip,
+    effort.undos,
+    effort.input_age,
+    effort.round_trip,
 )

@@ -9,8 +9,7 @@ from scipy.special import digamma, gammaln
 
 from handrail.controllers.arrays import FloatArray, IntArray
 from handrail.datasets.quality.metric import Metric
-from handrail.datasets.quality.pool import ObservationPool
-from handrail.datasets.quality.sample import Sample
+from handrail.datasets.quality.pool import ObservationPool, Sample
 from handrail.datasets.reading.demonstration import DoesNotApply
 
 RESOLUTION = 1e-3  # of the scale: states that are nearer are one state

@@ -8,8 +8,7 @@ import numpy as np
 
 from handrail.controllers.arrays import FloatArray
 from handrail.datasets.quality.metric import Metric
-from handrail.datasets.quality.pool import ObservationPool
-from handrail.datasets.quality.sample import Sample
+from handrail.datasets.quality.pool import ObservationPool, Sample
 from handrail.datasets.reading.demonstration import Demonstration
 from handrail.datasets.reading.episode import Episode
 from handrail.datasets.reading.load import each_opened

@@ -10,8 +10,7 @@ from handrail.controllers.arrays import FloatArray, IntArray
 from handrail.datasets.quality.catalogue import METRICS
 from handrail.datasets.quality.group_reading import GroupReading
 from handrail.datasets.quality.metric import Metric
-from handrail.datasets.quality.pool import FRAMES, ObservationPool
-from handrail.datasets.quality.sample import frames_of
+from handrail.datasets.quality.pool import FRAMES, ObservationPool, frames_of
 from handrail.datasets.quality.units import why_not
 from handrail.datasets.reading.demonstration import Demonstration, DoesNotApply
 from handrail.datasets.reading.episode import Episode

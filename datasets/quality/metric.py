@@ -7,8 +7,7 @@ from typing import Literal
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray
-from handrail.datasets.quality.pool import ObservationPool
-from handrail.datasets.quality.sample import Sample
+from handrail.datasets.quality.pool import ObservationPool, Sample
 from handrail.datasets.reading.demonstration import Demonstration
 from handrail.datasets.statistics.contrast import Measure
 

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from handrail.datasets.format.schema import Feature
-from handrail.datasets.quality import driving, effort, motion, safety, tracking
+from handrail.datasets.quality import effort, motion, safety, tracking
 from handrail.datasets.quality.consistency import action_variance, information, state_coverage
 from handrail.datasets.reading.columns import ColumnNames
 from handrail.datasets.reading.demonstration import Demonstration, DoesNotApply
@@ -238,13 +238,13 @@ def test_reversals_pass_over_the_dead_band():
 def test_what_a_device_tells_is_of_people_alone():
     keys, nothing = np.array(["", "keyboard", "keyboard"]), np.array(["", "", ""])
     age, back = np.array([0.0, 0.01, 0.03]), np.array([0, 1, 2])
-    assert value(driving.undos, device=keys, undos=back) == 2.0
-    assert value(driving.input_age, device=keys, age=age) == pytest.approx(0.01 + 0.9 * 0.02)
-    assert value(driving.round_trip, device=keys, round_trip=age) == pytest.approx(0.01 + 0.95 * 0.02)
+    assert value(effort.undos, device=keys, undos=back) == 2.0
+    assert value(effort.input_age, device=keys, age=age) == pytest.approx(0.01 + 0.9 * 0.02)
+    assert value(effort.round_trip, device=keys, round_trip=age) == pytest.approx(0.01 + 0.95 * 0.02)
     with pytest.raises(DoesNotApply, match="shows nothing"):
-        value(driving.round_trip, device=keys, round_trip=np.zeros(3))
+        value(effort.round_trip, device=keys, round_trip=np.zeros(3))
     with pytest.raises(DoesNotApply, match="nobody held a device"):
-        value(driving.undos, device=nothing, undos=back)
+        value(effort.undos, device=nothing, undos=back)
 
 
 def test_mode_switches():

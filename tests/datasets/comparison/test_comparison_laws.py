@@ -18,7 +18,7 @@ from handrail.datasets.comparison.tables import metrics_table
 from handrail.datasets.format.schema import Feature
 from handrail.datasets.quality.catalogue import METRICS
 from handrail.datasets.quality.measure import measure
-from handrail.datasets.quality.sample import frames_of
+from handrail.datasets.quality.pool import frames_of
 from handrail.datasets.reading.demonstration import Demonstration
 from handrail.datasets.reading.reader import DatasetInfo
 from handrail.datasets.statistics import resampling
