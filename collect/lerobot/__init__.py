@@ -9,11 +9,13 @@
 """
 
 import handrail.collect.processor.mpc_step  # noqa: F401  (registers the step)
-from handrail.collect.lerobot.config_cockpit import HandrailCockpitConfig
 from handrail.collect.lerobot.config_env import HandrailEnvConfig
-from handrail.collect.lerobot.config_gamepad import HandrailGamepadConfig
-from handrail.collect.lerobot.config_scripted import HandrailScriptedConfig
-from handrail.collect.lerobot.config_sim import HandrailSimConfig
+from handrail.collect.lerobot.configs import (
+    HandrailCockpitConfig,
+    HandrailGamepadConfig,
+    HandrailScriptedConfig,
+    HandrailSimConfig,
+)
 from handrail.collect.lerobot.person import HandrailCockpit, HandrailGamepad
 from handrail.collect.lerobot.scripted import HandrailScripted
 from handrail.collect.lerobot.sim import HandrailSim

@@ -16,8 +16,7 @@ from handrail.collect.cockpit.cockpit import Cockpit, check_installed
 from handrail.collect.cockpit.process import ServerProcess
 from handrail.collect.config import RecordConfig, SessionConfig
 from handrail.collect.devices.open_devices import open_gamepad
-from handrail.collect.lerobot.config_cockpit import HandrailCockpitConfig
-from handrail.collect.lerobot.config_gamepad import HandrailGamepadConfig
+from handrail.collect.lerobot.configs import HandrailCockpitConfig, HandrailGamepadConfig
 from handrail.collect.lerobot.mode_action import AGAIN, HOLD, NEXT
 from handrail.collect.lerobot.stepwise import Stepwise
 from handrail.collect.lerobot.teleoperator import SimTeleoperator

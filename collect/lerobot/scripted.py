@@ -7,7 +7,7 @@ from enum import StrEnum
 
 import numpy as np
 
-from handrail.collect.lerobot.config_scripted import HandrailScriptedConfig
+from handrail.collect.lerobot.configs import HandrailScriptedConfig
 from handrail.collect.lerobot.mode_action import HOLD, NEXT
 from handrail.collect.lerobot.stepwise import Stepwise
 from handrail.collect.lerobot.teleoperator import SimTeleoperator

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from lerobot.robots import Robot
 
-from handrail.collect.lerobot.config_sim import HandrailSimConfig
+from handrail.collect.lerobot.configs import HandrailSimConfig
 from handrail.collect.lerobot.link import announce
 from handrail.collect.lerobot.mode_action import AGAIN, HOLD, NEXT, pressed
 from handrail.collect.lerobot.names import POSITION
