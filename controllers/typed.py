@@ -101,7 +101,7 @@ def decoded[T](content: Any, kind: type[T], where: str) -> T:
 
     Args:
         content: the table.
-        kind: the dataclass; fields that are dataclasses, and tuples of them, are tables in the table.
+        kind: the dataclass; fields that are dataclasses, tuples of them and mappings to them are tables, too.
         where: the table is, for the error.
     """
     known = {field.name: field for field in fields(kind) if field.init}  # type: ignore[arg-type]
@@ -141,6 +141,9 @@ def _value(value: Any, kind: Any, where: str) -> Any:
     tables = [each for each in (inner, *get_args(inner)) if is_dataclass(each)]
     if not tables or (value is None and type(None) in get_args(inner)):
         return check(value, kind, where)
+    if get_origin(inner) is Mapping:
+        named = check(value, dict[str, dict], where)
+        return {name: decoded(each, tables[0], f"{where}.{name}") for name, each in named.items()}  # type: ignore[arg-type]
     if get_origin(inner) is not tuple:
         return decoded(value, tables[0], where)  # type: ignore[arg-type]
     listed = check(value, Annotated[(tuple[dict, ...], *marks)] if marks else tuple[dict, ...], where)

@@ -11,25 +11,12 @@ from handrail.controllers.errors import HandrailError, unknown_name
 from handrail.controllers.strict_toml import read_toml
 from handrail.controllers.typed import decoded
 from handrail.policies.study.design import (
-    Beside,
-    Factors,
-    Flat,
-    Pictures,
-    Robustness,
     StudyDesign,
-    TaskDesign,
     check_known,
 )
 from handrail.policies.study.settings import check_jobs
 
 PRESETS = Path(__file__).parent / "presets"
-_PARTS = {
-    "flat": Flat,
-    "factors": Factors,
-    "beside": Beside,
-    "pictures": Pictures,
-    "robustness": Robustness,
-}
 
 
 def design_names() -> list[str]:
@@ -48,16 +35,9 @@ def load_design(name: str) -> StudyDesign:
         raise HandrailError(
             f"{where}: expected no {entry}: it follows from the rest, and from the file's name"
         )
-    parts, tasks = dict[str, Any](own), content.get("tasks")
-    if isinstance(tasks, Mapping):
+    if isinstance(tasks := content.get("tasks"), Mapping):
         check_known("task", tasks, TASKS)
-        parts["tasks"] = {
-            each: decoded(tasks[each], TaskDesign, f"{where}: [tasks.{each}]") for each in tasks
-        }
-    for part, kind in _PARTS.items():
-        if part in content:
-            parts[part] = decoded(content[part], kind, f"{where}: [{part}]")
-    design = decoded({**content, **parts}, StudyDesign, where)
+    design = decoded({**content, **own}, StudyDesign, where)
     design.check()
     check_jobs(design)
     return design

@@ -48,7 +48,7 @@ FACTORS = "[factors]\n" + "".join(
             "batch_size: expected a whole number >= 0, got -4",
         ),
         (("rollouts = 40", "seed = -1\nrollouts = 40"), "seed: expected a whole number >= 0, got -1"),
-        (("draws = 2", "draws = -1"), "draws: expected a whole number >= 0, got -1"),
+        (("draws = 2", "draws = -1"), "draws: expected a whole number >= 1, got -1"),
         (('intents = ["ee"]', 'intents = ["direct"]'), "unknown mode of intents, which the MPC completes"),
         (("[beside]", '[beside]\ntargets = ["direct"]'), "targets"),
         (("[beside]", "[flat]\nheld_out = 1.5\n[beside]"), "--eval_split: expected a number < 1"),
