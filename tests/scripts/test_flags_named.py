@@ -148,7 +148,8 @@ def flags_in(text: str) -> set[str]:
     return (
         set()
         if styled
-        else {flag.rstrip(".") for flag in FLAG.findall(text)} - {"--human", "--cockpit", "--teleop"}
+        else {flag.rstrip(".") for flag in FLAG.findall(text)}
+        - {"--human", "--cockpit", "--teleop", "--client", "--dataset"}
     )  # --human.*
 
 
