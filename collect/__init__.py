@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from handrail.collect.world.env import HandrailEnv as HandrailEnv
 
 _MODULES = {
-    "HandrailEnv": "world.envs.env",
+    "HandrailEnv": "world.env",
     "MODES": "operators.modes",
     "RecordConfig": "config",
     "Session": "session.session",

@@ -86,7 +86,8 @@ def compare(config: CompareConfig) -> int:
     """Compare datasets, or people, and write a report; return the exit code."""
     console = Terminal()
     if config.study:
-        from handrail.datasets.comparison.people import compare_people, write_people_report
+        from handrail.datasets.comparison.people import compare_people
+        from handrail.datasets.comparison.people_report import write_people_report
 
         people = compare_people(config)
         tables, cautions, files = people.tables, people.cautions, write_people_report(people)

@@ -14,7 +14,7 @@ from handrail.collect.session.outcome import Outcome
 from handrail.collect.world.env import HandrailEnv
 from handrail.collect.world.geometry import ROBOT_BIT
 from handrail.collect.world.gl import MjData, MjModel, mujoco
-from handrail.collect.world.tasks.task import Aimed, TaskState
+from handrail.collect.world.task import Aimed, TaskState
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.interface.command import Status
 from handrail.controllers.interface.trajectory import Trajectory

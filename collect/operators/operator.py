@@ -7,7 +7,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from handrail.collect.world.tasks.task import TaskState
+from handrail.collect.world.task import TaskState
 from handrail.controllers.interface.controller import State
 from handrail.controllers.interface.intent import Intent
 from handrail.controllers.robot.model import Pose

@@ -17,8 +17,8 @@ from handrail.collect.world.env import RENDER_SIZE, HandrailEnv
 from handrail.collect.world.ideal_robot import IdealRobot
 from handrail.collect.world.plant import Plant
 from handrail.collect.world.simulation import Simulation
+from handrail.collect.world.task import Task
 from handrail.collect.world.tasks.catalogue import TASKS
-from handrail.collect.world.tasks.task import Task
 from handrail.controllers.baselines.catalogue import CONTROLLERS
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import Controller

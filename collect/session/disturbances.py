@@ -8,7 +8,7 @@ import numpy as np
 from handrail.collect.operators.operator import EpisodeEvent, Operator, View
 from handrail.collect.world.env import HandrailEnv
 from handrail.collect.world.scene import Scene, SceneObject
-from handrail.collect.world.tasks.task import Start, Task
+from handrail.collect.world.task import Start, Task
 from handrail.controllers.arrays import FloatArray, frozen
 from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.interface.intent import Intent

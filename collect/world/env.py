@@ -15,7 +15,7 @@ from handrail.collect.world.observation import AgentObservation, bounded, box_sp
 from handrail.collect.world.plant import Plant, Robot, Seeing, World
 from handrail.collect.world.rendering import CAMERAS, Painter
 from handrail.collect.world.simulation import Simulation
-from handrail.collect.world.tasks.task import Start, Task, TaskState, Verdict
+from handrail.collect.world.task import Start, Task, TaskState, Verdict
 from handrail.controllers.errors import HandrailError, unknown_name
 from handrail.controllers.interface.controller import State
 from handrail.controllers.robot.model import RobotModel, load_model

@@ -18,7 +18,6 @@ from handrail.datasets.comparison.report import (
     measure_cell,
     shown,
     shown_interval,
-    write_report,
 )
 from handrail.datasets.comparison.scores import SCORES
 from handrail.datasets.comparison.user_study import (
@@ -30,7 +29,6 @@ from handrail.datasets.comparison.user_study import (
     read_study,
     read_trials,
 )
-from handrail.datasets.presentation.markup import folded, items, page, paragraph, section
 from handrail.datasets.presentation.table import Cell, Table
 from handrail.datasets.reading.check import check_whole
 from handrail.datasets.statistics.contrast import LEVEL, Contrast, Estimate, Measure, adjusted
@@ -41,7 +39,6 @@ from handrail.datasets.statistics.resampling import (
     permutation_p,
 )
 
-FORMAT = "handrail.people/2"
 FORMS = "workload and usability"
 _TOO_FEW = f"Participants: {{}}. Intervals and tests need {FEWEST} or more, so there are none."
 _BLIND = "Participants: {}. Too few to detect any difference in some tables; the intervals describe it."
@@ -53,13 +50,6 @@ _ALONE = "In some tasks people drove no other condition beside the baseline: the
 _NO_SCORES = "No scores yet: exports/scores.csv is not there."
 _STRANGERS = "Participants with scores and without an episode: {}."
 _LEFT_OUT = "Episodes that name neither a participant nor a script, and are left out: {}."
-_HOW = (
-    "A participant's value is the mean over their episodes of a task in a condition. A difference is taken"
-    " within each participant, over the scenes that they met under both conditions, else of their means; then"
-    " the mean over participants. Intervals are 95 %, by a bootstrap that resamples participants. p:"
-    " permutation of the signs of the participants' differences, exact where there are few, adjusted by Holm"
-    " over each table. A difference is detected if its interval leaves zero out and p stays below 0.05."
-)
 _MEANS = "Means over participants; 95 % below, by resampling participants; n: who has a value, of all."
 _CONTRASTS = "Differences within participants; p after Holm over this table; bold: detected."
 
@@ -291,50 +281,3 @@ def _mean_cell(mean: Mean, measure: Measure) -> Cell:
         return Cell("missing", "quiet", below=below)
     span = f"{shown_interval(measure, mean.interval)}; " if mean.interval else ""
     return Cell(shown(measure, mean.estimate), below=span + below)
-
-
-def write_people_report(comparison: PeopleComparison) -> list[Path]:
-    """Write the report into the folder of its config and return the files."""
-    source = {"source": comparison.study.source}
-    content = source | {
-        "format": FORMAT,
-        "demo": comparison.study.demo,
-        "baseline": comparison.baseline,
-        "participants": comparison.participants,
-        "cautions": comparison.cautions,
-        "conditions": {
-            part.title: {name: [mean.content for mean in means] for name, means in part.means.items()}
-            for part in comparison.parts
-        },
-    }
-    contrasts = [each for part in comparison.parts for each in part.contrasts]
-    units = {"trials.csv": [source | _trial(trial) for trial in comparison.trials]}
-    return write_report(comparison.config.folder, _page(comparison), content, contrasts, units, source)
-
-
-def _page(comparison: PeopleComparison) -> str:
-    study = comparison.study
-    note = [study.source] if study.demo else []
-    said = items(("caution", text) for text in (*note, *comparison.cautions))
-    meanings = {each.title: each.meaning for part in comparison.parts for each in part.measures}
-    told = items(("quiet", f"{title}: {meaning}.") for title, meaning in meanings.items())
-    return page(
-        f"{study.root.absolute().name}: people, compared",
-        section("", said) if note or comparison.cautions else "",
-        *(section("", table) for table in comparison.tables),
-        section("How to read this", paragraph(_HOW), folded("What every measure means", told)),
-        what=f"{len(comparison.participants)} participants; baseline {comparison.baseline}",
-    )
-
-
-def _trial(each: Trial) -> dict[str, Any]:
-    return {
-        "task": each.task,
-        "condition": each.condition,
-        "participant": each.participant,
-        "operator": "person" if each.participant else "scripted",
-        "scene": each.scene,
-        "dataset": each.dataset.name if each.dataset else "",
-        "episode": each.episode,
-        **each.values,
-    }

@@ -10,8 +10,8 @@ import numpy as np
 
 from handrail.collect import SessionConfig, build_env, build_session
 from handrail.collect.world.scene import Scene, SceneObject
+from handrail.collect.world.task import Start, TaskState, Verdict
 from handrail.collect.world.tasks.catalogue import TaskSpec
-from handrail.collect.world.tasks.task import Start, TaskState, Verdict
 from handrail.controllers import Pose, RobotModel, Shape
 from handrail.controllers.arrays import FloatArray
 

@@ -7,8 +7,8 @@ import pytest
 from collect_helpers import environment
 
 from handrail.collect.world.scene import Scene
+from handrail.collect.world.task import Start
 from handrail.collect.world.tasks.furniture import pillar
-from handrail.collect.world.tasks.task import Start
 from handrail.controllers.baselines.cbf_filter import ALPHA, MARGIN, CbfFilter
 from handrail.controllers.baselines.direct import DirectController
 from handrail.controllers.collision.model import CollisionModel

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 import handrail.collect  # noqa: F401  (registers the environments)
 from handrail.collect.world.env import HandrailEnv
 from handrail.collect.world.scene import Scene, SceneObject
-from handrail.collect.world.tasks.task import Start
+from handrail.collect.world.task import Start
 from handrail.controllers.robot.model import RobotModel
 
 UP = np.array([0.0, 0.0, 1.0])

@@ -8,7 +8,7 @@ from handrail.collect.operators.operator import View
 from handrail.collect.operators.scripted.human import HumanSettings
 from handrail.collect.operators.scripted.scripted import ScriptedOperator, gains_of
 from handrail.collect.operators.scripted.steering import MotionGoal, Target
-from handrail.collect.world.tasks.task import TaskState
+from handrail.collect.world.task import TaskState
 from handrail.controllers.baselines.direct import DirectController
 from handrail.controllers.baselines.split_controller import split_controller
 from handrail.controllers.interface.controller import State

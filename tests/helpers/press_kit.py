@@ -10,8 +10,8 @@ from handrail.collect.operators.scripted.human import HumanSettings
 from handrail.collect.operators.scripted.scripted import scripted_operator
 from handrail.collect.operators.scripted.steering import MotionGoal, Target, hand_twist
 from handrail.collect.world.scene import Scene
+from handrail.collect.world.task import Start, Verdict
 from handrail.collect.world.tasks.catalogue import TaskSpec
-from handrail.collect.world.tasks.task import Start, Verdict
 from handrail.controllers.baselines.catalogue import ControllerSpec
 from handrail.controllers.baselines.twist_completion import WholeBodyCompletion, twist_controller
 from handrail.controllers.robot.catalogue import ROBOTS, RobotSpec

@@ -16,8 +16,8 @@ from handrail.collect.operators.scripted.steering import (
     hand_twist,
     pose_errors,
 )
+from handrail.collect.world.task import TaskState
 from handrail.collect.world.tasks.furniture import floor_obstacles
-from handrail.collect.world.tasks.task import TaskState
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.robot.model import Pose, RobotModel
 

@@ -4,7 +4,7 @@ import numpy as np
 
 from handrail.collect.operators.operator import View
 from handrail.collect.operators.scripted.phases import PhasedScript, Route, ScriptPhase
-from handrail.collect.world.tasks.task import reach_share
+from handrail.collect.world.task import reach_share
 from handrail.collect.world.tasks.tray import HANDLE
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.robot.model import Pose

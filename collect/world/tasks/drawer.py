@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from handrail.collect.world.scene import Colour, Part, Scene, SceneObject, Slide, Viewpoint, box
-from handrail.collect.world.tasks.task import Aim, Start, TaskState, Verdict, check_large, near_home
+from handrail.collect.world.task import Aim, Start, TaskState, Verdict, check_large, near_home
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.numerics.rotation import matrix_from_rpy
 from handrail.controllers.robot.model import RobotModel

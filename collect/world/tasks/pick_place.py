@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from handrail.collect.world.scene import Scene, SceneObject, Viewpoint
+from handrail.collect.world.task import Aim, Start, TaskState, Verdict, near_home
 from handrail.collect.world.tasks.furniture import (
     cube,
     obstacle_features,
@@ -13,7 +14,6 @@ from handrail.collect.world.tasks.furniture import (
     sample_obstacles,
     table,
 )
-from handrail.collect.world.tasks.task import Aim, Start, TaskState, Verdict, near_home
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.numerics.rotation import quaternion_from_matrix
 from handrail.controllers.robot.model import RobotModel

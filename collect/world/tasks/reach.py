@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from handrail.collect.world.scene import Part, Patrol, Scene, SceneObject, Viewpoint
+from handrail.collect.world.task import Aim, Start, TaskState, Verdict
 from handrail.collect.world.tasks.furniture import footprint
 from handrail.collect.world.tasks.goal_reaching import (
     ANGLE_TOLERANCE,
@@ -13,7 +14,6 @@ from handrail.collect.world.tasks.goal_reaching import (
     reached,
     sample_goal,
 )
-from handrail.collect.world.tasks.task import Aim, Start, TaskState, Verdict
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.errors import HandrailError

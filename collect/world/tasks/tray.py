@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from handrail.collect.world.scene import Scene, SceneObject, Viewpoint
+from handrail.collect.world.task import Aim, Start, TaskState, Verdict, check_large, reach_share
 from handrail.collect.world.tasks.furniture import (
     TRAY_BAR,
     can,
@@ -14,7 +15,6 @@ from handrail.collect.world.tasks.furniture import (
     table,
     tray,
 )
-from handrail.collect.world.tasks.task import Aim, Start, TaskState, Verdict, check_large, reach_share
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.channels import Channels

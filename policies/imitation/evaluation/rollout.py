@@ -15,7 +15,7 @@ from handrail.collect.session.disturbances import DelayedOperator, Pusher
 from handrail.collect.session.outcome import Outcome
 from handrail.collect.session.session import Observer, Session
 from handrail.collect.world.env import HandrailEnv
-from handrail.collect.world.tasks.task import Staged
+from handrail.collect.world.task import Staged
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.baselines.direct import DirectController
 from handrail.controllers.baselines.unprotected import unprotected_controller

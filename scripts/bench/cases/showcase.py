@@ -12,7 +12,7 @@ from handrail.collect.session.film import SIZE, Filmer
 from handrail.collect.session.session import Observer, Session
 from handrail.collect.world.env import HandrailEnv
 from handrail.collect.world.gl import graphics_trouble
-from handrail.collect.world.tasks.task import FixedTask, Start, Verdict
+from handrail.collect.world.task import FixedTask, Start, Verdict
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.interface.channel_matrix import channel_matrix

@@ -11,8 +11,8 @@ from handrail.collect.operators.operator import View
 from handrail.collect.session.session import Session
 from handrail.collect.world.env import HandrailEnv
 from handrail.collect.world.scene import Scene
+from handrail.collect.world.task import FixedTask, Start, TaskState, Verdict
 from handrail.collect.world.tasks.goal_reaching import STEP, T_MAX, StraightPlanner, pose_error, reached
-from handrail.collect.world.tasks.task import FixedTask, Start, TaskState, Verdict
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.interface.controller import Controller, State
 from handrail.controllers.interface.intent import Intent

@@ -7,7 +7,7 @@ import pytest
 from collect_helpers import environment, over_cube
 from scipy.spatial.transform import Rotation
 
-from handrail.collect.world.tasks.task import Aimed
+from handrail.collect.world.task import Aimed
 from handrail.controllers.robot.model import Pose
 
 

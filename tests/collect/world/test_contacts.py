@@ -4,8 +4,8 @@ import numpy as np
 from collect_helpers import action, environment
 
 from handrail.collect.world.scene import Scene, SceneObject, box
+from handrail.collect.world.task import Start
 from handrail.collect.world.tasks.furniture import pillar
-from handrail.collect.world.tasks.task import Start
 
 
 def in_the_way(env) -> Start:

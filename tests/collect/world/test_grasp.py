@@ -15,7 +15,7 @@ from handrail.collect.session.build import (
 )
 from handrail.collect.session.session import Session
 from handrail.collect.world.geometry import box_around
-from handrail.collect.world.tasks.task import Start
+from handrail.collect.world.task import Start
 from handrail.controllers.numerics.rotation import matrix_from_rpy
 from handrail.controllers.robot.model import load_model
 from handrail.controllers.robot.shape import Shape

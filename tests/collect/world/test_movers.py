@@ -11,8 +11,8 @@ from handrail.collect.session.build import build_env, build_session
 from handrail.collect.session.session import Session
 from handrail.collect.world.env import HandrailEnv
 from handrail.collect.world.scene import Patrol, Scene, SceneObject
+from handrail.collect.world.task import Start
 from handrail.collect.world.tasks.reach import FASTEST, Reach, sample_movers
-from handrail.collect.world.tasks.task import Start
 from handrail.controllers.baselines.direct import DirectController
 from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.errors import HandrailError

@@ -8,10 +8,10 @@ from scipy.stats import kstest
 from handrail.collect.world.gl import mujoco
 from handrail.collect.world.scene import Scene, SceneObject, box
 from handrail.collect.world.simulation import Simulation
+from handrail.collect.world.task import Start
 from handrail.collect.world.tasks.furniture import footprint
 from handrail.collect.world.tasks.pick_place import PickPlace
 from handrail.collect.world.tasks.reach import Reach
-from handrail.collect.world.tasks.task import Start
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.numerics.rotation import rotation_vector
 from handrail.controllers.robot.description import robot_names

@@ -10,8 +10,8 @@ from handrail.collect.commands.recording import episode_seed
 from handrail.collect.config import SessionConfig
 from handrail.collect.session.build import build_env, build_session, build_task
 from handrail.collect.world.env import HandrailEnv
+from handrail.collect.world.task import Start
 from handrail.collect.world.tasks.drawer import HANDLE, TRAVEL, Drawer, handle, inward, opened
-from handrail.collect.world.tasks.task import Start
 from handrail.collect.world.tasks.tray import Tray
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.robot.description import robot_names

@@ -6,9 +6,9 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from handrail.collect.world.task import TaskState
 from handrail.collect.world.tasks.pick_place import PickPlace
 from handrail.collect.world.tasks.reach import Reach
-from handrail.collect.world.tasks.task import TaskState
 from handrail.collect.world.tasks.tray import Tray
 from handrail.controllers.robot.model import Pose, load_model
 from handrail.policies.imitation.evaluation.rollout import RolloutProgress
