@@ -37,20 +37,20 @@ class TeleopMode:
         """Whether the operator owns other channels while they drive the base."""
         return self.groups("base") != self.groups("hand")
 
-    def leaving(self, left: tuple[str, ...], minded: tuple[str, ...]) -> "TeleopMode":
-        """Return the mode of an operator who leaves some tool channels alone, and minds some while driving.
+    def leaving(self, released: tuple[str, ...], owned: tuple[str, ...]) -> "TeleopMode":
+        """Return the mode of an operator who releases some tool channels, and owns some more while driving.
 
         Args:
-            left: channels of the tool that the group `ee` loses; a mode that names channels keeps them.
-            minded: channels that are owned too while the operator, who steers by focus, drives the base.
+            released: channels of the tool that the group `ee` loses; a mode that names channels keeps them.
+            owned: channels that are owned too while the operator, who steers by focus, drives the base.
         """
-        kept = tuple(name for name in TOOL if name not in left)
+        kept = tuple(name for name in TOOL if name not in released)
 
         def groups(focus: Focus) -> tuple[str, ...]:
             own = (name for group in self.groups(focus) for name in (kept if group == "ee" else (group,)))
-            return (*own, *(minded if self.by_focus and focus == "base" else ()))
+            return (*own, *(owned if self.by_focus and focus == "base" else ()))
 
-        return replace(self, groups=groups) if left or minded else self
+        return replace(self, groups=groups) if released or owned else self
 
 
 def always(*groups: str) -> Callable[[Focus], tuple[str, ...]]:

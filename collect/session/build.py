@@ -138,7 +138,7 @@ def build_mode(config: SessionConfig, model: RobotModel) -> TeleopMode:
         mode = replace(own, task_objectives=mode.task_objectives)
     if not (CONTROLLERS.find(mode.controller).objectives and mode.task_objectives):
         return mode
-    return mode.leaving(task.left, task.minded)
+    return mode.leaving(task.released_channels, task.owned_channels)
 
 
 def build_modes(config: SessionConfig, env: HandrailEnv) -> dict[str, TeleopMode]:

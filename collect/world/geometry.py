@@ -4,8 +4,9 @@ from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from handrail.collect.world.gl import mujoco
+from handrail.collect.world.gl import MjsBody, mujoco
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.numerics.rotation import quaternion_from_matrix
 from handrail.controllers.robot.shape import Shape
@@ -38,10 +39,12 @@ def pose(translation: FloatArray, rotation: FloatArray) -> dict[str, Any]:
     return {"pos": np.array(translation), "quat": quaternion_from_matrix(rotation)}
 
 
-def box_inertia(mass: float, size: FloatArray) -> FloatArray:
-    """Return the principal inertia of a solid box with full lengths `size` [m], (3,) [kg m²]."""
+def set_box_inertia(body: MjsBody, mass: float, size: ArrayLike, centre: ArrayLike = (0.0, 0.0, 0.0)) -> None:
+    """Give a body the mass [kg] and inertia of a solid box with full lengths `size` [m] around a centre."""
     x, y, z = np.square(size)
-    return mass / 12.0 * np.array([y + z, x + z, x + y])
+    body.explicitinertial = True
+    body.mass, body.ipos, body.iquat = mass, np.array(centre), [1.0, 0.0, 0.0, 0.0]
+    body.inertia = mass / 12.0 * np.array([y + z, x + z, x + y])
 
 
 def volume(shape: Shape) -> float:

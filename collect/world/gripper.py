@@ -35,9 +35,7 @@ def add_gripper(
     palm = mount.add_body(name="gripper", gravcomp=1.0, **geometry.pose(frame.translation, frame.rotation))
     length = abs(gripper.tip - gripper.finger_size[2])
     size = np.array([gripper.stroke, gripper.stroke, length])
-    palm.explicitinertial = True
-    palm.mass, palm.ipos, palm.iquat = gripper.mass, [0.0, 0.0, length / 2], [1.0, 0.0, 0.0, 0.0]
-    palm.inertia = geometry.box_inertia(gripper.mass, size)
+    geometry.set_box_inertia(palm, gripper.mass, size, [0.0, 0.0, length / 2])
     if gripper.jaw is None or jaw is None:
         left = _add_fingers(spec, gripper, palm, grips)
     else:
@@ -52,11 +50,14 @@ def _add_fingers(spec: MjSpec, gripper: Gripper, palm: MjsBody, grips: bool) -> 
     for name, side in (("finger_left", -1.0), ("finger_right", 1.0)):
         bodies.append(_add_finger(palm, gripper, name, side, 0.0 if grips else gripper.stroke / 2))
         if grips:
-            _add_slide(bodies[-1], gripper, name, side)
+            _add_finger_joint(bodies[-1], gripper, name, [side, 0.0, 0.0], 1.0)
     _add_rail(palm, gripper)
     if grips:
         _couple(spec)
-        _add_servo(spec, gripper)
+        tendon = spec.add_tendon(name="opening")
+        for finger in ("finger_left", "finger_right"):
+            tendon.wrap_joint(finger, 1.0)
+        _add_servo(spec, gripper, "opening", mujoco.mjtTrn.mjTRN_TENDON)
     return bodies[0]
 
 
@@ -76,9 +77,7 @@ def _add_finger(palm: MjsBody, gripper: Gripper, name: str, side: float, away: f
     width, _, length = gripper.finger_size
     position = [side * (width / 2 + away), 0.0, gripper.tip - length / 2]
     finger = palm.add_body(name=f"{name}_body", pos=position, gravcomp=1.0)
-    finger.explicitinertial = True
-    finger.mass, finger.ipos, finger.iquat = gripper.finger_mass, [0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0]
-    finger.inertia = geometry.box_inertia(gripper.finger_mass, np.array(gripper.finger_size))
+    geometry.set_box_inertia(finger, gripper.finger_mass, gripper.finger_size)
     _add_pad(finger, gripper, name, group=geometry.VISIBLE_GROUP)
     return finger
 
@@ -97,19 +96,6 @@ def _add_pad(body: MjsBody, gripper: Gripper, name: str, **options: object) -> N
         solimp=[0.95, 0.99, 0.001, 0.5, 2.0],
         rgba=_RUBBER,
         **options,
-    )
-
-
-def _add_slide(finger: MjsBody, gripper: Gripper, name: str, side: float) -> None:
-    """Let a finger move; its joint coordinate is its distance from the closed position [m]."""
-    finger.add_joint(
-        name=name,
-        type=mujoco.mjtJoint.mjJNT_SLIDE,
-        axis=[side, 0.0, 0.0],
-        limited=True,
-        range=[0.0, gripper.stroke / 2],
-        armature=_REFLECTED,
-        damping=[20.0, 0.0, 0.0],
     )
 
 
@@ -141,19 +127,30 @@ def _couple(spec: MjSpec) -> None:
     coupling.solref = [0.004, 1.0]
 
 
-def _add_servo(spec: MjSpec, gripper: Gripper) -> None:
-    """Add a position servo on the opening [m] whose force [N] on each finger is limited."""
-    tendon = spec.add_tendon(name="opening")
-    for finger in ("finger_left", "finger_right"):
-        tendon.wrap_joint(finger, 1.0)
+def _add_finger_joint(finger: MjsBody, gripper: Gripper, name: str, axis: list[float], lever: float) -> None:
+    """Let a finger slide (lever 1), or turn; its coordinate counts from where it is closed [m, rad]."""
+    kind = mujoco.mjtJoint.mjJNT_SLIDE if gripper.jaw is None else mujoco.mjtJoint.mjJNT_HINGE
+    finger.add_joint(
+        name=name,
+        type=kind,
+        axis=axis,
+        limited=True,
+        range=[0.0, gripper.stroke / 2 if gripper.jaw is None else gripper.travel],
+        armature=_REFLECTED * lever**2,
+        damping=[20.0 * lever**2, 0.0, 0.0],
+    )
+
+
+def _add_servo(spec: MjSpec, gripper: Gripper, target: str, kind: object, lever: float = 1.0) -> None:
+    """Add a position servo on the opening [m, rad]; the force of a pad [N] at a lever is limited."""
     servo = spec.add_actuator(
         name="gripper",
-        target="opening",
-        trntype=mujoco.mjtTrn.mjTRN_TENDON,
-        ctrlrange=[-gripper.beyond, gripper.stroke],
-        forcerange=[-gripper.force, gripper.force],
+        target=target,
+        trntype=kind,
+        ctrlrange=[-gripper.beyond, gripper.travel],
+        forcerange=[-gripper.force * lever, gripper.force * lever],
     )
-    servo.set_to_position(kp=_STIFFNESS, kv=_DAMPING)
+    servo.set_to_position(kp=_STIFFNESS * lever**2, kv=_DAMPING * lever**2)
 
 
 def _camera_pose(gripper: Gripper) -> dict[str, FloatArray]:
@@ -200,27 +197,10 @@ def _add_jaw(spec: MjSpec, gripper: Gripper, jaw: Jaw, palm: MjsBody, zero: pin.
     at = _turned(zero, jaw.closed if grips else jaw.open)
     body = palm.add_body(name=f"{JAW}_body", gravcomp=1.0, **geometry.pose(at.translation, at.rotation))
     pad = _pads(gripper, jaw, zero)[JAW]
-    body.explicitinertial = True
-    body.mass, body.ipos, body.iquat = gripper.finger_mass, pad.translation, [1.0, 0.0, 0.0, 0.0]
-    body.inertia = geometry.box_inertia(gripper.finger_mass, np.array(gripper.finger_size))
+    geometry.set_box_inertia(body, gripper.finger_mass, gripper.finger_size, pad.translation)
     if not grips:
         return body
     lever = float(np.hypot(*pad.translation[:2]))
-    body.add_joint(
-        name=JAW,
-        type=mujoco.mjtJoint.mjJNT_HINGE,
-        axis=[0.0, 0.0, 1.0],
-        limited=True,
-        range=[0.0, gripper.travel],
-        armature=_REFLECTED * lever**2,
-        damping=[20.0 * lever**2, 0.0, 0.0],
-    )
-    servo = spec.add_actuator(
-        name="gripper",
-        target=JAW,
-        trntype=mujoco.mjtTrn.mjTRN_JOINT,
-        ctrlrange=[-gripper.beyond, gripper.travel],
-        forcerange=[-gripper.force * lever, gripper.force * lever],
-    )
-    servo.set_to_position(kp=_STIFFNESS * lever**2, kv=_DAMPING * lever**2)
+    _add_finger_joint(body, gripper, JAW, [0.0, 0.0, 1.0], lever)
+    _add_servo(spec, gripper, JAW, mujoco.mjtTrn.mjTRN_JOINT, lever)
     return body

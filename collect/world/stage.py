@@ -142,9 +142,7 @@ def _add_freedom(body: MjsBody, item: SceneObject) -> None:
             frictionloss=item.slide.friction,
         )
     if not item.parts:
-        body.explicitinertial = True
-        body.mass, body.ipos, body.iquat = item.mass, [0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0]
-        body.inertia = geometry.box_inertia(item.mass, geometry.bounding_box(item.shape))
+        geometry.set_box_inertia(body, item.mass, geometry.bounding_box(item.shape))
 
 
 def _contact(item: SceneObject) -> dict[str, Any]:

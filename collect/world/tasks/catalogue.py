@@ -17,8 +17,8 @@ class TaskSpec:
         script: what a scripted person does, `(model, gains, drives) -> Script`.
         help: one line.
         objectives: what the masked MPC looks after by itself, `(channels) -> (Objective, …)`; None: nothing.
-        left: channels of the tool that the operator leaves to them.
-        minded: channels that an operator who drives the base by itself keeps nevertheless.
+        released_channels: channels of the tool that the operator leaves to them.
+        owned_channels: channels that an operator who drives the base by itself keeps nevertheless.
         movers: whether obstacles can move in it: the class has `moving_obstacles`.
     """
 
@@ -27,8 +27,8 @@ class TaskSpec:
     script: Callable[..., Any] | str
     help: str
     objectives: Callable[..., Any] | str | None = None
-    left: tuple[str, ...] = ()
-    minded: tuple[str, ...] = ()
+    released_channels: tuple[str, ...] = ()
+    owned_channels: tuple[str, ...] = ()
     movers: bool = False
 
 
@@ -57,8 +57,8 @@ TASKS = Registry(
             f"{_SCRIPTS}.tray:TrayScript",
             "carry a tray with a can on it",
             objectives=f"{_TASKS}.tray:level_tray",
-            left=("ee.wx", "ee.wy"),  # its tilt is the MPC's
-            minded=("ee.vz",),  # who drives with it in hand minds how high it is
+            released_channels=("ee.wx", "ee.wy"),  # its tilt is the MPC's
+            owned_channels=("ee.vz",),  # who drives with it in hand minds how high it is
         ),
     ),
 )
