@@ -15,9 +15,9 @@ from handrail.collect.user_study.exports import export
 from handrail.collect.user_study.folder import StudyFolder
 from handrail.collect.user_study.plan import plan
 from handrail.controllers.interrupts import Interrupts
+from handrail.datasets.editing.pack import drop_episodes
 from handrail.datasets.presentation.table import Table
 from handrail.datasets.presentation.terminal import Terminal
-from handrail.datasets.recording.drop import drop_episodes
 
 _FAREWELL = 1.0  # in which the page shows its last card [s]
 Say = Callable[[str], None]

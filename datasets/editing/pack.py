@@ -1,11 +1,12 @@
 """Packing and merging: whole datasets become one, in files of many episodes, in one pass."""
 
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
+from typing import Any
 
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.editing.merge import check_alike, merged_encodings, merged_types
@@ -13,9 +14,8 @@ from handrail.datasets.editing.source import EditSource
 from handrail.datasets.format.layout import Layout
 from handrail.datasets.format.lines import rows_of_lines
 from handrail.datasets.recording.checksums import Checksums
-from handrail.datasets.recording.drop import check_nothing_set_aside
 from handrail.datasets.recording.repair import tidy_locked
-from handrail.datasets.recording.rewrite import settle, write_anew
+from handrail.datasets.recording.rewrite import remove_whole, settle, write_anew
 from handrail.datasets.storage.atomic import explained
 from handrail.datasets.storage.lock import DatasetLock
 
@@ -87,13 +87,36 @@ def taken(root: Path, verify: bool) -> Iterator[EditSource]:
             f" {root}) before the next"
         )
     source = EditSource.open(root)
-    check_nothing_set_aside(source.layout)
-    lock = DatasetLock(source.layout.staging)
-    try:
+    if source.layout.damaged.exists():
+        raise HandrailError(
+            f"dataset {str(root)!r}: in {source.layout.damaged.name} are episodes that were set aside;"
+            " some may have to go too: remove that folder"
+        )
+    with DatasetLock(source.layout.staging):
         tidy_locked(source.layout, source.manifest, Checksums(root, anew=verify))
         yield source
-    finally:
-        lock.release()
+
+
+def drop_episodes(root: str | Path, dropped: Callable[[Mapping[str, Any]], bool]) -> int:
+    """Remove episodes from a dataset that Handrail wrote, for good; return how many.
+
+    Args:
+        root: Its folder; removed too if no episode is left.
+        dropped: Says by an episode's line of metadata whether it goes.
+    """
+    root = Path(root).expanduser().absolute()
+    with explained(f"cannot remove episodes from dataset {str(root)!r}"):
+        settle(root)  # what was cut short is done; dropping the same again does no harm
+        if _is_empty(root):
+            return 0
+        with taken(root, verify=True) as source:
+            kept = [row["episode_index"] for row in source.rows if not dropped(row)]
+            if 0 < len(kept) < len(source.rows):
+                pieces = source.pieces(kept)
+                write_anew(root, source.manifest, pieces, source.types, source.encodings, in_place=True)
+            elif not kept:
+                remove_whole(root)
+        return len(source.rows) - len(kept)
 
 
 def _merged(sources: Sequence[EditSource], target: Path, name: str, in_place: bool) -> Edited:

@@ -2,13 +2,19 @@
 
 import contextlib
 import os
+import re
 from pathlib import Path
 
 from handrail.controllers.errors import HandrailError
-from handrail.datasets.format.layout import DAMAGED, FOLDERS, STAGING, Layout, episode_of
+from handrail.datasets.format.layout import DAMAGED, FOLDERS, STAGING, Layout
 from handrail.datasets.storage.atomic import make_folder, move, remove
 from handrail.datasets.storage.lock import LOCK_NAME
 
+_NUMBERED = r"chunk-(\d{3}|[1-9]\d{3,})/file-\d{3}"
+_OURS = re.compile(
+    rf"(\.damaged/[^/]+/)?((data|meta/episodes)/{_NUMBERED}\.parquet|videos/[^/]+/{_NUMBERED}\.mp4)"
+    r"|meta/(info\.json|stats\.json|tasks\.parquet|handrail\.json)"
+)
 _GIVEN_UP = "episodes"  # the lines of a dataset that is being cleared, in the staging folder
 
 
@@ -146,31 +152,11 @@ def next_damaged(layout: Layout) -> Path:
 
 
 def _foreign(layout: Layout) -> list[str]:
-    """Return what lies among a dataset's files, or among those that were set aside, and is none of them."""
-    summaries = {layout.info, layout.stats, layout.tasks, layout.manifest}
-    places = {path: layout for name in FOLDERS for path in _all_below(layout.root / name)}
-    for path in _all_below(layout.damaged):
-        parts = path.relative_to(layout.damaged).parts
-        places[path] = Layout(layout.damaged / parts[0]) if len(parts) > 1 else layout
-    return sorted(
-        layout.relative(path)
-        for path, owner in places.items()
-        if path.is_symlink() or (path.is_file() and path not in summaries and not _is_numbered(owner, path))
-    )
-
-
-def _all_below(folder: Path) -> list[Path]:
-    return [folder, *folder.rglob("*")]
-
-
-def _is_numbered(layout: Layout, path: Path) -> bool:
-    """Return whether a path is that of an episode's rows, video or line of metadata."""
-    number, camera = episode_of(path), path.parent.parent.name
-    return number is not None and path in (
-        layout.data(number),
-        layout.row(number),
-        layout.video(camera, number),
-    )
+    """Return what lies among a dataset's files, or among those in quarantine, and is none of them."""
+    tops = [layout.root / name for name in (*FOLDERS, DAMAGED)]
+    found = [path for top in tops for path in (top, *top.rglob("*")) if path.is_symlink() or path.is_file()]
+    names = {layout.relative(path) for path in found if path.is_symlink()}
+    return sorted(names | {name for name in map(layout.relative, found) if not _OURS.fullmatch(name)})
 
 
 def _contents(root: Path) -> list[str]:

@@ -100,11 +100,8 @@ def repair(root: str | Path, set_aside_damaged: bool = False) -> RepairReport:
         settle(layout.root)
         manifest = read_manifest(layout)
         check_folders(layout)
-        lock = DatasetLock(layout.staging)
-        try:
+        with DatasetLock(layout.staging):
             return _repair_locked(layout, manifest, set_aside_damaged)
-        finally:
-            lock.release()
 
 
 def tidy_locked(layout: Layout, manifest: Manifest, sums: Checksums) -> tuple[RepairReport, Totals]:

@@ -18,7 +18,7 @@ from handrail.datasets.format.layout import DAMAGED, FOLDERS, STAGING, Layout
 from handrail.datasets.format.manifest import Manifest
 from handrail.datasets.format.metadata import Totals, info_bytes, stats_bytes
 from handrail.datasets.format.tables import tasks_bytes
-from handrail.datasets.recording.folder import next_damaged
+from handrail.datasets.recording.folder import clear_staging, next_damaged
 from handrail.datasets.recording.piece import Piece
 from handrail.datasets.recording.volume import write_volumes
 from handrail.datasets.storage.atomic import (
@@ -30,7 +30,7 @@ from handrail.datasets.storage.atomic import (
     sync_file,
     sync_folder,
 )
-from handrail.datasets.storage.lock import LOCK_NAME, DatasetLock
+from handrail.datasets.storage.lock import DatasetLock
 
 Encodings = Mapping[str, Mapping[str, Any]]
 _OURS = (*FOLDERS, STAGING, DAMAGED)
@@ -92,15 +92,13 @@ def drafted(root: Path) -> Iterator[Layout]:
         OSError: The disk does not take it.
     """
     draft = Layout(_draft(root))
-    lock = DatasetLock(draft.staging)
-    try:
-        _clear(draft)
-        yield draft
-    except BaseException:
-        remove(draft.root)
-        raise
-    finally:
-        lock.release()
+    with DatasetLock(draft.staging):
+        try:
+            _clear(draft)
+            yield draft
+        except BaseException:
+            remove(draft.root)
+            raise
     publish_folder(draft.root, root)
 
 
@@ -146,9 +144,7 @@ def _clear(draft: Layout) -> None:
     for path in draft.root.iterdir():
         if path != draft.staging:
             remove(path)
-    for path in draft.staging.iterdir():
-        if path.name != LOCK_NAME:
-            remove(path)
+    clear_staging(draft)
 
 
 def _carry_over(root: Path, draft: Path) -> None:

@@ -92,13 +92,13 @@ class EpisodeWriter:
         layout = Layout(Path(root).expanduser().absolute())
         manifest.check()
         check_target(layout, overwrite)
-        with explained(f"cannot create dataset {str(layout.root)!r}"):
-            lock = DatasetLock(layout.staging)
-            with lock.released_on_error():
-                check_target(layout, overwrite)  # again: another recorder may have been faster
-                clear_dataset(layout)
-                replace(layout.manifest, manifest.to_bytes(), layout.staging)
-                replace(layout.info, info_bytes(manifest, Totals()), layout.staging)
+        with explained(f"cannot create dataset {str(layout.root)!r}"), contextlib.ExitStack() as on_error:
+            lock = on_error.enter_context(DatasetLock(layout.staging))
+            check_target(layout, overwrite)  # again: another recorder may have been faster
+            clear_dataset(layout)
+            replace(layout.manifest, manifest.to_bytes(), layout.staging)
+            replace(layout.info, info_bytes(manifest, Totals()), layout.staging)
+            on_error.pop_all()
         return cls(layout, manifest, Totals(), lock, None)
 
     @classmethod
@@ -116,11 +116,12 @@ class EpisodeWriter:
         manifest.check()
         manifest.check_continues(existing, layout.root)
         check_folders(layout)
-        with explained(f"--resume: cannot add to dataset {str(layout.root)!r}"):
-            lock = DatasetLock(layout.staging)
-            with lock.released_on_error():
-                report, totals = tidy_locked(layout, existing, Checksums(layout.root, anew=verify))
-                types = read_column_types(rows_of_lines(layout)[-1]) if totals.episodes else None
+        words = f"--resume: cannot add to dataset {str(layout.root)!r}"
+        with explained(words), contextlib.ExitStack() as on_error:
+            lock = on_error.enter_context(DatasetLock(layout.staging))
+            report, totals = tidy_locked(layout, existing, Checksums(layout.root, anew=verify))
+            types = read_column_types(rows_of_lines(layout)[-1]) if totals.episodes else None
+            on_error.pop_all()
         return cls(layout, manifest, totals, lock, types, report)
 
     @property

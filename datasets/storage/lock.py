@@ -3,9 +3,8 @@
 import contextlib
 import fcntl
 import os
-from collections.abc import Iterator
 from pathlib import Path
-from typing import BinaryIO
+from typing import BinaryIO, Self
 
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.storage.atomic import make_folder
@@ -48,14 +47,11 @@ class DatasetLock:
         finally:
             file.close()
 
-    @contextlib.contextmanager
-    def released_on_error(self) -> Iterator[None]:
-        """Give the lock back if what is done under it fails."""
-        try:
-            yield
-        except BaseException:
-            self.release()
-            raise
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.release()
 
     def _acquire(self) -> BinaryIO:
         while True:
