@@ -10,7 +10,6 @@ from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
-from scipy import stats
 
 from handrail.datasets.statistics.resampling import Interval
 
@@ -184,4 +183,6 @@ def reach(tests: int = 1, freedom: float = np.inf) -> float:
         tests: m.
         freedom: Degrees of freedom with which the standard error is known; ∞ is the normal distribution.
     """
+    from scipy import stats  # a recording must start at once
+
     return float(stats.t.ppf(1.0 - 0.5 * LEVEL / max(1, tests), freedom) + stats.t.ppf(POWER, freedom))

@@ -152,6 +152,6 @@ def test_an_episode_among_movers_is_the_seeds():
 
     (first, q), (again, same) = run(), run()
     assert first.success
-    assert first.contacts == 0
+    assert first.contact_onsets == 0
     assert first.frames == again.frames
     np.testing.assert_array_equal(q, same)
