@@ -141,6 +141,8 @@ def _value(value: Any, kind: Any, where: str) -> Any:
     tables = [each for each in (inner, *get_args(inner)) if is_dataclass(each)]
     if not tables or (value is None and type(None) in get_args(inner)):
         return check(value, kind, where)
+    if isinstance(value, tables[0]):
+        return value
     if get_origin(inner) is Mapping:
         named = check(value, dict[str, dict], where)
         return {name: decoded(each, tables[0], f"{where}.{name}") for name, each in named.items()}  # type: ignore[arg-type]

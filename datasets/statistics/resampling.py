@@ -4,7 +4,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
 
 from handrail.controllers.arrays import FloatArray
 
@@ -35,6 +34,8 @@ def bootstrap(
 ) -> Interval:
     """Return the 95 % bootstrap interval (percentiles) of a statistic, which takes samples and an axis."""
     count = resamples or RESAMPLES
+    from scipy import stats  # a recording must start at once
+
     found = stats.bootstrap(
         samples,
         statistic,
@@ -65,6 +66,8 @@ def permutation_p(
         rng: Of the permutations.
     """
     kind = "samples" if paired else "independent"
+    from scipy import stats  # a recording must start at once
+
     found = stats.permutation_test(
         samples,
         statistic,

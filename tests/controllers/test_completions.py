@@ -215,7 +215,7 @@ def test_an_arm_without_a_base_completes_too():
     description = MODEL.description
     fixed = replace(
         description,
-        base_kind="fixed",
+        base=replace(description.base, kind="fixed"),
         home=HOME[3:],
         limits=replace(
             LIMITS,

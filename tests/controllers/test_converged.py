@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
+from robot_helpers import without_shapes
 
 from handrail.controllers.interface.controller import State
 from handrail.controllers.interface.intent import Intent
@@ -15,14 +16,14 @@ from handrail.controllers.interrupts import Interrupts
 from handrail.controllers.mpc.masked_mpc import MaskedMpc
 from handrail.controllers.numerics.threads import single_threaded
 from handrail.controllers.ocp.nodes import Nodes
-from handrail.controllers.robot.model import RobotModel, load_model
+from handrail.controllers.robot.model import load_model
 from handrail.controllers.robot.shape import Obstacle, Shape
 from handrail.controllers.solvers.basis import to_motion
 from handrail.controllers.solvers.constraints import constraints_around
 from handrail.controllers.solvers.converged import ConvergedSolver
 
 DESCRIPTION = load_model().description
-ALONE = RobotModel(replace(DESCRIPTION, collision=(), self_pairs=(), self_margins=np.zeros(0)))
+ALONE = without_shapes(DESCRIPTION)
 LIMITS = DESCRIPTION.limits
 PERIOD = 0.05
 SETTLED = 5  # updates after a jump of the intent

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from collect_helpers import environment
+from robot_helpers import without_shapes
 
 from handrail.collect.world.scene import Scene
 from handrail.collect.world.task import Start
@@ -19,12 +20,12 @@ from handrail.controllers.interface.controller import State
 from handrail.controllers.interface.intent import Intent
 from handrail.controllers.mpc.safety_filter import safety_filter
 from handrail.controllers.numerics.threads import single_threaded
-from handrail.controllers.robot.model import RobotModel, load_model
+from handrail.controllers.robot.model import load_model
 from handrail.controllers.robot.shape import Obstacle, Shape
 from handrail.controllers.solvers.converged import ConvergedSolver
 
 MODEL = load_model()
-ALONE = RobotModel(replace(MODEL.description, collision=(), self_pairs=(), self_margins=np.zeros(0)))
+ALONE = without_shapes(MODEL.description)
 HOME, LIMITS = MODEL.description.home, MODEL.description.limits
 CHANNELS = Channels.of(MODEL.description)
 JOINTS, MASK = CHANNELS.joint_slice, CHANNELS.mask("joint")

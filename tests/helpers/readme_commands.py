@@ -88,7 +88,7 @@ def joined(words: list[str]) -> list[str]:
 
 def small_study() -> str:
     """Return the quick study's design with less of everything."""
-    text = (ROOT / "policies" / "study" / "design" / "presets" / "quick.toml").read_text()
+    text = (ROOT / "policies" / "study" / "presets" / "quick.toml").read_text()
     for name, value in LESS_STUDY.items():
         text = re.sub(rf"^{name} = .*", f"{name} = {value}", text, flags=re.MULTILINE)
     return text

@@ -27,7 +27,7 @@ def run(words: list[str]) -> None:
 
 def fresh(tmp_path, monkeypatch):
     """Go to a folder with nothing but what a clone has beside the code."""
-    preset = tmp_path / "policies" / "study" / "design" / "presets" / "quick.toml"
+    preset = tmp_path / "policies" / "study" / "presets" / "quick.toml"
     preset.parent.mkdir(parents=True)
     preset.write_text(small_study())
     monkeypatch.chdir(tmp_path)

@@ -218,7 +218,7 @@ def test_a_thing_weighs_what_the_task_says():
 def test_the_time_limit_is_a_setting(task):
     own = build_task(SessionConfig(task=task))
     assert build_task(SessionConfig(task=task, time_limit=12.0)) == replace(own, horizon=12.0)
-    with pytest.raises(HandrailError, match="--time_limit -1"):
+    with pytest.raises(HandrailError, match="--time_limit: expected a number >= 0"):
         SessionConfig(task=task, time_limit=-1.0).check()
 
 
