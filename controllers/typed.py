@@ -141,7 +141,7 @@ def _value(value: Any, kind: Any, where: str) -> Any:
     tables = [each for each in (inner, *get_args(inner)) if is_dataclass(each)]
     if not tables or (value is None and type(None) in get_args(inner)):
         return check(value, kind, where)
-    if isinstance(value, tables[0]):
+    if isinstance(value, tables[0]):  # type: ignore[arg-type]
         return value
     if get_origin(inner) is Mapping:
         named = check(value, dict[str, dict], where)

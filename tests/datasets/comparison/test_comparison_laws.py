@@ -171,7 +171,7 @@ def test_what_is_called_detectable_is_detected_four_times_in_five(quick, policie
         ]
         return judge({each.label: each for each in conditions}, "b", generator).differences[0]
 
-    claimed = np.median([experiment(0.2).seen for _ in range(20)])
+    claimed = float(np.median(np.array([experiment(0.2).seen for _ in range(20)], dtype=float)))
     assert 0.6 <= np.mean([experiment(claimed).detected for _ in range(60)]) <= 0.95
 
 
