@@ -78,9 +78,13 @@ def check(value: Any, kind: Any, where: str) -> Any:
         where: the value is, for the error.
     """
     try:
-        return msgspec.convert(value, kind)
+        found = msgspec.convert(value, kind)
     except msgspec.ValidationError as error:
         raise HandrailError(f"{where}: {_expected(error, kind)}, got {shown(value)}") from error
+    texts = [found] if kind == Text else found if Text in get_args(kind) else ()
+    if not all(text.isprintable() for text in texts):
+        raise HandrailError(f"{where}: expected a text that can be printed, got {shown(value)}")
+    return found
 
 
 def check_settings(settings: Any, what: str = "") -> None:
