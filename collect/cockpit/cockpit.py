@@ -40,7 +40,7 @@ from handrail.collect.cockpit.strain import Strain
 from handrail.collect.config import RecordConfig
 from handrail.collect.operators.modes import TeleopMode
 from handrail.collect.operators.operator import EpisodeEvent, View
-from handrail.collect.operators.person.inputs import Ask, Inputs
+from handrail.collect.operators.person.inputs import Ask, Input
 from handrail.collect.operators.person.person import Person, Phase
 from handrail.collect.session.build import build_modes
 from handrail.collect.session.outcome import Outcome
@@ -191,7 +191,7 @@ class Cockpit:
             elif kind == DRIVE:
                 said = json.loads(data)
                 lists = {name: tuple(said["inputs"][name]) for name in ("axes", "targets")}
-                inputs = Inputs(**(said["inputs"] | lists))
+                inputs = Input(**(said["inputs"] | lists))
                 self._person.take(inputs, said["received"], said["round_trip"])
             elif kind in (ASK, STILL):
                 said = json.loads(data)

@@ -14,7 +14,7 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from handrail.collect.operators.person.inputs import ASKS, STILLS, Ask, Inputs
+from handrail.collect.operators.person.inputs import ASKS, STILLS, Ask, Input
 from handrail.controllers.errors import HandrailError, shown
 
 LARGEST = 4096  # message [bytes]
@@ -66,7 +66,7 @@ class Drive:
 
     sequence: int
     echo: float
-    inputs: Inputs
+    inputs: Input
 
 
 Said = Drive | Ask | CardAnswer | Stop
@@ -106,7 +106,7 @@ def _drive(said: dict[str, Any]) -> Drive:
         raise HandrailError(f"seq: expected a whole number >= 0, got {shown(sequence)}")
     if said["device"] not in DEVICES:
         raise HandrailError(f"device: expected one of {', '.join(DEVICES)}, got {shown(said['device'])}")
-    inputs = Inputs(
+    inputs = Input(
         _flag("on", said["on"]),
         said["device"],
         _flag("grip", said["grip"]),

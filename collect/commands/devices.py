@@ -4,14 +4,12 @@ import math
 import time
 from pathlib import Path
 
+from handrail.collect.devices.device import Device, DeviceInput, StickShape
+from handrail.collect.devices.device_reader import DeviceReader
 from handrail.collect.devices.gamepad import Gamepad
 from handrail.collect.devices.keyboard import Keyboard
-from handrail.collect.devices.leader_arm import LeaderArm
-from handrail.collect.devices.poller import Poller
-from handrail.collect.devices.reading import Device, Reading
+from handrail.collect.devices.leader_arm import LeaderArm, leader_types, make_teleoperator
 from handrail.collect.devices.spacemouse import SpaceMouse
-from handrail.collect.devices.stick import StickShape
-from handrail.collect.devices.teleoperators import leader_types, make_teleoperator
 from handrail.collect.teleop_config import LEADER, ListDevicesConfig, ShowDeviceConfig
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.presentation.table import Table
@@ -44,7 +42,7 @@ def _state(device: Device) -> str:
 
 def show_device(config: ShowDeviceConfig) -> int:
     """Print what a device says, line by line; return the exit code."""
-    poller, say = Poller(_device(config)).start(), Terminal().print
+    poller, say = DeviceReader(_device(config)).start(), Terminal().print
     try:
         for _ in range(math.ceil(config.seconds / _PERIOD)) if config.seconds else iter(int, 1):
             reading, presses = poller.take()
@@ -66,7 +64,7 @@ def _device(config: ShowDeviceConfig) -> Device:
     return {"gamepad": Gamepad, "spacemouse": SpaceMouse}[config.device](shape)
 
 
-def _line(reading: Reading, presses: tuple[str, ...]) -> str:
+def _line(reading: DeviceInput, presses: tuple[str, ...]) -> str:
     values = {**reading.deflections, **reading.joints}
     said = [f"{name} {value:+.2f}" for name, value in values.items()]
     return ", ".join([*said, *(f"{name} pressed" for name in presses)]) or "at rest"

@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from handrail.collect.teleop_config import LeaderConfig
 from handrail.controllers.arrays import FloatArray
-from handrail.controllers.entries import Entry, check_entries, is_number, is_table
 from handrail.controllers.errors import HandrailError
-from handrail.controllers.fields import check_fields
+from handrail.controllers.typed import Name, Number, check_names, decoded
 from handrail.datasets.storage.atomic import explained, make_folder, write_whole
 
 _OPEN, _CLOSED = 0.6, 0.4  # of the gripper's way: where it counts as open, and as closed
@@ -20,32 +20,25 @@ _OPEN, _CLOSED = 0.6, 0.4  # of the gripper's way: where it counts as open, and 
 
 @dataclass(frozen=True)
 class LeaderJoint:
-    """A joint of the leader that drives one of the arm's: `q = scale · l + offset`.
+    """A joint of the leader that drives one of the arm's: `q = scale · l + offset`."""
 
-    Attributes:
-        source: LeRobot's name of its position.
-        scale: [rad per unit of the leader]; negative where it turns the other way.
-        offset: [rad].
-    """
-
-    source: str
-    scale: float
-    offset: float = 0.0
+    source: Name
+    """LeRobot's name of its position."""
+    scale: Number
+    """[rad per unit of the leader]; negative where it turns the other way."""
+    offset: Number = 0.0
+    """[rad]."""
 
 
 @dataclass(frozen=True)
 class LeaderGripper:
-    """The leader's handle, that closes and opens the gripper.
+    """The leader's handle, that closes and opens the gripper."""
 
-    Attributes:
-        source: LeRobot's name of its position.
-        closed: where it is closed, in the leader's units.
-        opened: where it is open.
-    """
-
-    source: str
-    closed: float
-    opened: float
+    source: Name
+    """LeRobot's name of its position."""
+    closed: Number
+    """Where it is closed, in the leader's units."""
+    opened: Number
 
     def grips(self, reading: Mapping[str, float], before: bool) -> bool:
         """Return whether it is closed; in between, what it was before."""
@@ -55,12 +48,7 @@ class LeaderGripper:
 
 @dataclass(frozen=True)
 class LeaderCalibration:
-    """How a leader drives an arm; arm joints that no leader joint drives stand still.
-
-    Attributes:
-        joints: by the name of the arm's joint.
-        gripper: its handle, if it has one.
-    """
+    """How a leader drives an arm, joint by joint; arm joints that no leader joint drives stand still."""
 
     joints: Mapping[str, LeaderJoint]
     gripper: LeaderGripper | None = None
@@ -80,13 +68,15 @@ class LeaderCalibration:
         return (*(joint.source for joint in self.joints.values()), *handle)
 
 
-_SCALE = Entry("a finite number, not 0", lambda value: is_number(value) and value != 0)
-_GRIPPER = Entry("a table, or nothing", lambda value: value is None or is_table(value), needed=False)
-
-
 _SO_ARM = ("shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll")
 _SO_LEADERS = ("so100_leader", "so101_leader")
 _IN_DEGREES = ("", "use_degrees=true", "use_degrees=True")
+
+
+@dataclass(frozen=True)
+class _CalibrationFile:
+    joints: Mapping[str, Any]
+    gripper: Mapping[str, Any] | None = None
 
 
 def same_arm(leader: str, options: str, arm: tuple[str, ...]) -> LeaderCalibration | None:
@@ -123,18 +113,18 @@ def load_calibration(path: Path, arm: tuple[str, ...], advice: str) -> LeaderCal
         content: Any = json.loads(path.read_text())
     except (OSError, ValueError, RecursionError) as error:
         raise HandrailError(f"{where}: expected JSON; make it anew: {advice}") from error
-    check_fields(content, LeaderCalibration, where, gripper=_GRIPPER)
-    joint_entries = {name: Entry("a table", is_table, needed=False) for name in arm}
-    check_entries(content["joints"], joint_entries, f"{where}: joints")
-    for name, joint in content["joints"].items():
-        check_fields(joint, LeaderJoint, f"{where}: {name}", scale=_SCALE)
-    gripper = content.get("gripper")
-    if gripper is not None:
-        check_fields(gripper, LeaderGripper, f"{where}: gripper")
-        if gripper["closed"] == gripper["opened"]:
+    table = decoded(content, _CalibrationFile, where)
+    check_names(table.joints, dict.fromkeys(arm), f"{where}: joints")
+    joints = {name: decoded(joint, LeaderJoint, f"{where}: {name}") for name, joint in table.joints.items()}
+    for name, joint in joints.items():
+        if joint.scale == 0.0:
+            raise HandrailError(f"{where}: {name}: scale: expected a finite number, not 0")
+    gripper = None
+    if table.gripper is not None:
+        gripper = decoded(table.gripper, LeaderGripper, f"{where}: gripper")
+        if gripper.closed == gripper.opened:
             raise HandrailError(f"{where}: gripper: expected closed and opened to differ")
-    joints = {name: LeaderJoint(**joint) for name, joint in content["joints"].items()}
-    return LeaderCalibration(joints, LeaderGripper(**gripper) if gripper else None)
+    return LeaderCalibration(joints, gripper)
 
 
 def save_calibration(calibration: LeaderCalibration, path: Path) -> None:
@@ -142,3 +132,28 @@ def save_calibration(calibration: LeaderCalibration, path: Path) -> None:
     with explained(f"calibration {path}"):
         make_folder(path.parent)
         write_whole(path, (json.dumps(asdict(calibration), indent=2) + "\n").encode())
+
+
+def calibration_file(teleop: LeaderConfig, robot: str) -> Path:
+    """Return where the calibration is: beside LeRobot's own one of that device.
+
+    Args:
+        teleop: which leader.
+        robot: name of the robot.
+    """
+    from lerobot.utils.constants import HF_LEROBOT_CALIBRATION, TELEOPERATORS
+
+    name = "".join(c if c.isalnum() or c in "-_" else "_" for c in teleop.id or "leader")
+    return HF_LEROBOT_CALIBRATION / TELEOPERATORS / teleop.type / f"{name}.{robot}.handrail.json"
+
+
+def how_to_calibrate(teleop: LeaderConfig, robot: str) -> str:
+    """Return the command that calibrates a leader for a robot."""
+    given = (
+        ("--teleop.type", teleop.type),
+        ("--teleop.port", teleop.port),
+        ("--teleop.id", teleop.id),
+        ("--teleop.options", teleop.options),
+        ("--robot", robot),
+    )
+    return " ".join(["handrail-devices calibrate", *(f"{flag}={value}" for flag, value in given if value)])

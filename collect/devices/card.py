@@ -8,8 +8,7 @@ from rich.panel import Panel
 from rich.table import Table
 from rich.text import Text
 
-from handrail.collect.devices.control_map import ControlMap, Moves
-from handrail.collect.devices.help_card import actions_help, control_of, moves_help
+from handrail.collect.devices.control_map import ControlMap, Moves, actions_help, control_of, moves_help
 from handrail.collect.operators.operator import View
 from handrail.collect.operators.person.meaning import HandFrame
 from handrail.collect.operators.person.person import Person, Phase

@@ -5,15 +5,15 @@ A section says which axis a control moves while that part is steered: `[hand]`, 
 need the same controls are banks: the action `focus` goes from one to the next.
 """
 
-import tomllib
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from handrail.collect.devices.device import DeviceInput
 from handrail.controllers.errors import HandrailError, shown
 from handrail.controllers.interface.channels import BASE, TOOL
-from handrail.controllers.regular_file import open_regular
+from handrail.controllers.strict_toml import read_toml
 
 SECTIONS: Mapping[str, tuple[str, ...]] = {
     "hand": TOOL,
@@ -55,20 +55,36 @@ Moves = Mapping[str, tuple[str, int]]  # axis and sign of each control
 
 @dataclass(frozen=True)
 class ControlMap:
-    """The table of a device.
-
-    Attributes:
-        moves: by section and control, the axis and its sign.
-        actions: by control.
-    """
+    """The table of a device."""
 
     moves: Mapping[str, Moves]
+    """By section and control, the axis and its sign."""
     actions: Mapping[str, str]
+    """By control."""
 
-    @property
-    def is_held(self) -> bool:
-        """Whether a control has to be held to move."""
-        return "hold" in self.actions.values()
+    def meant(self, said: DeviceInput, presses: Iterable[str], moves: Moves) -> DeviceInput:
+        """Return an input in the words of the map: channels instead of axes, actions instead of presses.
+
+        Args:
+            said: by the device.
+            presses: all since the last time.
+            moves: in force now.
+        """
+        actions = self.actions
+        holds = {actions[name] for name in said.deflections if actions.get(name) in HELD}
+        if "hold" not in actions.values():
+            holds.add("hold")
+        axes: dict[str, float] = {}
+        if "hold" in holds and said.attended:
+            for control, (axis, sign) in moves.items():
+                axes[axis] = axes.get(axis, 0.0) + sign * said.deflections.get(control, 0.0)
+        asked = (actions[name] for name in presses if name in actions)
+        return replace(
+            said,
+            deflections={axis: value for axis, value in axes.items() if value},
+            presses=tuple(action for action in asked if action not in HELD),
+            holds=frozenset(holds) if said.attended else frozenset(holds - {"clutch"}),
+        )
 
     def only(self, *sections: str) -> "ControlMap":
         """Return it without the moves of other sections."""
@@ -121,10 +137,10 @@ def load_map(device: str, controls: Iterable[str], changes: str = "") -> Control
         controls: that it has.
         changes: a .toml file of the same form, with the sections and controls that differ, or an empty path.
     """
-    table = _read(_FOLDER / f"{device}.toml")
+    table = read_toml(_FOLDER / f"{device}.toml", "controls")
     if changes:
         path = Path(changes).expanduser()
-        changed = _read(path)
+        changed = read_toml(path, "--teleop.map")
         _check(changed, frozenset(controls), str(path))
         table = {name: table.get(name, {}) | changed.get(name, {}) for name in {**table, **changed}}
     moves = {
@@ -133,14 +149,6 @@ def load_map(device: str, controls: Iterable[str], changes: str = "") -> Control
         if name != "actions"
     }
     return ControlMap(moves, {control: action for control, action in table["actions"].items() if action})
-
-
-def _read(path: Path) -> dict[str, Any]:
-    try:
-        with open_regular(path) as file:
-            return tomllib.load(file)
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise HandrailError(f"--teleop.map {path}: expected a .toml file: {error}") from error
 
 
 def _axis(value: str) -> tuple[str, int]:
@@ -168,3 +176,62 @@ def _check(table: dict[str, Any], controls: frozenset[str], where: str) -> None:
                     f"--teleop.map {where}: [{name}] {control}: expected one of {', '.join(choices)} "
                     f'({sign}"" takes it away), got {shown(value)}'
                 )
+
+
+_AXES = {
+    "base.vx": ("base forward", "backward"),
+    "base.vy": ("base left", "right"),
+    "base.wz": ("base turns left", "right"),
+    "ee.vx": ("hand forward", "backward"),
+    "ee.vy": ("hand left", "right"),
+    "ee.vz": ("hand up", "down"),
+    "ee.wx": ("hand rolls right", "left"),
+    "ee.wy": ("hand tips down", "up"),
+    "ee.wz": ("hand turns left", "right"),
+}
+_CONTROLS = {
+    "left_x": "left stick ↔",
+    "left_y": "left stick ↕",
+    "right_x": "right stick ↔",
+    "right_y": "right stick ↕",
+    "left_stick": "press left stick",
+    "right_stick": "press right stick",
+    **{name: f"{sign}" for name, sign in (("left", "←"), ("right", "→"), ("up", "↑"), ("down", "↓"))},
+}
+
+
+def control_name(control: str) -> str:
+    """Return what a control is called."""
+    return _CONTROLS.get(control, control.replace("_", " "))
+
+
+def moves_help(moves: Moves) -> list[tuple[str, str]]:
+    """Return what moves what: controls, and in words what they do."""
+    lines = []
+    for axis in dict.fromkeys(axis for axis, _ in moves.values()):
+        of_axis = [(control, sign) for control, (name, sign) in moves.items() if name == axis]
+        forward, backward = _AXES.get(axis, (f"{_joint(axis)} +", "−"))
+        ordered = sorted(of_axis, key=lambda each: -each[1])
+        lines.append((" / ".join(control_name(name) for name, _ in ordered), f"{forward} / {backward}"))
+    return lines
+
+
+def actions_help(controls: ControlMap) -> list[tuple[str, str]]:
+    """Return what asks for what."""
+    by_action: dict[str, list[str]] = {}
+    for control, action in controls.actions.items():
+        by_action.setdefault(action, []).append(control_name(control))
+    return [(", ".join(by_action[name]), words) for name, words in ACTIONS.items() if name in by_action]
+
+
+def control_of(controls: Sequence[ControlMap], *actions: str) -> str:
+    """Return the control that asks for one of some actions; nothing where none does."""
+    for table in controls:
+        for control, action in table.actions.items():
+            if action in actions:
+                return control_name(control)
+    return ""
+
+
+def _joint(axis: str) -> str:
+    return axis.removeprefix("joint.").removesuffix("_joint").replace("_", " ")

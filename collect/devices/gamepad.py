@@ -7,8 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from handrail.collect.devices.reading import DeviceGoneError, Reading
-from handrail.collect.devices.stick import StickShape
+from handrail.collect.devices.device import DeviceGoneError, DeviceInput, StickShape
 from handrail.controllers.errors import not_installed
 
 AXES = ("left_x", "left_y", "right_x", "right_y", "left_trigger", "right_trigger")  # in SDL's order
@@ -59,7 +58,7 @@ class Gamepad:
             raise DeviceGoneError(_why_none(len(indices)))
         self._pygame, self._pad, self._down = pygame, controllers.Controller(known), frozenset()
 
-    def read(self) -> Reading:
+    def read(self) -> DeviceInput:
         """Return its sticks and buttons.
 
         Raises:
@@ -76,7 +75,7 @@ class Gamepad:
         held = {name: value for name, value in {**shaped, **buttons}.items() if value}
         before, self._down = self._down, frozenset(held)
         presses = tuple(name for name in CONTROLS if name in self._down - before)
-        return Reading(self._clock(), held, presses)
+        return DeviceInput(self._clock(), held, presses)
 
     def close(self) -> None:
         """Give it back."""

@@ -10,11 +10,10 @@ from handrail.collect.devices.calibration import (
     LeaderCalibration,
     LeaderGripper,
     LeaderJoint,
+    calibration_file,
     save_calibration,
 )
-from handrail.collect.devices.leader_arm import connected
-from handrail.collect.devices.setup import calibration_file
-from handrail.collect.devices.teleoperators import make_teleoperator
+from handrail.collect.devices.leader_arm import connected, make_teleoperator
 from handrail.collect.teleop_config import CalibrateConfig
 from handrail.controllers.errors import HandrailError, message_of
 from handrail.controllers.robot.description import RobotDescription

@@ -1,9 +1,15 @@
 """The keys of a terminal, also over ssh: held while they are down, or while the terminal repeats them."""
 
 import _thread
+import atexit
+import contextlib
+import os
+import select
+import sys
 import time
 from collections.abc import Callable
 
+from handrail.collect.devices.device import DeviceGoneError, DeviceInput
 from handrail.collect.devices.key_bytes import (
     FOCUS_IN,
     FOCUS_OUT,
@@ -13,14 +19,108 @@ from handrail.collect.devices.key_bytes import (
     Key,
     KeyBytes,
 )
-from handrail.collect.devices.reading import Reading
-from handrail.collect.devices.terminal import ARE_YOU_THERE, KeyTerminal
+from handrail.controllers.errors import message_of
 
 HELD = 0.2  # after its last character, a key of a terminal that does not tell releases counts as let go [s]
 _AGAIN = 0.7  # what comes earlier is a repetition, whose first one comes after 0.25 to 0.66 s [s]
 _ASKS = 0.05  # while keys are held, a terminal is asked that often whether it is there [s]
 _SILENCE = 0.15  # without an answer, nobody is there [s]
 _WAIT = 0.008  # for keys [s]
+_AT_ONCE = 4096  # bytes
+_KEYS_BEGIN = b"\x1b[>11u"  # kitty's keyboard protocol: every key, when it goes down and up
+_KEYS_END = b"\x1b[<u"
+_FOCUS_BEGIN, _FOCUS_END = b"\x1b[?1004h", b"\x1b[?1004l"  # the terminal says when it is left
+WHICH_KEYS = b"\x1b[?u\x1b[c"  # whether it has that protocol; every terminal answers the second one
+ARE_YOU_THERE = b"\x1b[5n"
+
+
+def has_terminal() -> bool:
+    """Return whether there is a terminal that belongs to this program now."""
+    try:
+        return os.tcgetpgrp(sys.stdin.fileno()) == os.getpgrp()
+    except (OSError, ValueError, AttributeError):
+        return False
+
+
+class KeyTerminal:
+    """The terminal of standard input."""
+
+    def __init__(self) -> None:
+        self._file = -1
+        self._tells_releases = False
+
+    def open(self) -> None:
+        """Take it.
+
+        Raises:
+            DeviceGoneError: there is none, or it belongs to another program now.
+        """
+        try:
+            import termios
+            import tty
+        except ImportError as error:  # Windows
+            raise DeviceGoneError(
+                "keyboard: expected a terminal of Linux or macOS; say --operator browser"
+            ) from error
+        try:
+            self._file = os.open(os.ttyname(sys.stdin.fileno()), os.O_RDWR | os.O_NOCTTY)
+        except (OSError, ValueError, AttributeError) as error:
+            raise DeviceGoneError(
+                "keyboard: expected a terminal to read keys from, found none; start it in a terminal without "
+                "a pipe or &, or say --operator browser"
+            ) from error
+        if not has_terminal():
+            self._forget()
+            raise DeviceGoneError("keyboard: this runs in the background (&); bring it to the front with fg")
+        self._before = termios.tcgetattr(self._file)
+        tty.setcbreak(self._file)
+        quiet = termios.tcgetattr(self._file)
+        quiet[0] &= ~(termios.IXON | termios.ICRNL)  # Ctrl-S does not freeze it
+        quiet[6][termios.VSUSP] = b"\0"  # Ctrl-Z does not suspend a robot that moves
+        termios.tcsetattr(self._file, termios.TCSANOW, quiet)
+        atexit.register(self.close)
+        self.write(_FOCUS_BEGIN + WHICH_KEYS)
+
+    def tell_releases(self) -> None:
+        """Let it tell also when keys go up."""
+        self._tells_releases = True
+        self.write(_KEYS_BEGIN)
+
+    def read(self, patience: float) -> bytes:
+        """Return what came, after some time at most [s].
+
+        Raises:
+            DeviceGoneError: it was closed.
+        """
+        try:
+            ready, _, _ = select.select([self._file], [], [], patience)
+            data = os.read(self._file, _AT_ONCE) if ready else None
+        except (OSError, ValueError) as error:
+            raise DeviceGoneError(f"keyboard: the terminal is gone ({message_of(error)})") from error
+        if data == b"":
+            raise DeviceGoneError("keyboard: the terminal was closed")
+        return data or b""
+
+    def write(self, data: bytes) -> None:
+        """Say something to the terminal itself; one that is gone shows at the next reading."""
+        with contextlib.suppress(OSError):
+            os.write(self._file, data)
+
+    def close(self) -> None:
+        """Put it back as it was."""
+        if self._file < 0:
+            return
+        import termios
+
+        self.write((_KEYS_END if self._tells_releases else b"") + _FOCUS_END)
+        with contextlib.suppress(termios.error):
+            termios.tcsetattr(self._file, termios.TCSAFLUSH, self._before)
+        self._forget()
+        atexit.unregister(self.close)
+
+    def _forget(self) -> None:
+        os.close(self._file)
+        self._file, self._tells_releases = -1, False
 
 
 class Keyboard:
@@ -53,7 +153,7 @@ class Keyboard:
         self._begin()
         self._terminal.open()
 
-    def read(self) -> Reading:
+    def read(self) -> DeviceInput:
         """Return the keys that are held.
 
         Raises:
@@ -67,7 +167,7 @@ class Keyboard:
         if not self._tells_releases:
             self._held = {name: since for name, since in self._held.items() if now - since <= HELD}
         silent = self._tells_releases and bool(self._held) and self._is_silent(now)
-        return Reading(
+        return DeviceInput(
             self._heard if silent else now,
             dict.fromkeys(self._held, 1.0),
             tuple(presses),

@@ -1,12 +1,16 @@
 """A leader arm, or any LeRobot teleoperator that says joint positions."""
 
+import contextlib
+import importlib
 import math
+import pkgutil
 import time
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
-from handrail.collect.devices.reading import DeviceGoneError, Reading
-from handrail.controllers.errors import message_of, shown
+from handrail.collect.devices.device import DeviceGoneError, DeviceInput
+from handrail.collect.teleop_config import LeaderConfig
+from handrail.controllers.errors import HandrailError, message_of, shown, unknown_name
 
 if TYPE_CHECKING:
     from lerobot.teleoperators.teleoperator import Teleoperator
@@ -42,7 +46,7 @@ class LeaderArm:
     ) -> None:
         self.name, self._make, self._sources, self._clock = name, make, sources, clock
         self._teleoperator: Teleoperator | None = None
-        self._last = Reading(-math.inf)
+        self._last = DeviceInput(-math.inf)
         self.dropped = 0
 
     def open(self) -> None:
@@ -52,9 +56,9 @@ class LeaderArm:
             DeviceGoneError: it does not answer, may not be opened, or is not calibrated.
         """
         self._teleoperator = connected(self._make(), self.name)
-        self._last = Reading(self._clock(), attended=False)
+        self._last = DeviceInput(self._clock(), attended=False)
 
-    def read(self) -> Reading:
+    def read(self) -> DeviceInput:
         """Return its joint positions.
 
         Raises:
@@ -69,7 +73,7 @@ class LeaderArm:
             joints, trouble = None, message_of(error)
         now = self._clock()
         if joints is not None and self._follows(joints, now):
-            self._last = Reading(now, joints=joints)
+            self._last = DeviceInput(now, joints=joints)
             return self._last
         self.dropped += 1
         if now - self._last.time > _GONE or not self._teleoperator.is_connected:
@@ -131,3 +135,53 @@ def _why_not(name: str, error: Exception) -> str:
             f"(sudo usermod -aG dialout $USER), log in again ({shown(words)})"
         )
     return f"{name}: cannot be connected: {words}; check --teleop.port (lerobot-find-port), cable and power"
+
+
+def make_teleoperator(config: LeaderConfig) -> "Teleoperator":
+    """Return LeRobot's teleoperator of the settings, not connected.
+
+    Also of installed packages whose names begin with `lerobot_teleoperator_`.
+    """
+    import draccus
+    from lerobot.teleoperators.utils import make_teleoperator_from_config
+
+    known = leader_types()
+    if config.type not in known:
+        raise unknown_name("--teleop.type", config.type, known)
+    try:
+        settings = draccus.decode(known[config.type], _settings(config))
+        return make_teleoperator_from_config(settings)
+    except Exception as error:  # whatever a driver's code raises
+        raise HandrailError(f"--teleop.type {config.type}: {message_of(error)}") from error
+
+
+def leader_types() -> Mapping[str, Any]:
+    """Return the settings of every type of LeRobot's teleoperators, by its name."""
+    from lerobot.teleoperators.config import TeleoperatorConfig
+    from lerobot.utils.import_utils import register_third_party_plugins
+
+    _import_all()
+    register_third_party_plugins()
+    return TeleoperatorConfig.get_known_choices()
+
+
+def _import_all() -> None:
+    """Let LeRobot's own teleoperators register; those whose drivers are not installed cannot."""
+    import lerobot.teleoperators
+
+    for module in pkgutil.iter_modules(lerobot.teleoperators.__path__):
+        with contextlib.suppress(ImportError):
+            importlib.import_module(f"lerobot.teleoperators.{module.name}")
+
+
+def _settings(config: LeaderConfig) -> dict[str, Any]:
+    """Return what LeRobot's settings are made of."""
+    given = {name: value for name in ("port", "id") if (value := getattr(config, name))}
+    for option in filter(None, (part.strip() for part in config.options.split(","))):
+        name, equals, value = option.partition("=")
+        if not equals or not name.isidentifier():
+            raise HandrailError(
+                f"--teleop.options {config.options}: expected name=value with commas between, got {option}"
+            )
+        given[name] = value
+    return given

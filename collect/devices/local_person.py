@@ -1,16 +1,15 @@
 """A person at this computer, with a device in hand: an operator, an observer, a card in the terminal."""
 
-from collections.abc import Sequence
-
 import numpy as np
 from rich.console import RenderableType
 
 from handrail.collect.devices.card import Card
 from handrail.collect.devices.control_map import Moves
+from handrail.collect.devices.device import DeviceInput
+from handrail.collect.devices.device_reader import DeviceReader
 from handrail.collect.devices.follower import Follower
-from handrail.collect.devices.source import DeviceSource, Heard
 from handrail.collect.operators.operator import EpisodeEvent, View
-from handrail.collect.operators.person.inputs import ASKS, Ask, Inputs
+from handrail.collect.operators.person.inputs import ASKS, Ask, Input
 from handrail.collect.operators.person.person import Person, Phase
 from handrail.collect.session.outcome import Outcome
 from handrail.collect.world.env import HandrailEnv
@@ -71,8 +70,8 @@ class LocalPerson:
     def __init__(
         self,
         person: Person,
-        main: DeviceSource,
-        beside: DeviceSource | None,
+        main: DeviceReader,
+        beside: DeviceReader | None,
         follower: Follower | None,
         card: Card,
     ) -> None:
@@ -100,9 +99,10 @@ class LocalPerson:
 
     def act(self, view: View) -> Intent | EpisodeEvent:
         """Return the intent now, or what becomes of the episode."""
-        main, beside = self._hear(self._main), self._hear(self._beside)
+        main = self._main.input(self._banks(self._main))
+        beside = self._beside.input(self._banks(self._beside)) if self._beside else None
         for heard in (main, beside):
-            for action in heard.actions if heard else ():
+            for action in heard.presses if heard else ():
                 self._do(action)
         self._take(main, beside, view)
         answer = self._person.act(view)
@@ -125,10 +125,7 @@ class LocalPerson:
         for source in filter(None, (self._main, self._beside)):
             source.close()
 
-    def _hear(self, source: DeviceSource | None) -> Heard | None:
-        return source.listen(self._banks(source)) if source else None
-
-    def _banks(self, source: DeviceSource) -> list[Moves]:
+    def _banks(self, source: DeviceReader) -> list[Moves]:
         """Return the banks of a device for what is steered now."""
         meaning = self._person.meaning
         channels, mask = meaning.channels, meaning.mask(self._person.setting)
@@ -138,24 +135,22 @@ class LocalPerson:
         drives = bool(mask[channels.base_slice].any() or (base and joints[:base].all()))
         return source.controls.banks(bool(mask[channels.tool_slice].any()), drives, arm)
 
-    def _take(self, main: Heard | None, beside: Heard | None, view: View) -> None:
+    def _take(self, main: DeviceInput | None, beside: DeviceInput | None, view: View) -> None:
         """Tell the person where the inputs are; that nobody drives, while a device that is needed is gone."""
         other = beside if self._follower else main
         if main is None or other is None:
             self._person.lose()
             return
-        on, axes, targets = main.attended and main.held, main.axes, ()
+        on, axes, targets = main.attended and "hold" in main.holds, main.deflections, ()
         if self._follower:
             on = main.attended and other.attended
-            targets = self._follower.targets(main.joints, on and other.clutch, view.state.q)
-            self._grip, axes = self._follower.grips(main.joints, self._grip), other.axes
-        values = tuple(float(np.clip(axes.get(name, 0.0), -1.0, 1.0)) for name in self._channels)
-        inputs = Inputs(on, self._main.name, self._grip, values, targets=targets)
+            targets = self._follower.targets(main.joints, on and "clutch" in other.holds, view.state.q)
+            self._grip, axes = self._follower.grips(main.joints, self._grip), other.deflections
+        values = tuple(
+            float(np.clip(axes.get(name, 0.0), -1.0, 1.0)) for name in self._person.meaning.channels.names
+        )
+        inputs = Input(on, self._main.device.name, self._grip, values, targets=targets)
         self._person.take(inputs, min(main.time, other.time), max(main.round_trip, other.round_trip))
-
-    @property
-    def _channels(self) -> Sequence[str]:
-        return self._person.meaning.channels.names
 
     @property
     def _trouble(self) -> str:

@@ -4,24 +4,23 @@ from collections.abc import Callable, Mapping
 
 from handrail.collect.config import RecordConfig
 from handrail.collect.devices import gamepad, spacemouse
-from handrail.collect.devices.calibration import load_calibration, same_arm
+from handrail.collect.devices.calibration import (
+    calibration_file,
+    how_to_calibrate,
+    load_calibration,
+    same_arm,
+)
 from handrail.collect.devices.card import Card
-from handrail.collect.devices.control_map import ControlMap, load_map
+from handrail.collect.devices.control_map import ControlMap, control_of, load_map
+from handrail.collect.devices.device import Device, StickShape
+from handrail.collect.devices.device_reader import DeviceReader
 from handrail.collect.devices.follower import Follower
 from handrail.collect.devices.gamepad import Gamepad
-from handrail.collect.devices.help_card import control_of
 from handrail.collect.devices.key_bytes import NAMES
-from handrail.collect.devices.keyboard import Keyboard
-from handrail.collect.devices.leader_arm import LeaderArm
+from handrail.collect.devices.keyboard import Keyboard, has_terminal
+from handrail.collect.devices.leader_arm import LeaderArm, make_teleoperator
 from handrail.collect.devices.local_person import LocalPerson
-from handrail.collect.devices.poller import Poller
-from handrail.collect.devices.reading import Device
-from handrail.collect.devices.setup import calibration_file, how_to_calibrate
-from handrail.collect.devices.source import DeviceSource
 from handrail.collect.devices.spacemouse import SpaceMouse
-from handrail.collect.devices.stick import StickShape
-from handrail.collect.devices.teleoperators import make_teleoperator
-from handrail.collect.devices.terminal import has_terminal
 from handrail.collect.operators.modes import TeleopMode
 from handrail.collect.operators.person.inputs import Ask
 from handrail.collect.operators.person.person import Person
@@ -68,8 +67,7 @@ def open_leader_arm(config: RecordConfig, env: HandrailEnv, say: Say) -> LocalPe
     calibration = twin if twin and not file.is_file() else load_calibration(file, arm, advice)
     leader = LeaderArm(lambda: make_teleoperator(teleop), teleop.type, calibration.sources)
     device, controls = {"keyboard": _keyboard, "gamepad": _gamepad}[teleop.beside](teleop)
-    pollers = [Poller(leader), Poller(device)]
-    main, beside = _opened(pollers, (ControlMap({}, {}), controls.only("base")))
+    main, beside = _opened(DeviceReader(leader), DeviceReader(device, controls.only("base")))
     say(f"{teleop.type}: hold {control_of([controls], 'clutch')} on the {teleop.beside} to move the arm")
     return _person(config, env, modes, main, beside, Follower(env.model, calibration))
 
@@ -83,38 +81,37 @@ def _with(
 ) -> LocalPerson:
     """Return a person with a device, and the terminal's keys for what the device has no control for."""
     device, controls = made
-    pollers, tables = [Poller(device)], [controls]
+    readers = [DeviceReader(device, controls)]
     if device.name != "keyboard" and has_terminal():
-        pollers.append(Poller(Keyboard()))
-        tables.append(load_map("keyboard", NAMES).only())
-    sources = _opened(pollers, tables)
+        readers.append(DeviceReader(Keyboard(), load_map("keyboard", NAMES).only()))
+    _opened(*readers)
     say(f"{device.name}: hold {control_of([controls], 'hold') or 'what moves'} to move")
     modes = modes or build_modes(config, env)
-    return _person(config, env, modes, sources[0], (sources[1:] or [None])[0], None)
+    return _person(config, env, modes, readers[0], (readers[1:] or [None])[0], None)
 
 
 def _person(
     config: RecordConfig,
     env: HandrailEnv,
     modes: Mapping[str, TeleopMode],
-    main: DeviceSource,
-    beside: DeviceSource | None,
+    main: DeviceReader,
+    beside: DeviceReader | None,
     follower: Follower | None,
 ) -> LocalPerson:
     person = Person(env.model, modes, config.mode_name)
     person.ask(Ask("frame", "base"))
     tables = [source.controls for source in (main, beside) if source]
-    card = Card(main.name, tables, len(env.model.description.base.joints))
+    card = Card(main.device.name, tables, len(env.model.description.base.joints))
     return LocalPerson(person, main, beside, follower, card)
 
 
-def _opened(pollers: list[Poller], tables: "list[ControlMap] | tuple[ControlMap, ...]") -> list[DeviceSource]:
+def _opened(*readers: DeviceReader) -> tuple[DeviceReader, ...]:
     """Return devices that are open; where one is not, those before are given back."""
     try:
-        return [DeviceSource(poller.start(), table) for poller, table in zip(pollers, tables, strict=True)]
+        return tuple(reader.start() for reader in readers)
     except BaseException:
-        for poller in pollers:
-            poller.close()
+        for reader in readers:
+            reader.close()
         raise
 
 

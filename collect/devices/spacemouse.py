@@ -5,8 +5,7 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from handrail.collect.devices.reading import DeviceGoneError, Reading
-from handrail.collect.devices.stick import StickShape
+from handrail.collect.devices.device import DeviceGoneError, DeviceInput, StickShape
 from handrail.controllers.errors import message_of, not_installed
 
 AXES = ("x", "y", "z", "roll", "pitch", "yaw")
@@ -71,7 +70,7 @@ class SpaceMouse:
                 "into /etc/udev/rules.d/70-spacemouse.rules, plug it in again"
             ) from error
 
-    def read(self) -> Reading:
+    def read(self) -> DeviceInput:
         """Return its axes and buttons.
 
         Raises:
@@ -93,7 +92,7 @@ class SpaceMouse:
         deflected = any(self._axes.values())
         silent = deflected and now - self._heard > _SILENCE
         held = {name: value for name, value in self._axes.items() if value} | dict.fromkeys(self._down, 1.0)
-        return Reading(self._heard if silent else now, held, tuple(presses), attended=not silent)
+        return DeviceInput(self._heard if silent else now, held, tuple(presses), attended=not silent)
 
     def close(self) -> None:
         """Give it back."""

@@ -6,7 +6,7 @@ import numpy as np
 
 from handrail.collect.operators.modes import TeleopMode
 from handrail.collect.operators.operator import EpisodeEvent, View
-from handrail.collect.operators.person.inputs import Inputs
+from handrail.collect.operators.person.inputs import Input
 from handrail.collect.operators.person.meaning import InputMeaning, Setting
 from handrail.controllers.interface.intent import Intent
 from handrail.controllers.robot.model import RobotModel
@@ -38,7 +38,7 @@ class Rehearsal:
         if isinstance(now, EpisodeEvent):
             return now
         axes = (_DEFLECTION,) * self._meaning.channels.size
-        return self._meaning.intent(Inputs(True, "rehearsal", False, axes), now, view.state)
+        return self._meaning.intent(Input(True, "rehearsal", False, axes), now, view.state)
 
     def _all(self) -> Iterator[Setting | EpisodeEvent]:
         for mode in self._modes:

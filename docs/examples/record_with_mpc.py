@@ -13,7 +13,7 @@ from lerobot.robots.lekiwi import LeKiwiClient, LeKiwiClientConfig
 from lerobot.scripts.lerobot_record import record_loop
 from lerobot.utils.feature_utils import hw_to_dataset_features
 
-from handrail.collect.devices.teleoperators import make_teleoperator
+from handrail.collect.devices.leader_arm import make_teleoperator
 from handrail.collect.processor.mpc_step import MaskedMpcStep, mpc_pipeline
 from handrail.collect.teleop_config import LeaderConfig
 

@@ -8,8 +8,10 @@ from typing import Any
 import pytest
 from places import ROOT
 
+from handrail.collect.devices.control_map import ControlMap
+from handrail.collect.devices.device import DeviceInput
+from handrail.collect.devices.device_reader import DeviceReader
 from handrail.collect.devices.gamepad import AXES, BUTTONS
-from handrail.collect.devices.reading import Reading
 
 EVENTS = ROOT / "tests" / "data" / "devices"
 
@@ -127,12 +129,12 @@ class PlayedTerminal:
         pass
 
 
-class PlayedPoller:
+class PlayedReader(DeviceReader):
     """A device as its thread shows it, without the thread."""
 
-    def __init__(self, name: str, clock: Clock) -> None:
-        self.device = self
+    def __init__(self, name: str, clock: Clock, controls: ControlMap) -> None:
         self.name, self._clock = name, clock
+        super().__init__(self, controls)
         self.trouble = ""
         self.gone = False
         self.values: dict[str, float] = {}
@@ -141,13 +143,13 @@ class PlayedPoller:
         self.attended = True
         self.time: float | None = None
 
-    def take(self) -> tuple[Reading | None, tuple[str, ...]]:
+    def take(self) -> tuple[DeviceInput | None, tuple[str, ...]]:
         presses, self.presses = tuple(self.presses), []
         if self.gone:
             return None, ()
         time = self._clock() if self.time is None else self.time
         values = {name: value for name, value in self.values.items() if value}
-        return Reading(time, values, presses, self.attended, dict(self.joints)), presses
+        return DeviceInput(time, values, presses, self.attended, dict(self.joints)), presses
 
     def close(self) -> None:
         self.gone = True

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
-from device_players import Clock, PlayedPoller
+from device_players import Clock, PlayedReader
 from rich.console import Console
 
 from handrail.collect.devices import gamepad, spacemouse
@@ -14,7 +14,6 @@ from handrail.collect.devices.card import Card
 from handrail.collect.devices.control_map import ControlMap, load_map
 from handrail.collect.devices.key_bytes import NAMES
 from handrail.collect.devices.local_person import LocalPerson
-from handrail.collect.devices.source import DeviceSource
 from handrail.collect.operators.modes import MODES
 from handrail.collect.operators.operator import View
 from handrail.collect.operators.person.inputs import Ask
@@ -44,15 +43,15 @@ class Driven:
         self.clock = Clock()
         self.person = Person(MODEL, dict(MODES), mode, self.clock)
         self.person.ask(Ask("frame", "base"))
-        self.main = PlayedPoller(device, self.clock)
         controls = load_map(device, CONTROLS[device]) if device in CONTROLS else ControlMap({}, {})
-        sources = [DeviceSource(self.main, controls)]
-        self.beside = PlayedPoller(beside, self.clock) if beside else None
+        self.main, self.beside = PlayedReader(device, self.clock, controls), None
+        tables = [controls]
         if beside:
             table = load_map(beside, CONTROLS[beside])
-            sources.append(DeviceSource(self.beside, table.only("base") if follower else table.only()))
-        self.card = Card(device, [source.controls for source in sources], 3)
-        self.local = LocalPerson(self.person, sources[0], sources[1] if beside else None, follower, self.card)
+            tables.append(table.only("base") if follower else table.only())
+            self.beside = PlayedReader(beside, self.clock, tables[1])
+        self.card = Card(device, tables, 3)
+        self.local = LocalPerson(self.person, self.main, self.beside, follower, self.card)
         self.q, self.time = HOME.copy(), 0.0
         self.local.reset(self.view(), np.random.default_rng(0))
 

@@ -6,7 +6,7 @@ from typing import Any
 
 
 @dataclass(frozen=True)
-class Inputs:
+class Input:
     """Where the inputs are.
 
     Attributes:
@@ -30,7 +30,7 @@ class Inputs:
         """Whether nothing is deflected."""
         return not any(self.axes) and not self.targets
 
-    def let_go(self) -> "Inputs":
+    def let_go(self) -> "Input":
         """Return them with nothing deflected."""
         return replace(self, axes=(0.0,) * len(self.axes), targets=())
 

@@ -6,7 +6,7 @@ from typing import Literal
 import numpy as np
 
 from handrail.collect.operators.modes import Focus, TeleopMode
-from handrail.collect.operators.person.inputs import Inputs
+from handrail.collect.operators.person.inputs import Input
 from handrail.collect.operators.scripted.input_map import StickMap
 from handrail.collect.operators.scripted.steering import FOLLOW, Gains
 from handrail.controllers.arrays import BoolArray, FloatArray
@@ -67,7 +67,7 @@ class InputMeaning:
         self._arm = slice(self.channels.joint_slice.start + self._base, self.channels.size)
         self._full = StickMap(model, mode, Gains().within(model.description.world)).full
 
-    def fits(self, inputs: Inputs) -> bool:
+    def fits(self, inputs: Input) -> bool:
         """Whether inputs are those of this robot."""
         arm = len(self.channels.joints) - self._base
         return len(inputs.axes) == self.channels.size and len(inputs.targets) in (0, arm)
@@ -79,7 +79,7 @@ class InputMeaning:
         return mask
 
     def intent(
-        self, inputs: Inputs, setting: Setting, state: State, age: float = 0.0, round_trip: float = 0.0
+        self, inputs: Input, setting: Setting, state: State, age: float = 0.0, round_trip: float = 0.0
     ) -> Intent:
         """Return what is asked for: on every channel of the mode, deflection × full stick × speed.
 
@@ -121,7 +121,7 @@ class InputMeaning:
             raw=RawInput(raw, int(np.count_nonzero(raw)), setting.switches, inputs.device, age, round_trip),
         )
 
-    def _hand(self, twist: FloatArray, inputs: Inputs, setting: Setting, state: State) -> FloatArray:
+    def _hand(self, twist: FloatArray, inputs: Input, setting: Setting, state: State) -> FloatArray:
         """Return the hand's twist in the world, or in the tool where it is meant there, (6,)."""
         if setting.frame in ("world", "tool"):
             return twist

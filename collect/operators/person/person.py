@@ -20,7 +20,7 @@ import numpy as np
 
 from handrail.collect.operators.modes import TeleopMode, mode_of_mask
 from handrail.collect.operators.operator import EpisodeEvent, View
-from handrail.collect.operators.person.inputs import STILLS, Ask, Inputs
+from handrail.collect.operators.person.inputs import STILLS, Ask, Input
 from handrail.collect.operators.person.meaning import HAND_FRAMES, InputMeaning, Setting
 from handrail.controllers.interface.intent import DEAD_MAN_TIME, Intent
 from handrail.controllers.robot.model import RobotModel
@@ -66,7 +66,7 @@ class Person:
         self.meaning = InputMeaning(model, modes[first])
         self.modes, self._clock = modes, clock
         self.setting, self.phase = Setting(modes[first]), Phase.READY
-        self.inputs: Inputs | None = None
+        self.inputs: Input | None = None
         self.received = self.round_trip = 0.0
         self.practises = False
         self._event: EpisodeEvent | None = None
@@ -80,7 +80,7 @@ class Person:
         self._event, self._armed = EpisodeEvent.QUIT if self._quits else None, False
         self._quits = False
 
-    def take(self, inputs: Inputs, received: float, round_trip: float = 0.0) -> None:
+    def take(self, inputs: Input, received: float, round_trip: float = 0.0) -> None:
         """Take where the inputs are now.
 
         Args:
@@ -140,7 +140,7 @@ class Person:
     def _is_driven(self) -> bool:
         return self.inputs is not None and self.inputs.on and self.age <= DEAD_MAN_TIME
 
-    def _pick_axis(self, inputs: Inputs) -> None:
+    def _pick_axis(self, inputs: Input) -> None:
         """Take the axis that is moved most, once the one before was let go; another one is a switch."""
         owned = np.abs(inputs.axes) * self.meaning.mask(self.setting)
         if (self.setting.axis >= 0 and owned[self.setting.axis]) or not owned.any():

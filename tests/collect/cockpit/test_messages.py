@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from handrail.collect.cockpit.messages import LARGEST, Drive, parse
-from handrail.collect.operators.person.inputs import Ask, Inputs
+from handrail.collect.operators.person.inputs import Ask, Input
 from handrail.controllers.errors import HandrailError
 
 GOOD = {
@@ -28,7 +28,7 @@ def said(**changes):
 
 
 def test_a_drive_and_an_ask():
-    assert parse(said()) == Drive(3, 1.5, Inputs(True, "keyboard", False, (0.0, 1.0), 0.3, (3.0,)))
+    assert parse(said()) == Drive(3, 1.5, Input(True, "keyboard", False, (0.0, 1.0), 0.3, (3.0,)))
     assert parse('{"kind": "ask", "what": "mode", "value": "ee"}') == Ask("mode", "ee")
     assert parse('{"kind": "ask", "what": "lock", "value": [1, 2]}') == Ask("lock", (1, 2))
 

@@ -15,7 +15,7 @@ from handrail.collect.cockpit.hub import Hub
 from handrail.collect.cockpit.pipe import ASK, DRIVE, FRAME, LOST, STAGE, STILL, STOP, Pipe
 from handrail.collect.operators.modes import MODES
 from handrail.collect.operators.operator import EpisodeEvent, View
-from handrail.collect.operators.person.inputs import STILLS, Ask, Inputs
+from handrail.collect.operators.person.inputs import STILLS, Ask, Input
 from handrail.collect.operators.person.person import Person, Phase
 from handrail.controllers.interface.controller import State
 from handrail.controllers.robot.model import load_model
@@ -106,7 +106,7 @@ class Robot:
             elif kind == DRIVE:
                 lists = {name: tuple(said["inputs"][name]) for name in ("axes", "targets")}
                 self._now = said["received"]
-                self.person.take(Inputs(**(said["inputs"] | lists)), said["received"])
+                self.person.take(Input(**(said["inputs"] | lists)), said["received"])
             elif kind in (ASK, STILL):
                 self.person.ask(Ask(said["what"], said["value"]))
         answer = self.person.act(self._view)

@@ -7,11 +7,15 @@ import numpy as np
 import pytest
 from played_leader import CALIBRATION, PLAYED, UR10, PlayedLeaderConfig
 
-from handrail.collect.devices import setup
-from handrail.collect.devices.calibration import LeaderGripper, load_calibration, save_calibration
+from handrail.collect.devices.calibration import (
+    LeaderGripper,
+    calibration_file,
+    how_to_calibrate,
+    load_calibration,
+    save_calibration,
+)
 from handrail.collect.devices.guided_calibration import calibrate
-from handrail.collect.devices.setup import calibration_file
-from handrail.collect.devices.teleoperators import make_teleoperator
+from handrail.collect.devices.leader_arm import make_teleoperator
 from handrail.collect.teleop_config import CalibrateConfig, LeaderConfig
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.robot.model import load_model
@@ -138,7 +142,7 @@ def test_a_wrong_file_is_refused_in_one_line(tmp_path, change, said):
 
 
 def test_no_file_or_no_json_says_how_to_make_one(tmp_path):
-    advice = setup.how_to_calibrate(LeaderConfig(type="so101_leader", port="/dev/ttyACM0"), "ridgeback_ur10")
+    advice = how_to_calibrate(LeaderConfig(type="so101_leader", port="/dev/ttyACM0"), "ridgeback_ur10")
     assert (
         advice == "handrail-devices calibrate --teleop.type=so101_leader --teleop.port=/dev/ttyACM0 "
         "--robot=ridgeback_ur10"

@@ -111,7 +111,7 @@ def test_a_persons_changes_win_and_an_empty_text_takes_away(tmp_path):
         ('[actions]\na = "jump"', "[actions] a: expected one of hold, clutch"),
         ("[hand]\na = 3", "got 3"),
         ("hand = 3", "section 'hand'"),
-        ("[hand", "expected a .toml file"),
+        ("[hand", "not valid TOML"),
     ],
 )
 def test_a_wrong_table_is_refused_in_one_line_that_names_the_choices(tmp_path, text, said):

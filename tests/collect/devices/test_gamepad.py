@@ -6,8 +6,8 @@ import pytest
 from device_players import Clock, VirtualPad, recorded
 
 from handrail.collect.devices import gamepad
+from handrail.collect.devices.device import DeviceGoneError
 from handrail.collect.devices.gamepad import Gamepad
-from handrail.collect.devices.reading import DeviceGoneError
 from handrail.controllers.errors import HandrailError
 
 

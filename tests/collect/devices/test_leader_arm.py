@@ -6,8 +6,8 @@ import pytest
 from device_players import Clock, recorded
 from played_leader import CALIBRATION, PLAYED, SOURCES, UR10, PlayedLeader, PlayedLeaderConfig
 
+from handrail.collect.devices.device import DeviceGoneError
 from handrail.collect.devices.leader_arm import LeaderArm
-from handrail.collect.devices.reading import DeviceGoneError
 
 FIRST = recorded("leader.json")[0]["action"]
 

@@ -14,11 +14,10 @@ from judges import doctor_fails, lint_defects
 from played_leader import CALIBRATION, PLAYED
 from terminal_player import TerminalPlayer
 
-from handrail.collect.devices.calibration import save_calibration
+from handrail.collect.devices.calibration import calibration_file, save_calibration
+from handrail.collect.devices.device import DeviceGoneError
 from handrail.collect.devices.gamepad import Gamepad
 from handrail.collect.devices.local_person import LocalPerson
-from handrail.collect.devices.reading import DeviceGoneError
-from handrail.collect.devices.setup import calibration_file
 from handrail.collect.teleop_config import LeaderConfig
 
 LEADER = ("--operator", "leader_arm", "--teleop.type", "played_leader")

@@ -5,7 +5,7 @@ import sys
 import pytest
 from device_players import Clock, PlayedHid, recorded
 
-from handrail.collect.devices.reading import DeviceGoneError
+from handrail.collect.devices.device import DeviceGoneError
 from handrail.collect.devices.spacemouse import SpaceMouse
 from handrail.controllers.errors import HandrailError
 

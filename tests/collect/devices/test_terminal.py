@@ -11,14 +11,14 @@ import time
 
 import pytest
 
-from handrail.collect.devices.reading import DeviceGoneError
-from handrail.collect.devices.terminal import KeyTerminal, has_terminal
+from handrail.collect.devices.device import DeviceGoneError
+from handrail.collect.devices.keyboard import KeyTerminal, has_terminal
 
 pytest.importorskip("termios", reason="only Linux and macOS have such terminals")
 
 TAKE = """
 import sys
-from handrail.collect.devices.terminal import KeyTerminal, has_terminal
+from handrail.collect.devices.keyboard import KeyTerminal, has_terminal
 terminal = KeyTerminal()
 assert has_terminal()
 terminal.open()

@@ -8,8 +8,8 @@ import pytest
 from cockpit_helpers import drive, page, told
 from device_players import VirtualPad
 
+from handrail.collect.devices.device import DeviceGoneError
 from handrail.collect.devices.gamepad import Gamepad
-from handrail.collect.devices.reading import DeviceGoneError
 from handrail.collect.lerobot import (
     HandrailCockpit,
     HandrailCockpitConfig,

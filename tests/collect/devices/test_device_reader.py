@@ -5,8 +5,8 @@ import time
 
 import pytest
 
-from handrail.collect.devices.poller import Poller
-from handrail.collect.devices.reading import DeviceGoneError, Reading
+from handrail.collect.devices.device import DeviceGoneError, DeviceInput
+from handrail.collect.devices.device_reader import DeviceReader
 from handrail.controllers.errors import HandrailError
 
 PATIENCE = 10.0  # [s]
@@ -30,7 +30,7 @@ class Scripted:
         time.sleep(0.001)
         if self.trouble:
             raise self.trouble
-        return self.readings.pop(0) if self.readings else Reading(0.0)
+        return self.readings.pop(0) if self.readings else DeviceInput(0.0)
 
     def close(self):
         self.closed += 1
@@ -43,7 +43,7 @@ def device():
 
 @pytest.fixture
 def poller(device):
-    made = Poller(device, retry=0.01)
+    made = DeviceReader(device, retry=0.01)
     yield made
     made.close()
 
@@ -56,7 +56,7 @@ def eventually(check):
 
 
 def test_the_newest_wins_and_no_press_is_lost(device, poller):
-    device.readings = [Reading(float(index), presses=(str(index),)) for index in range(5)]
+    device.readings = [DeviceInput(float(index), presses=(str(index),)) for index in range(5)]
     poller.start()
     seen = []
     eventually(lambda: seen.extend(poller.take()[1]) or len(seen) == 5)
@@ -84,7 +84,7 @@ def test_one_that_is_gone_is_none_until_it_is_there_again(device, poller, error)
 
 
 def test_what_was_pressed_before_it_was_gone_is_forgotten(device, poller):
-    device.readings = [Reading(0.0, presses=("success",))]
+    device.readings = [DeviceInput(0.0, presses=("success",))]
     poller.start()
     eventually(lambda: not device.readings)
     device.trouble = DeviceGoneError("lever: unplugged")

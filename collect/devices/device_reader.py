@@ -1,30 +1,33 @@
 """Reads a device in a thread of its own, so that one that hangs never holds up the robot's loop."""
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Self
 
-from handrail.collect.devices.reading import Device, DeviceGoneError, Reading
+from handrail.collect.devices.control_map import ControlMap, Moves
+from handrail.collect.devices.device import Device, DeviceGoneError, DeviceInput
 from handrail.controllers.errors import HandrailError, message_of
 
 _RETRY = 1.0  # between two attempts to find a device that is gone [s]
 _PATIENCE = 20.0  # with its first opening [s]
 
 
-class Poller:
-    """Keeps the newest reading of a device, and finds it again after it was gone.
+class DeviceReader:
+    """Keeps the newest input of a device, in the words of its map, and finds it again after it was gone.
 
     Args:
         device: opened, read and closed by the thread alone.
+        controls: what its controls mean; nothing by default.
         retry: pause between two attempts to open it again [s].
     """
 
-    def __init__(self, device: Device, retry: float = _RETRY) -> None:
+    def __init__(self, device: Device, controls: ControlMap | None = None, retry: float = _RETRY) -> None:
         self.device, self._retry = device, retry
+        self.controls, self._bank = controls or ControlMap({}, {}), 0
         self._lock = threading.Lock()
-        self._newest: Reading | None = None
+        self._newest: DeviceInput | None = None
         self._presses: list[str] = []
-        self._trouble = ""
+        self.trouble = ""  # why there is no input, and what to do
         self._opened, self._ended = threading.Event(), threading.Event()
         self._refusal: BaseException | None = None
         self._thread = threading.Thread(target=self._run, name=f"reads {device.name}", daemon=True)
@@ -40,16 +43,24 @@ class Poller:
             raise HandrailError(f"{self.device.name}: cannot be opened: {why}") from self._refusal
         return self
 
-    def take(self) -> tuple[Reading | None, tuple[str, ...]]:
-        """Return the newest reading, none while the device is gone, and all presses since the last time."""
+    def take(self) -> tuple[DeviceInput | None, tuple[str, ...]]:
+        """Return the newest input, none while the device is gone, and all presses since the last time."""
         with self._lock:
             presses, self._presses = tuple(self._presses), []
             return self._newest, presses
 
-    @property
-    def trouble(self) -> str:
-        """Why there is no reading, and what to do."""
-        return self._trouble
+    def bank(self, banks: Sequence[Moves]) -> Moves:
+        """Return the moves in force: those of the bank that was chosen."""
+        return banks[self._bank % len(banks)]
+
+    def next_bank(self, banks: Sequence[Moves]) -> None:
+        """Go on to the next bank."""
+        self._bank = (self._bank + 1) % len(banks)
+
+    def input(self, banks: Sequence[Moves]) -> DeviceInput | None:
+        """Return what the device says now in the words of its map; None while it is gone."""
+        newest, presses = self.take()
+        return self.controls.meant(newest, presses, self.bank(banks)) if newest else None
 
     def close(self) -> None:
         """Give the device back."""
@@ -75,10 +86,10 @@ class Poller:
 
     def _read_on(self) -> None:
         while not self._ended.is_set():
-            reading = self._attempt(self.device.read)
+            newest = self._attempt(self.device.read)
             with self._lock:
-                self._newest = reading
-                self._presses += reading.presses
+                self._newest = newest
+                self._presses += newest.presses
 
     def _find_again(self) -> None:
         while not self._ended.wait(self._retry):
@@ -86,21 +97,21 @@ class Poller:
             try:
                 self._attempt(self.device.open)
             except DeviceGoneError as error:
-                self._trouble = str(error)
+                self.trouble = str(error)
             else:
-                self._trouble = ""
+                self.trouble = ""
                 return
 
     def _lose(self, error: BaseException) -> None:
         with self._lock:
-            self._newest, self._trouble = None, message_of(error)
+            self._newest, self.trouble = None, message_of(error)
             self._presses.clear()
 
     def _close(self) -> None:
         try:
             self.device.close()
         except Exception as error:  # of a device that is gone anyway
-            self._trouble = self._trouble or message_of(error)
+            self.trouble = self.trouble or message_of(error)
 
     def _attempt[Result](self, step: Callable[[], Result]) -> Result:
         """Do a step of the device; whatever a driver raises means that it is gone."""

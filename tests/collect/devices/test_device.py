@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from handrail.collect.devices.stick import StickShape
+from handrail.collect.devices.device import StickShape
 
 SHAPES = st.builds(StickShape, st.floats(0.0, 0.5), st.floats(1.0, 3.0))
 

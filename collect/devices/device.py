@@ -1,0 +1,70 @@
+"""What a device is, what it says of one moment, and the shape of its sticks."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Protocol
+
+from handrail.controllers.errors import HandrailError
+
+
+class DeviceGoneError(HandrailError):
+    """A device cannot be read: unplugged, not to be opened, silent for good. The message says what to do."""
+
+
+@dataclass(frozen=True)
+class DeviceInput:
+    """What a device says of one moment, in the words of its controls or, after its map, of the robot."""
+
+    time: float
+    """When that was, on the operator's clock [s]."""
+    deflections: Mapping[str, float] = field(default_factory=dict)
+    """Of the controls, or of the channels, that are not at rest, from −1 to 1."""
+    presses: tuple[str, ...] = ()
+    """Controls that went down since the input before, or the actions that they ask for, in their order."""
+    attended: bool = True
+    """Whether somebody is there: a terminal in focus, a device that works."""
+    joints: Mapping[str, float] = field(default_factory=dict)
+    """Positions of a leader arm's joints, in its own units, by LeRobot's names."""
+    round_trip: float = 0.0
+    """From asking the device to its answer, where it is asked [s]."""
+    holds: frozenset[str] = frozenset()
+    """After its map: actions that last: `hold` (always, where no control asks for it) and `clutch`."""
+
+
+class Device(Protocol):
+    """Something in a person's hand. One thread opens, reads and closes it."""
+
+    @property
+    def name(self) -> str:
+        """What the data call it."""
+        ...
+
+    def open(self) -> None:
+        """Find it and get it ready; `DeviceGoneError` says what to do where it cannot be used."""
+        ...
+
+    def read(self) -> DeviceInput:
+        """Return where its controls are, within 0.01 s; `DeviceGoneError` where it is not there any more."""
+        ...
+
+    def close(self) -> None:
+        """Give it back, also one that is gone."""
+        ...
+
+
+@dataclass(frozen=True)
+class StickShape:
+    """Dead zone and curve: `y = sign(x) ((|x| − d) / (1 − d))^p` where |x| ≥ d, else 0."""
+
+    dead_zone: float = 0.12
+    """d, from 0 to 0.5."""
+    exponent: float = 1.7
+    """p, from 1 to 3."""
+
+    def __call__(self, raw: float) -> float:
+        """Return the deflection of a raw one, from −1 to 1; of NaN, 0."""
+        size = min(abs(raw), 1.0)
+        if not size > self.dead_zone:
+            return 0.0
+        curved = ((size - self.dead_zone) / (1.0 - self.dead_zone)) ** self.exponent
+        return curved if raw > 0 else -curved
