@@ -1,63 +1,30 @@
-"""Leads a participant through what is left of their session."""
+"""A participant's session: pages to read, forms to fill in, practice and trials."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import asdict
 from enum import StrEnum
-from typing import Any, Protocol
+from typing import Any
 
-from handrail.collect.cockpit.messages import CardAnswer
+from handrail.collect.cockpit.cards import Cards
 from handrail.collect.operators.operator import EpisodeEvent
-from handrail.collect.session.outcome import Outcome
-from handrail.collect.user_study import cards
-from handrail.collect.user_study.design import UserStudy
+from handrail.collect.user_study.design import DEMO_NOTE
+from handrail.collect.user_study.driving import Driving
 from handrail.collect.user_study.folder import StudyFolder
 from handrail.collect.user_study.forms import CONSENT, REFUSED, form
-from handrail.collect.user_study.items import Form
-from handrail.collect.user_study.participant import Participant
-from handrail.collect.user_study.plan import (
-    Step,
-    pairs_rng,
-    plan,
-    practice_is_over,
-    practice_seed,
-    trial_seed,
-)
+from handrail.collect.user_study.items import Answer, Form, Item
+from handrail.collect.user_study.participant import Interrupted, Noted, Participant, Practised
+from handrail.collect.user_study.plan import Step, pairs_rng, plan, practice_seed, trial_seed
 from handrail.controllers.errors import HandrailError
 
-
-class Desk(Protocol):
-    """Shows cards and hears answers."""
-
-    def show(self, card: Mapping[str, Any]) -> None:
-        """Show a card instead of the one before."""
-        ...
-
-    def hear(self) -> list[CardAnswer]:
-        """Return what was answered, waiting a little for it."""
-        ...
-
-
-class Track(Protocol):
-    """Runs practice and trials."""
-
-    task: str
-
-    @property
-    def help(self) -> str:
-        """What the mode is, in one line."""
-        ...
-
-    @property
-    def channels(self) -> tuple[str, ...]:
-        """The names of the channels that the operator owns."""
-        ...
-
-    def prepare(self, mode: str, task: str) -> None:
-        """Make a task in a mode ready."""
-        ...
-
-    def run(self, step: Step, seed: int) -> Outcome:
-        """Run a trial, or one of practice."""
-        ...
+NEXT, PAUSE = ":next", ":pause"  # answers of the buttons; no question is called so
+_GO_ON = "on"
+_PAUSED = Item(
+    "pause",
+    "choice",
+    "You have paused. The trial that you were in begins anew when you go on.",
+    choices=((_GO_ON, "Go on now"), ("end", "End for today; go on another time")),
+    declines=False,
+)
 
 
 class Ending(StrEnum):
@@ -69,149 +36,187 @@ class Ending(StrEnum):
 
 
 class Conductor:
-    """Leads a participant.
+    """Leads a participant through the steps that are left.
 
     Args:
         folder: of the study.
-        study: it.
         who: takes part.
-        desk: for forms.
-        track: for driving.
+        cards: of the page.
+        driving: for practice and trials.
         say: is told where they stand.
     """
 
     def __init__(
         self,
         folder: StudyFolder,
-        study: UserStudy,
         who: Participant,
-        desk: Desk,
-        track: Track,
+        cards: Cards,
+        driving: Driving,
         say: Callable[[str], None],
     ) -> None:
-        self._folder, self._study, self._who = folder, study, who
-        self._desk, self._track, self._say = desk, track, say
+        self._folder, self._study, self._who = folder, folder.study, who
+        self._cards, self._driving, self._say = cards, driving, say
         self._ready, self._pauses = ("", ""), 0
 
     def run(self) -> Ending:
         """Do what is left; return how it ended."""
-        who, study = self._who, self._study
-        steps, left = plan(study, who.slot), self._folder.left(study, who)
-        who.note(f"begun with {len(steps) - len(left)} of {len(steps)} steps done")
+        who, steps, left = self._who, plan(self._study, self._who.session.slot), self._folder.left(self._who)
+        self._note(f"begun with {len(steps) - len(left)} of {len(steps)} steps done")
         for step in left:
-            if self._refused:
+            if self._is_refused:
                 break
             self._say(f"{who.name}, step {steps.index(step) + 1} of {len(steps)}: {step}")
             if not self._does(step):
-                return self._paused()
-        if self._refused:
-            self._desk.show(cards.last_card(study, study.title, "Thank you. Nothing is kept of you."))
+                self._note("ended for today")
+                self._show_last("Paused", "Everything is kept. Go on another time.")
+                return Ending.PAUSED
+        if self._is_refused:
+            self._show_last(self._study.title, "Thank you. Nothing is kept of you.")
             return Ending.REFUSED
-        who.note("done")
-        self._desk.show(cards.last_card(study, "Done", study.thanks))
+        self._note("done")
+        self._show_last("Done", self._study.thanks)
         return Ending.DONE
 
     @property
-    def _refused(self) -> bool:
+    def _is_refused(self) -> bool:
         """Whether the participant does not consent, be it before a crash."""
-        return CONSENT in self._who.finished() and self._who.answers(CONSENT)[CONSENT] == REFUSED
+        return CONSENT in self._who.finished and self._who.answers(CONSENT)[CONSENT] == REFUSED
+
+    def _note(self, what: str) -> None:
+        self._who.add(events=Noted(what))
 
     def _does(self, step: Step) -> bool:
         """Return whether a step was done; else the participant paused."""
         if step.kind == "form":
-            rng = pairs_rng(self._study, self._who.slot, step.condition)
-            return self._fills_in(step.key, form(self._study, step.form, rng))
+            return self._fills_in(step)
         if self._ready != (step.condition, step.task) and not self._is_introduced(step):
             return False
         return self._practises(step) if step.kind == "practice" else self._tries(step)
 
-    def _fills_in(self, key: str, form: Form) -> bool:
-        """Return whether a form was filled in; every answer is on the disk before the page hears of it."""
-        who, error = self._who, ""
-        while True:
-            self._desk.show(cards.form_card(self._study, key, form, who.answers(key), error))
-            for said in self._desk.hear():
-                if said.card != key:
-                    continue  # of a card before, once more
-                if said.item == cards.PAUSE:
-                    return False
-                if said.item == cards.NEXT:
-                    if not form.missing(who.answers(key)):
-                        who.finish(key)
-                        return True
-                    continue
-                try:
-                    value, error = form.item(said.item).check(said.value), ""
-                except HandrailError as wrong:
-                    error = str(wrong)
-                    continue
-                if (said.item, value) not in who.answers(key).items():
-                    who.answer(key, said.item, value)
+    def _fills_in(self, step: Step) -> bool:
+        who = self._who
+        asked = form(self._study, step.form, pairs_rng(self._study, who.session.slot, step.condition))
+        card = self._card(step.key, asked, pause=step.form != CONSENT)
+
+        def keep(item: str, value: Answer) -> None:
+            who.answer(step.key, item, value)
+
+        if self._ask(card, asked, who.answers(step.key), keep):
+            who.finish(step.key)
+            return True
+        return False
 
     def _is_introduced(self, step: Step) -> bool:
         """Return whether a participant has read what comes and goes on; the robot is made ready before."""
-        self._desk.show(cards.last_card(self._study, "One moment", "The robot is made ready."))
-        self._track.prepare(step.condition, step.task)
-        place = self._who.modes.index(step.condition) + 1
-        card = cards.instructions_card(
-            self._study,
-            step,
-            self._track.task,
-            self._track.help,
-            self._track.channels,
-            f"Part {place} of {len(self._study.modes)}",
+        study, mode = self._study, step.condition
+        self._show_last("One moment", "The robot is made ready.")
+        briefing = self._driving.prepare(mode, step.task)
+        help_ = study.instructions.get(mode, f"{briefing.help[:1].upper()}{briefing.help[1:]}.")
+        practice = f"Practice first: at most {study.practice.most}. " if study.practice.most else ""
+        text = (
+            f"Your way of steering now: {mode}\n\n{help_}\n\nThe task: {briefing.task}\n\n{practice}"
+            f"Trials that count: {study.trials}. Failed gives a trial up; Pause lets you rest."
         )
-        while True:
-            self._desk.show(card)
-            said = [each.item for each in self._desk.hear() if each.card == card["id"]]
-            if cards.PAUSE in said:
-                return False
-            if cards.NEXT in said:
-                self._ready = step.condition, step.task
-                return True
+        place = self._who.session.modes.index(mode) + 1
+        page = Form("instructions", f"Part {place} of {len(study.modes)}", text)
+        card = self._card(f"{mode}/{step.task}/instructions", page, keys=briefing.channels)
+        if self._ask(card, page, {}):
+            self._ready = mode, step.task
+            return True
+        return False
 
     def _practises(self, step: Step) -> bool:
-        study, who = self._study, self._who
-        while True:
-            successes = who.practised_so_far(step.condition, step.task)
-            if practice_is_over(study.practice, successes):
-                return True
-            self._desk.show(cards.strip(study, cards.practice_words(study.practice, successes)))
-            seed = practice_seed(study, step.condition, step.task, len(successes))
-            outcome = self._track.run(step, seed)
+        practice, mode, task = self._study.practice, step.condition, step.task
+        while not practice.is_over(successes := self._who.practised(mode, task)):
+            row = next((n for n, success in enumerate(reversed(successes)) if not success), len(successes))
+            self._show_strip(
+                f"Practice {len(successes) + 1} of at most {practice.most}, nothing is saved: "
+                f"{row} of {practice.successes} successes in a row"
+            )
+            outcome = self._driving.run(step, practice_seed(self._study, mode, task, len(successes)))
             if outcome.ended_by is None or outcome.ended_by.judges:
-                who.practised(step, outcome)
+                seconds = round(outcome.seconds, 3)
+                self._who.add(practice=Practised(mode, task, outcome.seed, outcome.success, seconds))
             elif outcome.ended_by is EpisodeEvent.QUIT and not self._goes_on():
                 return False
+        return True
 
     def _tries(self, step: Step) -> bool:
-        words = f"Trial {step.trial} of {self._study.trials}: this one counts"
         while True:
-            self._desk.show(cards.strip(self._study, words))
-            outcome = self._track.run(step, trial_seed(self._study, step.task, step.trial))
+            self._show_strip(f"Trial {step.trial} of {self._study.trials}: this one counts")
+            outcome = self._driving.run(step, trial_seed(self._study, step.task, step.trial))
             if outcome.kept:
                 return True
-            self._who.interrupt(step, str(outcome.ended_by))
+            ended = Interrupted(step.condition, step.task, step.trial, str(outcome.ended_by))
+            self._who.add(interrupted=ended)
             if outcome.ended_by is EpisodeEvent.QUIT and not self._goes_on():
                 return False
 
     def _goes_on(self) -> bool:
         """Return whether a participant who paused goes on now."""
         self._pauses += 1
-        card = cards.pause_card(self._study, self._pauses)
-        self._who.note("paused")
-        chosen = ""
-        while True:
-            self._desk.show(card | {"answers": {"pause": chosen} if chosen else {}})
-            for said in self._desk.hear():
-                if said.card != card["id"]:
-                    continue
-                if said.item == "pause" and said.value in (cards.GO_ON, cards.END):
-                    chosen = str(said.value)
-                elif said.item == cards.NEXT and chosen:
-                    return chosen == cards.GO_ON
+        self._note("paused")
+        asked, answers = Form("pause", "Paused", items=(_PAUSED,)), {}
+        card = self._card(f"pause/{self._pauses}", asked, pause=False)
+        return self._ask(card, asked, answers) and answers[_PAUSED.name] == _GO_ON
 
-    def _paused(self) -> Ending:
-        self._who.note("ended for today")
-        self._desk.show(cards.last_card(self._study, "Paused", "Everything is kept. Go on another time."))
-        return Ending.PAUSED
+    def _ask(
+        self,
+        card: Mapping[str, Any],
+        asked: Form,
+        answers: dict[str, Answer],
+        keep: Callable[[str, Answer], None] = lambda item, value: None,
+    ) -> bool:
+        """Return whether a form was filled in, not paused; an answer is kept before the page hears of it.
+
+        Args:
+            card: of the form.
+            asked: the form.
+            answers: so far; those to come are added.
+            keep: puts an answer on the disk.
+        """
+        error = ""
+        while True:
+            self._cards.show({**card, "answers": dict(answers), "error": error})
+            for said in self._cards.hear():
+                if said.card != card["id"]:
+                    continue  # of a card before, once more
+                if said.item == PAUSE:
+                    return False
+                if said.item == NEXT:
+                    if asked.is_filled_in(answers):
+                        return True
+                    continue
+                try:
+                    value, error = asked.check(said.item, said.value), ""
+                except HandrailError as wrong:
+                    error = str(wrong)
+                    continue
+                if (said.item, value) not in answers.items():
+                    keep(said.item, value)
+                    answers[said.item] = value
+
+    def _card(self, key: str, page: Form, **more: Any) -> dict[str, Any]:
+        """Return a page as the cockpit shows it, with `keys`, `pause` and `last` as said or as by default."""
+        plain = {
+            "answers": {},
+            "error": "",
+            "keys": (),
+            "pause": True,
+            "last": False,
+            "note": self._demo_note,
+        }
+        text = [" ".join(part.split()) for part in page.text.split("\n\n") if part.strip()]
+        items = [asdict(item) for item in page.items]
+        return {"id": key, "title": page.title, "text": text, "items": items, **plain, **more}
+
+    def _show_last(self, title: str, text: str) -> None:
+        self._cards.show(self._card(f"last/{title}", Form("last", title, text), pause=False, last=True))
+
+    def _show_strip(self, words: str) -> None:
+        """Show words above the robot; they cover nothing."""
+        self._cards.show({"id": "", "strip": words, "note": self._demo_note})
+
+    @property
+    def _demo_note(self) -> str:
+        return DEMO_NOTE if self._study.demo else ""

@@ -1,13 +1,10 @@
 """The forms of a study: consent, NASA-TLX, SUS, and its own questions."""
 
-from collections.abc import Callable, Mapping
-
 import numpy as np
 
 from handrail.collect.user_study.design import Question, UserStudy
 from handrail.collect.user_study.items import Form, Item
-from handrail.collect.user_study.usability import SUS, sus_form
-from handrail.collect.user_study.workload import TLX, TLX_PAIRS, pairs_form, scales_form
+from handrail.collect.user_study.questionnaires import SUS, TLX, TLX_PAIRS, pairs_form, scales_form, sus_form
 
 CONSENT, START, END, QUESTIONS = "consent", "start", "end", "questions"
 AGREED, REFUSED = "yes", "no"
@@ -15,12 +12,17 @@ _CONSENT = Item(
     "consent",
     "choice",
     "Do you take part?",
-    choices=(AGREED, REFUSED),
-    shown=("I have read this, and take part of my own free will.", "I do not take part."),
+    choices=(
+        (AGREED, "I have read this, and take part of my own free will."),
+        (REFUSED, "I do not take part."),
+    ),
     declines=False,
 )
-_TITLES = {START: "Before we begin", QUESTIONS: "A few more questions", END: "At last"}
-_WHEN = {START: "start", QUESTIONS: "condition", END: "end"}
+_OWN = {
+    START: ("start", "Before we begin"),
+    QUESTIONS: ("condition", "A few more questions"),
+    END: ("end", "At last"),
+}
 
 
 def form_names(study: UserStudy) -> tuple[str, ...]:
@@ -30,34 +32,25 @@ def form_names(study: UserStudy) -> tuple[str, ...]:
 
 
 def form(study: UserStudy, name: str, rng: np.random.Generator) -> Form:
-    """Return a form.
-
-    Args:
-        study: whose it is.
-        name: of the form.
-        rng: draws the order of comparisons.
-    """
-    if name in _WHEN:
-        asked = (question for question in study.questions if question.when == _WHEN[name])
-        return Form(name, _TITLES[name], "", tuple(map(_item, asked)))
-    known: Mapping[str, Callable[[], Form]] = {
-        CONSENT: lambda: Form(CONSENT, study.title, study.consent, (_CONSENT,)),
-        TLX: scales_form,
-        TLX_PAIRS: lambda: pairs_form(rng),
-        SUS: sus_form,
-    }
-    return known[name]()
+    """Return the form of a name; `rng` draws the order of comparisons."""
+    if name in _OWN:
+        when, title = _OWN[name]
+        asked = (question for question in study.questions if question.when == when)
+        return Form(name, title, items=tuple(map(_item, asked)))
+    if name == CONSENT:
+        return Form(CONSENT, study.title, study.consent, (_CONSENT,))
+    return pairs_form(rng) if name == TLX_PAIRS else {TLX: scales_form, SUS: sus_form}[name]()
 
 
 def _item(question: Question) -> Item:
-    likert = question.kind == "likert"
+    least, most = question.bounds
     return Item(
         question.name,
-        question.kind,  # pyright: ignore[reportArgumentType]  (checked where it was read)
+        question.kind,
         question.text,
         low=question.low,
         high=question.high,
-        least=1 if likert else question.least,
-        most=question.points if likert else question.most,
-        choices=question.choices,
+        least=least,
+        most=most,
+        choices=tuple((choice, choice) for choice in question.choices),
     )

@@ -1,4 +1,4 @@
-"""What a participant does, step by step, and what of it is left.
+"""The steps of a participant's session.
 
 ```
 consent ─ questions at the start ─▶ for each mode, in the participant's order:
@@ -11,26 +11,23 @@ orders are rows of Williams designs.
 """
 
 import math
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
-from handrail.collect.user_study.design import Practice, UserStudy
+from handrail.collect.user_study.design import UserStudy
 from handrail.collect.user_study.forms import CONSENT, END, START, form_names
 
-_ORDER, _TRIAL, _PRACTICE, _PAIRS = range(4)  # what a seed is for
+_ORDER, _TRIAL, _PRACTICE, _PAIRS = range(4)  # purposes of a seed
 
 
 def williams(n: int) -> list[tuple[int, ...]]:
-    """Return the sequences of a Williams design: n for an even n, 2n for an odd one.
+    """Return the sequences of a Williams design of n conditions: n for an even n, 2n for an odd one.
 
     The first sequence is `0, 1, n − 1, 2, n − 2, …`; each other one adds a constant modulo n. For an odd n
     the reversed sequences follow.
-
-    Args:
-        n: number of conditions, 1 or more.
     """
     first = [0]
     for step in range(1, n):
@@ -40,13 +37,10 @@ def williams(n: int) -> list[tuple[int, ...]]:
 
 
 def order(names: tuple[str, ...], row: int, rng: np.random.Generator) -> tuple[str, ...]:
-    """Return the order of a row of the design.
+    """Return the order of a row of the design; after the last sequence the first one follows.
 
-    Args:
-        names: of what is ordered.
-        row: counts from 0; after the last sequence the first one follows.
-        rng: says which name is which number, and which sequence comes first, those of one Latin square
-            before those of the other; the same for all rows.
+    `rng`, the same for all rows, draws the numbers of the names and the order of the sequences, those of one
+    Latin square before those of the other.
     """
     sequences, size = williams(len(names)), len(names)
     labels = rng.permutation(size)
@@ -54,22 +48,22 @@ def order(names: tuple[str, ...], row: int, rng: np.random.Generator) -> tuple[s
     return tuple(names[labels[each]] for each in sequences[places[row % len(sequences)]])
 
 
+def orders(study: UserStudy, slot: int) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return the orders of modes and of tasks in a row of the design; every pair of rows is equally often."""
+    modes, tasks = len(williams(len(study.modes))), len(williams(len(study.tasks)))
+    row = slot + slot // math.lcm(modes, tasks) % math.gcd(modes, tasks)
+    rng = np.random.default_rng([study.seed, _ORDER])
+    return order(study.modes, slot, rng), order(study.tasks, row, rng)
+
+
 @dataclass(frozen=True)
 class Step:
-    """One thing to do.
-
-    Attributes:
-        kind: of it.
-        condition: the mode; empty before and after all conditions.
-        task: of practice and trials.
-        trial: its number, from 1.
-        form: its name.
-    """
+    """A form, the practice of a task in a mode, or a trial."""
 
     kind: Literal["form", "practice", "trial"]
-    condition: str = ""
+    condition: str = ""  # the mode; empty before and after all conditions
     task: str = ""
-    trial: int = 0
+    trial: int = 0  # its number, from 1
     form: str = ""
 
     @property
@@ -86,27 +80,15 @@ class Step:
         return f"{self.condition}, {self.task}, {what}"
 
 
-def orders(study: UserStudy, slot: int) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return the orders of modes and of tasks; every pair of rows comes up equally often.
-
-    Args:
-        study: to take part in.
-        slot: of the participant, from 0.
-    """
-    modes, tasks = len(williams(len(study.modes))), len(williams(len(study.tasks)))
-    row = slot + slot // math.lcm(modes, tasks) % math.gcd(modes, tasks)
-    rng = np.random.default_rng([study.seed, _ORDER])
-    return order(study.modes, slot, rng), order(study.tasks, row, rng)
-
-
 def plan(study: UserStudy, slot: int) -> tuple[Step, ...]:
-    """Return all that a participant does."""
+    """Return all steps of a participant."""
     return tuple(_steps(study, *orders(study, slot)))
 
 
 def _steps(study: UserStudy, modes: tuple[str, ...], tasks: tuple[str, ...]) -> Iterator[Step]:
+    asked = {question.when for question in study.questions}
     yield Step("form", form=CONSENT)
-    if any(question.when == "start" for question in study.questions):
+    if "start" in asked:
         yield Step("form", form=START)
     for mode in modes:
         for task in tasks:
@@ -114,34 +96,8 @@ def _steps(study: UserStudy, modes: tuple[str, ...], tasks: tuple[str, ...]) -> 
                 yield Step("practice", mode, task)
             yield from (Step("trial", mode, task, number + 1) for number in range(study.trials))
         yield from (Step("form", mode, form=name) for name in form_names(study))
-    if any(question.when == "end" for question in study.questions):
+    if "end" in asked:
         yield Step("form", form=END)
-
-
-def remaining(steps: tuple[Step, ...], done: Collection[str]) -> list[Step]:
-    """Return what is left; practice is over once a trial of its task and mode is done.
-
-    Args:
-        steps: of the participant.
-        done: keys of what is done.
-    """
-    begun = {(step.condition, step.task) for step in steps if step.kind == "trial" and step.key in done}
-    return [
-        step
-        for step in steps
-        if step.key not in done and not (step.kind == "practice" and (step.condition, step.task) in begun)
-    ]
-
-
-def practice_is_over(practice: Practice, successes: Sequence[bool]) -> bool:
-    """Return whether the criterion is met, or was tried for long enough.
-
-    Args:
-        practice: the criterion.
-        successes: of the trials of practice so far.
-    """
-    last = successes[-practice.successes :]
-    return len(successes) >= practice.most or (len(last) == practice.successes and all(last))
 
 
 def trial_seed(study: UserStudy, task: str, trial: int) -> int:

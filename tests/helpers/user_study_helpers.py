@@ -9,8 +9,8 @@ import numpy as np
 from handrail.collect.cockpit.messages import CardAnswer
 from handrail.collect.operators.operator import EpisodeEvent
 from handrail.collect.session.outcome import Outcome
-from handrail.collect.user_study.cards import NEXT, PAUSE
-from handrail.collect.user_study.conduct import Conductor
+from handrail.collect.user_study.conduct import NEXT, PAUSE, Conductor
+from handrail.collect.user_study.driving import Briefing
 from handrail.collect.user_study.exports import export
 from handrail.collect.user_study.folder import StudyFolder
 from handrail.collect.user_study.run import erase
@@ -109,14 +109,13 @@ class TinyTrack:
         events: what the operator says to end the first trials, before they do them.
     """
 
-    task, help, channels = "Do it.", "a mode", ("ee.vx",)
-
     def __init__(self, folder, who, events=()):
         self._folder, self._who, self._events = folder, who, list(events)
         self.done = []
 
     def prepare(self, mode, task):
         self._place = mode, task
+        return Briefing("Do it.", "a mode", ("ee.vx",))
 
     def run(self, step, seed):
         self.done.append((step.key, seed))
@@ -128,7 +127,7 @@ class TinyTrack:
         there = (root / "meta" / "handrail.json").exists()
         with (EpisodeWriter.resume if there else EpisodeWriter.create)(root, _MANIFEST) as writer:
             for index in range(3):
-                writer.add_frame({"action": np.array([index, seed % 97], np.float32)}, self.task)
+                writer.add_frame({"action": np.array([index, seed % 97], np.float32)}, "Do it.")
             said = {"participant": self._who, "trial": step.trial, "seed": seed, "failure_reason": ""}
             said |= {"contact_onsets": 0, "brakes": 0, "late": 0, "undos": 0}
             writer.save_episode(said | {"success": True, "wall_time": 1.5})
@@ -137,50 +136,39 @@ class TinyTrack:
 
 def session(folder, name, desk=None, events=()):
     """Run a session as the command does; return its ending, the desk and the track."""
-    lock = folder.lock()
-    try:
-        study = folder.freeze()
-        folder.settle(study)
-        who = folder.welcome(name, study)
+    with folder.lock():
+        folder.freeze()
+        folder.settle()
+        who = folder.welcome(name)
         desk, track = desk or SyntheticDesk(name), TinyTrack(folder, name, events)
-        ending = Conductor(folder, study, who, desk, track, lambda words: None).run()
-        export(folder, study)
-    finally:
-        lock.release()
+        ending = Conductor(folder, who, desk, track, lambda words: None).run()
+        export(folder)
     return ending, desk, track
 
 
 def erased(folder, name):
     """Erase a participant as the command does."""
-    lock = folder.lock()
-    try:
-        study = folder.study()
-        folder.settle(study)
-        return erase(folder, study, name)
-    finally:
-        lock.release()
+    with folder.lock():
+        folder.settle()
+        return erase(folder, name)
 
 
 def trials(folder):
     """Return the trials that the datasets hold."""
-    study = folder.study()
     return sorted(
         (row["participant"], mode, task, row["trial"])
-        for mode in study.modes
-        for task in study.tasks
+        for mode, task, _ in folder.conditions
         for row in folder.episodes(mode, task)
     )
 
 
 def wanted(folder, *names):
     """Return the trials that participants have to do."""
-    study = folder.study()
     return sorted(
         (name, mode, task, trial + 1)
         for name in names
-        for mode in study.modes
-        for task in study.tasks
-        for trial in range(study.trials)
+        for mode, task, _ in folder.conditions
+        for trial in range(folder.study.trials)
     )
 
 

@@ -30,7 +30,7 @@ class StoppingServer:
 
 def test_a_stop_holds_in_the_next_mode(tmp_path):
     server, folder = StoppingServer(), study_folder(tmp_path)
-    with Interrupts() as interrupts, Driving(folder, folder.study(), "P001", server, interrupts) as driving:
+    with Interrupts() as interrupts, Driving(folder, "P001", server, interrupts) as driving:
         driving.prepare("ee", "reach")
         driving.run(Step("practice", "ee", "reach"), 3)
         assert not server.unread

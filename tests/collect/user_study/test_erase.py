@@ -30,24 +30,24 @@ def texts(root):
 
 def check_only_the_other_is_left(folder):
     assert trials(folder) == wanted(folder, "P002")
-    assert [each.name for each in folder.participants()] == ["P002"]
+    assert list(folder.participants()) == ["P002"]
     for path, content in texts(folder.root).items():
         assert b"P001" not in content, path
         assert "P001" not in str(path.relative_to(folder.root))
-    for mode in folder.study().modes:
-        assert not check_report(folder.dataset(mode, "reach"))
+    for _, _, root in folder.conditions:
+        assert not check_report(root)
     assert {row["participant"] for name in COLUMNS for row in table(folder, name)} == {"P002"}
 
 
 def test_erasing_leaves_nothing_of_a_participant_and_all_of_the_others(two, tmp_path):
     shutil.copytree(two.root, tmp_path / "study")
     folder = type(two)(tmp_path / "study")
-    answers = json.loads((folder.place("P002") / "answers.json").read_text())
-    said = str(erased(folder, "P001"))
+    answers = json.loads((folder.root / "participants" / "P002" / "answers.json").read_text())
+    said = erased(folder, "P001")
     assert "erased P001: 25 answers, 2 trials of practice" in said
     assert "1 of data/reach/ee" in said
     check_only_the_other_is_left(folder)
-    assert json.loads((folder.place("P002") / "answers.json").read_text()) == answers
+    assert json.loads((folder.root / "participants" / "P002" / "answers.json").read_text()) == answers
     with pytest.raises(HandrailError, match="unknown participant 'P001': expected one of P002"):
         erased(folder, "P001")
     erased(folder, "P002")
@@ -58,8 +58,8 @@ def erased_in_two_goes(two, root, k):
     shutil.copytree(two.root, root)
     folder = type(two)(root)
     lived = GUILLOTINE.run(root, k, lambda: erased(folder, "P001"))
-    if any(each.name == "P001" for each in folder.participants()):
-        if folder.participant("P001").erasing:
+    if "P001" in folder.participants():
+        if folder.participant("P001").session.erasing:
             with pytest.raises(HandrailError, match="is being erased"):
                 session(folder, "P001")
         erased(folder, "P001")
@@ -94,7 +94,7 @@ def test_every_table_explains_its_columns_and_says_that_nobody_took_part(two):
         assert all(f"  {column} " in readme for column in columns)
     for name in ("P001", "P002"):
         for file in ("session.json", "answers.json"):
-            assert json.loads((two.place(name) / file).read_text())["source"] == DEMO_NOTE
+            assert json.loads((two.root / "participants" / name / file).read_text())["source"] == DEMO_NOTE
     assert json.loads((two.root / "study.json").read_text())["demo"] is True
 
 

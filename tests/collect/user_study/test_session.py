@@ -32,13 +32,13 @@ def test_a_session_does_everything_once_in_the_participant_s_order(tmp_path):
         tmp_path, tasks=["reach", "pick_place"], trials=2, forms=["tlx", "sus", "questions"]
     )
     ending, desk, track = session(folder, "P001")
-    who, study = folder.participant("P001"), folder.study()
+    who, study = folder.participant("P001"), folder.study
     assert ending is Ending.DONE
-    assert not folder.left(study, who)
+    assert not folder.left(who)
     assert trials(folder) == wanted(folder, "P001")
-    steps = [step.key for step in plan(study, who.slot) if step.kind != "form"]
+    steps = [step.key for step in plan(study, who.session.slot) if step.kind != "form"]
     assert [key for key, _ in track.done] == steps
-    assert list(who.forms) == [step.key for step in plan(study, who.slot) if step.kind == "form"]
+    assert list(who.forms) == [step.key for step in plan(study, who.session.slot) if step.kind == "form"]
     assert desk.titles[0] == study.title
     assert all(card["note"] == DEMO_NOTE for card in desk.cards)
     again, _, track = session(folder, "P001")
@@ -51,7 +51,7 @@ def test_trials_are_the_same_scenes_for_everybody_in_every_mode(tmp_path):
     seeds = []
     for name in ("P001", "P002"):
         _, _, track = session(folder, name)
-        for mode in folder.study().modes:
+        for mode in folder.study.modes:
             done = sorted((key, seed) for key, seed in track.done if key.startswith(mode + "/"))
             seeds.append([seed for key, seed in done if not key.endswith("practice")])
     assert len(seeds) == 4
@@ -62,10 +62,14 @@ def test_newcomers_get_free_rows_of_the_design(tmp_path):
     folder = study_folder(tmp_path)
     for name in ("P001", "P002", "P003"):
         session(folder, name)
-    assert [each.slot for each in folder.participants()] == [0, 1, 2]
+    assert [each.session.slot for each in folder.participants().values()] == [0, 1, 2]
     erased(folder, "P002")
     session(folder, "P009")
-    assert {each.name: each.slot for each in folder.participants()} == {"P001": 0, "P003": 2, "P009": 1}
+    assert {name: each.session.slot for name, each in folder.participants().items()} == {
+        "P001": 0,
+        "P003": 2,
+        "P009": 1,
+    }
 
 
 @pytest.mark.parametrize(

@@ -4,12 +4,14 @@ import numpy as np
 import pytest
 
 from handrail.collect.user_study.items import LONGEST_TEXT, Item
-from handrail.collect.user_study.usability import NAMES, sus_form, sus_score
-from handrail.collect.user_study.workload import (
+from handrail.collect.user_study.questionnaires import (
     PAIRS,
     SCALES,
+    STATEMENTS,
     pairs_form,
     scales_form,
+    sus_form,
+    sus_score,
     tlx_raw,
     tlx_weighted,
 )
@@ -29,10 +31,10 @@ def test_tlx_by_hand():
 
 
 def test_sus_by_hand():
-    assert sus_score(dict(zip(NAMES, (5, 1) * 5, strict=True))) == 100.0
-    assert sus_score(dict.fromkeys(NAMES, 3)) == 50.0
+    assert sus_score(dict(zip(STATEMENTS, (5, 1) * 5, strict=True))) == 100.0
+    assert sus_score(dict.fromkeys(STATEMENTS, 3)) == 50.0
     # odd: 4 3 5 2 4 → 3+2+4+1+3 = 13; even: 2 4 1 3 2 → 3+1+4+2+3 = 13; 26 × 2.5
-    assert sus_score(dict(zip(NAMES, (4, 2, 3, 4, 5, 1, 2, 3, 4, 2), strict=True))) == 65.0
+    assert sus_score(dict(zip(STATEMENTS, (4, 2, 3, 4, 5, 1, 2, 3, 4, 2), strict=True))) == 65.0
 
 
 @pytest.mark.parametrize("name", SCALES)
@@ -45,7 +47,7 @@ def test_a_scale_that_was_not_answered_leaves_the_scores_empty(name):
 def test_a_comparison_or_a_statement_that_was_not_answered_leaves_the_score_empty():
     assert tlx_weighted(RATINGS, {**CHOSEN, "mental_physical": None}) is None
     assert tlx_weighted(RATINGS, {}) is None
-    assert sus_score({**dict.fromkeys(NAMES, 3), "q10": None}) is None
+    assert sus_score({**dict.fromkeys(STATEMENTS, 3), "q10": None}) is None
 
 
 def test_tlx_asks_what_the_form_asks():
@@ -57,9 +59,9 @@ def test_tlx_asks_what_the_form_asks():
         assert item.low == ("perfect" if item.name == "performance" else "very low")
     forms = [pairs_form(np.random.default_rng(seed)) for seed in (0, 0, 1)]
     assert forms[0] == forms[1] != forms[2]
-    assert {frozenset(item.choices) for item in forms[0].items} == set(map(frozenset, PAIRS))
+    assert {frozenset(dict(item.choices)) for item in forms[0].items} == set(map(frozenset, PAIRS))
     assert len(forms[0].items) == 15
-    first = [item.choices[0] == SCALES[min(map(SCALES.index, item.choices))] for item in forms[0].items]
+    first = [item.choices[0][0] == min(dict(item.choices), key=SCALES.index) for item in forms[0].items]
     assert 0 < sum(first) < 15  # sides change
 
 
@@ -77,10 +79,10 @@ def fits(item, value):
 
 
 ITEMS = {
-    "scale": Item("a", "scale", "?"),
+    "scale": Item("a", "scale", "?", step=5),
     "likert": Item("a", "likert", "?", least=1, most=7),
     "number": Item("a", "number", "?", least=0, most=10),
-    "choice": Item("a", "choice", "?", choices=("x", "y")),
+    "choice": Item("a", "choice", "?", choices=(("x", "X"), ("y", "Y"))),
     "text": Item("a", "text", "?"),
 }
 ODD = (
@@ -109,4 +111,4 @@ def test_an_answer_that_is_none_is_refused_in_one_line(kind):
             assert "\n" not in str(told.value)
     assert ITEMS[kind].check(None) is None
     with pytest.raises(HandrailError):
-        Item("consent", "choice", "?", choices=("yes", "no"), declines=False).check(None)
+        Item("consent", "choice", "?", choices=(("yes", ""), ("no", "")), declines=False).check(None)

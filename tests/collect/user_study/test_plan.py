@@ -32,10 +32,12 @@ def test_the_first_participants_already_have_each_condition_in_each_place(n):
             assert all(len({row[place] for row in square}) == n for place in range(n))
 
 
+MODES = ("ee", "direct", "switching", "base+ee")
+TASKS = ("reach", "pick_place", "drawer", "tray")
+
+
 def study(modes=3, tasks=2, seed=0):
-    return UserStudy(
-        "t", "c", tuple("abcdef"[:modes]), tuple("uvwxyz"[:tasks]), seed=seed, forms=("tlx", "sus")
-    )
+    return UserStudy("t", "c", MODES[:modes], TASKS[:tasks], seed=seed, forms=("tlx", "sus"))
 
 
 @pytest.mark.parametrize(("modes", "tasks"), [(1, 2), (2, 2), (3, 2), (3, 3), (4, 2), (4, 4)])
@@ -56,15 +58,17 @@ def test_a_plan_has_every_trial_and_form_once():
     keys = [step.key for step in steps]
     assert len(set(keys)) == len(keys)
     assert sum(step.kind == "trial" for step in steps) == 3 * 2 * 3
-    for mode in "abc":
+    for mode in MODES[:3]:
         last = max(index for index, step in enumerate(steps) if step.condition == mode)
         assert [step.form for step in steps[last - 2 : last + 1]] == ["tlx", "tlx_pairs", "sus"]
 
 
 def test_trials_are_the_same_scenes_for_all_and_practice_has_others():
     made = study()
-    trials = {trial_seed(made, task, trial) for task in "uv" for trial in range(1, 4)}
-    practice = {practice_seed(made, mode, task, n) for mode in "abc" for task in "uv" for n in range(6)}
+    trials = {trial_seed(made, task, trial) for task in TASKS[:2] for trial in range(1, 4)}
+    practice = {
+        practice_seed(made, mode, task, n) for mode in MODES[:3] for task in TASKS[:2] for n in range(6)
+    }
     assert len(trials) == 6
     assert len(practice) == 36
     assert not trials & practice
