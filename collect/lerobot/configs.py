@@ -1,115 +1,111 @@
-"""Settings of the robot and the teleoperators, as LeRobot's commands take them."""
+"""Settings of the robot and the teleoperators, as LeRobot's commands take them, with our own names."""
 
 from dataclasses import dataclass
+from typing import Annotated, Any
 
 from lerobot.robots import RobotConfig
 from lerobot.teleoperators import TeleoperatorConfig
+from msgspec import Meta
 
 from handrail.collect.cockpit_config import CockpitConfig
 from handrail.collect.config import SessionConfig, check_fps
 from handrail.collect.teleop_config import TeleopConfig
-from handrail.controllers.errors import HandrailError
+from handrail.controllers.typed import Count, NonNegative, check
 
 
-@RobotConfig.register_subclass("handrail_sim")
 @dataclass(kw_only=True)
-class HandrailSimConfig(RobotConfig):
-    """A simulated robot with a task, steered through a controller. The names are those of `handrail-record`.
-
-    Attributes:
-        task: what to do.
-        mode: teleop mode: which channels the action has, and what completes them.
-        mask: a mask of your own instead of the mode's: 0 or 1 for each channel.
-        robot: a robot, or a description file (.toml).
-        camera_names: cameras: wrist, scene or both, with a comma; none by default.
-        image_size: height and width of the pictures [px].
-        moving_obstacles: obstacles that cross the robot's way; task reach only.
-        seed: of the scenes: those of `handrail-record` with this seed.
-        evaluation: whether they are those of `handrail-evaluate` with this seed: none is in a recording.
-        episode: number of the first scene; to replay an episode, the number of its scene.
-        fps: actions a second [Hz]; say the same to LeRobot (`--dataset.fps`, `--fps`).
-        realtime: never be faster than real time, however often LeRobot asks.
-        diagnostics: whether observations say what was sent, and how the controller fared.
-    """
+class SimulatedConfig:
+    """What is simulated; the names are those of `handrail-record`."""
 
     task: str = "reach"
-    mode: str = "ee"
-    mask: str = ""
-    robot: str = "ridgeback_ur10"
+    """What to do."""
+    robot: str = SessionConfig.robot
+    """A robot, or a description file (.toml)."""
     camera_names: str = ""
-    image_size: int = 128
+    """Cameras: wrist, scene or both, with a comma; none by default."""
+    image_size: int = SessionConfig.image_size
+    """Height and width of the pictures [px]."""
     moving_obstacles: int = 0
-    seed: int = 0
-    evaluation: bool = False
-    episode: int = 0
+    """Obstacles that cross the robot's way; task reach only."""
     fps: int = 20
-    realtime: bool = True
-    diagnostics: bool = True
+    """Actions a second [Hz]; say the same to LeRobot (`--dataset.fps`, `--fps`)."""
 
-    def session(self) -> SessionConfig:
-        """Return the settings of the session behind it."""
+    def _session(self, **more: Any) -> SessionConfig:
+        """Return the settings of the session, checked."""
         check_fps(self.fps)
-        if self.episode < 0:
-            raise HandrailError(f"--robot.episode {self.episode}: expected 0 or more")
         config = SessionConfig(
             task=self.task,
-            mode=self.mode,
-            mask=self.mask,
             robot=self.robot,
             cameras=self.camera_names,
             image_size=self.image_size,
             moving_obstacles=self.moving_obstacles,
-            seed=self.seed,
+            **more,
         )
         config.check()
         return config
 
 
+@RobotConfig.register_subclass("handrail_sim")
+@dataclass(kw_only=True)
+class HandrailSimConfig(SimulatedConfig, RobotConfig):
+    """A simulated robot with a task, steered through a controller; named as in `handrail-record`."""
+
+    mode: str = SessionConfig.mode
+    """Teleop mode: which channels the action has, and what completes them."""
+    mask: str = ""
+    """A mask of your own instead of the mode's: 0 or 1 for each channel."""
+    seed: int = 0
+    """Of the scenes: those of `handrail-record` with this seed."""
+    evaluation: bool = False
+    """Whether they are those of `handrail-evaluate` with this seed: none is in a recording."""
+    episode: int = 0
+    """Number of the first scene; to replay an episode, the number of its scene."""
+    realtime: bool = True
+    """Never be faster than real time, however often LeRobot asks."""
+    diagnostics: bool = True
+    """Whether observations say what was sent, and how the controller fared."""
+
+    def session(self) -> SessionConfig:
+        """Return the settings of the session behind it."""
+        check(self.episode, Count, "--robot.episode")
+        return self._session(mode=self.mode, mask=self.mask, seed=self.seed)
+
+
 @TeleoperatorConfig.register_subclass("handrail_scripted")
 @dataclass(kw_only=True)
 class HandrailScriptedConfig(TeleoperatorConfig):
-    """A script with a human-like hand steers `handrail_sim`.
+    """A script with a human-like hand steers `handrail_sim`."""
 
-    Attributes:
-        noise: how human the hand is: 0 perfect, 1 the default, partly from studies of people.
-        person: which person it is; persons differ in delay, noise and all the rest.
-        episode_time_s: the same as `--dataset.episode_time_s`; 0 to begin anew whenever the task is done.
-        reset_time_s: the same as `--dataset.reset_time_s`.
-    """
-
-    noise: float = 1.0
-    person: int = 0
+    noise: float = SessionConfig.noise
+    """How human the hand is: 0 perfect, 1 the default, partly from studies of people."""
+    person: int = SessionConfig.person
+    """Which person it is; persons differ in delay, noise and all the rest."""
     episode_time_s: float = 0.0
+    """The same as `--dataset.episode_time_s`; 0 to begin anew whenever the task is done."""
     reset_time_s: float = 1.0
+    """The same as `--dataset.reset_time_s`; the scene changes then."""
 
     def check(self) -> None:
         """Check the settings."""
-        if not 0.0 <= self.episode_time_s < float("inf"):
-            raise HandrailError(f"--teleop.episode_time_s {self.episode_time_s}: expected 0 s or more")
-        if not 0.5 <= self.reset_time_s < float("inf"):
-            raise HandrailError(
-                f"--teleop.reset_time_s {self.reset_time_s}: expected 0.5 s or more: the scene changes then"
-            )
+        check(self.episode_time_s, NonNegative, "--teleop.episode_time_s")
+        check(self.reset_time_s, Annotated[float, Meta(ge=0.5, le=1e12)], "--teleop.reset_time_s")
 
 
 @TeleoperatorConfig.register_subclass("handrail_cockpit")
 @dataclass(kw_only=True)
 class HandrailCockpitConfig(TeleoperatorConfig):
-    """A person at a browser steers `handrail_sim`. The names are those of `--cockpit` of `handrail-record`.
-
-    Attributes:
-        host: address to listen at; any other than 127.0.0.1 asks for a token, by HTTPS.
-        token: whether to ask for the token on 127.0.0.1 too; without, every account here can drive.
-        port: to listen at; the next free one where it is taken; 0 for any.
-        open: whether to open the page in this computer's browser, unless it asks for a token.
-        certificate: folder of a certificate of your own, cert.pem and key.pem.
-    """
+    """A person at a browser steers `handrail_sim`; named as `--cockpit` of `handrail-record`."""
 
     host: str = CockpitConfig.host
-    token: bool = False
+    """Address to listen at; any other than 127.0.0.1 asks for a token, by HTTPS."""
+    token: bool = CockpitConfig.token
+    """Whether to ask for the token on 127.0.0.1 too; without, every account here can drive."""
     port: int = CockpitConfig.port
-    open: bool = True
+    """To listen at; the next free one where it is taken; 0 for any."""
+    open: bool = CockpitConfig.open
+    """Whether to open the page in this computer's browser, unless it asks for a token."""
     certificate: str = ""
+    """Folder of a certificate of your own, cert.pem and key.pem."""
 
     def cockpit(self) -> CockpitConfig:
         """Return where the cockpit listens."""
@@ -121,17 +117,14 @@ class HandrailCockpitConfig(TeleoperatorConfig):
 @TeleoperatorConfig.register_subclass("handrail_gamepad")
 @dataclass(kw_only=True)
 class HandrailGamepadConfig(TeleoperatorConfig):
-    """A person with a gamepad steers `handrail_sim`. The names are those of `--teleop` of `handrail-record`.
-
-    Attributes:
-        map: file (.toml) that gives controls another meaning.
-        dead_zone: deflection of a stick that counts as none, 0 to 0.5.
-        exponent: curve of a stick, 1 (straight) to 3 (fine near the middle).
-    """
+    """A person with a gamepad steers `handrail_sim`; named as `--teleop` of `handrail-record`."""
 
     map: str = ""
+    """File (.toml) that gives controls another meaning."""
     dead_zone: float = TeleopConfig.dead_zone
+    """Deflection of a stick that counts as none, 0 to 0.5."""
     exponent: float = TeleopConfig.exponent
+    """Curve of a stick, 1 (straight) to 3 (fine near the middle)."""
 
     def teleop(self) -> TeleopConfig:
         """Return the settings of the device."""

@@ -1,20 +1,26 @@
 """What LeRobot's action is: the channels of a teleop mode as plain numbers, and back."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
+from functools import partial
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from handrail.collect.lerobot.names import lerobot_name, named
 from handrail.collect.operators.modes import TeleopMode
+from handrail.collect.session.build import build_controller
+from handrail.collect.session.loop import EpisodeLoop
+from handrail.collect.session.mode_controller import ModeController
+from handrail.collect.world.env import HandrailEnv
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.intent import Intent, decided_gripper
 
-FOCUS, GRIPPER = "focus", "gripper"
 # what a teleoperator presses: in its action beside the channels, and in no dataset
 NEXT, AGAIN, HOLD = "handrail.next", "handrail.again", "handrail.hold"
 BUTTONS = (NEXT, AGAIN, HOLD)
+_FOCUS, _GRIPPER = "focus", "gripper"
 _HALF = 0.5  # a focus beyond it is the base's, a button beyond it is pressed
 
 
@@ -33,35 +39,26 @@ class ModeAction:
         self._mode, self._channels = mode, channels
         self._hand, self._base = (channels.mask(*mode.groups(focus)) for focus in ("hand", "base"))
         self._owned = np.flatnonzero(self._hand | self._base)
-        focus = (FOCUS,) if mode.by_focus else ()
-        self._own = (*(channels.names[i] for i in self._owned), *focus, GRIPPER)
+        focus = (_FOCUS,) if mode.by_focus else ()
+        self._own = (*(channels.names[i] for i in self._owned), *focus, _GRIPPER)
         self.names = tuple(map(lerobot_name, self._own))
 
-    def intent(self, action: Mapping[str, float], time: float) -> Intent:
-        """Return what an action asks for; a number that is not finite becomes an intent that brakes.
+    def intent(self, numbers: ArrayLike, time: float) -> Intent:
+        """Return what numbers in the order of `names` ask for; one that is not finite brakes.
 
         A gripper beyond a half closes.
-
-        Args:
-            action: by name, LeRobot's or Handrail's own.
-            time: on the robot's clock [s].
         """
-        numbers = self.numbers(action)
-        values = np.zeros(self._channels.size)
+        numbers, values = np.asarray(numbers, float), np.zeros(self._channels.size)
         values[self._owned] = numbers[: len(self._owned)]
         mask = self._base if self._mode.by_focus and not numbers[-2] <= _HALF else self._hand
         return Intent(values, mask, decided_gripper(numbers[-1]), self._mode.name, time)
-
-    def decided(self, numbers: Sequence[float] | FloatArray, time: float) -> Intent:
-        """Return what the numbers of a policy ask for."""
-        return self.intent(dict(zip(self.names, numbers, strict=True)), time)
 
     def is_in(self, action: Mapping[str, float]) -> bool:
         """Whether an action has a channel of the mode."""
         return any(named(name, action) is not None for name in self._own[:-1])
 
     def numbers(self, action: Mapping[str, float]) -> FloatArray:
-        """Return the numbers of an action in the order of `names`."""
+        """Return the numbers of an action, by LeRobot's names or Handrail's own, in the order of `names`."""
         found = [named(name, action) for name in self._own]
         missing = [name for name, number in zip(self.names, found, strict=True) if number is None]
         if missing:
@@ -82,16 +79,21 @@ class ModeAction:
         if intent.frames.tool == "tool":
             twist = values[self._channels.tool_slice].reshape(2, 3)
             values[self._channels.tool_slice] = (twist @ rotation.T).ravel()
-        numbers = [*values[self._owned]]
-        if self._mode.by_focus:
-            numbers.append(float(np.array_equal(intent.mask, self._base)))
-        return dict(zip(self.names, map(float, (*numbers, intent.gripper)), strict=True))
+        focus = (np.array_equal(intent.mask, self._base),) if self._mode.by_focus else ()
+        numbers = (*values[self._owned], *focus, intent.gripper)
+        return dict(zip(self.names, map(float, numbers), strict=True))
 
     def still(self, gripper: float = 0.0) -> dict[str, float]:
         """Return the action of who touches nothing, with the gripper as it is."""
-        return dict.fromkeys(self.names, 0.0) | {lerobot_name(GRIPPER): gripper}
+        return dict.fromkeys(self.names, 0.0) | {lerobot_name(_GRIPPER): gripper}
 
 
 def pressed(action: Mapping[str, float]) -> str:
     """Return the button that an action presses; "" if none."""
     return next((button for button in BUTTONS if float(action.get(button, 0.0)) > _HALF), "")
+
+
+def mode_loop(env: HandrailEnv, task: str, mode: TeleopMode, also: TeleopMode) -> EpisodeLoop:
+    """Return the loop of an environment in a mode; intents of another one are completed, too."""
+    build = partial(build_controller, model=env.model, fps=env.fps, task=task)
+    return EpisodeLoop(env, ModeController({each.name: each for each in (also, mode)}, build, mode))

@@ -8,7 +8,8 @@ Handrail's own columns keep their names. An action may still have the old ones, 
 
 from collections.abc import Mapping
 
-POSITION, VELOCITY = ".pos", ".vel"
+from handrail.collect.processor.units import POSITION, VELOCITY
+
 _LINEAR, _ANGULAR = ("vx", "vy", "vz"), ("wx", "wy", "wz")
 
 

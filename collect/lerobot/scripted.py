@@ -3,26 +3,15 @@
 import time
 from collections.abc import Callable
 from dataclasses import replace
-from enum import StrEnum
-
-import numpy as np
 
 from handrail.collect.lerobot.configs import HandrailScriptedConfig
 from handrail.collect.lerobot.mode_action import HOLD, NEXT
-from handrail.collect.lerobot.stepwise import Stepwise
+from handrail.collect.lerobot.sim import HandrailSim
 from handrail.collect.lerobot.teleoperator import SimTeleoperator
-from handrail.collect.operators.operator import EpisodeEvent
+from handrail.collect.operators.operator import Operator
 from handrail.collect.session.build import build_operator
 
 _MARGIN = 2.0  # periods by which LeRobot's clock may be behind ours
-
-
-class ClockPhase(StrEnum):
-    """What a teleoperator that runs by itself does now."""
-
-    DRIVE = "drive"
-    WAIT = "wait"
-    NEXT = "next"  # begin another episode; said once
 
 
 class EpisodeClock:
@@ -40,19 +29,15 @@ class EpisodeClock:
     """
 
     def __init__(
-        self,
-        episode: float,
-        reset: float,
-        margin: float,
-        clock: Callable[[], float] = time.perf_counter,
+        self, episode: float, reset: float, margin: float, clock: Callable[[], float] = time.perf_counter
     ) -> None:
         self._episode, self._reset, self._margin, self._clock = episode, reset, margin, clock
         self._begun: float | None = None
         self._over: float | None = None
         self._changed = False
 
-    def phase(self, done: bool) -> ClockPhase:
-        """Return what to do now.
+    def button(self, done: bool) -> str:
+        """Return the button to press now: none while it drives, else HOLD, and NEXT once.
 
         Args:
             done: whether the task is.
@@ -60,29 +45,18 @@ class EpisodeClock:
         now = self._clock()
         if self._begun is None:
             self._begun = now
-        if self._over is None and self._is_over(now, done):
+        if self._over is None and (now - self._begun >= self._episode if self._episode else done):
             self._over = now
         if self._over is None:
-            return ClockPhase.DRIVE
-        return self._between(now)
-
-    def _is_over(self, now: float, done: bool) -> bool:
-        assert self._begun is not None
-        return now - self._begun >= self._episode if self._episode else done
-
-    def _between(self, now: float) -> ClockPhase:
-        assert self._begun is not None
-        assert self._over is not None
+            return ""
         start = self._begun + self._episode if self._episode else self._over
         if not self._changed:
-            if now < start + self._reset / 2:
-                return ClockPhase.WAIT
-            self._changed = True
-            return ClockPhase.NEXT
+            self._changed = now >= start + self._reset / 2
+            return NEXT if self._changed else HOLD
         if now < start + self._reset + self._margin:
-            return ClockPhase.WAIT
+            return HOLD
         self._begun, self._over, self._changed = now, None, False
-        return ClockPhase.DRIVE
+        return ""
 
 
 class HandrailScripted(SimTeleoperator):
@@ -94,27 +68,20 @@ class HandrailScripted(SimTeleoperator):
 
     config_class = HandrailScriptedConfig
     name = "handrail_scripted"
+    is_person = False
 
     def __init__(self, config: HandrailScriptedConfig) -> None:
         config.check()
         super().__init__(config)
         self._config = config
 
-    def _open(self, session: Stepwise) -> None:
+    def _made(self, robot: HandrailSim) -> Operator:
         config = self._config
-        who = replace(session.config, noise=config.noise, person=config.person)
-        who.check()
-        self._operator = build_operator(who, session.mode, session.env.model)
-        self._clock = EpisodeClock(config.episode_time_s, config.reset_time_s, _MARGIN / session.fps)
-        self._begun = 0
+        person = replace(robot.session, noise=config.noise, person=config.person)
+        person.check()
+        margin = _MARGIN * robot.env.period
+        self._clock = EpisodeClock(config.episode_time_s, config.reset_time_s, margin)
+        return build_operator(person, robot.mode, robot.env.model)
 
-    def _act(self, session: Stepwise) -> dict[str, float]:
-        phase = self._clock.phase(session.loop.now.done)
-        if phase is not ClockPhase.DRIVE:
-            return session.action.still(session.gripper) | {NEXT if phase is ClockPhase.NEXT else HOLD: 1.0}
-        if session.episodes != self._begun:
-            self._operator.reset(session.view, np.random.default_rng([session.seed, 1]))
-            self._begun = session.episodes
-        asked = self._operator.act(session.view)
-        assert not isinstance(asked, EpisodeEvent)  # of which a script says none
-        return session.action.action(asked, session.view.tool.rotation)
+    def _pressed(self, robot: HandrailSim) -> str:
+        return self._clock.button(robot.loop.now.done)

@@ -2,24 +2,42 @@
 
 import logging
 import time
+import weakref
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack
+from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 from lerobot.robots import Robot
 
+from handrail.collect.commands.recording import episode_seed
 from handrail.collect.lerobot.configs import HandrailSimConfig
-from handrail.collect.lerobot.link import announce
-from handrail.collect.lerobot.mode_action import AGAIN, HOLD, NEXT, pressed
-from handrail.collect.lerobot.names import POSITION
-from handrail.collect.lerobot.stepwise import Stepwise
+from handrail.collect.lerobot.mode_action import AGAIN, HOLD, NEXT, ModeAction, mode_loop, pressed
+from handrail.collect.lerobot.names import POSITION, lerobot_name
+from handrail.collect.operators.modes import MODES
+from handrail.collect.operators.operator import EpisodeEvent, View
+from handrail.collect.operators.scripted.steering import FOLLOW
+from handrail.collect.seeds import evaluation_seed
+from handrail.collect.session.build import build_env, build_mode
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import HandrailError
+from handrail.controllers.interface.channels import Channels
+from handrail.controllers.interface.command import Diagnostics, Status
+from handrail.controllers.interface.intent import LONG_AGO, Intent
 from handrail.controllers.numerics.threads import single_threaded
+from handrail.datasets.recording.frames import Frame, finite_distance
 
 _REHEARSED = 3  # periods before the first, in which what is compiled at first use is compiled
+_TOWARD = MODES["joints"]  # the mode in which joints are led to positions
+_TOLD = ("mode", "status", "distance", "contacts", "brakes", "success", "scene")
+_newest: list["weakref.ref[HandrailSim]"] = []
+
+
+def newest_robot() -> "HandrailSim | None":
+    """Return the robot of this process that was made last; LeRobot shows it to nobody."""
+    return _newest[0]() if _newest else None
 
 
 class Pace:
@@ -49,47 +67,8 @@ class Pace:
         self._due = max(self._due, now) + self._period if ahead > -self._period else now + self._period
 
 
-class HandrailSim(Robot):
-    """A robot in MuJoCo with a task; `handrail_sim` in LeRobot's commands.
-
-    Every `send_action` moves it for one period. An action that is not finite brakes, and is counted. When
-    `lerobot-rollout` has led the joints back to where they were at connect(), the next scene begins.
-
-    Args:
-        config: its settings.
-
-    Attributes:
-        stepwise: the session behind it.
-    """
-
-    config_class = HandrailSimConfig
-    name = "handrail_sim"
-
-    def __init__(self, config: HandrailSimConfig) -> None:
-        self._connected = False
-        super().__init__(config)
-        self._config = config
-        self.stepwise = Stepwise(config.session(), config.fps, config.diagnostics, config.evaluation)
-        self.cameras = dict.fromkeys(self.stepwise.env.cameras)  # LeRobot counts them
-        self._pace = Pace(1.0 / config.fps)
-        self._open = ExitStack()
-        announce(self)
-
-    @cached_property
-    def observation_features(self) -> dict[str, Any]:
-        """Names of what is observed: numbers, and pictures by camera."""
-        height, width = self.stepwise.env.image_size
-        return dict.fromkeys(self.stepwise.names, float) | dict.fromkeys(self.cameras, (height, width, 3))
-
-    @cached_property
-    def action_features(self) -> dict[str, type]:
-        """Names of the numbers of an action: the mode's channels and the gripper."""
-        return dict.fromkeys(self.stepwise.action.names, float)
-
-    @property
-    def is_connected(self) -> bool:
-        """Whether an episode has begun."""
-        return self._connected
+class Uncalibrated:
+    """A device of LeRobot's of which nothing is to be calibrated or configured."""
 
     @property
     def is_calibrated(self) -> bool:
@@ -102,27 +81,97 @@ class HandrailSim(Robot):
     def configure(self) -> None:
         """Do nothing."""
 
+
+class HandrailSim(Uncalibrated, Robot):
+    """A robot in MuJoCo with a task; `handrail_sim` in LeRobot's commands.
+
+    Every `send_action` moves it for one period. An action that is not finite brakes, and is counted. When
+    `lerobot-rollout` has led the joints back to where they were at connect(), the next scene begins.
+
+    Args:
+        config: its settings.
+
+    Attributes:
+        session: settings of the session behind it.
+        env: the robot, its world and a task.
+        mode: teleop mode.
+        action: what is asked for every period.
+        loop: of the episode.
+        scene: number of the episode's beginning: the same number, the same beginning.
+        episodes: how many have begun.
+        frame: what happened in the last period; None before any.
+    """
+
+    config_class = HandrailSimConfig
+    name = "handrail_sim"
+    frame: Frame | None
+    _connected = False
+
+    def __init__(self, config: HandrailSimConfig) -> None:
+        super().__init__(config)
+        self._config, self.session = config, config.session()
+        self.env = build_env(self.session, config.fps)
+        self.mode = build_mode(self.session, self.env.model)
+        self._channels = Channels.of(self.env.model.description)
+        self.action = ModeAction(self.mode, self._channels)
+        self.loop = mode_loop(self.env, self.session.task, self.mode, _TOWARD)
+        self.cameras = dict.fromkeys(self.env.cameras)  # LeRobot counts them
+        self.scene, self.episodes, self.frame = -1, 0, None
+        self._driven, self._led = False, None
+        self._pace, self._open = Pace(self.env.period), ExitStack()
+        _newest[:] = [weakref.ref(self)]
+
+    @cached_property
+    def observation_features(self) -> dict[str, Any]:
+        """Names of what is observed: numbers, and pictures by camera."""
+        picture = (*self.env.image_size, 3)
+        return dict.fromkeys(self._names, float) | dict.fromkeys(self.cameras, picture)
+
+    @cached_property
+    def action_features(self) -> dict[str, type]:
+        """Names of the numbers of an action: the mode's channels and the gripper."""
+        return dict.fromkeys(self.action.names, float)
+
+    @property
+    def is_connected(self) -> bool:
+        """Whether an episode has begun."""
+        return self._connected
+
+    @property
+    def seed(self) -> int:
+        """Of the episode."""
+        seed_of = evaluation_seed if self._config.evaluation else episode_seed
+        return seed_of(self.session.seed, self.scene)
+
+    @property
+    def view(self) -> View:
+        """What there is to see now."""
+        return self.loop.look()
+
+    @property
+    def gripper(self) -> float:
+        """What the gripper was sent last, 0 open, 1 closed."""
+        return float(self.loop.now.info["sent"][-1])
+
     def connect(self, calibrate: bool = True) -> None:
         """Begin the first episode, everything compiled."""
         if self._connected:
             raise HandrailError("handrail_sim: expected to be connected once, is connected already")
         self._open.enter_context(single_threaded())
-        self._open.callback(self.stepwise.close)
-        session = self.stepwise
-        session.begin(self._config.episode)
+        self._open.callback(self.env.close)
+        self._begin(self._config.episode)
         for _ in range(_REHEARSED):
-            session.step(session.action.intent(session.action.still(), session.view.state.time))
-        session.begin(self._config.episode)
-        self._first = self._positions(session.numbers())
+            self._move(self.action.intent(np.zeros(len(self.action.names)), self.view.state.time))
+        self._begin(self._config.episode)
+        self._first = self._positions(self._numbers())
         self._connected = True
 
     def get_observation(self) -> dict[str, Any]:
         """Return the robot, the scene, what was sent and how the controller fared; and the pictures."""
         self._check_connected()
-        session = self.stepwise
-        if session.led is not None and np.array_equal(session.led, self._first):
-            self._begin(session.scene + session.driven)
-        return {**session.numbers(), **session.pictures}
+        if self._led is not None and np.array_equal(self._led, self._first):
+            self._begin(self.scene + self._driven)
+        return self._numbers() | self.loop.now.observation.get("pixels", {})
 
     def send_action(self, action: dict[str, Any]) -> dict[str, Any]:
         """Do what an action asks for, for one period; return it as it was understood.
@@ -132,47 +181,93 @@ class HandrailSim(Robot):
         (`x.pos`, …) without any channel lead the joints there.
         """
         self._check_connected()
-        session, steered = self.stepwise, self.stepwise.action.is_in(action)
         if self._config.realtime:
             self._pace.wait()
-        if not steered and all(name in action for name in self._joints):
-            session.lead(self._positions(action))
+        if not self.action.is_in(action) and all(name in action for name in self._joints):
+            self._lead(self._positions(action))
             return action
-        numbers = session.action.numbers(action).astype(np.float32)  # as exact as a dataset keeps them
+        numbers = self.action.numbers(action).astype(np.float32)  # as exact as a dataset keeps them
         button = pressed(action)
         if button in (NEXT, AGAIN):
-            self._begin(session.scene + (button == NEXT))
+            self._begin(self.scene + (button == NEXT))
         elif button == HOLD:
-            session.hold()
+            self._hold()
         else:
-            session.step(session.action.decided(numbers, session.view.state.time))
-        return dict(zip(session.action.names, map(float, numbers), strict=True))
-
-    @cached_property
-    def _joints(self) -> tuple[str, ...]:
-        return tuple(name + POSITION for name in self.stepwise.env.model.joints)
-
-    def _positions(self, numbers: Mapping[str, float]) -> FloatArray:
-        return np.array([numbers[name] for name in self._joints], float)
-
-    def _begin(self, scene: int) -> None:
-        self._report()
-        self.stepwise.begin(scene)
-
-    def _report(self) -> None:
-        """Log how a scene went in which something was done."""
-        session = self.stepwise
-        if session.driven:
-            result = "success" if session.loop.now.success else "no success"
-            logging.info("handrail_sim: scene %d: %s, %d brakes", session.scene, result, session.brakes)
+            self._move(self.action.intent(numbers, self.view.state.time))
+            self._driven = True
+        return dict(zip(self.action.names, map(float, numbers), strict=True))
 
     def disconnect(self) -> None:
         """Stop the robot and close its world."""
         self._check_connected()
-        self._connected = False
         self._report()
-        self.stepwise.env.robot.stop()
+        self._connected = False
+        self.env.robot.stop()
         self._open.close()
+
+    def _begin(self, scene: int) -> None:
+        """Begin an episode in a scene."""
+        self._report()
+        self.scene, self.episodes = scene, self.episodes + 1
+        self.loop.begin(self.seed)
+        self._driven, self._led, self.frame = False, None, None
+
+    def _hold(self) -> None:
+        """Brake; once the robot rests, time stands still."""
+        self.loop.look()
+        if not self.loop.rests:
+            nothing = Intent.idle(self._channels, LONG_AGO)
+            self._move(replace(nothing, gripper=self.gripper, mode=self.mode.name), EpisodeEvent.PAUSE)
+
+    def _lead(self, positions: FloatArray) -> None:
+        """Lead the joints towards positions, (n,) [m, rad], for a period; that is no part of the task."""
+        fastest, state = self.env.model.description.limits.velocity, self.view.state
+        values, before = np.zeros(self._channels.size), positions if self._led is None else self._led
+        toward = (positions - before) * self.env.fps + FOLLOW * (positions - state.q)
+        values[self._channels.joint_slice] = np.clip(toward, -fastest, fastest)
+        mask = self._channels.mask("joint")
+        self._move(Intent(values, mask, self.gripper, _TOWARD.name, state.time), counts=False)
+        self._led = positions
+
+    def _move(self, intent: Intent, event: EpisodeEvent | None = None, counts: bool = True) -> None:
+        self.loop.look()
+        self.frame, self._led = self.loop.step(intent, event, counts), None
+
+    @cached_property
+    def _names(self) -> tuple[str, ...]:
+        """LeRobot's names of the numbers; what is no part of the robot or the scene keeps its own."""
+        seen = tuple(map(lerobot_name, (*self.env.agent_names, *self.env.state_names)))
+        sent = (f"sent.{name}" for name in (*self.env.model.joints, "gripper"))
+        return (*seen, *sent, *_TOLD) if self._config.diagnostics else seen
+
+    def _numbers(self) -> dict[str, float]:
+        """Return the robot, the scene, what was sent in the last period, and how the controller fared.
+
+        The mode is its place in the list of modes, −1 for a mask of one's own; the status that of `Status`;
+        the distance the smallest one now, cut to 10 m.
+        """
+        now, modes = self.loop.now, list(MODES)
+        numbers = [*now.observation["agent_pos"], *now.observation["environment_state"]]
+        if self._config.diagnostics:
+            mode = modes.index(self.mode.name) if self.mode.name in modes else -1
+            diagnostics = self.frame.diagnostics if self.frame else Diagnostics()
+            status = list(Status).index(Status(diagnostics.status))
+            told = (mode, status, finite_distance(diagnostics.smallest_distance), now.info["contacts"])
+            numbers += [*now.info["sent"], *told, self.loop.tally.brakes, now.success, self.scene]
+        return dict(zip(self._names, map(float, numbers), strict=True))
+
+    @cached_property
+    def _joints(self) -> tuple[str, ...]:
+        return tuple(name + POSITION for name in self.env.model.joints)
+
+    def _positions(self, numbers: Mapping[str, float]) -> FloatArray:
+        return np.array([numbers[name] for name in self._joints], float)
+
+    def _report(self) -> None:
+        """Log how a scene went in which something was done."""
+        if self._driven:
+            result = "success" if self.loop.now.success else "no success"
+            logging.info("handrail_sim: scene %d: %s, %d brakes", self.scene, result, self.loop.tally.brakes)
 
     def _check_connected(self) -> None:
         if not self._connected:

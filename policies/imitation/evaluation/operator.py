@@ -64,7 +64,7 @@ class AsSteered:
 
     def decode(self, action: FloatArray, state: FloatArray) -> Intent:
         """Return the intent on the mode's channels."""
-        return self._action.decided(action, 0.0)
+        return self._action.intent(action, 0.0)
 
 
 class PolicyOperator:

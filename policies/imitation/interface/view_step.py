@@ -131,12 +131,12 @@ def asked(step: str, transition: EnvTransition, view: Any, seen: PolicyInterface
 
 def _check_taken(step: str, size: int) -> None:
     """Refuse what `lerobot-rollout` would not: of too many numbers it takes the first, whatever they mean."""
-    from handrail.collect.lerobot.link import connected_robot
+    from handrail.collect.lerobot.sim import newest_robot
 
-    robot = connected_robot()
-    if robot is not None and len(names := robot.stepwise.action.names) != size:
+    robot = newest_robot()
+    if robot and robot.is_connected and len(names := robot.action.names) != size:
         raise HandrailError(
-            f"step {step}: the policy writes {size} numbers; --robot.mode={robot.stepwise.mode.name} takes"
+            f"step {step}: the policy writes {size} numbers; --robot.mode={robot.mode.name} takes"
             f" {len(names)}: {', '.join(names)}; expected direct for joint velocities, for intents the mode"
             " of their demonstrations"
         )

@@ -2,7 +2,8 @@
 
 import pytest
 
-from handrail.collect.lerobot.scripted import ClockPhase, EpisodeClock
+from handrail.collect.lerobot.mode_action import HOLD, NEXT
+from handrail.collect.lerobot.scripted import EpisodeClock
 from handrail.collect.lerobot.sim import Pace
 
 PERIOD = 0.05
@@ -32,16 +33,16 @@ def test_the_scene_changes_in_every_reset_and_never_in_an_episode(stall, late):
             begun = now.time
             while now.time - begun < length:
                 now.time += late
-                said.append((episode, phase, clock.phase(done=False)))
+                said.append((episode, phase, clock.button(done=False)))
                 now.time += PERIOD - late
         now.time += stall
     for episode in range(4):
         recorded = [what for number, phase, what in said if (number, phase) == (episode, "episode")]
         between = [what for number, phase, what in said if (number, phase) == (episode, "reset")]
-        assert between.count(ClockPhase.NEXT) == 1
-        assert ClockPhase.NEXT not in recorded
-        assert set(recorded) == {ClockPhase.DRIVE}
-        assert ClockPhase.DRIVE not in between[2:]
+        assert between.count(NEXT) == 1
+        assert NEXT not in recorded
+        assert set(recorded) == {""}
+        assert "" not in between[2:]
 
 
 def test_without_an_episode_s_time_the_task_decides():
@@ -49,10 +50,10 @@ def test_without_an_episode_s_time_the_task_decides():
     clock = EpisodeClock(0.0, 1.0, 0.0, now)
     phases = []
     for step in range(60):
-        phases.append(clock.phase(done=20 <= step < 30))
+        phases.append(clock.button(done=20 <= step < 30))
         now.time += PERIOD
     changes = [phase for phase, before in zip(phases, [None, *phases], strict=False) if phase is not before]
-    assert changes == [ClockPhase.DRIVE, ClockPhase.WAIT, ClockPhase.NEXT, ClockPhase.WAIT, ClockPhase.DRIVE]
+    assert changes == ["", HOLD, NEXT, HOLD, ""]
 
 
 @pytest.mark.parametrize("asked", [10.0, 20.0, 60.0, 1000.0])

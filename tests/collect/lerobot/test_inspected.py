@@ -22,13 +22,13 @@ def recorded(tmp_path_factory):
     folder = tmp_path_factory.mktemp("lerobot")
     seen: list[list[dict]] = [[], []]
     with steered(folder) as (robot, teleop):
-        while len(seen[0]) < 300 and not robot.stepwise.loop.now.success:
+        while len(seen[0]) < 300 and not robot.loop.now.success:
             seen[0].append(robot.get_observation())
             robot.send_action(teleop.get_action())
         seen[0].append(robot.get_observation())
         for _ in range(10):
             seen[1].append(robot.get_observation())
-            robot.send_action(robot.stepwise.action.still() | {NEXT: float(len(seen[1]) == 1)})
+            robot.send_action(robot.action.still() | {NEXT: float(len(seen[1]) == 1)})
     seen[1][4]["contacts"], seen[1][5]["contacts"] = 2.0, 1.0
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")

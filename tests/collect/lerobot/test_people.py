@@ -62,7 +62,7 @@ def test_a_person_at_a_page_drives_and_takes_the_next_scene(robot, tmp_path):
                 socket.send(json.dumps({"kind": "ask", "what": what, "value": True}))
 
             assert teleop.get_action()[HOLD]
-            until(robot, teleop, lambda action: robot.stepwise.frame is None)
+            until(robot, teleop, lambda action: robot.frame is None)
             ask("mode")  # of no use here
             ask("start")
             until(robot, teleop, lambda action: HOLD not in action, lambda: say((0.0,) * 18))

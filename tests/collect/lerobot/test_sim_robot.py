@@ -31,7 +31,7 @@ def test_actions_as_a_dataset_keeps_them_replay_exactly(task, mode, tmp_path):
             robot.send_action({name: np.float32(value) for name, value in action.items()})
         assert robot.get_observation() == first
         assert first["brakes"] == 0
-        assert any(abs(first[f"sent.{name}"]) > 0.01 for name in robot.stepwise.env.model.joints)
+        assert any(abs(first[f"sent.{name}"]) > 0.01 for name in robot.env.model.joints)
 
 
 @pytest.mark.parametrize("task", TASKS)
@@ -40,8 +40,7 @@ def test_lerobot_s_rollout_takes_every_number_of_robot_scene_and_action(task):
         robot = HandrailSim(HandrailSimConfig(task=task, mode=mode, diagnostics=False))
         for names in (robot.observation_features, robot.action_features):
             assert all(name.endswith((".pos", ".vel")) for name in names)
-        stepwise = robot.stepwise
-        assert len(robot.observation_features) == len(stepwise.env.agent_names + stepwise.env.state_names)
+        assert len(robot.observation_features) == len(robot.env.agent_names + robot.env.state_names)
 
 
 def test_an_action_with_the_names_of_older_datasets_moves_the_robot_alike(tmp_path):
@@ -67,10 +66,10 @@ def test_lerobot_leads_the_robot_back_and_the_next_scene_begins(mode, tmp_path, 
         robot.send_action({name: away[name] for name in first})  # LeRobot's handover to an operator
         assert robot.get_observation()["scene"] == 0
         RolloutStrategy._return_to_initial_position(hardware)
-        now, joints = robot.stepwise.view.state.q, robot.stepwise.env.model.joints
+        now, joints = robot.view.state.q, robot.env.model.joints
         assert max(abs(away[f"{name}.pos"] - start[f"{name}.pos"]) for name in joints) > 0.1
         np.testing.assert_allclose(now, [start[f"{name}.pos"] for name in joints], atol=0.02)
-        assert not robot.stepwise.loop.now.success
+        assert not robot.loop.now.success
         following = robot.get_observation()
         assert (following["scene"], robot.get_observation()) == (1, following)
         RolloutStrategy._return_to_initial_position(hardware)  # as before an episode that is recorded again
@@ -105,14 +104,14 @@ def test_a_held_robot_comes_to_rest_and_time_stands_still(tmp_path):
         for _ in range(60):
             robot.send_action(actions[-1] | {HOLD: 1.0})
         resting = robot.get_observation()
-        assert not any(resting[f"sent.{name}"] for name in robot.stepwise.env.model.joints)
+        assert not any(resting[f"sent.{name}"] for name in robot.env.model.joints)
         robot.send_action(actions[-1] | {HOLD: 1.0})
         assert robot.get_observation() == resting
 
 
 def test_scenes_are_those_of_the_recording_with_this_seed(tmp_path):
     with steered(tmp_path, seed=3) as (robot, _):
-        start, still = robot.get_observation(), robot.stepwise.action.still()
+        start, still = robot.get_observation(), robot.action.still()
         robot.send_action(still | {NEXT: 1.0})
         second = robot.get_observation()
         assert (start["scene"], second["scene"]) == (0, 1)

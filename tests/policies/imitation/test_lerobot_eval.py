@@ -77,13 +77,13 @@ def rolled(monkeypatch, tmp_path):
 
         def noted(robot):
             observation = seen(robot)
-            states.append(robot.stepwise.view.observation["agent_pos"].copy())
+            states.append(robot.view.observation["agent_pos"].copy())
             if len(states) > PERIODS:  # the first one is of connect()
                 stop.set()
             return observation
 
         def last(robot):
-            at_last.append(robot.stepwise.view.state.q)
+            at_last.append(robot.view.state.q)
             ended(robot)
 
         handler = SimpleNamespace(shutdown_event=stop)
