@@ -20,7 +20,7 @@ from handrail.datasets.comparison.episodes import MetricContrast, differences
 from handrail.datasets.comparison.evaluations import Condition, read_evaluations
 from handrail.datasets.comparison.groups import Group, baseline_of, group_of, load_groups, unlike
 from handrail.datasets.comparison.policies import Outcomes, judge_pairs, pairs_between
-from handrail.datasets.quality.measure import Measurements, measured, read
+from handrail.datasets.quality.measure import Measurements, measure_views
 from handrail.datasets.reading.check import check_whole
 from handrail.datasets.statistics.contrast import Contrast, adjusted
 from handrail.datasets.statistics.resampling import Interval
@@ -112,12 +112,9 @@ def compare(config: CompareConfig) -> Comparison:
         "the same operator time": matched_time(groups),
     }
     counted = {title: _counted(title, each, config) for title, each in chosen.items()}
-    readings = read(
-        [{group.label: group.episodes for group in each} for each in counted.values()], config.margin
-    )
+    episodes = [{group.label: group.episodes for group in each} for each in counted.values()]
     views = []
-    for title, reading in zip(chosen, readings, strict=True):
-        measurements = measured(reading, rng)
+    for title, measurements in zip(chosen, measure_views(episodes, rng, config.margin), strict=True):
         found = differences(title, counted[title], measurements, baseline, rng)
         numbers = [collected(group) for group in chosen[title]]
         views.append(EpisodeChoice(title, counted[title], numbers, measurements, found))

@@ -100,7 +100,7 @@ def _difference(
     measured = [measurements.values[metric.name][each.label] for each in (group, base)]
     found = MetricContrast(measure=metric, label=group.label, baseline=base.label)
     for each, values in zip((group, base), measured, strict=True):
-        if not values.applies:
+        if values.mean is None:
             return replace(found, reason=f"{each.label}: {values.reason}")
     apart = measurements.why_not(metric, group.label, base.label)
     if apart:
@@ -108,7 +108,7 @@ def _difference(
     one, other = (np.isfinite(each.values) for each in measured)
     if min(one.sum(), other.sum()) < FEWEST:
         return replace(found, reason=_TOO_FEW)
-    if metric.of_group:
+    if metric.of_dataset:
         return _described(found, *measured)
     pairs = [(i, j) for i, j in shared_seeds(group, base) if one[i] and other[j]]
     chosen = np.array(pairs).T if pairs else (np.flatnonzero(one), np.flatnonzero(other))

@@ -149,7 +149,7 @@ def metrics_panels(comparison: Comparison) -> list[Panel]:
     """Return each metric's values, one dot an episode, with mean and interval."""
     view, ranked = comparison.everything, not comparison.unlike
     metrics = {each.measure.name: each.measure for each in view.differences}.values()
-    shown = [m for m in metrics if any(v.applies for v in view.measurements.values[m.name].values())]
+    shown = [m for m in metrics if any(v.known.size for v in view.measurements.values[m.name].values())]
     return [_metric(comparison, metric, ranked) for metric in shown]
 
 
@@ -159,8 +159,8 @@ def _metric(comparison: Comparison, metric: Metric, ranked: bool) -> Panel:
     axes = new_figure(2.7, 0.42 + 0.3 * len(view.groups)).subplots()
     rng = np.random.default_rng(0)
     for row, (label, found) in enumerate(view.measurements.values[metric.name].items()):
-        if not found.applies or label in apart:
-            _say(axes, row, "not comparable" if found.applies else "does not apply")
+        if not found.known.size or label in apart:
+            _say(axes, row, "not comparable" if found.known.size else "does not apply")
         else:
             _strip(axes, found, row, known[label], rng)
     rows(axes, comparison.labels, _SMALL_LABEL)

@@ -12,7 +12,7 @@ from handrail.datasets.comparison.scores import DEMO, PEOPLE, Score, read_scores
 from handrail.datasets.quality.catalogue import METRICS
 from handrail.datasets.quality.measure import measure
 from handrail.datasets.quality.metric import metric
-from handrail.datasets.quality.pool import ObservationPool
+from handrail.datasets.quality.scale import Scale
 from handrail.datasets.reading.columns import ColumnNames
 from handrail.datasets.reading.demonstration import Demonstration, DoesNotApply
 from handrail.datasets.reading.episode import Episode
@@ -34,17 +34,17 @@ _CHOSEN = (
 )
 
 
-@metric("success", SHARE, "higher", "share of the episodes that succeeded")
-def success(episode: Demonstration, pool: ObservationPool) -> float:
-    """Return 1 for an episode that succeeded, else 0."""
+@metric(SHARE, "higher")
+def success(episode: Demonstration, scale: Scale) -> float:
+    """Share of the episodes that succeeded."""
     if episode.success is None:
         raise DoesNotApply("success was not recorded")
     return float(episode.success)
 
 
-@metric("completion_time", "s", "lower", "how long the episodes that succeeded took")
-def completion_time(episode: Demonstration, pool: ObservationPool) -> float:
-    """Return how long it took [s]; failures have none."""
+@metric("s", "lower")
+def completion_time(episode: Demonstration, scale: Scale) -> float:
+    """How long the episodes that succeeded took."""
     if not episode.success:
         raise DoesNotApply("it did not succeed")
     return episode.seconds

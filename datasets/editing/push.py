@@ -107,12 +107,12 @@ def _outcome(episodes: Sequence[Episode]) -> list[str]:
 
 def _metrics(episodes: Sequence[Episode]) -> list[list[str]]:
     """Return a row for each metric of single episodes that applies."""
-    metrics = [metric for metric in METRICS if not metric.of_group]
+    metrics = [metric for metric in METRICS if not metric.of_dataset]
     values = measure({"": episodes}, np.random.default_rng(0), metrics=metrics).values
     return [
         [metric.title, number(values[metric.name][""].mean), metric.unit or DASH, metric.meaning]
         for metric in metrics
-        if values[metric.name][""].applies
+        if values[metric.name][""].known.size
     ]
 
 

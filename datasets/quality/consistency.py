@@ -1,6 +1,6 @@
 """How alike episodes act in like situations, how much space they cover, what the state says of the action.
 
-All of these need the other episodes of a group.
+The unit of all of these is the dataset. Each takes frames that stand for it; `DoesNotApply` for too few.
 """
 
 import numpy as np
@@ -8,8 +8,8 @@ from scipy.spatial.distance import cdist
 from scipy.special import digamma, gammaln
 
 from handrail.controllers.arrays import FloatArray, IntArray
-from handrail.datasets.quality.metric import Metric
-from handrail.datasets.quality.pool import ObservationPool, Sample
+from handrail.datasets.quality.episode_set import EpisodeSet
+from handrail.datasets.quality.metric import metric
 from handrail.datasets.reading.demonstration import DoesNotApply
 
 RESOLUTION = 1e-3  # of the scale: states that are nearer are one state
@@ -18,57 +18,30 @@ _KS = (5, 6, 7)
 _BATCH = 1024
 
 
-def _action_variance(sample: Sample, pool: ObservationPool, rng: np.random.Generator) -> FloatArray:
-    states = sample.points(lambda episode: pool.observations(episode.observation))
-    actions = sample.points(lambda episode: pool.actions(episode.relative_action))
-    return action_variance(states, actions, sample.owner)
+@metric("σ²", "", "scale", of_dataset=True)
+def action_variance(dataset: EpisodeSet, rng: np.random.Generator) -> FloatArray:
+    """Spread of actions in like states of other episodes; falls with their number, no rank of quality."""
+    states = dataset.points(lambda each: dataset.scale.observations(each.observation))
+    actions = dataset.points(lambda each: dataset.scale.actions(each.relative_action))
+    return neighbour_variance(states, actions, dataset.owner)
 
 
-def _state_coverage(sample: Sample, pool: ObservationPool, rng: np.random.Generator) -> FloatArray:
-    return state_coverage(sample.points(lambda episode: pool.configurations(episode.configuration)))
+@metric("nat", "", "scale", of_dataset=True)
+def state_coverage(dataset: EpisodeSet, rng: np.random.Generator) -> FloatArray:
+    """Entropy of the configurations: too little and too much are both bad; for groups of the same size."""
+    return entropy(dataset.points(lambda each: dataset.scale.configurations(each.configuration)))
 
 
-def _information(sample: Sample, pool: ObservationPool, rng: np.random.Generator) -> FloatArray:
-    states = sample.points(lambda episode: pool.observations(episode.observation))
-    actions = sample.points(lambda episode: pool.action_components(episode.relative_action))
-    return information(states, actions, rng)
+@metric("nat", "higher", "scale", "mutual information", of_dataset=True)
+def information(dataset: EpisodeSet, rng: np.random.Generator) -> FloatArray:
+    """What the state says about the action (DemInf): varied and predictable at once."""
+    states = dataset.points(lambda each: dataset.scale.observations(each.observation))
+    actions = dataset.points(lambda each: dataset.scale.action_components(each.relative_action))
+    return mutual_information(states, actions, rng)
 
 
-GROUP_METRICS = (
-    Metric(
-        "action_variance",
-        "action variance",
-        "σ²",
-        "",
-        "spread of actions that other episodes took in like states; falls with more episodes, and is not"
-        " monotone in quality",
-        "pool",
-        measure_group=_action_variance,
-    ),
-    Metric(
-        "state_coverage",
-        "state coverage",
-        "nat",
-        "",
-        "entropy of the configurations: more is more varied, too little and too much are both bad; for groups"
-        " of the same size",
-        "pool",
-        measure_group=_state_coverage,
-    ),
-    Metric(
-        "information",
-        "mutual information",
-        "nat",
-        "higher",
-        "what the state says about the action (DemInf): varied and predictable at once",
-        "pool",
-        measure_group=_information,
-    ),
-)
-
-
-def action_variance(states: FloatArray, actions: FloatArray, owner: IntArray) -> FloatArray:
-    """Return tr Cov(a_j : j ∈ 5NN(s_i)), neighbours from other episodes, for each frame i.
+def neighbour_variance(states: FloatArray, actions: FloatArray, owner: IntArray) -> FloatArray:
+    """Return tr Cov(a_j : j ∈ 5NN(s_i)), neighbours from other episodes, for each frame i, `(N,)`.
 
     The dataset's value is the mean over the frames. With actions of unit variance that do not depend on the
     state it is their dimension; where the state alone decides, it goes to zero with the frames' distance.
@@ -77,14 +50,8 @@ def action_variance(states: FloatArray, actions: FloatArray, owner: IntArray) ->
 
     Args:
         states: `(N, s)`, on one scale.
-        actions: `(N, a)`, on one scale.
-        owner: Which episode a frame is from, `(N,)`.
-
-    Returns:
-        `(N,)`, in units of the pooled variance; NaN where other episodes have too few frames.
-
-    Raises:
-        DoesNotApply: There is only one episode.
+        actions: `(N, a)`, on one scale: the result is in units of the pooled variance.
+        owner: Which episode a frame is from, `(N,)`; NaN results where the others have too few frames.
     """
     if len(np.unique(owner)) < 2:
         raise DoesNotApply("there is only one episode")
@@ -93,22 +60,14 @@ def action_variance(states: FloatArray, actions: FloatArray, owner: IntArray) ->
     return np.where(np.isfinite(radius), spread, np.nan)
 
 
-def state_coverage(states: FloatArray) -> FloatArray:
-    """Return each frame's part of the Kozachenko–Leonenko entropy of the states; the dataset's is the mean.
+def entropy(states: FloatArray) -> FloatArray:
+    """Return each frame's part of the entropy of states `(N, d)` [nat], `(N,)`; the dataset's is the mean.
 
-    H = ψ(N) − ψ(k) + log c_d + d · mean_i log r_k(i), c_d the volume of the unit ball and r_k the distance
-    to the k-th neighbour, the fifth: 0 for a uniform unit cube, more where more is covered. Its relation to
-    quality is an inverted U. States nearer than a thousandth of the scale count as that far apart, since a
-    robot at rest would make the entropy −∞. Source: Kozachenko & Leonenko 1987; Kraskov et al. 2004, eq. 20.
-
-    Args:
-        states: `(N, d)`, on one scale.
-
-    Returns:
-        `(N,)` [nat].
-
-    Raises:
-        DoesNotApply: There are too few frames.
+    Kozachenko–Leonenko: H = ψ(N) − ψ(k) + log c_d + d · mean_i log r_k(i), c_d the volume of the unit ball
+    and r_k the distance to the k-th neighbour, the fifth: 0 for a uniform unit cube, more where more is
+    covered. Its relation to quality is an inverted U. States nearer than a thousandth of the scale count as
+    that far apart, since a robot at rest would make the entropy −∞. Source: Kozachenko & Leonenko 1987;
+    Kraskov et al. 2004, eq. 20.
     """
     count, size = states.shape
     radius = np.maximum(_nearest(states, np.arange(count))[1], RESOLUTION)
@@ -116,8 +75,8 @@ def state_coverage(states: FloatArray) -> FloatArray:
     return digamma(count) - digamma(_NEIGHBOURS) + ball + size * np.log(radius)
 
 
-def information(states: FloatArray, actions: FloatArray, rng: np.random.Generator) -> FloatArray:
-    """Return each frame's part of the mutual information I(s; a), clipped to its 1st to 99th percentile.
+def mutual_information(states: FloatArray, actions: FloatArray, rng: np.random.Generator) -> FloatArray:
+    """Return each frame's part of I(s; a) [nat], `(N,)`, clipped to its 1st to 99th percentile.
 
     Î = ψ(k) + ψ(N) − ⟨ψ(n_s + 1) + ψ(n_a + 1)⟩, the first estimator of Kraskov, Stögbauer & Grassberger
     2004, in random batches of about 1024 frames and averaged over k = 5, 6, 7. Its mean over an episode is
@@ -128,12 +87,6 @@ def information(states: FloatArray, actions: FloatArray, rng: np.random.Generato
         states: `(N, s)`, on one scale; few dimensions, since the estimate falls short in many.
         actions: `(N, a)`, on one scale; relative ones work best.
         rng: Of the batches.
-
-    Returns:
-        `(N,)` [nat].
-
-    Raises:
-        DoesNotApply: There are too few frames.
     """
     if len(states) <= max(_KS) + 1:
         raise DoesNotApply(f"there are only {len(states)} frames")

@@ -10,98 +10,81 @@ import numpy as np
 
 from handrail.controllers.arrays import FloatArray
 from handrail.datasets.quality.metric import metric
-from handrail.datasets.quality.pool import ObservationPool
+from handrail.datasets.quality.scale import Scale
 from handrail.datasets.reading.demonstration import Demonstration, DoesNotApply
 
 _LATE = 95.0  # percentile
 DEAD_BAND = 0.05  # of full deflection: below it an axis is not in use
 
 
-@metric("input_effort", "s", "lower", "seconds of full deflection, input axes added up", "pool")
-def input_effort(episode: Demonstration, pool: ObservationPool) -> float:
-    """Return Σ_i ∫ |u_i| / scale_i dt [s]."""
-    return float(np.abs(_deflection(episode, pool)).sum()) / episode.fps
+@metric("s", "lower", "scale")
+def input_effort(episode: Demonstration, scale: Scale) -> float:
+    """Seconds of full deflection, input axes added up.
+
+    Σ_i ∫ |u_i| / scale_i dt [s].
+    """
+    return float(np.abs(_deflection(episode, scale)).sum()) / episode.fps
 
 
-@metric("input_reversals", "", "lower", "how often an input axis changed its sign", "pool")
-def input_reversals(episode: Demonstration, pool: ObservationPool) -> float:
-    """Return how often an axis changed its sign, axes added up; what is below 5 % of full is passed over."""
-    deflection = _deflection(episode, pool)
+@metric("", "lower", "scale")
+def input_reversals(episode: Demonstration, scale: Scale) -> float:
+    """How often an input axis changed its sign.
+
+    Axes added up; what is below 5 % of full deflection is passed over.
+    """
+    deflection = _deflection(episode, scale)
     signs = np.where(np.abs(deflection) >= DEAD_BAND, np.sign(deflection), 0.0)
     return float(sum(np.count_nonzero(np.diff(axis[axis != 0])) for axis in signs.T))
 
 
-@metric(
-    "mode_switches", "", "lower", "how often the mode, or the set of axes that the operator owned, changed"
-)
-def mode_switches(episode: Demonstration, pool: ObservationPool) -> float:
-    """Return how often either changed; one of them is enough."""
-    changed = [_changes(episode.column(part)) for part in ("mode", "owned") if episode.has(part)]
-    if not changed:
+@metric("", "lower")
+def mode_switches(episode: Demonstration, scale: Scale) -> float:
+    """How often the mode, or the set of axes that the operator owned, changed."""
+    parts = [episode.column(part) for part in ("mode", "owned") if episode.has(part)]
+    if not parts:
         raise DoesNotApply("no column of the mode or of the axes that the operator owned")
+    rows = [part.reshape(len(part), -1) for part in parts]
+    changed = [(each[1:] != each[:-1]).any(axis=1) for each in rows]
     return float(np.count_nonzero(np.any(changed, axis=0)))
 
 
-@metric(
-    "active_axes",
-    "",
-    "lower",
-    "mean number of input axes in use at a time",
-    "pool",
-    title="active input axes",
-)
-def active_axes(episode: Demonstration, pool: ObservationPool) -> float:
-    """Return the mean number of axes that are above 5 % of full deflection at a time."""
-    return float((np.abs(_deflection(episode, pool)) >= DEAD_BAND).sum(axis=1).mean())
+@metric("", "lower", "scale", "active input axes")
+def active_axes(episode: Demonstration, scale: Scale) -> float:
+    """Mean number of input axes in use at a time."""
+    return float((np.abs(_deflection(episode, scale)) >= DEAD_BAND).sum(axis=1).mean())
 
 
-@metric(
-    "input_idle", "", "lower", "share of time with no input axis in use", "pool", title="hands off the input"
-)
-def input_idle(episode: Demonstration, pool: ObservationPool) -> float:
-    """Return the share of frames in which no axis is above 5 % of full deflection, 0 to 1."""
-    return float((np.abs(_deflection(episode, pool)) < DEAD_BAND).all(axis=1).mean())
+@metric("", "lower", "scale", "hands off the input")
+def input_idle(episode: Demonstration, scale: Scale) -> float:
+    """Share of time with no input axis in use."""
+    return float((np.abs(_deflection(episode, scale)) < DEAD_BAND).all(axis=1).mean())
 
 
-def _changes(values: np.ndarray) -> np.ndarray:
-    rows = values.reshape(len(values), -1)
-    return (rows[1:] != rows[:-1]).any(axis=1)
-
-
-def _deflection(episode: Demonstration, pool: ObservationPool) -> FloatArray:
-    used = pool.input_scale > 0
+def _deflection(episode: Demonstration, scale: Scale) -> FloatArray:
+    used = scale.input_scale > 0
     if not used.any():
         raise DoesNotApply("no input axis was ever used")
-    return episode.inputs[:, used] / pool.input_scale[used]
+    return episode.inputs[:, used] / scale.input_scale[used]
 
 
-@metric("undos", "", "lower", "how often the operator went back to a checkpoint")
-def undos(episode: Demonstration, pool: ObservationPool) -> float:
-    """Return how often they did in an episode that was kept."""
+@metric("", "lower")
+def undos(episode: Demonstration, scale: Scale) -> float:
+    """How often the operator went back to a checkpoint."""
     return float(_of_person(episode, "undos").max())
 
 
-@metric(
-    "input_age",
-    "s",
-    "lower",
-    "age of the input when it became a command, 95th percentile",
-    title="age of the input",
-)
-def input_age(episode: Demonstration, pool: ObservationPool) -> float:
-    """Return the 95th percentile of `teleop.age` over the frames [s]."""
+@metric("s", "lower", title="age of the input")
+def input_age(episode: Demonstration, scale: Scale) -> float:
+    """Age of the input when it became a command, 95th percentile."""
     return float(np.percentile(_of_person(episode, "age"), _LATE))
 
 
-@metric(
-    "round_trip",
-    "s",
-    "lower",
-    "from the picture to the answer to it, 95th percentile",
-    title="round trip",
-)
-def round_trip(episode: Demonstration, pool: ObservationPool) -> float:
-    """Return the 95th percentile of `teleop.round_trip` over the frames that have one [s]."""
+@metric("s", "lower")
+def round_trip(episode: Demonstration, scale: Scale) -> float:
+    """From the picture to the answer to it, 95th percentile.
+
+    Of the frames that have one.
+    """
     known = _of_person(episode, "round_trip")
     known = known[known > 0.0]
     if not known.size:

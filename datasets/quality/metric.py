@@ -1,46 +1,45 @@
-"""A quality metric: what it is called, its unit, what it means, and how it is measured."""
+"""A quality metric: its name, unit and meaning, what its unit hangs on, and how it is measured."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
-import numpy as np
-
-from handrail.controllers.arrays import FloatArray
-from handrail.datasets.quality.pool import ObservationPool, Sample
-from handrail.datasets.reading.demonstration import Demonstration
 from handrail.datasets.statistics.contrast import Measure
 
-Needs = Literal["", "motion", "position", "action", "controller", "pool"]
-OfEpisode = Callable[[Demonstration, ObservationPool], float]
-OfGroup = Callable[[Sample, ObservationPool, np.random.Generator], FloatArray]
+Needs = Literal["", "motion", "position", "action", "controller", "scale"]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Metric(Measure):
-    """A measure of quality.
+    """A measure of recorded data; its unit is an episode, or a whole dataset."""
 
-    Attributes:
-        needs: What its unit hangs on, see `units.why_not`; "" where it has a unit of its own; "pool" for
-            whatever looks at more of the pool than its margin.
-        measure: Its value for one episode, or None.
-        measure_group: Its values for frames that stand for a dataset, for what needs the other episodes; or
-            None. Such values depend on how many there are and, through shared neighbours, on each other.
-    """
-
+    measure: Callable[..., Any]
+    """Of an episode `(Demonstration, Scale) -> float`; of a dataset `(EpisodeSet, rng) -> (N,)` frames."""
     needs: Needs = ""
-    measure: OfEpisode | None = None
-    measure_group: OfGroup | None = None
-
-    @property
-    def of_group(self) -> bool:
-        """Whether an episode's value depends on the other episodes of its group."""
-        return self.measure_group is not None
+    """What its unit hangs on, see `units.why_not`: "" for nothing."""
+    of_dataset: bool = False
+    """Whether an episode's value depends on the others, on their number and on neighbours that they share."""
 
 
 def metric(
-    name: str, unit: str, good: str, meaning: str, needs: Needs = "", title: str = ""
-) -> Callable[[OfEpisode], Metric]:
-    """Return what makes a metric of the function that measures it; its title is its name if not given."""
-    called = title or name.replace("_", " ")
-    return lambda measure: Metric(name, called, unit, good, meaning, needs, measure)
+    unit: str = "", good: str = "", needs: Needs = "", title: str = "", of_dataset: bool = False
+) -> Callable[[Callable[..., Any]], Metric]:
+    """Return what makes a metric of the function that measures it.
+
+    Its name is the function's, its meaning the docstring's first line, its title the name if not given.
+    """
+
+    def made(measure: Callable[..., Any]) -> Metric:
+        name, meaning = measure.__name__, (measure.__doc__ or "").partition("\n")[0].rstrip(".")
+        return Metric(
+            name=name,
+            title=title or name.replace("_", " "),
+            unit=unit,
+            good=good,
+            meaning=meaning[:1].lower() + meaning[1:],
+            measure=measure,
+            needs=needs,
+            of_dataset=of_dataset,
+        )
+
+    return made

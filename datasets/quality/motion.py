@@ -3,9 +3,9 @@
 import numpy as np
 
 from handrail.controllers.arrays import BoolArray, FloatArray, IntArray
+from handrail.datasets.quality import metrics
 from handrail.datasets.quality.metric import metric
-from handrail.datasets.quality.metrics import ldlj, path_length, sparc
-from handrail.datasets.quality.pool import ObservationPool
+from handrail.datasets.quality.scale import Scale
 from handrail.datasets.reading.demonstration import Demonstration, DoesNotApply
 
 WINDOW = 0.5  # [s]
@@ -15,74 +15,41 @@ _LOW, _HIGH = 0.25, 0.75  # of the gripper's range: where it counts as closed an
 _STILL = 1e-9  # a path shorter than this is no path, in the unit of the motion
 
 
-@metric(
-    "length", "s", "lower", "how long an episode took, which is the operator's time", title="episode length"
-)
-def length(episode: Demonstration, pool: ObservationPool) -> float:
-    """Return frames over frames a second [s]."""
+@metric("s", "lower", title="episode length")
+def length(episode: Demonstration, scale: Scale) -> float:
+    """How long an episode took, which is the operator's time."""
     return episode.seconds
 
 
-@metric(
-    "sparc",
-    "",
-    "higher",
-    "spectral arc length of the speed: minimum jerk −1.4, more negative is less smooth",
-    "motion",
-    title="smoothness (SPARC)",
-)
-def smoothness(episode: Demonstration, pool: ObservationPool) -> float:
-    """Return the measure of `metrics.sparc`."""
-    return _known(sparc(episode.speed, episode.fps))
+@metric("", "higher", "motion", "smoothness (SPARC)")
+def sparc(episode: Demonstration, scale: Scale) -> float:
+    """Spectral arc length of the speed: minimum jerk −1.4, more negative is less smooth."""
+    return _known(metrics.sparc(episode.speed, episode.fps))
 
 
-@metric(
-    "ldlj",
-    "",
-    "higher",
-    "log dimensionless jerk of the speed: minimum jerk −5.2; very sensitive to noise",
-    "motion",
-    title="smoothness (LDLJ)",
-)
-def jerkiness(episode: Demonstration, pool: ObservationPool) -> float:
-    """Return the measure of `metrics.ldlj`."""
-    return _known(ldlj(episode.speed, episode.fps))
+@metric("", "higher", "motion", "smoothness (LDLJ)")
+def ldlj(episode: Demonstration, scale: Scale) -> float:
+    """Log dimensionless jerk of the speed: minimum jerk −5.2; very sensitive to noise."""
+    return _known(metrics.ldlj(episode.speed, episode.fps))
 
 
-@metric(
-    "path_efficiency", "", "higher", "straight-line over travelled distance, each phase on its own", "motion"
-)
-def directness(episode: Demonstration, pool: ObservationPool) -> float:
-    """Return the measure of `path_efficiency` of what moves."""
-    return path_efficiency(episode.motion, phase_boundaries(episode))
+@metric("", "higher", "motion")
+def path_efficiency(episode: Demonstration, scale: Scale) -> float:
+    """Straight-line over travelled distance, each phase on its own."""
+    return straightness(episode.motion, phase_boundaries(episode))
 
 
-@metric(
-    "idle_raw",
-    "",
-    "lower",
-    "share of time with hardly any net motion within 0.5 s",
-    "position",
-    title="idle, whole episode",
-)
-def idle_raw(episode: Demonstration, pool: ObservationPool) -> float:
-    """Return the share of windows that are idle, see `idle_windows`."""
+@metric("", "lower", "position", "idle, whole episode")
+def idle_raw(episode: Demonstration, scale: Scale) -> float:
+    """Share of time with hardly any net motion within 0.5 s."""
     return float(idle_windows(episode.motion, episode.fps).mean())
 
 
-@metric(
-    "idle_pruned",
-    "",
-    "lower",
-    "the same up to the last motion",
-    "position",
-    title="idle, before the final hold",
-)
-def idle_pruned(episode: Demonstration, pool: ObservationPool) -> float:
-    """Return the share without the idle time at the very end.
+@metric("", "lower", "position", "idle, before the final hold")
+def idle_pruned(episode: Demonstration, scale: Scale) -> float:
+    """The same up to the last motion.
 
-    Source: the definition of Handrail's own reference, after the pruning of pauses that imitation learning
-    code commonly does.
+    Source: Handrail's own reference, after the pruning of pauses that imitation learning commonly does.
     """
     idle = idle_windows(episode.motion, episode.fps)
     moving = np.flatnonzero(~idle)
@@ -100,17 +67,8 @@ def _known(value: float) -> float:
 def idle_windows(positions: FloatArray, fps: float) -> BoolArray:
     """Return which windows of 0.5 s are idle: ‖x(t + 0.5 s) − x(t)‖ < max(5 mm, 0.2 · p95).
 
-    p95 is the 95th percentile of the same net motion in the episode.
-
-    Args:
-        positions: `(N, d)`, any unit.
-        fps: Frames a second [Hz].
-
-    Returns:
-        For each window, by its first frame, `(N − w,)`.
-
-    Raises:
-        DoesNotApply: The episode is not longer than a window.
+    By their first frame, `(N − w,)`. p95 is the 95th percentile of the same net motion in the episode;
+    `positions` is `(N, d)`. `DoesNotApply` where the episode is not longer than a window.
     """
     width = max(1, round(WINDOW * fps))
     if len(positions) <= width:
@@ -119,24 +77,21 @@ def idle_windows(positions: FloatArray, fps: float) -> BoolArray:
     return net < max(FLOOR, SHARE * float(np.percentile(net, 95)))
 
 
-def path_efficiency(positions: FloatArray, boundaries: IntArray) -> float:
-    """Return straight-line over travelled distance, each phase on its own: 1 is straight, 0 goes nowhere.
+def straightness(positions: FloatArray, boundaries: IntArray) -> float:
+    """Return Σ_p ‖x(end_p) − x(start_p)‖ / Σ_p ∫_p ‖dx‖ over phases p: 1 is straight, 0 goes nowhere.
 
-    Σ_p ‖x(end_p) − x(start_p)‖ / Σ_p ∫_p ‖dx‖. Source: the straightness index of movement analysis
-    (Batschelet 1981), summed over phases so that there-and-back is not zero.
+    Source: the straightness index of movement analysis (Batschelet 1981), summed over phases so that
+    there-and-back is not zero.
 
     Args:
         positions: `(N, d)`, any unit.
         boundaries: Frames at which a phase ends and the next begins, `(P,)`, rising.
-
-    Raises:
-        DoesNotApply: Nothing moves.
     """
     ends = np.unique(np.concatenate(([0], boundaries, [len(positions) - 1])))
-    travelled = path_length(positions)
+    travelled = metrics.path_length(positions)
     if travelled <= _STILL:
         raise DoesNotApply("nothing moves")
-    return path_length(positions[ends]) / travelled
+    return metrics.path_length(positions[ends]) / travelled
 
 
 def phase_boundaries(episode: Demonstration) -> IntArray:

@@ -1,7 +1,4 @@
-"""One line an episode: what was done, how it ended, how smooth and how safe it was.
-
-What a dataset does not hold stays None and is shown as "–", so that any LeRobot dataset can be looked at.
-"""
+"""One line an episode: how it went and how it ended; what a dataset does not hold is None, shown as "–"."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,79 +10,53 @@ from handrail.datasets.format.columns import CLIENT
 from handrail.datasets.quality import motion, safety
 from handrail.datasets.quality.metric import Metric
 from handrail.datasets.quality.metrics import corrections, high_frequency_content, rate_of_change
-from handrail.datasets.quality.pool import ObservationPool
+from handrail.datasets.quality.scale import Scale
 from handrail.datasets.reading.demonstration import Demonstration, DoesNotApply
 from handrail.datasets.reading.load import each_demonstration
 
 UNKNOWN = "–"
-CHATTERING = (
-    "rate of change",
-    "high-frequency content",
-    "corrections",
-)  # a table of its own
+CHATTERING = ("rate of change", "high-frequency content", "corrections")  # a table of its own
 ASKED, OWNED = "teleop.values", "teleop.mask"
 
 
 @dataclass(frozen=True)
 class EpisodeSummary:
-    """One episode at a glance.
-
-    Attributes:
-        episode: Its number.
-        task: Its task sentences, joined by "; ".
-        mode: Its teleop modes, in the order in which they first occur, joined by " → ".
-        success: How it ended.
-        failure_reason: Why it failed.
-        length: Duration [s].
-        smallest_distance: Smallest distance to a collision [m].
-        smoothness: SPARC of the tool's speed, or else of the configuration's.
-        contacts: How many unwanted contacts began.
-        rate_of_change: Of the commanded velocities, see `metrics.rate_of_change`.
-        high_frequency_content: Of the commanded velocities, see `metrics.high_frequency_content`.
-        corrections: How often the command began or ceased to differ from what was asked, on the joints that
-            the operator commanded one by one; None without any: what is not commanded is not corrected.
-        robot_client: The robot of LeRobot's that was driven through its client; None if it was none.
-    """
+    """One episode at a glance."""
 
     episode: int
-    task: str
-    mode: str | None
+    task: str  # sentences, joined by "; "
+    mode: str | None  # teleop modes in the order in which they first occur, joined by " → "
     success: bool | None
     failure_reason: str | None
-    length: float
-    smallest_distance: float | None
-    smoothness: float | None
-    contacts: int | None
-    rate_of_change: float | None
-    high_frequency_content: float | None
-    corrections: int | None
-    robot_client: str | None = None
+    length: float  # [s]
+    smallest_distance: float | None  # to a collision [m]
+    smoothness: float | None  # SPARC of the tool's speed, or else of the configuration's
+    contacts: int | None  # unwanted ones that began
+    rate_of_change: float | None  # of the commanded velocities, see `metrics`
+    high_frequency_content: float | None  # of the commanded velocities, see `metrics`
+    corrections: int | None  # see `metrics`; of the joints that were commanded one by one, None without any
+    robot_client: str | None = None  # LeRobot's client that drove the robot
 
     def cells(self) -> dict[str, str]:
         """Return the line as text, by heading."""
-        success = None if self.success is None else ("yes" if self.success else "no")
         return {
             "episode": str(self.episode),
             "task": self.task or UNKNOWN,
             "mode": self.mode or UNKNOWN,
-            "success": success or UNKNOWN,
+            "success": {None: UNKNOWN, True: "yes", False: "no"}[self.success],
             "why not": self.failure_reason or UNKNOWN,
             "length [s]": f"{self.length:.1f}",
-            "smallest distance [m]": _number(self.smallest_distance, "{:.3f}"),
-            "smoothness": _number(self.smoothness, "{:.2f}"),
-            "contacts begun": _number(self.contacts, "{:d}"),
-            "rate of change": _number(self.rate_of_change, "{:.2f}"),
-            "high-frequency content": _number(self.high_frequency_content, "{:.2f}"),
-            "corrections": _number(self.corrections, "{:d}"),
+            "smallest distance [m]": _number(self.smallest_distance, ".3f"),
+            "smoothness": _number(self.smoothness, ".2f"),
+            "contacts begun": _number(self.contacts, "d"),
+            "rate of change": _number(self.rate_of_change, ".2f"),
+            "high-frequency content": _number(self.high_frequency_content, ".2f"),
+            "corrections": _number(self.corrections, "d"),
         }
 
 
 def summarize(root: str | Path) -> list[EpisodeSummary]:
-    """Return one summary an episode, in order.
-
-    Args:
-        root: The folder of any LeRobot v3.0 dataset.
-    """
+    """Return one summary an episode of any LeRobot v3.0 dataset, in order."""
     return [_summary(episode) for episode in each_demonstration(root)]
 
 
@@ -99,7 +70,7 @@ def _summary(episode: Demonstration) -> EpisodeSummary:
         failure_reason=episode.meta.get("failure_reason") or None,
         length=episode.seconds,
         smallest_distance=_measured(safety.smallest_distance, episode),
-        smoothness=_measured(motion.smoothness, episode),
+        smoothness=_measured(motion.sparc, episode),
         contacts=None if contacts is None else int(contacts),
         rate_of_change=_known(rate_of_change(commands, episode.fps)),
         high_frequency_content=_known(high_frequency_content(commands, episode.fps)),
@@ -110,7 +81,7 @@ def _summary(episode: Demonstration) -> EpisodeSummary:
 
 def _measured(metric: Metric, episode: Demonstration) -> float | None:
     try:
-        return metric.measure(episode, ObservationPool()) if metric.measure else None
+        return metric.measure(episode, Scale())
     except DoesNotApply:
         return None
 
@@ -128,12 +99,9 @@ def _corrections(episode: Demonstration) -> int | None:
     if not episode.has("action") or any(each.dtype.kind not in "fiub" or not each.size for each in given):
         return None
     channels = {name: index for index, name in enumerate(episode.info.features[ASKED].names or ())}
-    joints = [
-        (index, channels[f"joint.{name.removeprefix('v_')}"])
-        for index, name in enumerate(episode.entries("action"))
-        if f"joint.{name.removeprefix('v_')}" in channels
-    ]
-    sent, places = np.array(joints, dtype=int).reshape(-1, 2).T
+    joints = [f"joint.{name.removeprefix('v_')}" for name in episode.entries("action")]
+    sent = [index for index, name in enumerate(joints) if name in channels]
+    places = [channels[joints[index]] for index in sent]
     asked, owned = (each[:, places] for each in given)
     return corrections(asked, episode.numbers("action")[:, sent], owned) if owned.any() else None
 
@@ -143,4 +111,4 @@ def _known(value: float) -> float | None:
 
 
 def _number(value: float | None, pattern: str) -> str:
-    return UNKNOWN if value is None else pattern.format(value)
+    return UNKNOWN if value is None else format(value, pattern)

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray
-from handrail.datasets.quality.group_reading import GroupReading
+from handrail.datasets.quality.episode_set import EpisodeSet
 from handrail.datasets.quality.metric import Needs
 from handrail.datasets.reading.demonstration import Demonstration, DoesNotApply
 from handrail.datasets.reading.naming import quantity
@@ -24,21 +24,18 @@ _PARTS = ("state", "action", "asked")
 _OTHER_MODES = "the modes differ, so the controllers and their soft limits may"
 
 
-def why_not(needs: Needs, one: GroupReading, other: GroupReading) -> str:
+def why_not(needs: Needs, one: EpisodeSet, other: EpisodeSet) -> str:
     """Return why a metric's values of two groups cannot be compared; "" if they can.
 
-    Args:
-        needs: What the metric's unit hangs on: nothing; what moves; the unit of that as well; what the action
-            commands; whose soft limits were given up; or everything that is put on one scale.
-        one: Episodes of one dataset; that they were read is asked of them for the controller alone.
-        other: Of the other.
+    `needs` is what its unit hangs on: nothing; what moves; the unit of that as well; what the action
+    commands; whose soft limits were given up (the groups must have been read); or everything on one scale.
     """
     if needs == "controller":
         return "" if one.modes == other.modes else _OTHER_MODES
     if not needs or one.episodes[0].info.root == other.episodes[0].info.root:
         return ""
     try:
-        if needs == "pool":
+        if needs == "scale":
             return _on_one_scale(one, other)
         if needs == "action":
             return _numbers("action", one, other) or _followed(one, other)
@@ -50,7 +47,7 @@ def why_not(needs: Needs, one: GroupReading, other: GroupReading) -> str:
         return str(error)
 
 
-def _on_one_scale(one: GroupReading, other: GroupReading) -> str:
+def _on_one_scale(one: EpisodeSet, other: EpisodeSet) -> str:
     if _columns(one.first) != _columns(other.first):
         return "the datasets have different columns, so there is no common scale"
     parts = [part for part in _PARTS if one.first.has(part)]
@@ -64,7 +61,7 @@ def _columns(episode: Demonstration) -> tuple[object, ...]:
     return tuple((name, episode.frames[name].shape[1:], episode.info.features[name].names) for name in names)
 
 
-def _numbers(part: str, one: GroupReading, other: GroupReading) -> str:
+def _numbers(part: str, one: EpisodeSet, other: EpisodeSet) -> str:
     """Return why the numbers of a part are not known to be in the same unit."""
     first, second = one.first, other.first
     names = first.entries(part), second.entries(part)
@@ -89,7 +86,7 @@ def _numbers(part: str, one: GroupReading, other: GroupReading) -> str:
     return ""
 
 
-def _followed(one: GroupReading, other: GroupReading) -> str:
+def _followed(one: EpisodeSet, other: EpisodeSet) -> str:
     """Return why commands and what follows them are not the same thing, or not in the same unit."""
     if one.first.fps != other.first.fps:
         return "the frame rates differ, and what follows a command is measured a frame later"

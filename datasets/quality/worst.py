@@ -22,12 +22,7 @@ RANKING = {metric.name: metric for metric in METRICS if metric.good}
 
 @dataclass(frozen=True)
 class Ranked:
-    """An episode and its value.
-
-    Attributes:
-        episode: Which.
-        value: Of the metric.
-    """
+    """An episode and its value of a metric."""
 
     episode: Episode
     value: float
@@ -48,7 +43,7 @@ def worst_episodes(root: str | Path, metric: Metric, count: int) -> list[Ranked]
     if not episodes:
         raise HandrailError(f"dataset {str(root)!r}: expected an episode or more, found none")
     measured = measure({"": episodes}, np.random.default_rng(0), metrics=[metric]).values[metric.name][""]
-    if not measured.applies:
+    if measured.mean is None:
         raise HandrailError(
             f"--worst {metric.name}: expected a value of an episode, got none: {measured.reason}"
         )
@@ -56,18 +51,9 @@ def worst_episodes(root: str | Path, metric: Metric, count: int) -> list[Ranked]
 
 
 def ranked(episodes: Sequence[Episode], metric: Metric, values: FloatArray) -> list[Ranked]:
-    """Return episodes from the worst to the best; those without a value are left out.
-
-    Args:
-        episodes: Of a dataset.
-        metric: One of which one end is better.
-        values: `(E,)`, NaN where it does not apply.
-    """
-    known = [
-        Ranked(episode, float(value))
-        for episode, value in zip(episodes, values, strict=True)
-        if np.isfinite(value)
-    ]
+    """Return episodes from the worst to the best by their values, `(E,)`; those with NaN are left out."""
+    pairs = zip(episodes, values, strict=True)
+    known = [Ranked(episode, float(value)) for episode, value in pairs if np.isfinite(value)]
     sign = 1.0 if metric.good == "higher" else -1.0
     return sorted(known, key=lambda each: (sign * each.value, each.episode.number))
 

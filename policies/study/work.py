@@ -45,7 +45,9 @@ def summary(root: Path, seed: int) -> dict[str, Any]:
         "frames": sum(episode.count for episode in episodes),
         "reasons": dict(Counter(str(reason or "not recorded") for reason in failed).most_common()),
         "digest": digest_of_dataset(root),
-        "quality": {name: each["all"].mean for name, each in measured.items() if each["all"].applies},
+        "quality": {
+            name: each["all"].mean for name, each in measured.items() if each["all"].mean is not None
+        },
     }
 
 

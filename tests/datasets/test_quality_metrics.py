@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from handrail.datasets.format.schema import Feature
 from handrail.datasets.quality import effort, motion, safety, tracking
-from handrail.datasets.quality.consistency import action_variance, information, state_coverage
+from handrail.datasets.quality.consistency import entropy, mutual_information, neighbour_variance
 from handrail.datasets.reading.columns import ColumnNames
 from handrail.datasets.reading.demonstration import Demonstration, DoesNotApply
 from handrail.datasets.reading.reader import DatasetInfo
@@ -37,27 +37,27 @@ def value(metric, pool=None, fps=10, **parts):
 def test_half_a_circle_is_two_over_pi_efficient():
     angle = np.linspace(0.0, np.pi, 2001)
     half = np.column_stack([np.cos(angle), np.sin(angle)])
-    assert motion.path_efficiency(half, NONE) == pytest.approx(2 / np.pi, rel=1e-6)
+    assert motion.straightness(half, NONE) == pytest.approx(2 / np.pi, rel=1e-6)
 
 
 def test_phases_are_judged_one_by_one():
     corner = np.array([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [2.0, 1.0], [2.0, 2.0]])
-    assert motion.path_efficiency(corner, NONE) == pytest.approx(np.sqrt(8) / 4)
-    assert motion.path_efficiency(corner, np.array([2])) == pytest.approx(1.0)
+    assert motion.straightness(corner, NONE) == pytest.approx(np.sqrt(8) / 4)
+    assert motion.straightness(corner, np.array([2])) == pytest.approx(1.0)
 
 
 def test_out_and_back_is_not_zero():
     there = np.linspace([0.0, 0.0, 0.0], [1.0, 2.0, 3.0], 30)
     back = np.vstack([there, there[::-1]])
-    assert motion.path_efficiency(back, NONE) == pytest.approx(0.0, abs=1e-12)
-    assert motion.path_efficiency(back, motion.farthest(back)) == pytest.approx(1.0)
+    assert motion.straightness(back, NONE) == pytest.approx(0.0, abs=1e-12)
+    assert motion.straightness(back, motion.farthest(back)) == pytest.approx(1.0)
 
 
 @given(st.integers(0, 10_000), st.integers(0, 5))
 def test_efficiency_is_a_share_and_more_phases_never_lower_it(seed, count):
     walk = np.cumsum(rng(seed).normal(size=(40, 3)), axis=0)
     boundaries = np.sort(rng(seed).choice(40, count, replace=False))
-    whole, parts = motion.path_efficiency(walk, NONE), motion.path_efficiency(walk, boundaries)
+    whole, parts = motion.straightness(walk, NONE), motion.straightness(walk, boundaries)
     assert 0.0 <= whole <= parts + 1e-12
     assert parts <= 1.0 + 1e-12
 
@@ -70,7 +70,7 @@ def test_the_gripper_changes_where_it_is_sure():
 
 def test_nothing_moves():
     with pytest.raises(DoesNotApply, match="nothing moves"):
-        motion.path_efficiency(np.zeros((9, 3)), NONE)
+        motion.straightness(np.zeros((9, 3)), NONE)
     with pytest.raises(DoesNotApply, match="nothing moves"):
         value(motion.idle_pruned, fps=20, state=np.zeros((99, 3)))
 
@@ -99,14 +99,14 @@ def test_actions_that_do_not_depend_on_the_state_vary_by_their_dimension():
     """Golden: unit normal actions in three dimensions, whatever the state: trace 3."""
     states, actions = rng().normal(size=(3000, 2)), rng(1).normal(size=(3000, 3))
     owner = np.repeat(np.arange(30), 100)
-    assert action_variance(states, actions, owner).mean() == pytest.approx(3.0, rel=0.05)
-    assert action_variance(states, 2.0 * actions, owner).mean() == pytest.approx(12.0, rel=0.05)
+    assert neighbour_variance(states, actions, owner).mean() == pytest.approx(3.0, rel=0.05)
+    assert neighbour_variance(states, 2.0 * actions, owner).mean() == pytest.approx(12.0, rel=0.05)
 
 
 def test_actions_that_the_state_decides_hardly_vary():
     states = rng().uniform(size=(3000, 2))
     owner = np.repeat(np.arange(30), 100)
-    assert action_variance(states, states, owner).mean() < 2e-3
+    assert neighbour_variance(states, states, owner).mean() < 2e-3
 
 
 def test_neighbours_are_from_other_episodes():
@@ -114,15 +114,15 @@ def test_neighbours_are_from_other_episodes():
     states = np.repeat([[0.0], [1.0]], 20, axis=0) + 1e-3 * rng().normal(size=(40, 1))
     owner = np.repeat([0, 1], 20)
     actions = owner[:, None] * rng(1).normal(size=(40, 1))
-    variance = action_variance(states, actions, owner)
+    variance = neighbour_variance(states, actions, owner)
     assert variance[:20].min() > 0.0
     assert variance[20:].max() == 0.0
     with pytest.raises(DoesNotApply, match="only one episode"):
-        action_variance(states, actions, np.zeros(40, int))
+        neighbour_variance(states, actions, np.zeros(40, int))
 
 
 @pytest.mark.parametrize(
-    ("draw", "dimensions", "entropy"),
+    ("draw", "dimensions", "expected"),
     [
         (lambda r, n, d: r.uniform(size=(n, d)), 2, 0.0),
         (lambda r, n, d: 3.0 * r.uniform(size=(n, d)), 2, 2 * np.log(3.0)),
@@ -130,16 +130,16 @@ def test_neighbours_are_from_other_episodes():
         (lambda r, n, d: r.normal(size=(n, d)), 3, 1.5 * np.log(2 * np.pi * np.e)),
     ],
 )
-def test_state_coverage_is_the_entropy(draw, dimensions, entropy):
-    values = state_coverage(draw(rng(), 4000, dimensions))
-    assert values.mean() == pytest.approx(entropy, abs=0.08)
+def test_state_coverage_is_the_entropy(draw, dimensions, expected):
+    values = entropy(draw(rng(), 4000, dimensions))
+    assert values.mean() == pytest.approx(expected, abs=0.08)
 
 
 def test_a_robot_that_rests_has_a_finite_coverage():
     resting = np.vstack([np.zeros((50, 2)), rng().normal(size=(50, 2))])
-    assert np.isfinite(state_coverage(resting)).all()
+    assert np.isfinite(entropy(resting)).all()
     with pytest.raises(DoesNotApply, match="only 3 frames"):
-        state_coverage(np.zeros((3, 2)))
+        entropy(np.zeros((3, 2)))
 
 
 @pytest.mark.parametrize("rho", [0.0, 0.6, 0.9])
@@ -147,7 +147,7 @@ def test_mutual_information_of_two_normal_numbers(rho):
     """Golden: −½ log(1 − ρ²)."""
     state = rng().normal(size=(4000, 1))
     action = rho * state + np.sqrt(1 - rho**2) * rng(1).normal(size=(4000, 1))
-    parts = information(state, action, rng(2))
+    parts = mutual_information(state, action, rng(2))
     assert parts.shape == (4000,)
     assert parts.mean() == pytest.approx(-0.5 * np.log(1 - rho**2), abs=0.06)
 
@@ -155,10 +155,10 @@ def test_mutual_information_of_two_normal_numbers(rho):
 def test_more_noise_is_less_information():
     state = rng().normal(size=(1000, 2))
     noise = rng(1).normal(size=(1000, 2))
-    values = [information(state, state + level * noise, rng(2)).mean() for level in (0.1, 0.5, 2.0)]
+    values = [mutual_information(state, state + level * noise, rng(2)).mean() for level in (0.1, 0.5, 2.0)]
     assert values == sorted(values, reverse=True)
     with pytest.raises(DoesNotApply, match="only 8 frames"):
-        information(state[:8], state[:8], rng())
+        mutual_information(state[:8], state[:8], rng())
 
 
 def test_tracking_error_is_against_the_next_state():

@@ -8,8 +8,9 @@ from compare_helpers import handrail_dataset
 from hypothesis import given
 from hypothesis import strategies as st
 
-from handrail.datasets.quality.measure import measure, measured, read
-from handrail.datasets.quality.pool import Extent, Spread, embed
+from handrail.datasets.quality.measure import measure, measure_views
+from handrail.datasets.quality.metric import metric
+from handrail.datasets.quality.scale import Extent, Spread, embed
 from handrail.datasets.reading import load
 from handrail.datasets.reading.demonstration import Demonstration
 from handrail.datasets.reading.load import read_demonstrations, recorded_episodes
@@ -24,10 +25,12 @@ def test_what_is_measured_from_the_disk_is_what_is_measured_in_memory(root):
     """In every view, also where an episode is in several, which is measured once for all."""
     on_disk, here = recorded_episodes(root), read_demonstrations(root)
     views = [{"a": slice(0, 12), "b": slice(6, 20)}, {"a": slice(0, 5), "b": slice(6, 9)}]
-    found = read([{label: on_disk[part] for label, part in view.items()} for view in views])
-    for view, readings in zip(views, found, strict=True):
+    chosen = [{label: on_disk[part] for label, part in view.items()} for view in views]
+    generator = np.random.default_rng(0)
+    for view, found in zip(views, measure_views(chosen, generator), strict=True):
+        generator.bit_generator.state = np.random.default_rng(0).bit_generator.state
         expected = measure({label: here[part] for label, part in view.items()}, np.random.default_rng(0))
-        for name, groups in measured(readings, np.random.default_rng(0)).values.items():
+        for name, groups in found.values.items():
             for label, each in groups.items():
                 other = expected.values[name][label]
                 np.testing.assert_array_equal(each.values, other.values, err_msg=name)
@@ -49,6 +52,29 @@ def test_one_episode_is_in_memory_at_a_time(root, monkeypatch):
     measure({"a": episodes[:10], "b": episodes[10:]}, np.random.default_rng(0))
     assert len(most) >= 2 * len(episodes)
     assert max(most) <= 4
+
+
+def test_a_metric_of_one_s_own_is_measured_like_ours(root):
+    @metric("frames", "lower")
+    def half_the_frames(episode, scale):
+        """Half the number of frames."""
+        return 0.5 * episode.count
+
+    @metric("frames", of_dataset=True)
+    def frames_of_all(dataset, rng):
+        return np.full(len(dataset.owner), len(dataset.owner))
+
+    assert (half_the_frames.title, half_the_frames.meaning) == (
+        "half the frames",
+        "half the number of frames",
+    )
+    episodes = recorded_episodes(root)
+    found = measure(
+        {"a": episodes}, np.random.default_rng(0), metrics=[half_the_frames, frames_of_all]
+    ).values
+    counts = [each.count for each in episodes]
+    assert found["half_the_frames"]["a"].values.tolist() == [0.5 * count for count in counts]
+    assert found["frames_of_all"]["a"].mean == sum(counts)
 
 
 @given(

@@ -211,7 +211,7 @@ def test_a_column_of_another_type_is_as_if_missing(tmp_path, name):
     (seen,) = summarize(tmp_path / "set")
     assert (seen.contacts, seen.smallest_distance, seen.mode) == (None, None, None)
     found = measure({"a": read_demonstrations(tmp_path / "set")}, np.random.default_rng(0))
-    assert not found.values["contacts"]["a"].applies
+    assert not found.values["contacts"]["a"].known.size
 
 
 def test_a_newer_format_is_refused_on_reading(root):

@@ -167,8 +167,8 @@ def test_policies_come_first(ours, tmp_path):
 def test_columns_may_be_named(foreign):
     episodes = read_demonstrations(foreign[0], replace(CompareConfig(()).columns, asked="action"))
     found = measure({"calm": episodes}, np.random.default_rng(0)).values
-    assert found["input_effort"]["calm"].applies
-    assert not found["contacts"]["calm"].applies
+    assert found["input_effort"]["calm"].known.size
+    assert not found["contacts"]["calm"].known.size
 
 
 def test_one_episode_is_enough_to_say_that_it_is_too_few(tmp_path):

@@ -17,8 +17,8 @@ from handrail.datasets.comparison.policies import LIKE_FOR_LIKE, MIXED, Pair, ju
 from handrail.datasets.comparison.tables import metrics_table
 from handrail.datasets.format.schema import Feature
 from handrail.datasets.quality.catalogue import METRICS
+from handrail.datasets.quality.episode_set import frames_of
 from handrail.datasets.quality.measure import measure
-from handrail.datasets.quality.pool import frames_of
 from handrail.datasets.reading.demonstration import Demonstration
 from handrail.datasets.reading.reader import DatasetInfo
 from handrail.datasets.statistics import resampling
@@ -30,7 +30,7 @@ from handrail.datasets.statistics.proportions import (
     unpaired_shares,
 )
 
-OF_GROUP = [metric for metric in METRICS if metric.of_group]
+OF_GROUP = [metric for metric in METRICS if metric.of_dataset]
 FEATURES = {
     "observation.state": Feature("float64", (3,), ("x", "y", "goal")),
     "action": Feature("float64", (2,), ("v_x", "v_y")),
@@ -78,7 +78,7 @@ def test_more_episodes_of_the_same_are_no_difference(quick, counts):
         groups = [group(label, count, generator) for label, count in zip("ab", counts, strict=True)]
         _, found = compared(groups, generator)
         assert not any(each.detected for each in found)
-        told = [each for each in found if each.measure.of_group]
+        told = [each for each in found if each.measure.of_dataset]
         assert [each.measure for each in told] == OF_GROUP
         for each in told:
             assert (each.tested, each.p, each.p_adjusted) == (False, None, None)
@@ -99,7 +99,7 @@ def test_as_many_frames_stand_for_every_group(monkeypatch):
     generator = rng(4)
     groups = [group("few", 9, generator), group("many", 30, generator)]
     monkeypatch.setattr(
-        "handrail.datasets.quality.consistency.state_coverage",
+        "handrail.datasets.quality.consistency.entropy",
         lambda points: seen.append(len(points)) or np.zeros(len(points)),
     )
     measure({each.label: each.episodes for each in groups}, generator, metrics=[metric])
@@ -146,7 +146,7 @@ def test_pairs_are_all_episodes_or_none():
     assert not success_difference(one, other).paired
     assert success_difference(one.first(9), other).paired
     measured = measure({"a": one.episodes, "b": other.episodes}, generator, metrics=METRICS[:1])
-    assert measured.values["length"]["a"].applies
+    assert measured.values["length"]["a"].known.size
 
 
 def condition_of(label, mean, policies, generator, scenes=100, luck=0.0, hard=0.0, difficulty=None):

@@ -101,7 +101,7 @@ def test_figures_show_what_was_measured(alike):
     assert shows(first.figure, [100 * each.successes / each.episodes for each in everything.collected])
     for panel, metric in zip(metrics_panels(alike), shown_metrics(alike), strict=True):
         for found in everything.measurements.values[metric].values():
-            if found.applies:
+            if found.known.size:
                 assert shows(panel.figure, [found.mean, *found.known])
     tested = [each for each in everything.differences if each.tested]
     near = [abs(each.effect[0]) for each in tested if abs(each.effect[0]) < 4.0]
@@ -113,7 +113,7 @@ def test_figures_show_what_was_measured(alike):
 def shown_metrics(comparison):
     values = comparison.everything.measurements.values
     names = dict.fromkeys(each.measure.name for each in comparison.everything.differences)
-    return [name for name in names if any(found.applies for found in values[name].values())]
+    return [name for name in names if any(found.known.size for found in values[name].values())]
 
 
 def test_metrics_are_turned_so_that_right_is_better(alike):
