@@ -13,9 +13,9 @@ from typing import Any, get_args, get_type_hints
 
 import pytest
 from command_helpers import command
-from configs import BENCH_CONFIGS, CONFIGS
 from hypothesis import given
 from hypothesis import strategies as st
+from pages import CONFIGS
 from places import ROOT
 from rich.console import Console
 
@@ -140,9 +140,7 @@ def list_flags(config: type, prefix: str = "") -> list[str]:
     return found
 
 
-FLAGS = [
-    (command, flag) for command, config in (CONFIGS | BENCH_CONFIGS).items() for flag in list_flags(config)
-]
+FLAGS = [(command, flag) for command, config in CONFIGS.items() for flag in list_flags(config)]
 
 
 def test_there_are_lists_in_many_commands():
@@ -156,7 +154,7 @@ def test_there_are_lists_in_many_commands():
 def test_a_list_is_written_with_commas_or_spaces(name, flag):
     needed = NEEDED.get(name, ["x"] if name.startswith("handrail-edit") else [])
     values = {
-        str(cli.parse((CONFIGS | BENCH_CONFIGS)[name], name, [*needed, f"--{flag}", *shlex.split(written)]))
+        str(cli.parse(CONFIGS[name], name, [*needed, f"--{flag}", *shlex.split(written)]))
         for written in ("1 2", "1,2", "1, 2", "'1,2'", "1,2,")
     }
     assert len(values) == 1, values
