@@ -4,15 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from backup_helpers import HOME, LIMITS, MODEL, PERIOD, Robot, asking, clutter, table
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from ideal_robot import CHANNELS, HOME, LIMITS, MODEL, PERIOD, Robot, asking, clutter, table
 
 from handrail.controllers.baselines.cbf_filter import CbfFilter
 from handrail.controllers.baselines.direct import DirectController
-from handrail.controllers.collision.model import CollisionModel
-from handrail.controllers.collision.surroundings import Surroundings
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.command import Status
 from handrail.controllers.interface.controller import State
@@ -20,15 +18,13 @@ from handrail.controllers.interface.intent import Intent
 from handrail.controllers.mpc.build import resumed
 from handrail.controllers.mpc.masked_mpc import MaskedMpc
 from handrail.controllers.robot.shape import Obstacle, Shape
-from handrail.controllers.safety.certificate import StopCertificate
 from handrail.controllers.safety.limiter import Limiter
 
 MPC = MaskedMpc(MODEL)
-CHANNELS = MPC.channels
 LIMITER = Limiter(MODEL.description)
 HONEST = MPC.solver.solve
 FLOOR = 0.03 - 2e-3  # what the settings ask for, less what counts as no loss
-AHEAD = asking(CHANNELS, np.eye(18)[0] * 0.6, "base")
+AHEAD = asking(np.eye(18)[0] * 0.6, "base")
 
 
 def reckless(joint):
@@ -284,17 +280,10 @@ def test_where_nothing_is_safe_the_least_bad_is_done(monkeypatch):
         assert robot.v[0] == pytest.approx(before - LIMITS.acceleration[0] * PERIOD, abs=1e-9)
 
 
-def test_where_obstacles_move_rest_is_not_safe_for_ever():
-    """A pillar comes to a robot that stands: safe as long as it is farther than the span."""
-    for away, safe in ((0.35, False), (1.0, True)):
-        x = HOME[0] + 0.48 + 0.2 + away
-        pillar = Obstacle(
-            "pillar", Shape("cylinder", [0.2, 0.25]), [x, 0.0, 0.125], velocity=[-0.5, 0.0, 0.0]
-        )
-        collision = CollisionModel(MODEL, (pillar,))
-        least = 0.3 * Surroundings.of(collision, 0.1, 0.1).margins
-        certificate = StopCertificate(LIMITER, collision, least, span=1.0)
-        now = collision.values(HOME[None])[0]
-        violation = certificate.violation(HOME, np.zeros(9), (HOME, now))
-        assert violation.all == pytest.approx(0.0 if safe else 0.5 - away + 0.03, abs=1e-6)
-        assert violation.hard == 0.0  # a pillar that comes by itself is nobody's fault
+def test_a_solver_that_ignores_a_wall_is_stopped_before_it(monkeypatch):
+    monkeypatch.setattr(MPC.solver, "solve", reckless(joint=0))
+    robot = Robot(MPC, (Obstacle("wall", Shape("box", [0.2, 4.0, 0.2]), [HOME[0] + 0.83, 0.0, 0.1]),))
+    for _ in range(60):
+        robot.update(AHEAD(robot.time))
+    assert Status.BACKUP in {command.diagnostics.status for command in robot.commands}
+    assert robot.smallest > 0.02

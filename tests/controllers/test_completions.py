@@ -8,36 +8,33 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from ideal_robot import CHANNELS, HOME, LIMITS, MODEL, REST, asking, intent, roll
 
 from handrail.collect.world.tasks.goal_reaching import STEP
-from handrail.controllers.baselines.arm_completion import WeldedBaseCompletion
-from handrail.controllers.baselines.base_following import FREE, BaseFollowingCompletion
-from handrail.controllers.baselines.twist_completion import (
-    WholeBodyCompletion,
-    blended,
-    tool_twist,
-    twist_controller,
+from handrail.controllers.baselines.arm_completion import (
+    LARGEST_RATE,
+    LARGEST_SPEED,
+    ArmCompletion,
+    WeldedBaseCompletion,
+    clamp_twist,
 )
-from handrail.controllers.interface.channels import Channels
+from handrail.controllers.baselines.base_following import FREE, BaseFollowingCompletion
+from handrail.controllers.baselines.twist_completion import WholeBodyCompletion, blended, tool_twist
 from handrail.controllers.interface.command import Status
 from handrail.controllers.interface.controller import State
 from handrail.controllers.interface.frames import Frames
-from handrail.controllers.interface.intent import Intent
 from handrail.controllers.objectives.objective import Stage
 from handrail.controllers.objectives.tracking import channel_velocities
 from handrail.controllers.registry import resolved
-from handrail.controllers.robot.model import RobotModel, load_model
+from handrail.controllers.robot.model import RobotModel
 from handrail.scripts.bench.goal_reaching.catalogue import BASELINES
 
-MODEL = load_model()
-HOME = MODEL.description.home
-LIMITS = MODEL.description.limits
-CHANNELS = Channels.of(MODEL.description)
-REST = np.zeros(9)
 TWISTS = arrays(float, 6, elements=st.floats(-0.2, 0.2))
 NEAR_HOME = arrays(float, 9, elements=st.floats(-0.3, 0.3)).map(lambda change: HOME + change)
 ANY_TWIST = arrays(float, 6, elements=st.floats(-10, 10))
+BASES = arrays(float, 3, elements=st.floats(-2.0, 2.0))
 RIVALS = [name for name in BASELINES if name not in ("mpc", "safety_filter")]
+QUICK = settings(max_examples=30, deadline=None)
 
 
 def controller(name):
@@ -46,90 +43,111 @@ def controller(name):
     return BASELINES[name].controller(MODEL)
 
 
-def hand_intent(twist, time=0.0, frames=None):
-    values = np.zeros(CHANNELS.size)
-    values[CHANNELS.tool_slice] = twist
-    return Intent(values, CHANNELS.mask("ee"), time=time, frames=frames or Frames())
+def of_the_tool(twist):
+    return dict(zip(CHANNELS.names[CHANNELS.tool_slice], twist, strict=True))
 
 
 @given(NEAR_HOME, TWISTS, st.sampled_from(["world", "tool"]), arrays(float, 3, elements=st.floats(-0.3, 0.3)))
-@settings(max_examples=30, deadline=None)
+@QUICK
 def test_a_twist_means_the_same_as_in_the_mpc(q, twist, frame, point):
     """A velocity with the twist at the robot's tool point tracks the intent's channels without error."""
-    intent = hand_intent(twist, frames=Frames(tool=frame, point=point))
-    meant = tool_twist(intent, CHANNELS, MODEL.pose(q))
+    asked = intent(of_the_tool(twist), "ee", frames=Frames(tool=frame, point=point))
+    meant = tool_twist(asked, CHANNELS, MODEL.pose(q))
     v = np.linalg.lstsq(MODEL.jacobian(q), meant, rcond=None)[0]
     z, p = ca.SX.sym("z", 27), ca.SX.sym("p", 5)
     stage = Stage(MODEL, z[:9], z[9:18], z[18:])
     channels = ca.Function("channels", [z, p], [channel_velocities(stage, CHANNELS, p)])
-    found = np.array(channels(np.concatenate([q, v, REST]), intent.frames.parameters)).ravel()
+    found = np.array(channels(np.concatenate([q, v, REST]), asked.frames.parameters)).ravel()
     np.testing.assert_allclose(found[CHANNELS.tool_slice], twist, atol=1e-6)
 
 
-@given(NEAR_HOME, TWISTS)
-@settings(max_examples=30, deadline=None)
-def test_least_squares_is_the_optimum(q, twist):
-    """No other velocity has a lower cost: its gradient vanishes."""
-    damping = 0.01
-    v = WholeBodyCompletion(MODEL, damping)(q, REST, twist, STEP)
-    jacobian = MODEL.jacobian(q)
-    gradient = jacobian.T @ (jacobian @ v - twist) + damping * v / LIMITS.velocity**2
-    np.testing.assert_allclose(gradient, 0.0, atol=1e-9)
+@given(NEAR_HOME, TWISTS, BASES)
+@QUICK
+def test_damped_least_squares_is_the_optimum(q, twist, base):
+    """The gradient of ‖J v − e‖² + λ‖W v‖² is 0: of all joints; of the arm's, whatever the base does."""
+    damping, jacobian = 0.01, MODEL.jacobian(q)
+    whole = WholeBodyCompletion(MODEL, damping)(q, REST, twist, STEP)
+    arm = ArmCompletion(MODEL, damping).arm_velocity(q, base, twist)
+    for v, joints in ((whole, slice(9)), (np.concatenate([base, arm]), slice(3, 9))):
+        gradient = jacobian.T @ (jacobian @ v - twist) + damping * v / LIMITS.velocity**2
+        np.testing.assert_allclose(gradient[joints], 0.0, atol=1e-9)
 
 
-def test_less_damping_tracks_better():
-    twist = np.array([0.1, -0.05, 0.05, 0.1, 0.2, -0.3])
-    errors = [
-        np.linalg.norm(
-            MODEL.jacobian(HOME) @ WholeBodyCompletion(MODEL, damping)(HOME, REST, twist, STEP) - twist
-        )
-        for damping in (1.0, 0.1, 1e-6)
-    ]
-    assert errors[0] > errors[1] > errors[2]
-    assert errors[2] < 1e-6
+@given(arrays(float, 9, elements=st.floats(-1.0, 1.0)), BASES, ANY_TWIST)
+def test_the_arm_s_limits_hold_for_anything(previous, base, twist):
+    previous = previous * LIMITS.velocity
+    v = ArmCompletion(MODEL).velocity(HOME, previous, base, twist, STEP)
+    assert np.all(np.abs(v) <= LIMITS.velocity + 1e-9)
+    assert np.all(np.abs(v - previous) <= LIMITS.acceleration * STEP + 1e-9)
+
+
+@given(BASES)
+def test_the_arm_makes_up_for_the_base_that_the_limits_leave(base):
+    """Law: the arm answers to what the base will do, not to what was asked of it."""
+    arm, step = ArmCompletion(MODEL), LIMITS.acceleration * STEP
+    v = arm.velocity(HOME, REST, base, np.zeros(6), STEP)
+    np.testing.assert_allclose(v[:3], np.clip(base, -step[:3], step[:3]))
+    expected = np.clip(arm.arm_velocity(HOME, v[:3], np.zeros(6)), -step[3:], step[3:])
+    np.testing.assert_allclose(v[3:], expected, atol=1e-12)
+
+
+@given(arrays(float, 3, elements=st.floats(-0.1, 0.1)), st.floats(-3.0, 3.0))
+def test_a_welded_base_makes_planar_motions_alone(planar, angle):
+    """Law: for vx, vy, ωz of the tool the arm rests, wherever the base points."""
+    q = HOME.copy()
+    q[2] = angle
+    twist = np.array([planar[0], planar[1], 0.0, 0.0, 0.0, planar[2]])
+    v = WeldedBaseCompletion(MODEL)(q, REST, twist, duration=10.0)
+    np.testing.assert_allclose(v[3:], 0.0, atol=1e-9)
+    np.testing.assert_allclose(MODEL.jacobian(q) @ v, twist, atol=1e-9)
+
+
+@given(ANY_TWIST)
+def test_a_long_twist_is_shortened_and_keeps_its_direction(twist):
+    clamped = clamp_twist(twist)
+    for part, most in ((slice(0, 3), LARGEST_SPEED), (slice(3, 6), LARGEST_RATE)):
+        length = np.linalg.norm(twist[part])
+        assert np.linalg.norm(clamped[part]) == pytest.approx(min(length, most))
+        assert np.allclose(clamped[part] * length, twist[part] * np.linalg.norm(clamped[part]))
 
 
 @given(TWISTS, st.floats(0.0, 1.0))
-@settings(max_examples=20, deadline=None)
+@QUICK
 def test_a_blend_gives_the_hand_what_both_give_it(twist, alpha):
     """The twist of the blend is the weighted mean of the two twists; at the ends it is one of the two."""
     parts = WholeBodyCompletion(MODEL), WeldedBaseCompletion(MODEL)
     blend = blended(*parts, alpha)(HOME, REST, twist, STEP)
     operator, autonomy = (part(HOME, REST, twist, STEP) for part in parts)
     jacobian = MODEL.jacobian(HOME)
-    np.testing.assert_allclose(
-        jacobian @ blend, alpha * jacobian @ operator + (1 - alpha) * jacobian @ autonomy, atol=1e-12
-    )
+    mean = alpha * jacobian @ operator + (1 - alpha) * jacobian @ autonomy
+    np.testing.assert_allclose(jacobian @ blend, mean, atol=1e-12)
     if alpha in (0.0, 1.0):
         np.testing.assert_allclose(blend, operator if alpha else autonomy, atol=1e-12)
 
 
 def test_a_base_that_follows_keeps_the_hand_in_its_place():
     """Pull the hand away: the base follows until the hand is back within the free distance of its place."""
-    rule = BaseFollowingCompletion(MODEL)
-    np.testing.assert_allclose(rule.base_velocity(HOME), 0.0, atol=1e-12)
-    q = HOME.copy()
+    q, hand = HOME.copy(), MODEL.pose(HOME).position
     q[:2] -= [0.6, 0.3]  # the same as the hand 0.67 m ahead of where it should be, were it held in the world
-    held = MODEL.pose(HOME).position
 
     class Held(BaseFollowingCompletion):
         """The hand stays where it is in the world."""
 
         def _seen_from_base(self, q):
             c, s = np.cos(q[2]), np.sin(q[2])
-            away = held[:2] - q[:2]
+            away = hand[:2] - q[:2]
             return np.array([c * away[0] + s * away[1], -s * away[0] + c * away[1]])
 
-    held_rule = Held(MODEL)
+    rule = Held(MODEL)
+    np.testing.assert_allclose(rule.base_velocity(HOME), 0.0, atol=1e-12)
     for _ in range(2000):
-        q[:3] += 0.01 * held_rule.base_velocity(q)
+        q[:3] += 0.01 * rule.base_velocity(q)
     assert abs(np.linalg.norm(q[:2] - HOME[:2]) - FREE) < 0.02
 
 
 def test_a_base_that_follows_rests_when_nothing_is_asked():
-    q = HOME.copy()
+    q, rule = HOME.copy(), BaseFollowingCompletion(MODEL)
     q[3] += 0.8  # the hand is out of its place
-    rule = BaseFollowingCompletion(MODEL)
     assert np.linalg.norm(rule.base_velocity(q)) > 0.05
     np.testing.assert_allclose(rule(q, REST, np.zeros(6), STEP), 0.0, atol=1e-9)
 
@@ -137,13 +155,9 @@ def test_a_base_that_follows_rests_when_nothing_is_asked():
 @pytest.mark.parametrize("name", ["dls", "dls_arm", "blended", "mink"])
 def test_a_rival_follows_the_hand(name):
     """From home, after the acceleration, a slow twist is followed to a few per cent."""
-    rival, twist = controller(name), np.array([0.05, 0.03, 0.02, 0.05, -0.05, 0.1])
-    q, v = HOME.copy(), REST
-    for step in range(30):
-        command = rival.update(State(q, v, step * STEP), hand_intent(twist, step * STEP))
-        after = command.velocity(STEP)
-        q, v = q + 0.5 * STEP * (v + after), after
-    np.testing.assert_allclose(MODEL.jacobian(q) @ v, twist, atol=0.05 * float(np.linalg.norm(twist)))
+    twist = np.array([0.05, 0.03, 0.02, 0.05, -0.05, 0.1])
+    q, v, _ = roll(controller(name), [asking(of_the_tool(twist), "ee")] * 30, period=STEP)
+    np.testing.assert_allclose(MODEL.jacobian(q[-1]) @ v[-1], twist, atol=0.05 * float(np.linalg.norm(twist)))
 
 
 @pytest.mark.parametrize("name", RIVALS)
@@ -160,18 +174,16 @@ def test_a_rival_stays_inside_the_limits(name, twists):
         assert np.all(np.abs(after - v) <= LIMITS.acceleration * STEP + 1e-9)
         q, v = q + 0.5 * STEP * (v + after), after
     state = State(q, v, 4 * STEP)
-    garbled = replace(operator(np.full(6, 0.1), state, state.time), time=np.nan)
-    command = rival.update(state, garbled)
+    command = rival.update(state, replace(operator(np.full(6, 0.1), state, state.time), time=np.nan))
     assert command.diagnostics.status is Status.INVALID_INTENT
     assert np.all(np.abs(command.velocity(STEP)) <= np.abs(v) + 1e-9)
 
 
 @pytest.mark.parametrize("name", RIVALS)
 def test_a_rival_says_how_it_fares(name):
-    rival = controller(name)
     state = State(HOME, REST, 1.0)
     stale = resolved(BASELINES[name].operator)(MODEL)(np.full(6, 0.1), state, 0.5)
-    command = rival.update(state, stale)
+    command = controller(name).update(state, stale)
     assert command.diagnostics.status is Status.STALE_INTENT
     assert command.diagnostics.solve_time > 0
     assert 0.05 < command.diagnostics.smallest_distance < 0.2
@@ -179,18 +191,12 @@ def test_a_rival_says_how_it_fares(name):
 
 
 @pytest.mark.parametrize("name", ["dls", "decoupled", "mink"])
-def test_who_completes_twists_refuses_other_channels(name):
-    intent = Intent(np.full(CHANNELS.size, 0.1), CHANNELS.mask("ee", "base"))
-    command = controller(name).update(State(HOME, REST), intent)
-    assert command.diagnostics.status is Status.INVALID_INTENT
-    np.testing.assert_array_equal(command.velocity(STEP), 0.0)
-
-
-def test_nobody_steers_nothing_moves():
-    command = twist_controller(MODEL, WholeBodyCompletion(MODEL)).update(
-        State(HOME, REST), Intent.idle(CHANNELS)
-    )
-    assert command.diagnostics.status is Status.OK
+@pytest.mark.parametrize(
+    ("groups", "status"), [(("ee", "base"), Status.INVALID_INTENT), ((), Status.OK)], ids=["others", "none"]
+)
+def test_who_completes_twists_refuses_other_channels_and_rests_without_any(name, groups, status):
+    command = controller(name).update(State(HOME, REST), intent(np.full(CHANNELS.size, 0.1), *groups))
+    assert command.diagnostics.status is status
     np.testing.assert_array_equal(command.velocities, 0.0)
 
 
@@ -203,7 +209,9 @@ def test_mink_keeps_its_distance():
         for step in range(500):
             towards = MODEL.pose(q, "shoulder_link").position - MODEL.pose(q).position
             twist = np.append(0.15 * towards / np.linalg.norm(towards), np.zeros(3))
-            command = rival.update(State(q, v, step * STEP), hand_intent(twist, step * STEP))
+            command = rival.update(
+                State(q, v, step * STEP), intent(of_the_tool(twist), "ee", time=step * STEP)
+            )
             after = command.velocity(STEP)
             q, v = q + 0.5 * STEP * (v + after), after
             smallest[name] = min(smallest.get(name, np.inf), command.diagnostics.smallest_distance)
@@ -212,19 +220,11 @@ def test_mink_keeps_its_distance():
 
 
 def test_an_arm_without_a_base_completes_too():
-    description = MODEL.description
-    fixed = replace(
-        description,
-        base=replace(description.base, kind="fixed"),
-        home=HOME[3:],
-        limits=replace(
-            LIMITS,
-            **{name: getattr(LIMITS, name)[3:] for name in vars(LIMITS)},
-        ),
-    )
-    arm = RobotModel(fixed)
+    of_the_arm = replace(LIMITS, **{name: getattr(LIMITS, name)[3:] for name in vars(LIMITS)})
+    base = replace(MODEL.description.base, kind="fixed")
+    arm = RobotModel(replace(MODEL.description, base=base, home=HOME[3:], limits=of_the_arm))
     twist = np.array([0.02, 0.01, 0.02, 0.0, 0.0, 0.0])
     for complete in (WholeBodyCompletion(arm, 1e-4), BaseFollowingCompletion(arm)):
-        v = complete(fixed.home, np.zeros(6), twist, STEP)
+        v = complete(HOME[3:], np.zeros(6), twist, STEP)
         assert v.shape == (6,)
-        assert (arm.jacobian(fixed.home) @ v) @ twist > 0
+        assert (arm.jacobian(HOME[3:]) @ v) @ twist > 0

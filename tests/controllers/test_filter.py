@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from collect_helpers import environment
+from ideal_robot import CHANNELS, HOME, LIMITS, MODEL, PERIOD, intent, roll
 from robot_helpers import without_shapes
 
 from handrail.collect.world.scene import Scene
@@ -14,22 +15,15 @@ from handrail.controllers.baselines.cbf_filter import ALPHA, MARGIN, CbfFilter
 from handrail.controllers.baselines.direct import DirectController
 from handrail.controllers.collision.model import CollisionModel
 from handrail.controllers.collision.slacks import LIMITS as DISTANCES
-from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.command import Status
 from handrail.controllers.interface.controller import State
-from handrail.controllers.interface.intent import Intent
 from handrail.controllers.mpc.safety_filter import safety_filter
 from handrail.controllers.numerics.threads import single_threaded
-from handrail.controllers.robot.model import load_model
 from handrail.controllers.robot.shape import Obstacle, Shape
 from handrail.controllers.solvers.converged import ConvergedSolver
 
-MODEL = load_model()
 ALONE = without_shapes(MODEL.description)
-HOME, LIMITS = MODEL.description.home, MODEL.description.limits
-CHANNELS = Channels.of(MODEL.description)
-JOINTS, MASK = CHANNELS.joint_slice, CHANNELS.mask("joint")
-PERIOD = 0.05
+JOINTS = CHANNELS.joint_slice
 FILTERS = (safety_filter, CbfFilter)
 POST = Obstacle("post", Shape("cylinder", [0.2, 0.4]), [-0.3, 0.0, 0.2])
 AHEAD = np.array([1.0, 0, 0, 0, 0, 0, 0, 0, 1.0])  # drive on, and turn a wrist that has nothing to do with it
@@ -38,20 +32,14 @@ AHEAD = np.array([1.0, 0, 0, 0, 0, 0, 0, 0, 1.0])  # drive on, and turn a wrist 
 def asked(velocities, time=0.0):
     values = np.zeros(CHANNELS.size)
     values[JOINTS] = velocities
-    return Intent(values, MASK, time=time)
+    return intent(values, "joint", time=time)
 
 
-def roll(controller, velocities, q=HOME):
-    """Run a controller on an ideal robot; return positions (T + 1, n), what was sent (T, n), and commands."""
-    q, v, sent, path, commands = np.array(q), np.zeros(9), [], [np.array(q)], []
-    for step, wanted in enumerate(velocities):
-        command = controller.update(State(q, v, step * PERIOD), asked(wanted, step * PERIOD))
-        after = command.velocity(PERIOD)
-        q, v = q + PERIOD * 0.5 * (v + after), after
-        sent.append(after)
-        path.append(q)
-        commands.append(command)
-    return np.array(path), np.array(sent), commands
+def follow(controller, velocities):
+    """Ask for joint velocities in turn; return positions (T + 1, n), what was sent (T, n), and commands."""
+    asks = [lambda time, wanted=wanted: asked(wanted, time) for wanted in velocities]
+    path, sent, commands = roll(controller, asks)
+    return path, sent[1:], commands
 
 
 def feasible(rng, steps=60):
@@ -66,7 +54,7 @@ def feasible(rng, steps=60):
 @pytest.mark.parametrize("seed", range(3))
 def test_a_feasible_command_passes(make, seed):
     velocities = feasible(np.random.default_rng(seed))
-    _, sent, commands = roll(make(ALONE, PERIOD), velocities)
+    _, sent, commands = follow(make(ALONE, PERIOD), velocities)
     assert np.abs((sent - velocities) / LIMITS.velocity).max() < 1e-3
     assert {command.diagnostics.status for command in commands} == {Status.OK}
 
@@ -76,8 +64,8 @@ def test_in_free_space_the_smallest_correction_is_the_clip(make):
     """Full stick to and fro: what the limits of velocity and acceleration cut is all that is cut."""
     rng = np.random.default_rng(3)
     velocities = np.repeat(LIMITS.velocity * rng.choice([-1.5, 0.0, 1.0], (6, 9)), 5, axis=0)
-    _, sent, _ = roll(make(ALONE, PERIOD), velocities)
-    _, clipped, _ = roll(DirectController(ALONE, PERIOD), velocities)
+    _, sent, _ = follow(make(ALONE, PERIOD), velocities)
+    _, clipped, _ = follow(DirectController(ALONE, PERIOD), velocities)
     assert np.abs((sent - clipped) / LIMITS.velocity).max() < 1e-3
 
 
@@ -99,7 +87,7 @@ def test_the_correction_is_the_smallest():
     """Close to a post, full speed ahead: no plan that keeps the limits deviates less, says IPOPT."""
     mpc = safety_filter(MODEL, PERIOD)
     mpc.reset((POST,))
-    path, sent, _ = roll(mpc, [AHEAD] * 14)
+    path, sent, _ = follow(mpc, [AHEAD] * 14)
     state, intent = State(path[-1], sent[-1], 14 * PERIOD), asked(AHEAD, 14 * PERIOD)
     problem = mpc.build_problem(state, intent)
     velocity = mpc.update(state, intent).velocity(PERIOD)
@@ -115,7 +103,7 @@ def test_the_correction_is_the_smallest():
 def test_a_joint_that_threatens_nothing_is_left_alone(make):
     controller = make(MODEL, PERIOD)
     controller.reset((POST,))
-    path, sent, _ = roll(controller, [AHEAD] * 80)
+    path, sent, _ = follow(controller, [AHEAD] * 80)
     np.testing.assert_allclose(sent[20:, 8], AHEAD[8], atol=1e-3)
     assert np.abs(sent[-1, :3]).max() < 0.02  # the base stands
     collision = CollisionModel(MODEL, (POST,))
@@ -209,7 +197,7 @@ def test_a_failed_qp_brakes(monkeypatch):
     from handrail.controllers.baselines import cbf_filter
 
     controller = CbfFilter(MODEL, PERIOD)
-    _, sent, _ = roll(controller, [0.3 * AHEAD] * 5)
+    _, sent, _ = follow(controller, [0.3 * AHEAD] * 5)
     monkeypatch.setattr(cbf_filter.daqp, "solve", lambda *_: (np.zeros(10), 0.0, -1, {}))
     command = controller.update(State(HOME, sent[-1], 0.25), asked(AHEAD, 0.25))
     assert command.diagnostics.status is Status.SOLVER_FAILED

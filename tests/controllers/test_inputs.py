@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from backup_helpers import HOME, LIMITS, MODEL, PERIOD, Robot, asking
+from ideal_robot import HOME, LIMITS, MODEL, PERIOD, Robot, asking
 
 from handrail.controllers.baselines.cbf_filter import CbfFilter
 from handrail.controllers.baselines.direct import DirectController
@@ -19,8 +19,8 @@ from handrail.controllers.mpc.masked_mpc import MaskedMpc
 from handrail.controllers.robot.shape import Obstacle, Shape
 
 CHANNELS = Channels.of(MODEL.description)
-AHEAD = asking(CHANNELS, np.eye(18)[0] * 0.3, "base")
-JOINTS = asking(CHANNELS, np.eye(18)[9] * 0.3, "joint")
+AHEAD = asking(np.eye(18)[0] * 0.3, "base")
+JOINTS = asking(np.eye(18)[9] * 0.3, "joint")
 CONTROLLERS = {
     "mpc": (MaskedMpc, AHEAD),
     "cbf": (CbfFilter, JOINTS),

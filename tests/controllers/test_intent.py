@@ -1,15 +1,13 @@
-"""Laws of intent: prediction, frames, over-determined commands, the stop certificate."""
+"""Laws of intent: prediction, frames, over-determined commands."""
 
 import numpy as np
 import pytest
+from ideal_robot import CHANNELS, HOME, MODEL, REST, asking, intent, roll
 
-from handrail.controllers.collision.model import CollisionModel
-from handrail.controllers.collision.surroundings import Surroundings
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.command import Status
 from handrail.controllers.interface.controller import State
 from handrail.controllers.interface.frames import Frames
-from handrail.controllers.interface.intent import Intent
 from handrail.controllers.interface.prediction import (
     Bounded,
     Extrapolated,
@@ -19,34 +17,9 @@ from handrail.controllers.interface.prediction import (
 )
 from handrail.controllers.mpc.masked_mpc import MaskedMpc
 from handrail.controllers.ocp.settings import MpcSettings
-from handrail.controllers.robot.model import load_model
-from handrail.controllers.robot.shape import Obstacle, Shape
-from handrail.controllers.safety.certificate import StopCertificate
-from handrail.controllers.safety.limiter import Limiter
 
-MODEL = load_model()
-HOME = MODEL.description.home
 MPC = MaskedMpc(MODEL)
-CHANNELS = MPC.channels
 TIMES = 0.1 * np.arange(1, 11)
-
-
-def intent(values, *groups, time=0.0, frames=None):
-    mask = CHANNELS.mask(*groups)
-    return Intent(np.where(mask, values, 0.0), mask, time=time, frames=frames or Frames())
-
-
-def roll(controller, command, steps=30, period=0.05, q=HOME):
-    q, v = np.array(q), np.zeros(9)
-    for k in range(steps):
-        after = controller.update(State(q, v, k * period), command(k * period)).velocity(period)
-        q, v = q + period * 0.5 * (v + after), after
-    return q, v
-
-
-def test_constant_holds():
-    asked = intent(np.arange(18.0), "ee", "base")
-    np.testing.assert_array_equal(constant(asked, TIMES), np.tile(asked.values, (10, 1)))
 
 
 @pytest.mark.parametrize("speed", [0.05, 0.5, 1.0, 50.0])
@@ -135,30 +108,26 @@ def test_smoothed_begins_at_rest_and_again_on_new_channels():
 
 def test_turns_may_be_followed_less_closely_than_the_way():
     """A small weight of the tool's turning leaves the way alone and costs some of the turn."""
-    asked = np.zeros(18)
-    asked[CHANNELS.tool_slice] = [0.1, 0.0, 0.05, 0.0, 0.3, 0.0]
-    errors = []
+    asked, errors = {"ee.vx": 0.1, "ee.vz": 0.05, "ee.wy": 0.3}, []
     for weight in (1000.0, 0.5):
         controller = MaskedMpc(MODEL, MpcSettings(turn_tracking=weight))
-        q, v = roll(controller, lambda time: intent(asked, "ee", time=time))
-        twist = MODEL.jacobian(q) @ v
-        errors.append(np.abs(twist - asked[CHANNELS.tool_slice]))
+        q, v, _ = roll(controller, [asking(asked, "ee")] * 30)
+        errors.append(np.abs(MODEL.jacobian(q[-1]) @ v[-1] - intent(asked, "ee").values[CHANNELS.tool_slice]))
     assert errors[0].max() < 0.01
     assert errors[1][:3].max() < 0.01
     assert errors[1][3:].max() > 0.02
 
 
 def test_any_callable_predicts():
-    asked = []
+    seen = []
 
     def predict(now, times):
-        asked.append(times)
+        seen.append(times)
         return np.zeros((len(times), 18))
 
-    mpc = MaskedMpc(MODEL, predict=predict)
-    _, v = roll(mpc, lambda time: intent(np.full(18, 0.3), "ee", time=time), steps=5)
-    np.testing.assert_allclose(asked[0], TIMES)
-    np.testing.assert_allclose(v, 0.0, atol=1e-3)
+    _, v, _ = roll(MaskedMpc(MODEL, predict=predict), [asking(np.full(18, 0.3), "ee")] * 5)
+    np.testing.assert_allclose(seen[0], TIMES)
+    np.testing.assert_allclose(v[-1], 0.0, atol=1e-3)
 
 
 def test_a_prediction_of_another_shape_is_refused_before_anything_moves():
@@ -179,26 +148,21 @@ def test_only_the_tracked_stages_are_tracked():
 def test_the_base_twist_is_meant_in_its_frame():
     turned = np.array(HOME)
     turned[2] = np.pi / 2
-    values = np.zeros(18)
-    values[0] = 0.2
     for frame, expected in (("base", [0.0, 0.2]), ("world", [0.2, 0.0])):
         MPC.reset()
-        frames = Frames(base=frame)
-        _, v = roll(MPC, lambda time, f=frames: intent(values, "base", time=time, frames=f), q=turned)
-        np.testing.assert_allclose(v[:2], expected, atol=5e-3)
+        _, v, _ = roll(MPC, [asking({"base.vx": 0.2}, "base", frames=Frames(base=frame))] * 30, q=turned)
+        np.testing.assert_allclose(v[-1, :2], expected, atol=5e-3)
 
 
 def test_the_tool_twist_is_meant_in_its_frame_and_at_its_point():
-    values = np.zeros(18)
-    values[5], values[6] = 0.1, 0.2
     point = np.array([0.1, 0.0, 0.15])
+    asked = asking({"ee.vz": 0.1, "ee.wx": 0.2}, "ee", frames=Frames(tool="tool", point=point))
     MPC.reset()
-    frames = Frames(tool="tool", point=point)
-    q, v = roll(MPC, lambda time: intent(values, "ee", time=time, frames=frames))
-    twist, rotation = MODEL.jacobian(q) @ v, MODEL.pose(q).rotation
+    positions, velocities, _ = roll(MPC, [asked] * 30)
+    twist, rotation = MODEL.jacobian(positions[-1]) @ velocities[-1], MODEL.pose(positions[-1]).rotation
     at_point = twist[:3] + np.cross(twist[3:], rotation @ point)
-    np.testing.assert_allclose(rotation.T @ at_point, values[3:6], atol=5e-3)
-    np.testing.assert_allclose(rotation.T @ twist[3:], values[6:9], atol=5e-3)
+    np.testing.assert_allclose(rotation.T @ at_point, [0.0, 0.0, 0.1], atol=5e-3)
+    np.testing.assert_allclose(rotation.T @ twist[3:], [0.2, 0.0, 0.0], atol=5e-3)
 
 
 @pytest.mark.parametrize(
@@ -206,72 +170,15 @@ def test_the_tool_twist_is_meant_in_its_frame_and_at_its_point():
 )
 def test_a_frame_that_does_not_exist_brakes(frames):
     MPC.reset()
-    command = MPC.update(State(HOME, np.zeros(9)), intent(np.full(18, 0.2), "ee", frames=frames))
+    command = MPC.update(State(HOME, REST), intent(np.full(18, 0.2), "ee", frames=frames))
     assert command.diagnostics.status is Status.INVALID_INTENT
 
 
 def test_an_over_determined_command_is_a_compromise():
-    """Hand and all joints at once: no robot can do both; what it does is between the two."""
+    """The hand forward, all joints at rest: no robot can do both; what it does is between the two."""
     MPC.reset()
-    values = np.zeros(18)
-    values[3] = 0.2  # the hand forward, all joints at rest
-    both = lambda time: intent(values, "ee", "joint", time=time)  # noqa: E731
-    q, v = roll(MPC, both)
-    hand = (MODEL.jacobian(q) @ v)[0]
-    assert 0.02 < hand < 0.19
-
-
-def test_a_feasible_command_has_no_tracking_error():
-    MPC.reset()
-    values = np.zeros(18)
-    values[3] = 0.1
-    q, v = roll(MPC, lambda time: intent(values, "ee", time=time))
-    np.testing.assert_allclose((MODEL.jacobian(q) @ v)[:6], values[3:9], atol=0.002)
-
-
-def test_the_certificate_measures_the_stop():
-    """At 0.8 m/s the base needs 0.32 m to stop; a wall is 0.2 m ahead, then 0.5 m."""
-    limiter = Limiter(MODEL.description)
-    v = np.zeros(9)
-    v[0] = 0.8
-    for gap, safe in ((0.2, False), (0.5, True)):
-        wall = Obstacle("wall", Shape("box", [0.2, 4.0, 0.2]), [HOME[0] + 0.48 + gap + 0.1, 0.0, 0.1])
-        collision = CollisionModel(MODEL, (wall,))
-        least = 0.3 * Surroundings.of(collision, 0.1, 0.1).margins
-        certificate = StopCertificate(limiter, collision, least, span=1.0)
-        now = collision.values(HOME[None])[0]
-        violation = certificate.violation(HOME, v, (HOME, now))
-        assert (violation.all == 0.0) is safe
-        if not safe:
-            assert violation.all == pytest.approx(0.32 - 0.2 + 0.03, abs=5e-3)
-            assert violation.hard == pytest.approx(0.32 - 0.2 + 0.015, abs=5e-3)
-
-
-def test_an_unsafe_plan_is_replaced_by_a_full_stop(monkeypatch):
-    """If the solver's plan runs into a wall, the backup takes over and is counted."""
-    wall = Obstacle("wall", Shape("box", [0.2, 4.0, 0.2]), [HOME[0] + 0.48 + 0.35, 0.0, 0.1])
-    mpc = MaskedMpc(MODEL)
-    mpc.reset((wall,))
-    honest = mpc.solver.solve
-
-    def reckless(problem, guess, *active):
-        from dataclasses import replace
-
-        plan = honest(problem, guess)
-        u = np.zeros_like(plan.u)
-        u[:, 0] = 1.0
-        q, v = problem.rollout(u)
-        return replace(plan, u=u, q=q, v=v)
-
-    monkeypatch.setattr(mpc.solver, "solve", reckless)
-    q, v, statuses = np.array(HOME), np.zeros(9), []
-    for k in range(60):
-        command = mpc.update(State(q, v, 0.05 * k), intent(np.full(18, 0.5), "base", time=0.05 * k))
-        after = command.velocity(0.05)
-        q, v = q + 0.05 * 0.5 * (v + after), after
-        statuses.append(command.diagnostics.status)
-    assert Status.BACKUP in statuses
-    assert mpc.loop.surroundings.collision.values(q[None])[0].min() > 0.02
+    q, v, _ = roll(MPC, [asking({"ee.vx": 0.2}, "ee", "joint")] * 30)
+    assert 0.02 < (MODEL.jacobian(q[-1]) @ v[-1])[0] < 0.19
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from backup_helpers import HOME, LIMITS, MODEL, PERIOD, Robot, asking, clutter
+from ideal_robot import HOME, LIMITS, MODEL, PERIOD, Robot, asking, clutter
 
 from handrail.controllers.baselines.cbf_filter import CbfFilter
 from handrail.controllers.baselines.direct import DirectController
@@ -17,8 +17,8 @@ from handrail.controllers.robot.shape import Obstacle, Shape
 
 CHANNELS = Channels.of(MODEL.description)
 MPC = MaskedMpc(MODEL, predict=Smoothed(Extrapolated(), 0.3))
-HAND = asking(CHANNELS, np.full(18, 0.2), "ee")
-BASE = asking(CHANNELS, np.full(18, -0.4), "base")
+HAND = asking(np.full(18, 0.2), "ee")
+BASE = asking(np.full(18, -0.4), "base")
 HELD = Obstacle("box", Shape("box", [0.06, 0.06, 0.06]), [0.0, 0.0, 0.06], frame="tool")
 
 
@@ -62,7 +62,7 @@ def test_an_update_depends_on_the_loop_state_alone():
 @pytest.mark.parametrize("build", [DirectController, CbfFilter])
 def test_what_a_controller_asked_for_before_does_not_matter(build):
     """It looks at one moment: an old one and a new one answer a state alike."""
-    ask = asking(CHANNELS, np.full(18, 0.3), "joint")
+    ask = asking(np.full(18, 0.3), "joint")
     robot = Robot(build(MODEL))
     for _ in range(8):
         robot.update(ask(robot.time))

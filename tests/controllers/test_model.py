@@ -81,6 +81,7 @@ def test_home_puts_the_tool_where_the_robot_has_it():
         (("mass = 165.3", 'mass = "heavy"'), "mass: expected a number"),
         (("mass = 165.3", "mas = 165.3"), "base: unknown entry 'mas'"),
         (("velocity = [1.0,", "velocity = [inf,"), "limits: velocity: expected a number <= 1000000.0 at [0]"),
+        (("velocity = [1.0,", "velocity = [5e-324,"), "limits: velocity: expected a number >= 1e-06 at"),
         (("acceleration = [1.0,", "acceleration = [0.0,"), "acceleration: expected a number >= 1e-06 at [0]"),
         (("effort = [2000.0,", "effort = [-2000.0,"), "effort: expected a number >= 1e-06 at [0]"),
         (("effort = [2000.0, ", "effort = ["), "effort: expected 9 numbers"),

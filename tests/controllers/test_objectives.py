@@ -5,24 +5,17 @@ from dataclasses import replace
 import casadi as ca
 import numpy as np
 import pytest
+from ideal_robot import CHANNELS, HOME, MODEL, PERIOD, intent, realised, roll
 
-from handrail.controllers.interface.channels import Channels
-from handrail.controllers.interface.controller import State
-from handrail.controllers.interface.intent import Intent
 from handrail.controllers.mpc.masked_mpc import MaskedMpc
 from handrail.controllers.objectives.hold import end_effector_hold, hold_parameters
 from handrail.controllers.objectives.objective import Stage
 from handrail.controllers.objectives.switch import switchable, switched
 from handrail.controllers.objectives.tray import GRAVITY, acceleration, tray_levelling
 from handrail.controllers.ocp.settings import MpcSettings
-from handrail.controllers.robot.model import load_model
 
-MODEL = load_model()
-CHANNELS = Channels.of(MODEL.description)
-HOME = MODEL.description.home
 HAND = MODEL.pose(HOME)
 UP = HAND.rotation.T @ np.array([0.0, 0.0, 1.0])
-PERIOD = 0.05
 PLACES = {"hold": hold_parameters(HAND)}
 
 
@@ -37,26 +30,16 @@ def scaled(objective, factor):
     return replace(objective, weights=lambda mask: factor * objective.weights(mask))
 
 
-def roll(objectives, groups, ask, q=HOME, steps=80, settings=None):
+def steer(objectives, groups, ask, steps=80, settings=None):
     """Steer an ideal robot by `ask(time)`, {channel: value}; return positions and velocities."""
     mpc = MaskedMpc(MODEL, settings, tuple(objectives))
     mpc.reset()
     for objective in objectives:
         if objective.name in PLACES:
             mpc.set_parameters(objective.name, PLACES[objective.name])
-    mask = CHANNELS.mask(*groups)
-    positions, velocities = [np.array(q)], [np.zeros(9)]
-    for step in range(steps):
-        time = step * PERIOD
-        values = np.zeros(CHANNELS.size)
-        for name, value in ask(time).items():
-            values[CHANNELS.names.index(name)] = value
-        command = mpc.update(State(positions[-1], velocities[-1], time), Intent(values, mask, time=time))
-        assert not command.diagnostics.status.brakes
-        after = command.velocity(PERIOD)
-        positions.append(positions[-1] + 0.5 * PERIOD * (velocities[-1] + after))
-        velocities.append(after)
-    return np.array(positions), np.array(velocities)
+    positions, velocities, commands = roll(mpc, [lambda t: intent(ask(t), *groups, time=t)] * steps)
+    assert not any(command.diagnostics.status.brakes for command in commands)
+    return positions, velocities
 
 
 def function(objective):
@@ -129,16 +112,11 @@ def test_objectives_do_not_overwrite_a_command(groups):
         names = ("base_velocity", "arm_velocity", "acceleration", "posture", "terminal_velocity")
         strong = replace(weak, **{name: factor * getattr(weak, name) for name in names})
         objectives = [scaled(objective, factor) for objective in everything()]
-        motion = roll(objectives, groups, lambda time: values, steps=50, settings=strong)
+        motion = steer(objectives, groups, lambda time: values, steps=50, settings=strong)
         tracked.append([realised(q, v)[mask] for q, v in zip(*motion, strict=True)])
     change = np.linalg.norm(np.subtract(*tracked), axis=1)[10:]  # after the start at full acceleration
     assert change.max() < 0.01 * np.linalg.norm(asked)
     assert np.linalg.norm(tracked[0][-1] - asked) < 0.01 * np.linalg.norm(asked)
-
-
-def realised(q, v):
-    c, s = np.cos(q[2]), np.sin(q[2])
-    return np.concatenate([[c * v[0] + s * v[1], -s * v[0] + c * v[1], v[2]], MODEL.jacobian(q) @ v, v])
 
 
 def test_objectives_rest_where_everything_is_commanded():
@@ -155,9 +133,9 @@ def drift(positions):
 def test_hold_keeps_the_hand_where_it_is_while_the_base_drives():
     drive = {"base.vx": 0.15, "base.vy": 0.1}
     hold = end_effector_hold(CHANNELS, position=20.0, orientation=20.0)
-    without, _ = roll([], ("base",), lambda time: drive)
-    held, _ = roll([hold], ("base",), lambda time: drive)
-    point_only, _ = roll([end_effector_hold(CHANNELS, position=20.0)], ("base",), lambda time: drive)
+    without, _ = steer([], ("base",), lambda time: drive)
+    held, _ = steer([hold], ("base",), lambda time: drive)
+    point_only, _ = steer([end_effector_hold(CHANNELS, position=20.0)], ("base",), lambda time: drive)
     assert drift(without) > 0.5
     assert drift(held) < 0.03
     assert drift(point_only) < 0.03
@@ -171,8 +149,8 @@ def tilt(q):
 
 def test_the_tray_stays_level_while_the_hand_moves():
     move, groups = {"ee.vx": 0.1, "ee.vy": 0.2, "ee.vz": -0.08}, ("ee.vx", "ee.vy", "ee.vz")
-    without, _ = roll([], groups, lambda time: move)
-    level, _ = roll([tray_levelling(CHANNELS, UP)], groups, lambda time: move)
+    without, _ = steer([], groups, lambda time: move)
+    level, _ = steer([tray_levelling(CHANNELS, UP)], groups, lambda time: move)
     assert max(map(tilt, without)) > 10.0
     assert max(map(tilt, level)) < 3.0
 
@@ -192,8 +170,8 @@ def test_the_tray_is_not_torn_away_when_the_base_turns_round():
     def to_and_fro(time):
         return {"base.vx": 0.3 if time % 4 < 2 else -0.3}
 
-    without = roll([], ("base",), to_and_fro)
-    careful = roll([tray_levelling(CHANNELS, UP, slip=1.0, friction=0.06)], ("base",), to_and_fro)
+    without = steer([], ("base",), to_and_fro)
+    careful = steer([tray_levelling(CHANNELS, UP, slip=1.0, friction=0.06)], ("base",), to_and_fro)
     assert slip(*without) > 0.09
     assert slip(*careful) < 0.065
     assert max(map(tilt, careful[0])) < 6.0
@@ -202,7 +180,7 @@ def test_the_tray_is_not_torn_away_when_the_base_turns_round():
 def test_a_switched_off_objective_changes_nothing():
     drive = {"base.vx": 0.15}
     hold = switchable(end_effector_hold(CHANNELS, position=20.0))
-    without, _ = roll([], ("base",), lambda time: drive, steps=20)
+    without, _ = steer([], ("base",), lambda time: drive, steps=20)
     mpc_off = drive_with(hold, drive, on=False)
     np.testing.assert_allclose(mpc_off, without[-1], atol=1e-6)
     assert np.linalg.norm(MODEL.pose(drive_with(hold, drive, on=True)).position - HAND.position) < 0.03
@@ -210,4 +188,4 @@ def test_a_switched_off_objective_changes_nothing():
 
 def drive_with(hold, values, on):
     PLACES["switched"] = switched(hold_parameters(HAND), on)
-    return roll([replace(hold, name="switched")], ("base",), lambda time: values, steps=20)[0][-1]
+    return steer([replace(hold, name="switched")], ("base",), lambda time: values, steps=20)[0][-1]

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from backup_helpers import HOME, LIMITS, MODEL, Robot, asking
+from ideal_robot import HOME, LIMITS, MODEL, Robot, asking
 
 from handrail.controllers.interface.controller import State
 from handrail.controllers.mpc.masked_mpc import MaskedMpc
@@ -19,7 +19,7 @@ def test_what_comes_too_near_buys_no_slack_to_the_robot_itself(speed):
     """The wrist is turned towards the robot as far as it may; a ball is in the chassis, at rest or moving."""
     mpc = MaskedMpc(MODEL)
     turning = np.arange(mpc.channels.size) == mpc.channels.joint_slice.start + 7
-    ask = asking(mpc.channels, 1.0 * turning, "joint")
+    ask = asking(1.0 * turning, "joint")
     robot = Robot(mpc)
     for _ in range(30):
         robot.update(ask(robot.time))

@@ -9,10 +9,8 @@ from contextlib import contextmanager, suppress
 from urllib.parse import urlsplit
 
 import numpy as np
-from cockpit_helpers import drive
+from cockpit_helpers import drive, page
 from websockets.exceptions import ConnectionClosed
-from websockets.sync.client import connect
-from websockets.typing import Origin
 
 PATIENCE = 120.0  # [s]
 _NAMES = itertools.count()
@@ -22,24 +20,17 @@ class Witness:
     """Watches; may drive when it is let."""
 
     def __init__(self, address):
-        self._address, self._name = address, f"a-witness-{next(_NAMES)}"
+        self.address, self._name = address, f"a-witness-{next(_NAMES)}"
         self.frame, self.you, self._ends = {}, {}, False
         self._socket, self._wants = None, False
         threading.Thread(target=self._watch, daemon=True).start()
 
-    def _connect(self):
-        parts = urlsplit(self._address)
-        return connect(
-            f"ws://{parts.netloc}/drive?page={self._name}",
-            origin=Origin(f"http://{parts.netloc}"),
-            compression=None,
-            ping_interval=None,
-            open_timeout=PATIENCE,
-        )
-
     def _watch(self):
         while not self._ends:
-            with suppress(OSError, ConnectionClosed, TimeoutError, EOFError), self._connect() as self._socket:
+            with (
+                suppress(OSError, ConnectionClosed, TimeoutError, EOFError),
+                page(self, self._name) as self._socket,
+            ):
                 for message in self._socket:
                     self._hear(message)
             time.sleep(0.2)

@@ -8,6 +8,7 @@ from typing import Any
 
 import gymnasium
 import numpy as np
+from places import ROOT
 from scipy.spatial.transform import Rotation
 
 import handrail.collect  # noqa: F401  (registers the environments)
@@ -67,86 +68,7 @@ def moved(episode: Start, name: str, position: Any) -> Start:
     return Start(scene, episode.q, episode.goal)
 
 
-SMALL_ROBOT = """
-name = "small_ur5"
-
-[base]
-kind = "planar"
-mass = 60.0
-height = 0.30
-size = [0.6, 0.5]
-
-[arm]
-urdf = "example-robot-data/robots/ur_description/urdf/ur5_robot.urdf"
-translation = [0.1, 0.0, 0.30]
-joints = [
-    "shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint",
-    "wrist_1_joint", "wrist_2_joint", "wrist_3_joint",
-]
-
-[tool]
-frame = "tool0"
-translation = [0.0, 0.0, 0.15]
-
-[home]
-q = [-1.5, 0.0, 0.0, 0.0, -1.5708, 1.2, -1.2, -1.5708, 0.0]
-
-[limits]
-position_lower = [-3.0, -3.0, -6.3, -6.3, -6.3, -3.1, -6.3, -6.3, -6.3]
-position_upper = [3.0, 3.0, 6.3, 6.3, 6.3, 3.1, 6.3, 6.3, 6.3]
-velocity = [0.8, 0.8, 0.8, 2.0, 2.0, 2.0, 3.0, 3.0, 3.0]
-acceleration = [1.0, 1.0, 1.0, 2.0, 2.0, 2.0, 3.0, 3.0, 3.0]
-effort = [800.0, 800.0, 400.0, 150.0, 150.0, 150.0, 28.0, 28.0, 28.0]
-servo = [20000.0, 20000.0, 4000.0, 1500.0, 1500.0, 1000.0, 300.0, 300.0, 200.0]
-
-[gripper]
-frame = "tool0"
-mass = 0.5
-finger_mass = 0.05
-finger_size = [0.01, 0.02, 0.08]
-stroke = 0.08
-tip = 0.16
-force = 30.0
-speed = 0.1
-friction = 1.0
-camera = [0.0, -0.08, 0.02]
-camera_tilt = 0.4
-
-[[collision]]
-name = "body"
-frame = "planar_base"
-box = [0.6, 0.5, 0.30]
-at = [0.0, 0.0, 0.15]
-
-[[collision]]
-name = "forearm"
-frame = "forearm_link"
-capsule = 0.07
-a = [0.0, 0.0, 0.0]
-b = [0.0, 0.0, 0.39]
-
-[[collision]]
-name = "palm"
-frame = "tool0"
-capsule = 0.04
-a = [0.0, 0.0, 0.0]
-b = [0.0, 0.0, 0.03]
-
-[[collision]]
-name = "fingers"
-frame = "tool0"
-box = [0.10, 0.02, 0.09]
-at = [0.0, 0.0, 0.12]
-tool = true
-
-[self_collision]
-pairs = [["body", "forearm"], ["body", "palm"], ["body", "fingers"]]
-
-[[visual]]
-frame = "planar_base"
-box = [0.6, 0.5, 0.2]
-at = [0.0, 0.0, 0.2]
-"""
+SMALL_ROBOT = (ROOT / "tests" / "data" / "small_ur5.toml").read_text()
 
 
 def write_small_robot(folder: Path) -> Path:

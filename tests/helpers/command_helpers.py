@@ -40,3 +40,19 @@ def command(*arguments: Any, name: str = "record") -> Done:
     ):
         main()
     return Done(int(stop.value.code or 0), out.getvalue(), error.getvalue())
+
+
+def ran(*arguments: Any, name: str = "record") -> str:
+    """Run a command that ends well; return what it said."""
+    done = command(*arguments, name=name)
+    assert done.returncode == 0, f"{name} {arguments}\n{done.stdout[-2000:]}\n{done.stderr[-2000:]}"
+    return done.stdout
+
+
+def refused(*arguments: Any, name: str = "record", told: str = "") -> str:
+    """Run a command that is refused in one line with some words; return the line."""
+    done = command(*arguments, name=name)
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1), done.stderr
+    assert done.stderr.startswith("error: ")
+    assert told in done.stderr, done.stderr
+    return done.stderr

@@ -1,6 +1,7 @@
 """Shared by the tests of `handrail-compare`: datasets of another robot by plain LeRobot, and our own."""
 
 import warnings
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
@@ -15,8 +16,8 @@ CAMERA = "observation.images.top"
 EPISODES, FRAMES = 6, 24
 
 
-def lerobot_dataset(root: Path, names: list[str], fps: int, jitter: float, camera: bool) -> Path:
-    """Record with plain LeRobot an arm that follows commanded positions one frame later."""
+def _write(root: Path, robot: str, names: list[str], fps: int, episodes: Iterable, camera: bool) -> Path:
+    """Record with plain LeRobot episodes of (state, action, level of the picture)."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         from lerobot.datasets.lerobot_dataset import LeRobotDataset
@@ -26,42 +27,49 @@ def lerobot_dataset(root: Path, names: list[str], fps: int, jitter: float, camer
         if camera:
             axes = ["height", "width", "channels"]
             features[CAMERA] = {"dtype": "video", "shape": (32, 48, 3), "names": axes}
-        dataset = LeRobotDataset.create(REPO, fps, features, root=root, robot_type="so101")
-        rng = np.random.default_rng(len(names))
-        for episode in range(EPISODES):
-            state = np.zeros(len(names), np.float32)
-            for index in range(FRAMES + 3 * episode):
-                goal = np.sin(0.1 * index + np.arange(len(names))) + jitter * rng.normal(size=len(names))
-                action = goal.astype(np.float32)
-                picture = np.full((32, 48, 3), 40 * episode, np.uint8)
-                frame = {"observation.state": state, "action": action, "task": "wave"}
-                dataset.add_frame(frame | ({CAMERA: picture} if camera else {}))
-                state = action
+        dataset = LeRobotDataset.create(REPO, fps, features, root=root, robot_type=robot)
+        for episode in episodes:
+            for state, action, level in episode:
+                picture = {CAMERA: np.full((32, 48, 3), level, np.uint8)} if camera else {}
+                dataset.add_frame(
+                    {
+                        "observation.state": state.astype(np.float32),
+                        "action": action.astype(np.float32),
+                        "task": "wave",
+                        **picture,
+                    }
+                )
             dataset.save_episode()
         dataset.finalize()
     return root
+
+
+def lerobot_dataset(root: Path, names: list[str], fps: int, jitter: float, camera: bool) -> Path:
+    """Record an arm that follows commanded positions one frame later."""
+    rng = np.random.default_rng(len(names))
+
+    def episode(number: int):
+        state = np.zeros(len(names))
+        for index in range(FRAMES + 3 * number):
+            action = np.sin(0.1 * index + np.arange(len(names))) + jitter * rng.normal(size=len(names))
+            yield state, action, 40 * number
+            state = action
+
+    return _write(root, "so101", names, fps, map(episode, range(EPISODES)), camera)
 
 
 def arm_dataset(root: Path, scale: float, velocities: bool) -> Path:
-    """Record with plain LeRobot an arm with bare names, steered by positions or by velocities."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        from lerobot.datasets.lerobot_dataset import LeRobotDataset
+    """Record an arm with bare names, steered by positions or by velocities."""
+    rng = np.random.default_rng(1)
 
-        vector = {"dtype": "float32", "shape": (3,), "names": ["pan", "lift", "elbow"]}
-        features = {"observation.state": vector, "action": vector}
-        dataset = LeRobotDataset.create(REPO, 30, features, root=root, robot_type="arm")
-        rng = np.random.default_rng(1)
-        for episode in range(8):
-            state = np.zeros(3, np.float32)
-            for index in range(FRAMES + 2 * episode):
-                goal = scale * (np.sin(0.1 * index + np.arange(3)) + 0.05 * rng.normal(size=3))
-                action = (30.0 * (goal - state) if velocities else goal).astype(np.float32)
-                dataset.add_frame({"observation.state": state, "action": action, "task": "wave"})
-                state = goal.astype(np.float32)
-            dataset.save_episode()
-        dataset.finalize()
-    return root
+    def episode(number: int):
+        state = np.zeros(3, np.float32)
+        for index in range(FRAMES + 2 * number):
+            goal = scale * (np.sin(0.1 * index + np.arange(3)) + 0.05 * rng.normal(size=3))
+            yield state, (30.0 * (goal - state) if velocities else goal), 0
+            state = goal.astype(np.float32)
+
+    return _write(root, "arm", ["pan", "lift", "elbow"], 30, map(episode, range(8)), False)
 
 
 def handrail_dataset(root: Path, fail_every: int, mode: str, episodes: int = 12, slow: int = 0) -> str:

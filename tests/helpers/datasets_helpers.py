@@ -64,9 +64,9 @@ def length_of(episode: int) -> int:
     return 8 + 3 * (episode % 3)
 
 
-def record_one(writer: EpisodeWriter, cameras: bool) -> int:
-    """Record and save the next episode."""
-    episode = writer.num_episodes
+def record_one(writer: EpisodeWriter, cameras: bool, first: int = 0) -> int:
+    """Record and save the next episode, as if `first` others lay before all of the dataset."""
+    episode = first + writer.num_episodes
     for index in range(length_of(episode)):
         frame = frame_of(episode, index, cameras)
         writer.add_frame({key: frame[key] for key in writer.features}, TASKS[episode // 2 % 2])

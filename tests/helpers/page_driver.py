@@ -27,7 +27,28 @@ def browser(program):
             made.close()
 
 
-class PageDriver:
+class Page:
+    """What is on a page, and keys that are held."""
+
+    def __init__(self, page):
+        self.page, self._held = page, set()
+
+    def at(self, name):
+        return self.page.locator(f"#{name}")
+
+    def text(self, name):
+        return self.page.evaluate("(name) => document.getElementById(name).textContent", name)
+
+    def hold(self, keys):
+        """Hold these keys, and no others."""
+        for key in self._held - set(keys):
+            self.page.keyboard.up(key)
+        for key in set(keys) - self._held:
+            self.page.keyboard.down(key)
+        self._held = set(keys)
+
+
+class PageDriver(Page):
     """A page, and who looks at it.
 
     Args:
@@ -36,16 +57,10 @@ class PageDriver:
     """
 
     def __init__(self, page, address=""):
-        self.page, self._held = page, set()
+        super().__init__(page)
         if address:
             page.goto(address)
         expect(self.at("numbers")).not_to_be_empty(timeout=SLOW)
-
-    def at(self, name):
-        return self.page.locator(f"#{name}")
-
-    def text(self, name):
-        return self.page.evaluate("(name) => document.getElementById(name).textContent", name)
 
     def press(self, key):
         self.page.keyboard.press(key)
@@ -71,14 +86,6 @@ class PageDriver:
         self.page.keyboard.down(key)
         time.sleep(seconds)
         self.page.keyboard.up(key)
-
-    def hold(self, keys):
-        """Hold these keys, and no others."""
-        for key in self._held - keys:
-            self.page.keyboard.up(key)
-        for key in keys - self._held:
-            self.page.keyboard.down(key)
-        self._held = set(keys)
 
     def end(self, save=""):
         """End the recording; save what is open by pressing a key, where there is something."""

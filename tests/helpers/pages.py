@@ -15,7 +15,8 @@ JOBS = {f"handrail-{name}": command.job for name, command in COMMANDS.items() if
     for verb, job in command.verbs.items()
 }
 BENCH_CONFIGS = {f"bench {name}": bench.settings for name, bench in BENCHES.items()}
-CONFIGS = {name: job.config for name, job in JOBS.items()} | BENCH_CONFIGS
+COMMAND_CONFIGS = {name: job.config for name, job in JOBS.items()}
+CONFIGS = COMMAND_CONFIGS | BENCH_CONFIGS
 
 PAGES = ("README.md", *sorted(str(path.relative_to(ROOT)) for path in (ROOT / "docs").glob("*.md")))
 RESULTS = sorted(str(path.relative_to(ROOT)) for path in (ROOT / "docs" / "results").glob("*.md"))

@@ -5,6 +5,7 @@ import re
 import time
 
 import numpy as np
+from page_driver import SLOW, Page
 from page_words import keys, way
 from playwright.sync_api import expect
 
@@ -12,10 +13,9 @@ DECLINED = "I prefer not to answer"
 DRIVING = re.compile("^(recording|practice: not recorded)$")
 READY = "ready: press Start"
 REMARK = "=1+1; synthetic"  # what a spreadsheet would run
-_SLOW = 180_000  # patience: the controller may be compiled first [ms]
 
 
-class ParticipantDriver:
+class ParticipantDriver(Page):
     """Goes through a session as the page asks.
 
     Args:
@@ -27,27 +27,24 @@ class ParticipantDriver:
     """
 
     def __init__(self, page, address, seed, declines=(), answers=()):
-        self.page, self._held = page, set()
+        super().__init__(page)
         page.goto(address)
-        expect(page.locator("#study")).to_be_visible(timeout=_SLOW)
+        expect(self.at("study")).to_be_visible(timeout=SLOW)
         self._rng, self._declines = np.random.default_rng(seed), declines
         self.answers = dict(answers)
         self.trials = 0
 
-    def text(self, name):
-        return self.page.evaluate("(name) => document.getElementById(name).textContent", name)
-
     @property
     def title(self):
         """Of the card that covers the page, or ""."""
-        card = self.page.locator("#study")
+        card = self.at("study")
         return self.page.inner_text("#study-title") if card.is_visible() else ""
 
     def go_on(self, until=lambda driver: False):
         """Do what the page asks until the last card, or until something is so; return the title then."""
         while not until(self):
             title = self.title
-            if title in ("Done", "Paused") and not self.page.locator("#study-next").is_visible():
+            if title in ("Done", "Paused") and not self.at("study-next").is_visible():
                 return title
             if title == "One moment" or (not title and self.text("phase") != READY):
                 time.sleep(0.1)
@@ -59,7 +56,7 @@ class ParticipantDriver:
 
     def fill_in(self, most=None):
         """Answer a card, or only so many of its questions; all, and wait for the next card."""
-        card = self.page.locator("#study").get_attribute("data-card")
+        card = self.at("study").get_attribute("data-card")
         items = self.page.locator("#study .item")
         answers = self.answers.setdefault(card, {})
         for index in range(items.count())[:most]:
@@ -72,7 +69,7 @@ class ParticipantDriver:
                 assert kept == "", f"{card}, {name}: expected nothing chosen before somebody does"
                 answers[name] = self._answer(name, box)
         if most is None:
-            expect(self.page.locator("#study-next")).to_be_enabled(timeout=_SLOW)
+            expect(self.at("study-next")).to_be_enabled(timeout=SLOW)
             old = self.page.locator("#study-title").element_handle()
             self.page.click("#study-next")
             gone = "old => !old.isConnected || document.getElementById('study').hidden"
@@ -106,17 +103,17 @@ class ParticipantDriver:
 
     def drive(self):
         """Do the task if these keys can, or say that it failed."""
-        expect(self.page.locator("#phase")).to_have_text(READY, timeout=_SLOW)
+        expect(self.at("phase")).to_have_text(READY, timeout=SLOW)
         self.page.keyboard.press("Enter")
-        expect(self.page.locator("#phase")).to_have_text(DRIVING, timeout=_SLOW)
+        expect(self.at("phase")).to_have_text(DRIVING, timeout=SLOW)
         self.trials += 1
         by_hand = self.page.input_value("#mode") in ("ee", "base+ee")
         if by_hand and way(self.text("way"))[0] == "goal":
             self._reach()
         else:
-            self._hold({"KeyI"})
+            self.hold({"KeyI"})
             time.sleep(0.5)
-            self._hold(())
+            self.hold(())
         while self._drives:
             self.page.keyboard.press("ArrowDown")
             time.sleep(0.2)
@@ -129,14 +126,6 @@ class ParticipantDriver:
         """Steer the hand as the page says."""
         end = time.monotonic() + patience
         while time.monotonic() < end and self._drives:
-            self._hold(keys(way(self.text("way"))[1], 0.02, 0.08))
+            self.hold(keys(way(self.text("way"))[1], 0.02, 0.08))
             time.sleep(0.02)
-        self._hold(())
-
-    def _hold(self, keys):
-        keys = set(keys)
-        for key in self._held - keys:
-            self.page.keyboard.up(key)
-        for key in keys - self._held:
-            self.page.keyboard.down(key)
-        self._held = keys
+        self.hold(())

@@ -1,5 +1,7 @@
-"""A LeRobot teleoperator that plays back recorded actions; importing it takes LeRobot."""
+"""LeRobot teleoperators that play back recorded actions, or move a hand; importing them takes LeRobot."""
 
+import math
+import time
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -109,3 +111,23 @@ class PlayedLeader(Teleoperator):
 
     def disconnect(self) -> None:
         self._connected = False
+
+
+@TeleoperatorConfig.register_subclass("played_hand")
+@dataclass
+class PlayedHandConfig(PlayedLeaderConfig):
+    """Settings of the one below."""
+
+
+class PlayedHand(PlayedLeader):
+    """Leads the hand ahead, and to and fro."""
+
+    config_class = PlayedHandConfig
+    name = "played_hand"
+
+    @property
+    def action_features(self) -> dict:
+        return dict.fromkeys(("delta_x", "delta_y", "delta_z", "gripper"), float)
+
+    def get_action(self) -> Any:
+        return {"delta_x": 1.0, "delta_y": math.sin(time.monotonic()), "delta_z": 0.0, "gripper": 1.0}

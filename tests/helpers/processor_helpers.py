@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field
 
 import numpy as np
+from device_players import Clock
 
 from handrail.collect.processor.mpc_step import MaskedMpcStep, mpc_pipeline
 from handrail.collect.processor.units import RobotUnits, robot_units
@@ -10,16 +11,6 @@ from handrail.collect.processor.whole_body import moved
 from handrail.controllers.robot.model import load_model
 
 PERIOD = 1.0 / 30.0
-
-
-@dataclass
-class Clock:
-    """Time that a test sets."""
-
-    now: float = 100.0
-
-    def __call__(self) -> float:
-        return self.now
 
 
 @dataclass

@@ -1,23 +1,15 @@
-"""A Ray cluster of two computers, both here, and a recording on it that loses a third in the middle.
-
-python tests/helpers/ray_helpers.py 500    record so many episodes with one worker and so; say what came of it
-"""
+"""A Ray cluster of two computers, both here, and a recording on it that loses a third in the middle."""
 
 import os
-import sys
-import tempfile
 import threading
 import time
 from contextlib import contextmanager
 from dataclasses import dataclass
-from pathlib import Path
 from unittest import mock
 
 from command_helpers import command
 from places import HELPERS
-from shared_helpers import content, saved, started, wait_until
-
-from handrail.datasets.reading.digest import digest_of_dataset
+from shared_helpers import saved, started, wait_until
 
 os.environ["RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER"] = "0"  # else Ray looks for 127.0.0.1 at another address
 NODE = {"num_cpus": 1, "object_store_memory": 100_000_000, "node_ip_address": "127.0.0.1"}
@@ -83,23 +75,3 @@ def _place(path):
     """Return which episode of its shard a file of lines has, as a slice."""
     number = int(path.stem.rpartition("-")[2])
     return slice(number, number + 1)
-
-
-def main(episodes):
-    """Record reach both ways and compare."""
-    flags = ["--task", "reach", "--seed", "7"]
-    with tempfile.TemporaryDirectory() as folder, two_computers() as cluster:
-        one, other, start = Path(folder, "one"), Path(folder, "other"), time.monotonic()
-        done = command(one, *flags, "--dataset.num_episodes", episodes)
-        assert done.returncode == 0, done.stderr
-        print(f"one worker: {time.monotonic() - start:.1f} s, rows {digest_of_dataset(one)}")
-        loss = record_with_a_loss(cluster, other, episodes, *flags)
-        print(f"three computers, one lost: {loss.seconds:.1f} s, rows {digest_of_dataset(other)}")
-        print(f"saved when it was lost: {loss.kept}; of these recorded once more: {loss.twice}")
-        times = started(other)
-        print(f"episodes: {len(times)}, recorded at as many different times: {len(set(times)) == len(times)}")
-        print(f"all that both say is the same, without clocks: {content(one) == content(other)}")
-
-
-if __name__ == "__main__":
-    main(int(sys.argv[1]))

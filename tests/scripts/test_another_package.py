@@ -5,7 +5,8 @@ import sys
 from dataclasses import replace
 
 import pytest
-from command_helpers import command
+from canned import canned
+from command_helpers import ran, refused
 from press_kit import PRESS
 from training_helpers import TINY
 
@@ -24,22 +25,24 @@ def said(*flags):
     return [word for flag in flags for word in (flag, NAMED[flag])]
 
 
-@pytest.fixture(scope="module")
-def recorded(tmp_path_factory):
-    root = tmp_path_factory.mktemp("press") / "set"
-    done = command(root, *SAID, "--dataset.num_episodes", 1)
-    assert done.returncode == 0, done.stderr
-    return root
+def press(root):
+    ran(root, *SAID, "--dataset.num_episodes", 1)
 
 
-@pytest.fixture(scope="module")
-def trained(recorded, tmp_path_factory):
-    """A policy that nobody trained for long on that dataset."""
-    folder = tmp_path_factory.mktemp("press_policy") / "act"
+def act_of_press(folder):
+    """Train a policy on that dataset, not for long."""
     words = f"--output {folder} --actions intent --steps 2 --batch_size 4 --policy_options".split()
-    done = command(recorded, *said("--mode"), *words, *TINY, name="train")
-    assert done.returncode == 0, done.stderr
-    return folder
+    ran(canned(press), *said("--mode"), *words, *TINY, name="train")
+
+
+@pytest.fixture
+def recorded():
+    return canned(press)
+
+
+@pytest.fixture
+def trained():
+    return canned(act_of_press)
 
 
 @pytest.fixture
@@ -72,45 +75,36 @@ def test_it_is_recorded_under_the_names_that_find_it_again(recorded):
 @pytest.mark.parametrize("missing", NAMED)
 def test_a_dataset_alone_imports_nothing(missing, recorded, unseen):
     """Whatever of it the command line does not say too is refused, by the flag to say."""
-    done = command(recorded, *said(*(NAMED.keys() - {missing})), name="replay")
-    assert (done.returncode, done.stderr.count("\n")) == (2, 1), done.stderr
-    assert f"{missing} {NAMED[missing]}" in done.stderr
+    words = said(*(NAMED.keys() - {missing}))
+    refused(recorded, *words, name="replay", told=f"{missing} {NAMED[missing]}")
     assert unseen()
 
 
 def test_it_is_replayed(recorded):
-    done = command(recorded, *SAID, name="replay")
-    assert done.returncode == 0, done.stderr
-    assert "0.00e+00" in done.stdout
+    assert "0.00e+00" in ran(recorded, *SAID, name="replay")
 
 
 @pytest.mark.parametrize("missing", ["--task", "--mode", "--robot"])
 def test_a_policy_alone_imports_nothing(missing, trained, unseen):
     flags = {"--task", "--mode", "--robot"} - {missing}
-    done = command(trained, *said(*flags), "--episodes", 1, name="evaluate")
-    assert (done.returncode, done.stderr.count("\n")) == (2, 1), done.stderr
-    assert f"{missing} {NAMED[missing]}" in done.stderr
+    refused(trained, *said(*flags), "--episodes", 1, name="evaluate", told=f"{missing} {NAMED[missing]}")
     assert unseen()
 
 
 def test_what_was_trained_on_it_is_evaluated(trained, tmp_path):
     flags = [*said("--task", "--mode", "--robot"), "--episodes", 1, "--time_limit", 0.5, "--workers", 1]
-    done = command(trained, *flags, "--json", tmp_path / "e.json", name="evaluate")
-    assert done.returncode == 0, done.stderr
+    ran(trained, *flags, "--json", tmp_path / "e.json", name="evaluate")
     content = json.loads((tmp_path / "e.json").read_text())
     assert content["task"] == "press_kit:PRESS"
     assert list(content["arms"]) == ["press_kit:HAND intent"]
 
 
 def test_an_installed_entry_is_listed_recorded_and_found_again(installed, tmp_path, unseen):
-    assert "; press; or module:name" in " ".join(
-        word for word in command("--help").stdout.split() if word != "│"
-    )
+    shown = " ".join(word for word in ran("--help").split() if word != "│")
+    assert "; press; or module:name" in shown
     assert unseen()  # the help imports nothing
-    words = ["--task", "press", "--dataset.num_episodes", 1, "--time_limit", 0.5]
-    done = command(tmp_path / "set", *words)
-    assert done.returncode == 0, done.stderr
-    assert command(tmp_path / "set", name="replay").returncode == 0
+    ran(tmp_path / "set", "--task", "press", "--dataset.num_episodes", 1, "--time_limit", 0.5)
+    ran(tmp_path / "set", name="replay")
 
 
 @pytest.mark.parametrize(
@@ -124,9 +118,7 @@ def test_an_installed_entry_is_listed_recorded_and_found_again(installed, tmp_pa
     ],
 )
 def test_what_is_not_there_is_one_line(flags, words, tmp_path):
-    done = command(tmp_path / "set", *flags)
-    assert (done.returncode, done.stderr.count("\n")) == (2, 1), done.stderr
-    assert words in done.stderr
+    refused(tmp_path / "set", *flags, told=words)
     assert not (tmp_path / "set").exists()
 
 

@@ -9,14 +9,14 @@ import subprocess
 import sys
 from collections import Counter
 from pathlib import Path
-from typing import Any, get_args, get_type_hints
+from typing import get_args, get_type_hints
 
 import pytest
-from command_helpers import command
+from command_helpers import command, refused
 from hypothesis import given
 from hypothesis import strategies as st
-from pages import CONFIGS
-from places import ROOT
+from pages import COMMAND_CONFIGS, CONFIGS
+from places import FLOORS, sources
 from rich.console import Console
 
 from handrail.controllers.errors import HandrailError, not_installed
@@ -25,22 +25,17 @@ from handrail.datasets.presentation.table import Table
 from handrail.policies.imitation.config import check_installed
 from handrail.scripts import cli
 
-SOURCES = [
-    path
-    for room in ("collect", "controllers", "datasets", "policies", "scripts")
-    for path in (ROOT / room).rglob("*.py")
-]
-STORED = ("inspect", "repair", "replay", "train", "record")
+STORED = ("inspect", "edit repair", "replay", "train", "record")
 NEEDED = {
     "handrail-compare": ["x"],
     "handrail-edit merge": ["x", "y"],
     "handrail-devices test": ["keyboard"],
     "handrail-user-study": ["status", "x"],
 }
-LISTS = (Names, Numbers, Words)
+LISTS = [get_args(kind)[1] for kind in (Names, Numbers, Words)]
 
 
-@pytest.mark.parametrize("name", CONFIGS)
+@pytest.mark.parametrize("name", COMMAND_CONFIGS)
 def test_every_command_says_its_version(name):
     done = command("--version", name=name.removeprefix("handrail-"))
     assert (done.returncode, done.stderr) == (0, "")
@@ -55,11 +50,8 @@ def test_every_command_says_its_version(name):
         ("x --stepz 3", "Unrecognized options: --stepz"),
     ],
 )
-def test_a_wrong_flag_is_one_line_that_begins_with_what_is_wrong(words, said, capsys):
-    with pytest.raises(SystemExit) as stopped:
-        cli.parse(CONFIGS["handrail-train"], "handrail-train", shlex.split(words))
-    line = capsys.readouterr().err
-    assert (stopped.value.code, line.count("\n")) == (2, 1)
+def test_a_wrong_flag_is_one_line_that_begins_with_what_is_wrong(words, said):
+    line = refused(*words.split(), name="train")
     assert line.startswith(f"error: {said}")
     assert line.endswith("(see handrail-train --help)\n")
 
@@ -80,78 +72,55 @@ def test_a_terminal_without_unicode_gets_the_words_it_can_show(monkeypatch):
 def test_a_name_that_none_can_have_is_one_line(name, word, tmp_path, monkeypatch):
     """Bytes that are no text, a person who has no home here, a name too long, the top of all folders."""
     monkeypatch.chdir(tmp_path)
-    done = command(word, *(["--output", "new"] if name == "train" else []), name=name)
-    assert (done.returncode, done.stderr.count("\n")) == (2, 1), done.stderr
-    assert len(done.stderr) < 500
+    line = refused(word, *(["--output", "new"] if name == "train" else []), name=name)
+    assert len(line) < 500
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize("name", STORED)
-def test_a_dataset_is_a_folder_or_lerobot_s_flag_and_never_both(name, monkeypatch):
-    config = CONFIGS["handrail-edit repair" if name == "repair" else f"handrail-{name}"]
-    monkeypatch.setenv("HF_LEROBOT_HOME", "/hub")
-    ways = (["outputs/a"], ["--dataset.root", "outputs/a"], ["--dataset.root=outputs/a"])
-    assert {cli.parse(config, name, words).dataset.folder for words in ways} == {Path("outputs/a")}
-    named = cli.parse(config, name, ["--dataset.repo_id", "me/a"])
-    assert named.dataset.folder == Path("/hub/me/a")
-    for words, told in ((["a", "--dataset.root", "b"], "got both"), ([], "got neither")):
-        done = command(*words, name=name)
-        assert (done.returncode, done.stderr.count("\n")) == (2, 1), done.stderr
-        assert told in done.stderr
-        assert "--dataset." in done.stderr
+ONE_WAY = [  # command, ways to say the same, both ways at once
+    *((name, ("a", "--dataset.root a", "--dataset.root=a"), "a --dataset.root b") for name in STORED),
+    ("evaluate", ("a b", "a,b", "--policy a b", "--policy a,b"), "a --policy b"),
+    ("demo", ("a", "--root a"), "a --root b"),
+]
 
 
-def test_policies_are_folders_or_the_flag_and_never_both():
-    config = CONFIGS["handrail-evaluate"]
-    ways = ("a b", "a,b", "--policy a b", "--policy a,b --workers 2")
-    assert {cli.parse(config, "evaluate", shlex.split(way)).folders for way in ways} == {
-        (Path("a"), Path("b"))
-    }
-    for words, told in ((["a", "--policy", "b"], "got both"), (["--workers", "2"], "got none")):
-        done = command(*words, name="evaluate")
-        assert (done.returncode, done.stderr.count("\n")) == (2, 1), done.stderr
-        assert told in done.stderr
-
-
-def test_the_demo_s_folder_is_given_either_way():
-    config = CONFIGS["handrail-demo"]
-    folders = [cli.parse(config, "demo", words).folder for words in ([], ["a"], ["--root", "a"])]
-    assert folders == [Path("outputs/demo"), Path("a"), Path("a")]
-    assert cli.parse(config, "demo", ["~/a"]).folder == Path.home() / "a"
-    done = command("a", "--root", "b", name="demo")
-    assert (done.returncode, done.stderr.count("\n")) == (2, 1), done.stderr
-
-
-def is_list(hint: Any) -> bool:
-    """Whether a type is that of a list with a flag, perhaps with help of its own."""
-    _, *given = get_args(hint) or (hint,)
-    return "Positional" not in map(str, given) and any(given[:1] == [get_args(kind)[1]] for kind in LISTS)
+@pytest.mark.parametrize(("name", "ways", "both"), ONE_WAY)
+def test_a_folder_is_the_first_word_or_a_flag_and_never_both(name, ways, both, monkeypatch):
+    config = CONFIGS[f"handrail-{name}"]
+    found = [cli.parse(config, name, way.split()) for way in ways]
+    folders = [
+        each.folders if name == "evaluate" else getattr(each, "dataset", each).folder for each in found
+    ]
+    assert set(folders) == {(Path("a"), Path("b")) if name == "evaluate" else Path("a")}
+    refused(*both.split(), name=name, told="got both")
+    if name == "demo":
+        assert cli.parse(config, name, []).folder == Path("outputs/demo")
+        assert cli.parse(config, name, ["~/a"]).folder == Path.home() / "a"
+    else:
+        refused(name=name, told="got n")
+    if name in STORED:
+        monkeypatch.setenv("HF_LEROBOT_HOME", "/hub")
+        assert cli.parse(config, name, ["--dataset.repo_id", "me/a"]).dataset.folder == Path("/hub/me/a")
 
 
 def list_flags(config: type, prefix: str = "") -> list[str]:
-    """Return the flags and fields of a config that take a list."""
+    """Return the flags and fields of a config that take a list, perhaps with help of their own."""
     found = []
     for name, hint in get_type_hints(config, include_extras=True).items():
-        kind = getattr(hint, "__origin__", hint)
+        kind, (_, *given) = getattr(hint, "__origin__", hint), get_args(hint) or (hint,)
         if dataclasses.is_dataclass(kind):
             found += list_flags(kind, f"{prefix}{name}.")
-        elif is_list(hint):
+        elif "Positional" not in map(str, given) and any(given[:1] == [each] for each in LISTS):
             found.append(f"{prefix}{name}")
     return found
 
 
-FLAGS = [(command, flag) for command, config in CONFIGS.items() for flag in list_flags(config)]
-
-
-def test_there_are_lists_in_many_commands():
-    assert {"--" + flag for _, flag in FLAGS} >= {
-        *("--cameras", "--controllers", "--profile", "--tasks", "--modes", "--protection", "--perturbation"),
-        *("--policy", "--policy_options", "--labels", "--evaluations", "--columns.asked", "--layers"),
-    }
+FLAGS = [(name, flag) for name, config in CONFIGS.items() for flag in list_flags(config)]
 
 
 @pytest.mark.parametrize(("name", "flag"), FLAGS)
 def test_a_list_is_written_with_commas_or_spaces(name, flag):
+    assert len(FLAGS) > 12
     needed = NEEDED.get(name, ["x"] if name.startswith("handrail-edit") else [])
     values = {
         str(cli.parse(CONFIGS[name], name, [*needed, f"--{flag}", *shlex.split(written)]))
@@ -160,26 +129,14 @@ def test_a_list_is_written_with_commas_or_spaces(name, flag):
     assert len(values) == 1, values
 
 
-def test_no_help_asks_for_commas_but_where_a_space_does_as_well():
-    """A setting of many names is a list, which takes both: none is left that takes commas alone."""
-    for name, config in CONFIGS.items():
-        assert "comma-separated" not in str(command("--help", name=name.removeprefix("handrail-")).stdout), (
-            name
-        )
-        plain = [
-            hint
-            for hint in get_type_hints(config, include_extras=True).values()
-            if hint in (tuple[str, ...],)
-        ]
-        assert not plain, name
+@pytest.mark.parametrize("config", COMMAND_CONFIGS.values())
+def test_every_setting_of_many_names_is_such_a_list(config):
+    assert tuple[str, ...] not in get_type_hints(config, include_extras=True).values()
 
 
-def test_brackets_keep_their_commas():
+def test_brackets_and_names_of_folders_keep_their_commas(tmp_path, monkeypatch):
     words = ["down_dims=[64, 128],n=3", '{"a": [1], "b": [2, 3]}', "x"]
     assert split_list(words) == ("down_dims=[64, 128]", "n=3", '{"a": [1], "b": [2, 3]}', "x")
-
-
-def test_a_folder_with_a_comma_in_its_name_is_one(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path("a,b").mkdir()
     assert split_list(["a,b", "c,d"]) == ("a,b", "c", "d")
@@ -187,29 +144,14 @@ def test_a_folder_with_a_comma_in_its_name_is_one(tmp_path, monkeypatch):
 
 def test_install_hints_come_from_one_place_and_lead_to_the_clone():
     """The package of this name on a public index is somebody else's."""
-    hints = [
-        (path.name, line)
-        for path in SOURCES
-        for line in path.read_text().splitlines()
-        if "pip install" in line
-    ]
-    assert [name for name, _ in hints] == ["errors.py"], hints
+    files = [path for floor in FLOORS for path in sources(floor)]
+    assert [path.name for path in files if "pip install" in path.read_text()] == ["errors.py"]
     for extra, what in (("display", "'.[display]'"), ("", ".")):
         message = str(not_installed("--flag", "module", extra))
         assert message.endswith(f"in the clone of Handrail: pip install -c constraints.txt {what}")
         assert "\n" not in message
     with pytest.raises(HandrailError, match=r"^handrail-x: expected nowhere, found none; .*'\.\[rl\]'$"):
         check_installed("handrail-x", ("nowhere",), extra="rl")
-
-
-def test_messages_name_flags(tmp_path):
-    """What may be done about a dataset in the way is said in words that can be typed."""
-    folder = tmp_path / "set"
-    (folder / "meta").mkdir(parents=True)
-    (folder / "meta" / "info.json").write_text("{}")
-    done = command(folder, "--task", "reach")
-    assert (done.returncode, done.stderr.count("\n")) == (2, 1), done.stderr
-    assert {"--resume", "--overwrite"} <= set(done.stderr.split())
 
 
 def shown(table: Table) -> str:
@@ -231,10 +173,8 @@ def test_a_table_fits_in_80_columns_and_loses_nothing(cells, size):
 
 
 def test_a_table_keeps_units_and_words_whole():
-    headings = (
-        *("episode", "mode", "success", "why not", "length [s]"),
-        *("smallest distance [m]", "smoothness", "contacts"),
-    )
+    headings = ("episode", "mode", "success", "why not", "length [s]")
+    headings += ("smallest distance [m]", "smoothness", "contacts")
     row = ("0", "direct_filtered", "no", "timeout", "30.0", "0.088", "-2.20", "0")
     words = shown(Table(headings, [row])).split()
     assert {*" ".join(headings).split(), *row} <= set(words)

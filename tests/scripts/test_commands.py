@@ -10,8 +10,10 @@ import time
 
 import numpy as np
 import pytest
-from command_helpers import command
+from canned import canned, copied
+from command_helpers import command, ran, refused
 
+from handrail.collect.commands.replay import OpenDataset, replay_episode
 from handrail.datasets.reading.reader import read_episodes, read_frames, read_info
 
 RECORD = [sys.executable, "-m", "handrail.scripts", "record"]
@@ -23,16 +25,18 @@ def in_its_own_process(*arguments):
     return subprocess.run([*RECORD, *map(str, arguments)], capture_output=True, text=True, timeout=300)
 
 
-def digest(root):
+def stamps(root):
     return {path.name: path.stat().st_mtime_ns for path in root.rglob("*") if path.is_file()}
 
 
-@pytest.fixture(scope="module")
-def recorded(tmp_path_factory):
-    root = tmp_path_factory.mktemp("recorded") / "reach"
+def record_in_its_own_process(root):
     done = in_its_own_process(*REACH, "--dataset.root", root)
     assert done.returncode == 0, done.stderr
-    return root
+
+
+@pytest.fixture
+def recorded():
+    return canned(record_in_its_own_process)
 
 
 WRONG = {
@@ -74,13 +78,8 @@ WRONG = {
 @pytest.mark.parametrize("case", WRONG)
 def test_wrong_input_is_one_clear_line_and_nothing_written(case, tmp_path):
     arguments, words = WRONG[case]
-    root = tmp_path / "dataset"
-    done = command(*arguments, "--dataset.root", root)
-    assert done.returncode == 2, done.stderr
-    assert words in done.stderr
-    assert done.stderr.startswith("error: ")
-    assert done.stderr.count("\n") == 1, done.stderr
-    assert not root.exists()
+    refused(*arguments, "--dataset.root", tmp_path / "dataset", told=words)
+    assert not (tmp_path / "dataset").exists()
 
 
 def test_a_shell_gets_the_same_line_and_code(tmp_path):
@@ -89,33 +88,20 @@ def test_a_shell_gets_the_same_line_and_code(tmp_path):
     assert (shell.returncode, shell.stdout, shell.stderr) == (here.returncode, here.stdout, here.stderr)
 
 
-def test_an_existing_dataset_is_never_overwritten(recorded):
-    before = digest(recorded)
-    done = command(*REACH, "--dataset.root", recorded)
-    assert (done.returncode, done.stderr.count("\n")) == (2, 1), done.stderr
-    assert "--overwrite" in done.stderr or "overwrite" in done.stderr
-    assert digest(recorded) == before
+@pytest.mark.parametrize("words", [REACH, ["--task", "pick_place", "--resume"]])
+def test_an_existing_dataset_is_never_overwritten_nor_continued_by_another_recording(words, recorded):
+    before = stamps(recorded)
+    line = refused(*words, "--dataset.root", recorded)
+    assert "--resume" in words or {"--resume", "--overwrite"} <= set(line.split())
+    assert stamps(recorded) == before
 
 
-def test_resume_of_another_recording_is_refused(recorded):
-    before = digest(recorded)
-    done = command("--task", "pick_place", "--dataset.root", recorded, "--resume")
-    assert (done.returncode, done.stderr.count("\n")) == (2, 1), done.stderr
-    assert digest(recorded) == before
-
-
-def test_resume_of_nothing_is_refused(tmp_path):
-    done = command(*REACH, "--dataset.root", tmp_path / "none", "--resume")
-    assert (done.returncode, done.stderr.count("\n")) == (2, 1), done.stderr
+def test_resume_of_nothing_and_a_folder_that_cannot_be_written_are_refused(tmp_path):
+    refused(*REACH, "--dataset.root", tmp_path / "none", "--resume")
     assert not (tmp_path / "none").exists()
-
-
-def test_a_folder_that_cannot_be_written_is_refused(tmp_path):
-    in_the_way = tmp_path / "file"
-    in_the_way.write_text("not a folder")
-    done = command(*REACH, "--dataset.root", in_the_way / "dataset")
-    assert (done.returncode, done.stderr.count("\n")) == (2, 1), done.stderr
-    assert in_the_way.read_text() == "not a folder"
+    (tmp_path / "file").write_text("not a folder")
+    refused(*REACH, "--dataset.root", tmp_path / "file" / "dataset")
+    assert (tmp_path / "file").read_text() == "not a folder"
 
 
 def test_help_loads_nothing_heavy():
@@ -138,16 +124,9 @@ def test_help_loads_nothing_heavy():
 
 
 def test_flags_are_written_as_lerobot_users_write_them(tmp_path):
-    root = tmp_path / "d"
-    done = command(
-        "--task=reach",
-        "--dataset.num_episodes=1",
-        f"--dataset.root={root}",
-        "--realtime=false",
-        "--resume=false",
-    )
-    assert done.returncode == 0, done.stderr
-    assert read_info(root).episodes == 1
+    flags = ["--task=reach", "--dataset.num_episodes=1", "--realtime=false", "--resume=false"]
+    ran(*flags, f"--dataset.root={tmp_path / 'd'}")
+    assert read_info(tmp_path / "d").episodes == 1
 
 
 def test_what_is_recorded_says_how_it_came_about(recorded):
@@ -165,62 +144,46 @@ def test_what_is_recorded_says_how_it_came_about(recorded):
 
 
 def test_a_replay_repeats_the_recording_exactly(recorded):
-    from handrail.collect.commands.replay import replay_episode
-
     for episode in (0, 1):
         replay, _ = replay_episode(recorded, episode)
         assert replay.largest == 0.0
         assert replay.success == replay.recorded_success
-    done = command("--dataset.root", recorded, name="replay")
-    assert done.returncode == 0
-    assert "0.00e+00" in done.stdout
+    assert "0.00e+00" in ran("--dataset.root", recorded, name="replay")
 
 
 def test_moving_obstacles_move_again_in_a_replay(tmp_path):
-    from handrail.collect.commands.replay import replay_episode
-
     root = tmp_path / "d"
-    done = command(
-        "--task", "reach", "--moving_obstacles", 1, "--dataset.num_episodes", 1, "--dataset.root", root
-    )
-    assert done.returncode == 0, done.stderr
+    words = ["--task", "reach", "--dataset.root", root]
+    ran(*words, "--moving_obstacles", 1, "--dataset.num_episodes", 1)
     assert json.loads(read_episodes(root)[0]["settings"])["moving_obstacles"] == 1
     assert "mover_0.vx" in (read_info(root).features["observation.environment_state"].names or ())
     assert replay_episode(root, 0)[0].largest == 0.0
-    refused = command("--task", "reach", "--dataset.root", root, "--resume")
-    assert refused.returncode == 2
+    refused(*words, "--resume")
 
 
 def test_a_replay_shows_when_the_commands_differ(recorded, monkeypatch):
     """The deviation is measured, not assumed."""
-    from handrail.collect.commands import replay
-
-    honest = replay.OpenDataset.frames
+    honest = OpenDataset.frames
 
     def tampered(*arguments):
         frames = honest(*arguments)
         return frames | {"action": frames["action"] * np.float32(0.9)}
 
-    monkeypatch.setattr(replay.OpenDataset, "frames", tampered)
-    assert replay.replay_episode(recorded, 0)[0].largest > 0.01
+    monkeypatch.setattr(OpenDataset, "frames", tampered)
+    assert replay_episode(recorded, 0)[0].largest > 0.01
 
 
 def test_inspect_prints_every_episode(recorded):
-    done = command("--dataset.root", recorded, name="inspect")
-    assert done.returncode == 0, done.stderr
-    assert "2 episodes, 2 succeeded" in done.stdout
-    assert len(re.findall(r"^ *\d+  ee", done.stdout, re.MULTILINE)) == 2
-    more = command("--dataset.root", recorded, "--quality", name="inspect")
-    assert len(re.findall(r"^ *\d+  ee", more.stdout, re.MULTILINE)) == 4
+    shown = ran("--dataset.root", recorded, name="inspect")
+    assert "2 episodes, 2 succeeded" in shown
+    assert len(re.findall(r"^ *\d+  ee", shown, re.MULTILINE)) == 2
+    more = ran("--dataset.root", recorded, "--quality", name="inspect")
+    assert len(re.findall(r"^ *\d+  ee", more, re.MULTILINE)) == 4
 
 
-def test_resume_goes_on_with_new_seeds(recorded, tmp_path):
-    import shutil
-
-    root = tmp_path / "copy"
-    shutil.copytree(recorded, root)
-    done = command(*REACH, "--dataset.root", root, "--resume", "--mode", "switching")
-    assert done.returncode == 0, done.stderr
+def test_resume_goes_on_with_new_seeds(tmp_path):
+    root = copied(tmp_path / "copy", record_in_its_own_process)
+    ran(*REACH, "--dataset.root", root, "--resume", "--mode", "switching")
     rows = read_episodes(root)
     assert len({row["seed"] for row in rows}) == len(rows) == 4
     assert [row["mode"] for row in rows] == ["ee", "ee", "switching", "switching"]
@@ -228,8 +191,7 @@ def test_resume_goes_on_with_new_seeds(recorded, tmp_path):
 
 def test_the_same_seed_records_the_same_data(recorded, tmp_path):
     """Here as in the process of its own that recorded the first."""
-    done = command(*REACH, "--dataset.root", tmp_path / "again")
-    assert done.returncode == 0
+    ran(*REACH, "--dataset.root", tmp_path / "again")
     first, again = read_frames(recorded, 1), read_frames(tmp_path / "again", 1)
     for key in set(first) - {"controller.solve_time", "wall_clock"}:
         np.testing.assert_array_equal(first[key], again[key], err_msg=key)
@@ -289,8 +251,7 @@ def test_kill_at_random_moments_loses_at_most_the_open_episode(tmp_path):
         kept = {
             path: path.read_bytes() for path in [*rows, *sorted(root.glob("data/*/*.parquet"))[: len(rows)]]
         }
-    done = command(*REACH, "--dataset.root", root, "--resume")
-    assert done.returncode == 0, done.stderr
+    ran(*REACH, "--dataset.root", root, "--resume")
     episodes = read_episodes(root)
     assert [row["episode_index"] for row in episodes] == list(range(len(episodes)))
     assert read_info(root).frames == sum(row["length"] for row in episodes)

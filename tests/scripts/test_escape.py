@@ -15,7 +15,8 @@ from pathlib import Path
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from command_helpers import command
+from canned import copied
+from command_helpers import command, ran
 from hypothesis import given
 from hypothesis import strategies as st
 from markdown_it import MarkdownIt
@@ -29,20 +30,17 @@ from handrail.datasets.printable import printable
 from handrail.scripts import cli
 
 
-@pytest.fixture(scope="module")
-def recorded(tmp_path_factory):
-    """Return the folders of a plain dataset and of a stranger's, whose names are words too."""
-    folder = tmp_path_factory.mktemp("escape")
-    plain = dataset(folder / "plain", [f"{PLAIN} {place}" for place in range(5)])
-    return plain, dataset(folder / f"{STEERING}{LIVE[3]}\n{FORGED}", STRANGE)
+def plain_and_strange(folder):
+    """Record a plain dataset and a stranger's, whose folder's name is such words too."""
+    dataset(folder / "plain", [f"{PLAIN} {place}" for place in range(5)])
+    dataset(folder / "strange" / f"{STEERING}{LIVE[3]}\n{FORGED}", STRANGE)
 
 
 @pytest.fixture
-def sets(recorded, tmp_path):
+def sets(tmp_path):
     """Return copies of both."""
-    import shutil
-
-    return [shutil.copytree(root, tmp_path / "sets" / root.name) for root in recorded]
+    root = copied(tmp_path / "sets", plain_and_strange)
+    return root / "plain", next((root / "strange").iterdir())
 
 
 def unseen(text):
@@ -53,10 +51,7 @@ def unseen(text):
 def check_printed(done):
     """Check that a command's words are lines of text, none of them a stranger's."""
     for text in (done.stdout, done.stderr):
-        strange = {
-            each for each in text if each != "\n" and unicodedata.category(each) in ("Cc", "Cf", "Zl", "Zp")
-        }
-        assert not strange, (strange, text)
+        assert not unseen(text), (unseen(text), text)
         assert not re.search(rf"^\s*({FORGED}|# heading|- item)", text, re.MULTILINE), text
         assert "Traceback" not in text
 
@@ -170,9 +165,9 @@ def test_an_error_about_a_stranger_s_dataset_is_a_line_of_text(script, fault, se
     check_printed(command(root, *more, name=script))
 
 
-def test_a_terminal_that_takes_colours_is_steered_by_nobody_else(recorded, monkeypatch):
+def test_a_terminal_that_takes_colours_is_steered_by_nobody_else(sets, monkeypatch):
     monkeypatch.setenv("FORCE_COLOR", "1")
-    shown = command(recorded[1], name="inspect")
+    shown = command(sets[1], name="inspect")
     assert "\x1b[1m" in shown.stdout  # the title's
     own = re.compile(r"\x1b\[[0-9;]*m")
     check_printed(type(shown)(0, own.sub("", shown.stdout), own.sub("", shown.stderr)))
@@ -180,7 +175,7 @@ def test_a_terminal_that_takes_colours_is_steered_by_nobody_else(recorded, monke
 
 def test_a_dataset_s_card_has_the_shape_of_a_plain_one(sets):
     for root in sets:
-        assert command(root, "--dataset.repo_id", "me/x", name="edit push").returncode == 0
+        ran(root, "--dataset.repo_id", "me/x", name="edit push")
     plain, strange = ((root / "README.md").read_text() for root in sets)
     assert markdown_shape(strange) == markdown_shape(plain)
     assert "alert(1)" in strange  # it is told, as text
@@ -188,14 +183,11 @@ def test_a_dataset_s_card_has_the_shape_of_a_plain_one(sets):
 
 def test_a_report_has_the_tags_and_the_rows_of_a_plain_one(sets, tmp_path):
     for place, root in enumerate(sets):
-        words = root, "--by", "environment", "--output", tmp_path / str(place)
-        assert command(*words, name="compare").returncode == 0
+        ran(root, "--by", "environment", "--output", tmp_path / str(place), name="compare")
     plain, strange = (tmp_path / "0", tmp_path / "1")
     text = (strange / "report.html").read_text()
     assert Tags(text).found == Tags((plain / "report.html").read_text()).found
-    assert not [
-        each for each in text if each != "\n" and unicodedata.category(each) in ("Cc", "Cf", "Zl", "Zp")
-    ]
+    assert not unseen(text)
     for path in strange.glob("*.csv"):
         rows = list(csv.reader(io.StringIO(path.read_text())))
         others = list(csv.reader(io.StringIO((plain / path.name).read_text())))

@@ -6,7 +6,7 @@ import sys
 
 import numpy as np
 import pytest
-from command_helpers import command
+from canned import canned, record_by_command
 from places import ROOT
 
 EXAMPLES = ROOT / "docs" / "examples"
@@ -57,10 +57,9 @@ def test_a_controller_of_one_s_own_reaches_some_goals(capsys, monkeypatch):
     assert 1 <= shown("new_controller", capsys, monkeypatch).count("reached after") <= 3
 
 
-def test_a_metric_of_a_dataset_is_computed(tmp_path, capsys, monkeypatch):
-    recorded = command(tmp_path / "reach", "--task", "reach", "--dataset.num_episodes", 2)
-    assert recorded.returncode == 0, recorded.stderr
-    out = shown("dataset_metric", capsys, monkeypatch, tmp_path / "reach")
+def test_a_metric_of_a_dataset_is_computed(capsys, monkeypatch):
+    recorded = canned(record_by_command, "--task reach --dataset.num_episodes 2")
+    out = shown("dataset_metric", capsys, monkeypatch, recorded)
     assert out.count("done in") == 2
     assert -6.0 < float(re.search(r"\(SPARC\): (-[\d.]+)", out)[1]) < -1.4
 

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from canned import canned, record_by_command
 
 from handrail.scripts.commands import COMMANDS
 
@@ -107,22 +108,18 @@ def test_a_command_that_loads_is_ended_by_one_line(name, number):
     assert ended(process, number) == "error: interrupted\n"
 
 
-@pytest.fixture(scope="module")
-def recorded(tmp_path_factory):
-    root = tmp_path_factory.mktemp("recorded") / "set"
-    words = [*OURS, "record", str(root), *SET, "4"]
-    subprocess.run([sys.executable, *words], check=True, capture_output=True)
-    return root
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("seconds", [0.5, 1.0, 2.0, 4.0, 8.0])
 @pytest.mark.parametrize("name", WORK)
-def test_a_command_that_works_is_ended_by_one_line(name, seconds, recorded, tmp_path):
+def test_a_command_that_works_is_ended_by_one_line(name, seconds, tmp_path):
     """One that is done by then is tried again, twice as early; one that ignores signals is always done."""
     for moment in seconds * 0.5 ** np.arange(5):
         out = tmp_path / f"{moment}"
-        places = {"SET": str(recorded), "OUT": str(out), "OUT/none": str(out / "none")}
+        places = {
+            "SET": str(canned(record_by_command, f"{' '.join(SET)} 4")),
+            "OUT": str(out),
+            "OUT/none": str(out / "none"),
+        }
         words = [places.get(word, word) for word in WORK[name]]
         process = begun(*words, cwd=tmp_path, env=os.environ | {"HF_HUB_OFFLINE": "1"})
         time.sleep(moment)

@@ -131,10 +131,10 @@ def test_a_reader_can_repeat_every_table_and_test_from_the_episodes(name):
         for controller in others:
             published = run["paired"][profile][controller]
             pair = measured[first], measured[controller]
-            assert asdict(paired_success(*(each["success"] for each in pair))) == published["success"]
+            assert asdict(paired_success(pair[0]["success"], pair[1]["success"])) == published["success"]
             for metric in METRICS[1:-1]:
                 rng = np.random.default_rng(0)
-                found, told = paired_difference(*(each[metric] for each in pair), rng), published[metric]
+                found, told = paired_difference(pair[0][metric], pair[1][metric], rng), published[metric]
                 assert [found.pairs, found.mean, found.p_wilcoxon, *found.t_interval] == pytest.approx(
                     [told["pairs"], told["mean"], told["p_wilcoxon"], *told["t_interval"]], rel=1e-6
                 )

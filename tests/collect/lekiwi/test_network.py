@@ -146,7 +146,7 @@ def test_nobody_there_is_said_in_one_line(tmp_path):
 
 
 def test_lerobots_own_loop_records_through_the_processor(tmp_path, host, monkeypatch, capsys):
-    importlib.import_module("played_hand")
+    importlib.import_module("played_leader")
     file = ROOT / "docs" / "examples" / "record_with_mpc.py"
     words = ["127.0.0.1", tmp_path / "set", "played_hand", *host.ports, 3.0]
     monkeypatch.setattr(sys, "argv", [str(file), *map(str, words)])

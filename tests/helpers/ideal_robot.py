@@ -1,11 +1,13 @@
-"""An ideal robot among obstacles, watched between updates too, for the tests of the backup."""
+"""An ideal robot among obstacles, watched between updates too; what it is asked for and where it goes."""
 
 from dataclasses import replace
 
 import numpy as np
 
 from handrail.controllers.collision.model import CollisionModel
+from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import State
+from handrail.controllers.interface.frames import Frames
 from handrail.controllers.interface.intent import Intent
 from handrail.controllers.robot.model import load_model
 from handrail.controllers.robot.shape import Obstacle, Shape
@@ -13,6 +15,8 @@ from handrail.controllers.robot.shape import Obstacle, Shape
 MODEL = load_model()
 HOME = MODEL.description.home
 LIMITS = MODEL.description.limits
+CHANNELS = Channels.of(MODEL.description)
+REST = np.zeros(MODEL.size)
 PERIOD = 0.05
 TRAIL = 5  # positions looked at in a period
 
@@ -67,10 +71,36 @@ class Robot:
         return tuple(replace(o, position=o.position + time * o.velocity) for o in self._obstacles)
 
 
-def asking(channels, values, *groups):
+def intent(values, *groups, time=0.0, frames=None):
+    """Return an intent: values of the channels, (18,) or by name, of which those of some groups are owned."""
+    if isinstance(values, dict):
+        values = np.array([values.get(name, 0.0) for name in CHANNELS.names])
+    mask = CHANNELS.mask(*groups)
+    return Intent(np.where(mask, values, 0.0), mask, time=time, frames=frames or Frames())
+
+
+def asking(values, *groups, frames=None):
     """Return what makes the intent of a time."""
-    mask = channels.mask(*groups)
-    return lambda time: Intent(np.where(mask, values, 0.0), mask, time=time)
+    return lambda time: intent(values, *groups, time=time, frames=frames)
+
+
+def roll(controller, intents, q=HOME, period=PERIOD):
+    """Run a controller on a robot that does as it is told; return positions, velocities and commands."""
+    positions, velocities, commands = [np.array(q)], [REST], []
+    for step, ask in enumerate(intents):
+        time = step * period
+        command = controller.update(State(positions[-1], velocities[-1], time), ask(time))
+        velocity = command.velocity(period)
+        positions.append(positions[-1] + 0.5 * period * (velocities[-1] + velocity))
+        velocities.append(velocity)
+        commands.append(command)
+    return np.array(positions), np.array(velocities), commands
+
+
+def realised(q, v):
+    """Return the velocity along every channel, (18,): of the base in its frame, of the tool in the world."""
+    c, s = np.cos(q[2]), np.sin(q[2])
+    return np.concatenate([[c * v[0] + s * v[1], -s * v[0] + c * v[1], v[2]], MODEL.jacobian(q) @ v, v])
 
 
 def table(height):

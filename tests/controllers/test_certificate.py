@@ -1,0 +1,42 @@
+"""The stop certificate measures how much too near a stop comes."""
+
+import numpy as np
+import pytest
+from ideal_robot import HOME, MODEL, REST
+
+from handrail.controllers.collision.model import CollisionModel
+from handrail.controllers.collision.surroundings import Surroundings
+from handrail.controllers.robot.shape import Obstacle, Shape
+from handrail.controllers.safety.certificate import StopCertificate
+from handrail.controllers.safety.limiter import Limiter
+
+FRONT = HOME[0] + 0.48  # of the chassis [m]
+FORWARD = np.eye(MODEL.size)[0]
+
+
+def violation_of(v, obstacle):
+    """Return what a full stop from home violates."""
+    collision = CollisionModel(MODEL, (obstacle,))
+    least = 0.3 * Surroundings.of(collision, 0.1, 0.1).margins
+    certificate = StopCertificate(Limiter(MODEL.description), collision, least, span=1.0)
+    return certificate.violation(HOME, v, (HOME, collision.values(HOME[None])[0]))
+
+
+@pytest.mark.parametrize(("gap", "all_", "hard"), [(0.2, 0.15, 0.135), (0.5, 0.0, 0.0)])
+def test_the_way_to_rest_counts(gap, all_, hard):
+    """At 0.8 m/s the base needs 0.32 m to stop; a wall is 0.2 m ahead, then 0.5 m."""
+    wall = Obstacle("wall", Shape("box", [0.2, 4.0, 0.2]), [FRONT + gap + 0.1, 0.0, 0.1])
+    violation = violation_of(0.8 * FORWARD, wall)
+    assert violation.all == pytest.approx(all_, abs=5e-3)
+    assert violation.hard == pytest.approx(hard, abs=5e-3)
+    assert all_ > 0.0 or violation.all == 0.0
+
+
+@pytest.mark.parametrize(("away", "all_"), [(0.35, 0.18), (1.0, 0.0)])
+def test_where_obstacles_move_rest_is_not_safe_for_ever(away, all_):
+    """A pillar comes at 0.5 m/s to a robot that stands: safe as long as it is farther than the span."""
+    place, velocity = [FRONT + 0.2 + away, 0.0, 0.125], [-0.5, 0.0, 0.0]
+    pillar = Obstacle("pillar", Shape("cylinder", [0.2, 0.25]), place, velocity=velocity)
+    violation = violation_of(REST, pillar)
+    assert violation.all == pytest.approx(all_, abs=1e-6)
+    assert violation.hard == 0.0  # a pillar that comes by itself is nobody's fault
