@@ -4,7 +4,7 @@ from pathlib import Path
 
 from handrail.collect.commands.config import ReplayConfig
 from handrail.collect.config import RecordConfig
-from handrail.collect.execution.forking import RECORDING, begin_loading
+from handrail.collect.execution.pool import RECORDING, begin_loading
 from handrail.collect.operators.catalogue import OPERATORS
 from handrail.collect.user_study.config import StudySessionConfig
 from handrail.scripts import cli

@@ -1,71 +1,28 @@
 """Records episodes into a dataset, with a progress bar, and says what came of it."""
 
-from collections.abc import Iterable, Sequence
+import time
+from contextlib import ExitStack, closing
+from pathlib import Path
 from typing import Any
 
-from rich.console import RenderableType
-from rich.progress import (
-    BarColumn,
-    MofNCompleteColumn,
-    Progress,
-    ProgressColumn,
-    TextColumn,
-    TimeElapsedColumn,
-    TimeRemainingColumn,
-)
-from rich.protocol import is_renderable
-
-from handrail.collect.commands.account import RecordingLog, report
-from handrail.collect.commands.recording import Recording, come_first, episode_seed, session_writer
-from handrail.collect.commands.shards import Shards
-from handrail.collect.commands.shared import record_shared
+from handrail.collect.commands.account import RecordingLog
+from handrail.collect.commands.recording import Recording, come_first, open_writer, session_writer
+from handrail.collect.commands.shared import Shards
 from handrail.collect.commands.target import located
 from handrail.collect.config import RecordConfig
+from handrail.collect.execution.bar import WorkBar
+from handrail.collect.execution.execution import Execution
+from handrail.collect.execution.pool import RECORDING
 from handrail.collect.operators.catalogue import OPERATORS
-from handrail.collect.operators.operator import EpisodeEvent
-from handrail.collect.session.build import build_env, build_modes, build_session
+from handrail.collect.session.build import build_env, build_mode
 from handrail.collect.session.display import Display
 from handrail.collect.world.env import HandrailEnv
-from handrail.controllers.errors import FAILED, INTERRUPTED, HandrailError
-from handrail.controllers.interrupts import Interrupts
 from handrail.controllers.registry import resolved
 from handrail.datasets.format.layout import Layout
 from handrail.datasets.presentation.terminal import Terminal
+from handrail.datasets.reading.reader import read_info
 from handrail.datasets.recording.folder import check_target
 from handrail.datasets.recording.writer import EpisodeWriter
-
-
-class _Progress(Progress):
-    """The bar of a recording, below what the people who steer have to show."""
-
-    def __init__(self, *columns: ProgressColumn, console: Terminal, shown: Sequence[Any]) -> None:
-        self._shown = shown  # the bar draws itself once while it is made
-        super().__init__(*columns, console=console)
-
-    def get_renderables(self) -> Iterable[RenderableType]:
-        """Return what is shown."""
-        yield from self._shown
-        yield from super().get_renderables()
-
-
-def recording_bar(console: Terminal, people: Sequence[Any]) -> Progress:
-    """Return the bar of a recording, not started.
-
-    Args:
-        console: to draw on.
-        people: who steer now; what rich can draw of them is shown above the bar.
-    """
-    return _Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn("{task.fields[success]}"),
-        TimeElapsedColumn(),
-        TextColumn("left"),
-        TimeRemainingColumn(),
-        console=console,
-        shown=[each for each in people if is_renderable(each)],
-    )
 
 
 def record(config: RecordConfig) -> int:
@@ -74,91 +31,104 @@ def record(config: RecordConfig) -> int:
     Args:
         config: of the recording.
     """
-    console = Terminal(stderr=True)
-    if config.is_shared or Shards(config).begun:
-        return record_shared(config, console)
+    console, log, shards = Terminal(stderr=True), RecordingLog(), Shards(config)
+    if config.is_shared or shards.begun:
+        saved = _record_shared(config, shards, log, console)
+    else:
+        saved = _record_here(config, log, console)
+    log.report(config, *saved, console)
+    return log.exit_code
+
+
+def _record_here(config: RecordConfig, log: RecordingLog, console: Terminal) -> tuple[Path, int, int]:
+    """Record in this process; return the dataset's folder and its episodes and frames."""
     interactive = OPERATORS.find(config.operator).interactive
     if interactive or config.robot_client:
         come_first()
-    env, link = _opened(config, interactive)
-    displays: list[Display] = []
-    people: list[Any] = []
-    try:
-        displays = _displays(config, console)
-        try_out = build_modes if interactive else build_session
-        try_out(config, env)  # a wrong mask, or cameras without GL, show before anything is written
+    with ExitStack() as stack:
+        env = _opened(config, interactive, stack)
+        displays = _displays(config, console, stack)
+        build_mode(config, env.model)  # a wrong mask, or cameras without GL, show before anything is written
         env.reset(seed=config.seed)
         config = located(config, env)
         if interactive and not config.resume:  # before a person's page is opened, or their device
             check_target(Layout(config.dataset.folder.absolute()), config.overwrite)
-        people = _people(config, env, console)
-        with session_writer(config, env) as writer:
-            if writer.repaired and not writer.repaired.clean:
-                console.print(str(writer.repaired))
-            if writer.num_episodes:
-                console.print(f"Adds to {writer.root}; episodes there: {writer.num_episodes}")
-            recording = Recording(config, env, writer, people, displays)
-            if interactive or env.real:
-                console.print("Getting ready; the first time on a computer takes about a minute.")
-                recording.warm_up(config.seed)
-                console.print("Ready.")
-            log = RecordingLog()
-            _record_all(config, recording, writer, log, console)
-            report(config, writer.root, writer.num_episodes, writer.num_frames, log, console)
-    finally:
-        for display in [*displays, *people]:
-            display.close()
-        env.close()
-        if link:
-            link.close()
-    return log.exit_code
+        people = _people(config, env, console, stack)
+        recording = Recording(config, env, people, displays)
+        writer = stack.enter_context(session_writer(config, env))
+        _print_state(writer, console)
+        recording.into(writer)
+        if interactive or env.real:
+            console.print("Getting ready; the first time on a computer takes about a minute.")
+            recording.warm_up(config.seed)
+            console.print("Ready.")
+        count = config.dataset.num_episodes
+        with (
+            log.noting("the open episode is dropped, the saved ones are whole"),
+            WorkBar(console, "recording", count, people) as bar,
+        ):
+            for _ in recording.episodes(writer, writer.num_episodes + count, log.add):
+                bar.show(completed=len(log.outcomes), words=log.words)
+        return writer.root, writer.num_episodes, writer.num_frames
 
 
-def _opened(config: RecordConfig, interactive: bool) -> tuple[HandrailEnv, Any]:
-    """Return the environment; and the link to a robot, if it is no simulation."""
+def _record_shared(
+    config: RecordConfig, shards: Shards, log: RecordingLog, console: Terminal
+) -> tuple[Path, int, int]:
+    """Record with several workers, or go on with what they left; return what `_record_here` does."""
+    start, goes_on = time.monotonic(), shards.begun
+    if goes_on:
+        config = shards.going_on()
+    with (
+        Execution(config, "recording", console, RECORDING) as execution,
+        closing(build_env(config, config.dataset.fps)) as env,
+    ):
+        Recording(config, env)  # a wrong mask, or cameras without GL, show before anything is written
+        env.reset(seed=config.seed)
+        with open_writer(config, env) as writer:  # nobody else writes there meanwhile
+            _print_state(writer, console)
+            if not goes_on:
+                shards.begin(writer.num_episodes)
+            jobs = shards.jobs(writer.num_episodes)
+            with log.noting(f"what was recorded is kept in {shards.folder}, and the same flags go on"):
+                if jobs:
+                    shards.record(jobs, log, execution)
+    if not log.exit_code:
+        with log.noting():
+            shards.remove()
+    log.wall_time = time.monotonic() - start
+    info = read_info(shards.root)
+    return shards.root, info.episodes, info.frames
+
+
+def _print_state(writer: EpisodeWriter, console: Terminal) -> None:
+    if writer.repaired and not writer.repaired.clean:
+        console.print(str(writer.repaired))
+    if writer.num_episodes:
+        console.print(f"Adds to {writer.root}; episodes there: {writer.num_episodes}")
+
+
+def _opened(config: RecordConfig, interactive: bool, stack: ExitStack) -> HandrailEnv:
+    """Return the environment, with the link to a robot if it is no simulation."""
     if not config.robot_client:
-        return build_env(config, config.dataset.fps, render=interactive), None
+        return stack.enter_context(closing(build_env(config, config.dataset.fps, render=interactive)))
     from handrail.collect.lekiwi.client_plant import open_client  # loads LeRobot
 
-    return open_client(config)
+    env, link = open_client(config)
+    stack.callback(link.close)
+    return stack.enter_context(closing(env))
 
 
-def _record_all(
-    config: RecordConfig, recording: Recording, writer: EpisodeWriter, log: RecordingLog, console: Terminal
-) -> None:
-    """Record until the number is reached, the operator interrupts, or the disk or an encoder fails."""
-    with recording_bar(console, recording.people) as progress, Interrupts() as interrupts:
-        bar = progress.add_task("recording", total=config.dataset.num_episodes, success="–")
-
-        def tell_paused(paused: bool) -> None:
-            progress.update(bar, description="paused" if paused else "recording")
-
-        try:
-            while len(log.outcomes) < config.dataset.num_episodes:
-                seed = episode_seed(config.seed, writer.num_episodes, log.attempt)
-                outcome = recording.episode(seed, interrupts, tell_paused, log.add)
-                if outcome.ended_by is EpisodeEvent.QUIT:
-                    break
-                progress.update(bar, completed=len(log.outcomes), description="recording", success=log.words)
-        except KeyboardInterrupt:
-            log.trouble, log.exit_code = (
-                "interrupted; the open episode is dropped, the saved ones are whole",
-                INTERRUPTED,
-            )
-        except HandrailError as error:
-            log.trouble, log.exit_code = str(error), FAILED
-
-
-def _displays(config: RecordConfig, console: Terminal) -> list[Display]:
+def _displays(config: RecordConfig, console: Terminal, stack: ExitStack) -> list[Display]:
     spawn, web, save = config.display_data, config.display_web, config.display_save
     if not (spawn or web or save):
         return []
-    return [Display(spawn, web, save, say=console.print)]
+    return [stack.enter_context(closing(Display(spawn, web, save, say=console.print)))]
 
 
-def _people(config: RecordConfig, env: HandrailEnv, console: Terminal) -> list[Any]:
+def _people(config: RecordConfig, env: HandrailEnv, console: Terminal, stack: ExitStack) -> list[Any]:
     """Return whoever steers now at this computer, if the settings say so."""
     spec = OPERATORS.find(config.operator)
     if not spec.interactive:
         return []
-    return [resolved(spec.build)(config, env, console.print)]
+    return [stack.enter_context(closing(resolved(spec.build)(config, env, console.print)))]

@@ -4,23 +4,18 @@ import os
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager, suppress
 from dataclasses import replace
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
 from handrail.collect.config import RecordConfig
-from handrail.collect.session.build import (
-    build_env,
-    build_modes,
-    build_session,
-    session_features,
-)
+from handrail.collect.operators.operator import EpisodeEvent
+from handrail.collect.session.build import build_env, build_modes, build_session, session_features
 from handrail.collect.session.outcome import Outcome
 from handrail.collect.session.recorded import COLUMN as SETTINGS
 from handrail.collect.session.recorded import settings_json
 from handrail.collect.session.recorder import Recorder
 from handrail.collect.session.rehearsal import Rehearsal
-from handrail.collect.session.session import Observer
 from handrail.collect.world.env import HandrailEnv
 from handrail.controllers.interrupts import Interrupts
 from handrail.controllers.versions import SIMULATION, versions
@@ -37,81 +32,84 @@ def come_first() -> None:
         os.setpriority(os.PRIO_PROCESS, 0, _NICE)
 
 
-class EpisodeObserver(Observer, Protocol):
-    """An observer of a session that also hears how episodes went."""
-
-    def end(self, outcome: Outcome) -> None:
-        """Take note of how the episode went."""
-        ...
-
-
 class Recording:
-    """Runs episodes and saves those that are to be kept.
+    """Runs episodes and saves those that are to be kept; `into` says where.
 
     Args:
         config: of the recording.
         env: of the recording.
-        writer: of the dataset.
         people: whoever steers now at this computer; none where a script does.
-        displays: what else watches.
+        displays: what else watches, and hears how episodes went.
 
     Attributes:
-        people: whoever steers.
         columns: what the metadata of the episodes to come says of the session; may change between two.
     """
 
     def __init__(
-        self,
-        config: RecordConfig,
-        env: HandrailEnv,
-        writer: EpisodeWriter,
-        people: Sequence[Any] = (),
-        displays: Sequence[EpisodeObserver] = (),
+        self, config: RecordConfig, env: HandrailEnv, people: Sequence[Any] = (), displays: Sequence[Any] = ()
     ) -> None:
+        self._config, self._env, self._people = config, env, people
         self.columns = session_columns(config)
-        task = config.dataset.single_task or env.task_description
-        self._recorder = Recorder(writer, task, self.columns)
-        self.people = people
-        self._observers: list[EpisodeObserver] = [self._recorder, *displays, *people]
+        self._recorder = Recorder(config.dataset.single_task or env.task_description, self.columns)
+        self._observers: list[Any] = [self._recorder, *displays, *people]
         self._session = build_session(config, env, self._observers, config.dataset.fps, *people)
-        self._rehearsal = Rehearsal(env.model, build_modes(config, env))
-        self._config, self._real = replace(config, cameras=""), env.real
 
     def into(self, writer: EpisodeWriter) -> None:
-        """Save the episodes to come in another dataset."""
+        """Save the episodes to come in a dataset."""
         self._recorder.writer = writer
 
     def warm_up(self, seed: int) -> None:
         """Compile what an update needs, before somebody waits for it in real time; no robot moves."""
-        if not self._real:
-            self._session.warm_up(seed, self._rehearsal)
+        rehearsal = Rehearsal(self._env.model, build_modes(self._config, self._env))
+        if not self._env.real:
+            self._session.warm_up(seed, rehearsal)
             return
-        fps = self._config.dataset.fps
-        with closing(build_env(self._config, fps)) as simulated:
-            build_session(self._config, simulated, (), fps, *self.people).warm_up(seed, self._rehearsal)
+        config, fps = replace(self._config, cameras=""), self._config.dataset.fps
+        with closing(build_env(config, fps)) as simulated:
+            build_session(config, simulated, (), fps, *self._people).warm_up(seed, rehearsal)
 
     def episode(
-        self,
-        seed: int,
-        interrupts: Interrupts,
-        tell_paused: Callable[[bool], None] = lambda paused: None,
-        note: Callable[[Outcome], None] = lambda outcome: None,
+        self, seed: int, interrupts: Interrupts, note: Callable[[Outcome], None] = lambda outcome: None
     ) -> Outcome:
         """Run one episode and save it, if it is to be kept.
 
         Args:
             seed: of the episode.
             interrupts: that wait until it is saved.
-            tell_paused: is told when the operator pauses, and when they go on.
             note: is told how it went, before an interrupt takes effect.
         """
-        outcome = self._session.run(seed, tell_paused)
-        outcome = replace(outcome, practice=any(each.practises for each in self.people))
+        outcome = self._session.run(seed)
+        outcome = replace(outcome, practice=any(each.practises for each in self._people))
         with interrupts.deferred():
             for observer in self._observers:
                 observer.end(outcome)
             note(outcome)
         return outcome
+
+    def episodes(
+        self, writer: EpisodeWriter, wanted: int, note: Callable[[Outcome], None], first: int = 0
+    ) -> Iterator[Outcome]:
+        """Record until a dataset has so many episodes, or the operator quits; yield how each went.
+
+        What an episode is depends on its number alone, whoever records it.
+
+        Args:
+            writer: of the dataset.
+            wanted: how many episodes it has in the end.
+            note: is told how an episode went, before an interrupt takes effect.
+            first: number of its first episode in the whole of which it is a part.
+        """
+        self.into(writer)
+        attempt = 0  # how many of the next number were thrown away; one begun again is the same one
+        with Interrupts() as interrupts:
+            while writer.num_episodes < wanted:
+                seed = episode_seed(self._config.seed, first + writer.num_episodes, attempt)
+                outcome = self.episode(seed, interrupts, note)
+                another = outcome.practice or outcome.ended_by is EpisodeEvent.DISCARD
+                attempt = 0 if outcome.kept else attempt + another
+                yield outcome
+                if outcome.ended_by is EpisodeEvent.QUIT:
+                    return
 
 
 def episode_seed(seed: int, episode: int, attempt: int = 0) -> int:
@@ -127,7 +125,7 @@ def episode_seed(seed: int, episode: int, attempt: int = 0) -> int:
 
 def session_columns(config: RecordConfig) -> dict[str, Scalar]:
     """Return what every episode's metadata says of the session: what one asks for most, and all settings."""
-    return {
+    columns: dict[str, Scalar] = {
         "environment": config.task,
         "robot": config.robot,
         "operator": config.operator,
@@ -136,17 +134,18 @@ def session_columns(config: RecordConfig) -> dict[str, Scalar]:
         "person": config.person,
         "participant": "",  # of a user study
         SETTINGS: settings_json(config),
-    } | ({CLIENT: _client(config)} if config.robot_client else {})
-
-
-def _client(config: RecordConfig) -> str:
-    """Return which robot of LeRobot's is driven, and whether its host is a simulation."""
-    return config.robot_client + (" (simulated)" if config.client.simulated else "")
+    }
+    if config.robot_client:
+        columns[CLIENT] = config.robot_client + (" (simulated)" if config.client.simulated else "")
+    return columns
 
 
 def open_writer(config: RecordConfig, env: HandrailEnv) -> EpisodeWriter:
     """Return the writer of a recording's dataset, new or resumed."""
-    dataset, manifest = config.dataset, manifest_of(config, env)
+    dataset, features = config.dataset, session_features(env)
+    manifest = Manifest(
+        dataset.name, dataset.fps, env.model.description.name, features, versions(*SIMULATION)
+    )
     if config.resume:
         return EpisodeWriter.resume(dataset.folder, manifest, config.verify)
     return EpisodeWriter.create(dataset.folder, manifest, config.overwrite)
@@ -167,11 +166,3 @@ def session_writer(config: RecordConfig, env: HandrailEnv) -> Iterator[EpisodeWr
         for folder in made:
             with suppress(OSError):  # something is in it
                 folder.rmdir()
-
-
-def manifest_of(config: RecordConfig, env: HandrailEnv) -> Manifest:
-    """Return the schema of a recording's dataset."""
-    dataset = config.dataset
-    return Manifest(
-        dataset.name, dataset.fps, env.model.description.name, session_features(env), versions(*SIMULATION)
-    )

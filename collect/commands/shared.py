@@ -1,143 +1,193 @@
-"""Records with several workers: each its own shards, episode by episode crash-safe; merged as they come."""
+"""Records with several workers: each its own shards, episode by episode crash-safe; merged as they come.
 
+A shard is a dataset of a few episodes. All lie beside the dataset, in `.NAME.shards`, until they are whole
+and become one. Which episodes a shard has does not depend on who records it: whatever is cut short goes on
+with any number of workers.
+"""
+
+import json
 import time
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
-from contextlib import closing, contextmanager
-from dataclasses import replace
-from functools import lru_cache
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
+from itertools import chain
 from pathlib import Path
-from threading import Event
+from typing import Any, Literal
 
-from handrail.collect.commands.account import RecordingLog, report
-from handrail.collect.commands.recording import Recording, episode_seed, open_writer
-from handrail.collect.commands.shards import Shard, Shards
+import pyarrow as pa
+
+from handrail.collect.commands.account import RecordingLog
+from handrail.collect.commands.recording import Recording, open_writer
 from handrail.collect.config import RecordConfig
 from handrail.collect.execution.execution import Execution
-from handrail.collect.execution.forking import RECORDING
-from handrail.collect.execution.job import Job
-from handrail.collect.session.build import build_env, build_session
+from handrail.collect.execution.job import Job, Result
+from handrail.collect.session.build import build_env
 from handrail.collect.session.outcome import Outcome
+from handrail.collect.session.recorded import settings_json
 from handrail.collect.world.env import HandrailEnv
-from handrail.controllers.errors import FAILED, INTERRUPTED, HandrailError
-from handrail.controllers.interrupts import Interrupts
+from handrail.controllers.errors import HandrailError, message_of
+from handrail.controllers.typed import Count, decoded
+from handrail.datasets.editing.merge import check_alike, merged_encodings, merged_types
+from handrail.datasets.editing.source import EditSource
 from handrail.datasets.format.layout import Layout
 from handrail.datasets.format.lines import each_line
+from handrail.datasets.format.manifest import Manifest
 from handrail.datasets.format.metadata import EpisodeRecord
-from handrail.datasets.presentation.terminal import Terminal
-from handrail.datasets.reading.reader import read_info
+from handrail.datasets.recording.piece import Piece
+from handrail.datasets.recording.rewrite import settle, write_anew
 from handrail.datasets.recording.writer import EpisodeWriter
+from handrail.datasets.storage.atomic import beside, explained, remove, write_whole
 from handrail.datasets.storage.lock import HeldError
+from handrail.datasets.storage.strict_json import load_json
 
+_FORMAT = "handrail.shards/1"
+_FEW = 5  # episodes of a shard at least
+_MANY = 1000  # shards of a recording at most
 _DYING = 60.0  # of a worker whose parent or computer is lost [s]
 _MOMENT = 0.1  # [s]
-_RECORDINGS: dict[RecordConfig, Recording] = {}
 
 
-def record_shared(config: RecordConfig, console: Terminal) -> int:
-    """Record as configured, the work shared; return the exit code: 0, 1 after a failure, 130 after Ctrl-C.
+@dataclass(frozen=True)
+class _Plan:
+    """What is being recorded, as it lies beside the shards."""
 
-    What was recorded before a failure is kept: the same flags go on, with any number of workers.
+    format: Literal["handrail.shards/1"]
+    first: Count  # how many episodes the dataset had before
+    settings: dict[str, Any]
+
+
+class Shards:
+    """The shards of a recording, begun or not.
 
     Args:
         config: of the recording.
-        console: to say how far it is, and what came of it.
     """
-    shards, log, start = Shards(config), RecordingLog(), time.monotonic()
-    going_on = shards.begun
-    if going_on:
-        shards.check()
-        config = replace(config, resume=Layout(shards.root).manifest.is_file(), overwrite=False)
-    with (
-        Execution(config, "recording", console, RECORDING) as execution,
-        closing(build_env(config, config.dataset.fps)) as env,
-    ):
-        build_session(config, env)  # a wrong mask, or cameras without GL, show before anything is written
-        env.reset(seed=config.seed)
-        with open_writer(config, env) as writer:  # nobody else writes there meanwhile
-            if writer.repaired and not writer.repaired.clean:
-                console.print(str(writer.repaired))
-            if not going_on:
-                shards.begin(writer.num_episodes)
-            merged = shards.are_in(writer.num_episodes)
-            if not merged:
-                _record_all(config, shards, log, execution)
-    if not log.exit_code:
-        _remove(shards, log)
-    log.wall_time = time.monotonic() - start
-    info = read_info(shards.root)
-    report(config, shards.root, info.episodes, info.frames, log, console)
-    return log.exit_code
 
+    def __init__(self, config: RecordConfig) -> None:
+        self._config = config
+        self.root = config.dataset.folder.absolute()
+        self.folder = beside(self.root, "shards")
+        self._file = self.folder / "plan.json"
 
-def _record_all(config: RecordConfig, shards: Shards, log: RecordingLog, execution: Execution) -> None:
-    """Record all shards and merge them, until that is done, one fails, or an interrupt comes."""
-    parts = {each.name: each for each in shards.all}
-    jobs = [
-        Job(name, record_shard, (config, each.folder, each.first, each.episodes), (), each.episodes, each.log)
-        for name, each in parts.items()
-    ]
-    goes_on = f"what was recorded is kept in {shards.folder}, and the same flags go on"
-    try:
-        with _merging(shards) as take:
-            for result in execution.run(jobs, part=lambda job: parts[job.name].saved):
+    @property
+    def begun(self) -> bool:
+        """Whether there are any, of this recording or another."""
+        return self._file.is_file()
+
+    def going_on(self) -> RecordConfig:
+        """Return the settings that go on with the shards that are there, which must be of this recording."""
+        with explained(f"cannot go on with dataset {str(self.root)!r}"):
+            settle(self.root)  # a merge that was cut short
+        for name, now in self._settings.items():
+            before = self._plan.settings.get(name)
+            if before != now:
+                raise HandrailError(
+                    f"{str(self.folder)!r} holds episodes of a recording that was cut short, with {name}"
+                    f" {before!r}, got {now!r}: the same flags as then finish it;"
+                    " remove the folder to give them up"
+                )
+        return replace(self._config, resume=Layout(self.root).manifest.is_file(), overwrite=False)
+
+    def begin(self, first: int) -> None:
+        """Take note of what is to be recorded, beside a dataset that has so many episodes already."""
+        with explained(f"cannot record beside dataset {str(self.root)!r}"):
+            content = {"format": _FORMAT, "first": first, "settings": self._settings}
+            write_whole(self._file, (json.dumps(content, indent=1) + "\n").encode())
+
+    def jobs(self, episodes: int) -> list[Job]:
+        """Return what records the shards, for a dataset with so many episodes; none if it has them all."""
+        first, end = self._plan.first, self._plan.first + self._config.dataset.num_episodes
+        if episodes not in (first, end):
+            raise HandrailError(
+                f"dataset {str(self.root)!r}: expected {first} episodes, as when {str(self.folder)!r}"
+                f" was begun, found {episodes}; remove the one or the other"
+            )
+        size = max(_FEW, -(-(end - first) // _MANY))
+        return [self._job(begin, min(size, end - begin)) for begin in range(episodes, end, size)]
+
+    def record(self, jobs: Sequence[Job], log: RecordingLog, execution: Execution) -> None:
+        """Record the shards, and make one dataset of what was there before and of them, in order.
+
+        Nothing is encoded anew. Whoever calls has the sole right to write there.
+        """
+        with explained(f"cannot write dataset {str(self.root)!r}"):
+            self._merge(jobs, self._lines(jobs, execution.run(jobs), log, execution))
+
+    def remove(self) -> None:
+        """Remove them; the plan first, so that nobody goes on with a part."""
+        with explained(f"cannot remove {str(self.folder)!r}"):
+            remove(self._file)
+            remove(self.folder)
+
+    @cached_property
+    def _plan(self) -> _Plan:
+        return decoded(load_json(self._file, "the plan of a recording"), _Plan, str(self._file))
+
+    @property
+    def _settings(self) -> dict[str, Any]:
+        dataset = self._config.dataset
+        names = ("name", "fps", "single_task", "num_episodes")
+        return json.loads(settings_json(self._config)) | {name: getattr(dataset, name) for name in names}
+
+    def _job(self, first: int, episodes: int) -> Job:
+        folder = self.folder / f"shard-{first:07d}"
+        return Job(
+            f"episodes {first} to {first + episodes - 1}",
+            record_shard,
+            (self._config, folder, first, episodes),
+            size=episodes,
+            log=folder.with_suffix(".log"),
+        )
+
+    def _lines(
+        self, jobs: Sequence[Job], results: Iterator[Result], log: RecordingLog, execution: Execution
+    ) -> Iterator[list[EpisodeRecord]]:
+        """Yield the lines of metadata of every shard, in order, while the next ones are recorded."""
+        found: dict[str, list[EpisodeRecord]] = {}
+        for job in jobs:
+            while job.name not in found:
+                result = next(results)
                 if result.error:
-                    raise HandrailError(f"{result.job.name}: {result.error}; {goes_on}")
-                outcomes, lines = result.value
+                    raise HandrailError(
+                        f"{result.job.name}: {result.error}; what was recorded is kept in {self.folder},"
+                        " and the same flags go on"
+                    )
+                outcomes, found[result.job.name] = result.value
                 for outcome in outcomes:
                     log.add(outcome)
                 execution.say(log.words)
-                take(result.job.name, lines)
-            execution.say(f"{log.words}, merging")
-    except KeyboardInterrupt:
-        log.trouble, log.exit_code = f"interrupted; {goes_on}", INTERRUPTED
-    except HandrailError as error:
-        log.trouble, log.exit_code = str(error), FAILED
+            yield found.pop(job.name)  # some 50 kB an episode
 
-
-@contextmanager
-def _merging(shards: Shards) -> Iterator[Callable[[str, Sequence[EpisodeRecord]], None]]:
-    """Merge shards while others are recorded; yield a function that takes a whole one by name and lines."""
-    whole = {each.name: Future[Sequence[EpisodeRecord]]() for each in shards.all}
-    stopped = Event()
-
-    def lines(shard: Shard) -> Sequence[EpisodeRecord]:
-        found = whole[shard.name].result()
-        del whole[shard.name]  # some 50 kB an episode
-        if stopped.is_set():
-            raise CancelledError
-        return found
-
-    def take(name: str, found: Sequence[EpisodeRecord]) -> None:
-        whole[name].set_result(found)
-        if merge.done():  # not all are whole: it failed
-            merge.result()
-
-    with ThreadPoolExecutor(1) as thread:
-        merge = thread.submit(shards.merge, lines)
+    def _merge(self, jobs: Sequence[Job], lines: Iterator[list[EpisodeRecord]]) -> None:
+        begin = next(lines)
+        roots = [self.root] * bool(self._plan.first) + [_folder(jobs[0])]
+        sources = [EditSource.open(root) for root in roots]
+        check_alike(sources[0], sources[-1])
+        manifest, types = sources[0].manifest, merged_types(sources)
+        new = (_pieces(job, found, manifest) for job, found in zip(jobs, chain([begin], lines), strict=True))
+        pieces = chain(sources[0].pieces() if self._plan.first else (), chain.from_iterable(new))
         try:
-            yield take
-            merge.result()
-        except BaseException:
-            stopped.set()
-            for each in list(whole.values()):
-                each.cancel()
-            raise
+            write_anew(self.root, manifest, pieces, types, merged_encodings(sources), in_place=True)
+        except (pa.ArrowException, ValueError, KeyError) as error:
+            raise HandrailError(f"{str(self.folder)!r} cannot be read: {message_of(error)}") from error
 
 
-def _remove(shards: Shards, log: RecordingLog) -> None:
-    try:
-        shards.remove()
-    except HandrailError as error:
-        log.trouble, log.exit_code = str(error), FAILED
+def _folder(job: Job) -> Path:
+    return job.arguments[1]
+
+
+def _pieces(job: Job, lines: Sequence[EpisodeRecord], manifest: Manifest) -> Iterator[Piece]:
+    """Yield the episodes of a shard."""
+    folder = _folder(job)
+    if len(lines) != job.size:
+        raise HandrailError(f"dataset {str(folder)!r}: expected {job.size} episodes, found {len(lines)}")
+    yield from (Piece.of(Layout(folder), manifest, line) for line in lines)
 
 
 def record_shard(
     config: RecordConfig, folder: Path, first: int, episodes: int
 ) -> tuple[list[Outcome], list[EpisodeRecord]]:
     """Record a part of a recording into a dataset of its own.
-
-    Every episode is what it would be in one whole recording: it depends on its seed alone.
 
     Args:
         config: of the whole recording.
@@ -148,15 +198,14 @@ def record_shard(
     Returns:
         How those went that were not there yet, and the lines of metadata of all.
     """
+    outcomes: list[Outcome] = []
+    env, recording = _recording(config)
     own = replace(config, dataset=replace(config.dataset, place=str(folder), root=""))
-    env, outcomes = _env(config), list[Outcome]()
-    with _opened(own, folder, env) as writer, Interrupts() as interrupts:
+    with _opened(own, folder, env) as writer:
         lines = list(each_line(Layout(folder), with_stats=True))
-        recording = _recording(config, env, writer)
-        while writer.num_episodes < episodes:
-            seed = episode_seed(config.seed, first + writer.num_episodes)
-            outcomes.append(recording.episode(seed, interrupts))
-            lines += [writer.last] if writer.last else []
+        for _ in recording.episodes(writer, episodes, outcomes.append, first):
+            assert writer.last
+            lines.append(writer.last)
     return outcomes, lines
 
 
@@ -173,16 +222,8 @@ def _opened(config: RecordConfig, folder: Path, env: HandrailEnv) -> EpisodeWrit
             time.sleep(_MOMENT)
 
 
-def _recording(config: RecordConfig, env: HandrailEnv, writer: EpisodeWriter) -> Recording:
-    """Return what records, built once a process, for it takes as long as a part of an episode."""
-    if config not in _RECORDINGS:
-        _RECORDINGS.clear()
-        _RECORDINGS[config] = Recording(config, env, writer)
-    _RECORDINGS[config].into(writer)
-    return _RECORDINGS[config]
-
-
 @lru_cache(maxsize=1)
-def _env(config: RecordConfig) -> HandrailEnv:
-    """Return the environment of a recording, built once a process."""
-    return build_env(config, config.dataset.fps)
+def _recording(config: RecordConfig) -> tuple[HandrailEnv, Recording]:
+    """Return what records, built once a process, for it takes as long as a part of an episode."""
+    env = build_env(config, config.dataset.fps)
+    return env, Recording(config, env)

@@ -9,9 +9,7 @@ from typing import Any
 import ray  # pyright: ignore[reportMissingImports]  (an extra)
 from ray.exceptions import RayError, RayTaskError  # pyright: ignore[reportMissingImports]
 
-from handrail.collect.execution.engine import TRIES
-from handrail.collect.execution.job import Job, Result
-from handrail.collect.execution.worker import alone
+from handrail.collect.execution.job import TRIES, Job, Result, attempt_alone
 from handrail.controllers.errors import HandrailError, message_of
 
 _MOMENT = 0.2  # [s]
@@ -33,16 +31,9 @@ class Cluster:
     def __init__(self, address: str, fresh: bool = False) -> None:
         self._joined = not ray.is_initialized()
         if self._joined:
-            try:
-                _knock(address)
-                ray.init(address=address, log_to_driver=False, configure_logging=False)
-            except Exception as error:  # Ray says it in many ways
-                raise HandrailError(
-                    f"--ray {address}: expected a running cluster (`ray start --head`), got"
-                    f" {message_of(error)}{_TOKEN if 'RAY_AUTH_MODE' not in os.environ else ''}"
-                ) from error
+            _join(address)
         once: dict[str, Any] = {"max_calls": 1} if fresh else {}
-        self._attempt: Any = ray.remote(num_cpus=1, max_retries=TRIES - 1, **once)(alone)
+        self._attempt: Any = ray.remote(num_cpus=1, max_retries=TRIES - 1, **once)(attempt_alone)
         self._running: dict[Any, Job] = {}
 
     @property
@@ -62,7 +53,7 @@ class Cluster:
     def wait(self) -> list[Result]:
         """Wait a moment; return what has finished."""
         ready, _ = ray.wait(list(self._running), num_returns=1, timeout=_MOMENT)
-        return [self._result(each) for each in ready]
+        return [_result(self._running.pop(each), each) for each in ready]
 
     def close(self) -> None:
         """End everything that still runs, at once, and leave the cluster."""
@@ -73,28 +64,35 @@ class Cluster:
         if self._joined:
             ray.shutdown()
 
-    def _result(self, reference: Any) -> Result:
-        job = self._running.pop(reference)
-        try:
-            result: Any = ray.get(reference)
-        except RayTaskError as error:  # nothing that the job did: that is in its result
-            why = message_of(getattr(error, "cause", None) or error)
-            return Result(job, error=f"could not begin ({why}); every computer needs the same packages")
-        except RayError as error:
-            return Result(
-                job,
-                error=f"lost {TRIES} times with its process or computer; what was done is kept, and the same"
-                f" command goes on: {message_of(error)}",
-            )
-        return replace(result, job=job)
+
+def _result(job: Job, reference: Any) -> Result:
+    try:
+        result: Any = ray.get(reference)
+    except RayTaskError as error:  # nothing that the job did: that is in its result
+        why = message_of(getattr(error, "cause", None) or error)
+        return Result(job, error=f"could not begin ({why}); every computer needs the same packages")
+    except RayError as error:
+        return Result(
+            job,
+            error=f"lost {TRIES} times with its process or computer; what was done is kept, and the same"
+            f" command goes on: {message_of(error)}",
+        )
+    return replace(result, job=job)
+
+
+def _join(address: str) -> None:
+    try:
+        _knock(address)
+        ray.init(address=address, log_to_driver=False, configure_logging=False)
+    except Exception as error:  # Ray says it in many ways
+        hint = _TOKEN if "RAY_AUTH_MODE" not in os.environ else ""
+        raise HandrailError(
+            f"--ray {address}: expected a running cluster (`ray start --head`), got {message_of(error)}{hint}"
+        ) from error
 
 
 def _knock(address: str) -> None:
-    """Check that a control server answers at an address that has a port; Ray would look for it for minutes.
-
-    Raises:
-        OSError, ValueError: none does.
-    """
+    """Check that a control server answers at an address with a port; Ray would look for it for minutes."""
     host, colon, port = address.rpartition(":")
     if not colon or "/" in address:
         return

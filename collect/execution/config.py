@@ -35,17 +35,15 @@ class ExecutionConfig:
 
     def check_execution(self) -> None:
         """Check the settings."""
+        ray, workers = f"--ray {self.ray}", f"--workers {self.workers}"
         if not 0 <= self.workers <= MOST_WORKERS:
             raise HandrailError(
-                f"--workers {self.workers}: expected a whole number from 1 to {MOST_WORKERS},"
-                " or 0 for all cores"
+                f"{workers}: expected a whole number from 1 to {MOST_WORKERS}, or 0 for all cores"
             )
         if self.ray and self.workers != type(self).workers:
-            raise HandrailError(
-                f"--ray {self.ray} and --workers {self.workers}: expected one of them, got both"
-            )
+            raise HandrailError(f"{ray} and {workers}: expected one of them, got both")
         if self.ray and find_spec("ray") is None:
-            raise not_installed(f"--ray {self.ray}", "ray", "cluster")
+            raise not_installed(ray, "ray", "cluster")
 
 
 def cores(cgroup: Path = _CGROUP) -> int:

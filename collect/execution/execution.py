@@ -1,29 +1,41 @@
 """Runs jobs wherever the settings say, shows how far it is, and names the slowest and the failed."""
 
-import time
 from collections import OrderedDict
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
-from rich.progress import (
-    BarColumn,
-    MofNCompleteColumn,
-    Progress,
-    TextColumn,
-    TimeElapsedColumn,
-    TimeRemainingColumn,
-)
-
+from handrail.collect.execution.bar import WorkBar
 from handrail.collect.execution.config import ExecutionConfig
-from handrail.collect.execution.engine import engine_of
-from handrail.collect.execution.job import Job, Result
+from handrail.collect.execution.job import Job, Result, attempt
+from handrail.collect.execution.pool import ProcessPool
 from handrail.controllers.interrupts import Interrupts
 from handrail.datasets.presentation.terminal import Terminal
 
+if TYPE_CHECKING:
+    from handrail.collect.execution.cluster import Cluster
+
 _SLOWEST = 3  # jobs that are named at the end
 _WORTH_NAMING = 5.0  # [s]
-_LOOK = 1.0  # how often it is asked how far the running jobs are [s]
+
+
+class _InProcess:
+    """Runs jobs in this process, one after the other."""
+
+    capacity = 1
+
+    def __init__(self) -> None:
+        self._job: Job | None = None
+
+    def start(self, job: Job) -> None:
+        self._job = job
+
+    def wait(self) -> list[Result]:
+        job, self._job = self._job, None
+        return [attempt(job)] if job else []
+
+    def close(self) -> None:
+        pass
 
 
 class Execution:
@@ -45,46 +57,30 @@ class Execution:
         preload: Sequence[str] = (),
         fresh: bool = False,
     ) -> None:
-        self._engine = engine_of(config, preload, fresh)
+        self._executor = _executor(config, preload, fresh)
         self._console = console or Terminal(quiet=True)
-        self._progress = Progress(
-            TextColumn("{task.description}", markup=False),
-            BarColumn(),
-            MofNCompleteColumn(),
-            TextColumn("{task.fields[words]}", markup=False),
-            TimeElapsedColumn(),
-            TextColumn("left"),
-            TimeRemainingColumn(),
-            console=self._console,
-        )
-        self._bar = self._progress.add_task(title, total=None, words="")
+        self._bar = WorkBar(self._console, title)
         self._interrupts = Interrupts()
         self._results: list[Result] = []
-        self._done, self._parts, self._looked = 0, dict[str, int](), 0.0
 
     def __enter__(self) -> Self:
         self._interrupts.__enter__()
-        self._progress.start()
+        self._bar.start()
         return self
 
     def __exit__(self, *_: object) -> None:
         try:
-            self._engine.close()
+            self._executor.close()
         finally:
-            self._progress.stop()
+            self._bar.stop()
             self._interrupts.__exit__()
         self._name_slowest_and_failed()
 
     def say(self, words: str) -> None:
         """Show how it stands, beside the bar."""
-        self._progress.update(self._bar, words=words)
+        self._bar.show(words=words)
 
-    def run(
-        self,
-        jobs: Iterable[Job],
-        wanted: Callable[[Job], bool] = lambda job: True,
-        part: Callable[[Job], int] = lambda job: 0,
-    ) -> Iterator[Result]:
+    def run(self, jobs: Iterable[Job], wanted: Callable[[Job], bool] = lambda job: True) -> Iterator[Result]:
         """Run jobs and yield what came of each as it is done, in any order.
 
         A job begins when all that it needs is done, what is first in the list first; one that needs what
@@ -93,64 +89,32 @@ class Execution:
         Args:
             jobs: with names that differ.
             wanted: whether a job is still to be done; asked before it begins.
-            part: how much of its size a running job has done; asked once a second, for the progress bar.
         """
-        todo = OrderedDict((job.name, job) for job in jobs)
-        pending, running = set(todo), dict[str, Job]()
-        self._progress.update(self._bar, total=sum(job.size for job in todo.values()))
-        while self._begin(todo, pending, running, wanted) or running:
-            self._look_at(running.values(), part)
-            for result in self._engine.wait() if running else ():
-                del running[result.job.name]
+        todo, running = OrderedDict((job.name, job) for job in jobs), 0
+        pending = set(todo)
+        self._bar.show(total=sum(job.size for job in todo.values()))
+        while True:
+            capacity = self._executor.capacity
+            while running < capacity and (job := _next(todo, pending)):
+                if wanted(job):
+                    self._executor.start(job)
+                    running += 1
+                else:
+                    pending.discard(job.name)
+                    self._bar.show(advance=job.size)
+            if not running:
+                break
+            for result in self._executor.wait():
+                running -= 1
                 if not result.error:
                     pending.discard(result.job.name)
                 yield self._noted(result)
         for job in todo.values():
             yield self._noted(Result(job, error="what it needs failed"))
 
-    def _begin(
-        self,
-        todo: OrderedDict[str, Job],
-        pending: set[str],
-        running: dict[str, Job],
-        wanted: Callable[[Job], bool],
-    ) -> bool:
-        """Begin what can begin, as much as there is room for; return whether anything left the list."""
-        begun, capacity = list[Job](), self._engine.capacity
-        for job in todo.values():
-            if len(running) >= capacity:
-                break
-            if pending.isdisjoint(job.needs):
-                begun.append(job)
-                if wanted(job):
-                    self._engine.start(job)
-                    running[job.name] = job
-        for job in begun:
-            del todo[job.name]
-            if job.name not in running:
-                pending.discard(job.name)
-                self._advance(job)
-        return bool(begun)
-
-    def _look_at(self, running: Iterable[Job], part: Callable[[Job], int]) -> None:
-        """Show how far the running jobs are."""
-        now = time.monotonic()
-        if now >= self._looked + _LOOK:
-            self._looked, self._parts = now, {job.name: min(part(job), job.size) for job in running}
-            self._show()
-
-    def _advance(self, job: Job) -> None:
-        """Show that a job is over."""
-        self._done += job.size
-        self._parts.pop(job.name, None)
-        self._show()
-
-    def _show(self) -> None:
-        self._progress.update(self._bar, completed=self._done + sum(self._parts.values()))
-
     def _noted(self, result: Result) -> Result:
         self._results.append(replace(result, value=None))
-        self._advance(result.job)
+        self._bar.show(advance=result.job.size)
         return result
 
     def _name_slowest_and_failed(self) -> None:
@@ -164,3 +128,21 @@ class Execution:
                 log = f" ({each.job.log})" if each.job.log and each.job.log.is_file() else ""
                 words = f"failed: {each.job.name}: {each.error}{log}"
                 self._console.print(words, style="bold red")
+
+
+def _executor(
+    config: ExecutionConfig, preload: Sequence[str], fresh: bool
+) -> "_InProcess | ProcessPool | Cluster":
+    if config.ray:
+        from handrail.collect.execution.cluster import Cluster
+
+        return Cluster(config.ray, fresh)
+    if config.is_shared or fresh:
+        return ProcessPool(config.processes, preload, fresh)
+    return _InProcess()
+
+
+def _next(todo: OrderedDict[str, Job], pending: set[str]) -> Job | None:
+    """Take the first job that needs nothing which is not done."""
+    found = next((name for name, job in todo.items() if pending.isdisjoint(job.needs)), None)
+    return todo.pop(found) if found is not None else None

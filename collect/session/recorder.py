@@ -18,15 +18,15 @@ class Recorder:
     """Records moments as frames; an observer of a session.
 
     Args:
-        writer: of the dataset; the next episode may have another one.
         task: what is being done, in words.
         columns: what every episode's metadata says of the session (operator, mode, …), as of its end.
     """
 
-    def __init__(self, writer: EpisodeWriter, task: str, columns: Mapping[str, Scalar]) -> None:
-        self.writer = writer
-        self._task = task
-        self._columns = columns
+    writer: EpisodeWriter
+    """Of the dataset: has to be said before an episode; the next one may have another."""
+
+    def __init__(self, task: str, columns: Mapping[str, Scalar]) -> None:
+        self._task, self._columns = task, columns
         self._undoable: list[Frame] = []
 
     def begin(self, env: HandrailEnv, seed: int) -> None:

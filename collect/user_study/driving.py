@@ -60,7 +60,8 @@ class Driving:
         self._cockpit = Cockpit(
             env.model, {name: modes[name] for name in offered}, mode, self._server, refuses
         )
-        self._recording = Recording(config, env, writer, [self._cockpit])
+        self._recording = Recording(config, env, [self._cockpit])
+        self._recording.into(writer)
         self._recording.warm_up(seed)
         mask = channels.mask(*modes[mode].groups("hand")) | channels.mask(*modes[mode].groups("base"))
         owned = tuple(name for name, own in zip(channels.names, mask, strict=True) if own)

@@ -63,10 +63,3 @@ def is_alive(process):
     except FileNotFoundError:
         return False
     return state != "Z"
-
-
-def awaiting(path, seconds=1.0):
-    """Wait for a file, and a little longer."""
-    while not Path(path).exists():
-        time.sleep(0.02)
-    time.sleep(seconds)

@@ -16,9 +16,8 @@ from rich.console import Console
 from shared_helpers import content, saved, started, wait_until
 
 from handrail.collect.execution.config import ExecutionConfig
-from handrail.collect.execution.engine import TRIES
 from handrail.collect.execution.execution import Execution
-from handrail.collect.execution.job import Job
+from handrail.collect.execution.job import TRIES, Job
 
 pytest.importorskip("ray.cluster_utils", reason="needs Ray: pip install '.[cluster]'")
 pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("ignore")]

@@ -86,7 +86,8 @@ def recorded(tmp_path_factory):
     operator, controller = Counter(), Answer()
     manifest = Manifest("x/columns", FPS, "ridgeback_ur10", session_features(env), {})
     with EpisodeWriter.create(root, manifest) as writer:
-        recorder = Recorder(writer, "count", {})
+        recorder = Recorder("count", {})
+        recorder.writer = writer
         outcome = Session(env, controller, operator, [recorder]).run(3)
         recorder.end(outcome)
     assert outcome.frames == STEPS

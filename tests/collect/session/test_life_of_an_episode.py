@@ -143,7 +143,8 @@ def test_a_late_operator_is_braked(env):
 @pytest.mark.parametrize("event", [DISCARD, RESTART, QUIT])
 def test_what_is_not_kept_is_over_at_once(env, event, tmp_path):
     with EpisodeWriter.create(tmp_path / "d", Manifest("x/d", 20, "robot", session_features(env))) as writer:
-        recorder, person = Recorder(writer, "reach", {}), Person(env.model, {9: event}, {5: SUCCESS})
+        recorder, person = Recorder("reach", {}), Person(env.model, {9: event}, {5: SUCCESS})
+        recorder.writer = writer
         session = Session(env, DirectController(env.model, env.period), person, [recorder])
         outcome = session.run(3)
         assert (outcome.kept, outcome.ended_by, outcome.frames) == (False, event, 8)
@@ -159,7 +160,8 @@ def test_a_dataset_of_before_goes_on_with_the_columns_that_it_has(env, tmp_path)
     old = {"success": True, "failure_reason": "", "seed": 3, "started": 0.0, "wall_time": 1.0}
     old |= dict.fromkeys(("brakes", "late", "undos", "contact_onsets", "contact_periods"), 0)
     with EpisodeWriter.create(tmp_path / "d", Manifest("x/d", 20, "robot", session_features(env))) as writer:
-        recorder, person = Recorder(writer, "reach", {}), Person(env.model, *2 * [{5: SUCCESS}])
+        recorder, person = Recorder("reach", {}), Person(env.model, *2 * [{5: SUCCESS}])
+        recorder.writer = writer
         session = Session(env, DirectController(env.model, env.period), person, [recorder])
         session.run(3)
         writer.save_episode(old)

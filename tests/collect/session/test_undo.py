@@ -51,7 +51,8 @@ def recorded(root, plan, plant, robot_fps=FPS):
     """Return the frames of an episode, and how it went."""
     env = HandrailEnv(Reach(moving_obstacles=1), MODEL, fps=robot_fps, plant=plant)
     with EpisodeWriter.create(root, Manifest("x/undo", FPS, "r", session_features(env), {})) as writer:
-        recorder = Recorder(writer, "t", {})
+        recorder = Recorder("t", {})
+        recorder.writer = writer
         periods = {"control_period": 1 / FPS, "record_period": 1 / FPS}
         outcome = Session(env, MaskedMpc(MODEL), Person(plan), [recorder], undoes=True, **periods).run(3)
         recorder.end(outcome)
