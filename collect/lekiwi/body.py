@@ -59,9 +59,9 @@ class LeKiwiBody:
         if not np.isfinite(twist).all() or not all(map(math.isfinite, said.values())):
             return False
         now |= said
-        self._twist = twist * [1.0, 1.0, self._units.turn]
+        self._twist = twist * base.scale
         self._arm = self._units.joint_positions(np.array([now[name] for name in self._units.positions]))
-        self._gripper = self._units.grip(now[grip.name])
+        self._gripper = grip.closing(now[grip.name])
         return True
 
     def stop_base(self) -> None:

@@ -8,15 +8,13 @@ import numpy as np
 
 from handrail.collect.processor.units import RobotUnits, number
 from handrail.controllers.arrays import FloatArray
-from handrail.controllers.errors import HandrailError, shown, unknown_name
+from handrail.controllers.errors import unknown_name
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.frames import Frames
 from handrail.controllers.interface.intent import Intent
 
-GRIPPER, TIME = "gripper", "time"
-_GRIPS = ("share", "actions")
 _STAYS = -1.0
-_LEROBOT = {0.0: 1.0, 1.0: _STAYS, 2.0: 0.0}  # LeRobot's gripper actions: close, stay, open
+_ACTIONS = {0.0: 1.0, 1.0: _STAYS, 2.0: 0.0}  # LeRobot's gripper actions: close, stay, open
 _FOLLOW = 4.0  # of a joint towards the position that is asked for [1/s]
 
 
@@ -35,32 +33,26 @@ class PartialIntent:
         units: of the robot.
         inputs: by name of an entry, the channel and how much of it one unit is.
         frames: in which twists are meant.
-        gripper: what `gripper` is: share or actions.
+        actions: whether `gripper` is an action of LeRobot's.
     """
 
     def __init__(
         self,
         channels: Channels,
         units: RobotUnits,
-        inputs: Mapping[str, Any],
+        inputs: Mapping[str, tuple[str, float]],
         frames: Frames,
-        gripper: str = "share",
+        actions: bool = False,
     ) -> None:
-        if gripper not in _GRIPS:
-            raise unknown_name("gripper", gripper, _GRIPS)
-        self._actions = gripper == "actions"
-        self._channels, self._units, self._frames = channels, units, frames
+        self._channels, self._units, self._frames, self._actions = channels, units, frames, actions
         self._scaled = {name: (index, 1.0) for index, name in enumerate(channels.names)}
-        for name, said in inputs.items():
-            channel, scale = _checked(name, said)
+        for name, (channel, scale) in inputs.items():
             if channel not in channels.names:
                 raise unknown_name(f"channel of input {name}:", channel, channels.names)
             self._scaled[name] = (channels.names.index(channel), scale)
-        if base := units.base:
-            twist = zip((base.x, base.y, base.theta), (1.0, 1.0, units.turn), strict=True)
-            self._scaled |= {name: (index, scale) for index, (name, scale) in enumerate(twist)}
+        if units.base:
+            self._scaled |= zip(units.base.twist, enumerate(units.base.scale), strict=True)
         self._first_arm = channels.joint_slice.start + len(channels.base)
-        self._joints = {name: index for index, name in enumerate(units.positions)}
         self.reset()
 
     def reset(self) -> None:
@@ -78,36 +70,27 @@ class PartialIntent:
         """
         values, mask = np.zeros(self._channels.size), np.zeros(self._channels.size, dtype=bool)
         entries = action if isinstance(action, Mapping) else {"": math.nan}
-        stamp, grip = now, self._grip if self._grip is not None else float(opening < 0.5)
+        units, stamp = self._units, now
+        grip = self._grip if self._grip is not None else float(opening < 0.5)
         for name in entries:
             value = number(entries, name)
-            if name == TIME:
+            if name == "time":
                 stamp = value
-            elif name == GRIPPER:
-                grip = _LEROBOT.get(value, math.nan) if self._actions else value
+            elif name == "gripper":
+                grip = _ACTIONS.get(value, math.nan) if self._actions else value
                 grip = (self._grip or 0.0) if grip == _STAYS else grip
             elif name in self._scaled:
                 index, scale = self._scaled[name]
                 values[index] += scale * value
                 mask[index] = True
-            elif name in self._joints:
-                joint = self._joints[name]
-                wanted = self._units.joint_positions(np.where(np.arange(len(targets)) == joint, value, 0.0))
+            elif name in units.positions:
+                joint = units.positions.index(name)
+                wanted = units.joint_positions(np.where(np.arange(len(targets)) == joint, value, 0.0))
                 values[self._first_arm + joint] += _FOLLOW * (wanted[joint] - targets[joint])
                 mask[self._first_arm + joint] = True
-            elif self._units.gripper and name == self._units.gripper.name:
-                grip = self._units.grip(value)
+            elif units.gripper and name == units.gripper.name:
+                grip = units.gripper.closing(value)
             else:
                 values[:], mask[:] = math.nan, True
         self._grip = grip if math.isfinite(grip) else self._grip
         return Intent(values, mask, grip, "processor", stamp, self._frames)
-
-
-def _checked(name: str, said: Any) -> tuple[str, float]:
-    try:
-        channel, scale = said
-        if isinstance(channel, str) and math.isfinite(float(scale)):
-            return channel, float(scale)
-    except (TypeError, ValueError):
-        pass
-    raise HandrailError(f"input {name}: expected a channel and how much of it one unit is, got {shown(said)}")

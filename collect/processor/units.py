@@ -1,7 +1,7 @@
 """What a robot of LeRobot's calls its joints, and in which units: from its numbers to ours, and back."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple
 
@@ -13,9 +13,9 @@ from handrail.controllers.robot.description import RobotDescription
 from handrail.controllers.typed import Number, Text, decoded
 
 POSITION, VELOCITY = ".pos", ".vel"
-_DEGREE = math.pi / 180.0
 _OPEN = 35.0  # percent of the jaw's range, −0.17 to 1.75 rad: where the model of the SO-101 is open, 0.5 rad
 _SENT = {"position": POSITION, "velocity": VELOCITY}
+_RADIANS = {"degrees": math.pi / 180.0}  # of an angle's unit; 1 of any other
 
 
 @dataclass(frozen=True)
@@ -33,6 +33,12 @@ class JointUnits:
     sends: Literal["position", "velocity"] = "position"
     """What the robot takes."""
 
+    def terms(self, lower: float, upper: float) -> tuple[float, float]:
+        """Return `sign · s` and q₀ of a joint between limits."""
+        if self.unit == "range":
+            return self.sign * (upper - lower) / 200.0, 0.5 * (lower + upper)
+        return self.sign * _RADIANS.get(self.unit, 1.0), 0.0
+
 
 @dataclass(frozen=True)
 class BaseUnits:
@@ -49,6 +55,21 @@ class BaseUnits:
     pose: tuple[Text, ...] = ()
     """Names of x, y and heading in the world [m, unit]; none where they are to be integrated."""
 
+    def __post_init__(self) -> None:
+        """Check the pose."""
+        if len(self.pose) not in (0, 3):
+            raise HandrailError(f"pose: expected three names, got {len(self.pose)}")
+
+    @property
+    def twist(self) -> tuple[str, str, str]:
+        """Names of the velocities."""
+        return self.x, self.y, self.theta
+
+    @property
+    def scale(self) -> FloatArray:
+        """Size of the units [m, m, rad], (3,)."""
+        return np.array([1.0, 1.0, _RADIANS.get(self.unit, 1.0)])
+
 
 @dataclass(frozen=True)
 class GripperUnits:
@@ -57,6 +78,25 @@ class GripperUnits:
     name: Text
     opened: Number
     closed: Number
+
+    def __post_init__(self) -> None:
+        """Check that it moves."""
+        if self.opened == self.closed:
+            raise HandrailError("expected opened and closed to differ")
+
+    def closing(self, value: float) -> float:
+        """Return how far it is closed, from 0 to 1."""
+        share = (value - self.opened) / (self.closed - self.opened)
+        return min(max(share, 0.0), 1.0) if math.isfinite(share) else share
+
+
+@dataclass(frozen=True)
+class UnitsTable:
+    """Names and units of a robot; joints of the arm are by the description's names."""
+
+    joints: Mapping[str, JointUnits]
+    base: BaseUnits | None = None
+    gripper: GripperUnits | None = None
 
 
 class BodyReading(NamedTuple):
@@ -73,50 +113,38 @@ class RobotUnits:
 
     Args:
         description: of the robot.
-        joints: of the arm, by the description's names.
-        base: of the base; None on a fixed one.
-        gripper: None where there is none.
+        table: its names and units.
 
     Attributes:
+        base: None on a fixed base.
+        gripper: None where there is none.
+        positions: names of the arm's positions.
         action_names: of the action's entries, in order.
+        observation_names: of the numbers that an observation has to have.
         sends_position: which joints of the arm are sent positions, (n − b,).
     """
 
-    def __init__(
-        self,
-        description: RobotDescription,
-        joints: Mapping[str, JointUnits],
-        base: BaseUnits | None,
-        gripper: GripperUnits | None,
-    ) -> None:
-        arm = description.arm_joints
-        if set(joints) != set(arm) or bool(base) != bool(description.base.joints):
+    def __init__(self, description: RobotDescription, table: UnitsTable) -> None:
+        arm, b, limits = description.arm_joints, len(description.base.joints), description.limits
+        self.base, self.gripper = table.base, table.gripper
+        if set(table.joints) != set(arm) or bool(self.base) != bool(b):
             raise HandrailError(
                 f"units of robot {description.name}: expected joints {', '.join(arm)} and "
-                f"{'a' if description.base.joints else 'no'} base; got {', '.join(joints) or 'no joints'} "
-                f"and {'a' if base else 'no'} base"
+                f"{'a' if b else 'no'} base; got {', '.join(table.joints) or 'no joints'} "
+                f"and {'a' if self.base else 'no'} base"
             )
-        self.base, self.gripper = base, gripper
-        self._joints = [joints[name] for name in arm]
-        offset = len(description.base.joints)
-        lower, upper = (
-            limit[offset:] for limit in (description.limits.position_lower, description.limits.position_upper)
-        )
-        terms = [_terms(joint, *ends) for joint, *ends in zip(self._joints, lower, upper, strict=True)]
+        joints = [table.joints[name] for name in arm]
+        ends = zip(joints, limits.position_lower[b:], limits.position_upper[b:], strict=True)
+        terms = [joint.terms(lower, upper) for joint, lower, upper in ends]
         self._scale, self._centre = np.array(terms).reshape(-1, 2).T
-        self._zero = np.array([joint.zero for joint in self._joints])
-        self.sends_position = np.array([joint.sends == "position" for joint in self._joints], dtype=bool)
-        self.turn = _angle(base.unit) if base else 1.0
-        self.positions = tuple(joint.name + POSITION for joint in self._joints)
-        grip = (gripper.name,) if gripper else ()
-        twist = (base.x, base.y, base.theta) if base else ()
-        self.action_names = (*(joint.name + _SENT[joint.sends] for joint in self._joints), *grip, *twist)
-
-    @property
-    def observation_names(self) -> tuple[str, ...]:
-        """Names of the numbers that an observation has to have."""
-        base = (self.base.pose or (self.base.x, self.base.y, self.base.theta)) if self.base else ()
-        return (*self.positions, *((self.gripper.name,) if self.gripper else ()), *base)
+        self._zero = np.array([joint.zero for joint in joints])
+        self.sends_position = np.array([joint.sends == "position" for joint in joints], dtype=bool)
+        self.positions = tuple(joint.name + POSITION for joint in joints)
+        sent = (joint.name + _SENT[joint.sends] for joint in joints)
+        grip = (self.gripper.name,) if self.gripper else ()
+        twist = self.base.twist if self.base else ()
+        self.action_names = (*sent, *grip, *twist)
+        self.observation_names = (*self.positions, *grip, *(self.base.pose or twist if self.base else ()))
 
     def read(self, observation: Any) -> BodyReading | None:
         """Return what an observation says; None where a number is missing or not finite."""
@@ -125,15 +153,11 @@ class RobotUnits:
             return None
         arm = self.joint_positions(np.array([values[name] for name in self.positions]))
         twist, pose = np.zeros(3), None
-        if self.base is not None:
-            rad = np.array([1.0, 1.0, self.turn])
-            named = (self.base.x, self.base.y, self.base.theta)
-            if self.base.pose:
-                pose = rad * [values[name] for name in self.base.pose]
-            else:
-                twist = rad * [values[name] for name in named]
-        grip = self.gripper
-        opening = 1.0 - self.grip(values[grip.name]) if grip else 0.0
+        if self.base and self.base.pose:
+            pose = self.base.scale * [values[name] for name in self.base.pose]
+        elif self.base:
+            twist = self.base.scale * [values[name] for name in self.base.twist]
+        opening = 1.0 - self.gripper.closing(values[self.gripper.name]) if self.gripper else 0.0
         return BodyReading(arm, twist, pose, opening)
 
     def action(self, q: FloatArray, v: FloatArray, twist: FloatArray, gripper: float) -> dict[str, float]:
@@ -150,18 +174,12 @@ class RobotUnits:
         if self.gripper:
             numbers.append(self.gripper.opened + gripper * (self.gripper.closed - self.gripper.opened))
         if self.base:
-            numbers += (twist / [1.0, 1.0, self.turn]).tolist()
+            numbers += (twist / self.base.scale).tolist()
         return dict(zip(self.action_names, map(float, numbers), strict=True))
 
     def joint_positions(self, values: FloatArray) -> FloatArray:
         """Return the arm's joints from the robot's values, (n − b,) [m, rad]."""
         return self._centre + self._scale * (values - self._zero)
-
-    def grip(self, value: float) -> float:
-        """Return how far the gripper is closed, from 0 to 1."""
-        assert self.gripper is not None
-        share = (value - self.gripper.opened) / (self.gripper.closed - self.gripper.opened)
-        return min(max(share, 0.0), 1.0) if math.isfinite(share) else share
 
 
 def number(values: Any, name: str) -> float:
@@ -172,71 +190,26 @@ def number(values: Any, name: str) -> float:
         return math.nan
 
 
-def lekiwi(description: RobotDescription) -> RobotUnits:
-    """Return what LeRobot's LeKiwi says: degrees, percents of the jaw, and the base's velocities."""
-    joints = {name: JointUnits(f"arm_{name}") for name in description.arm_joints}
-    return RobotUnits(description, joints, BaseUnits(), GripperUnits("arm_gripper.pos", _OPEN, 0.0))
-
-
-def so_follower(description: RobotDescription) -> RobotUnits:
-    """Return what LeRobot's SO-100 and SO-101 say: degrees, and percents of the jaw."""
-    joints = {name: JointUnits(name) for name in description.arm_joints}
-    return RobotUnits(description, joints, None, GripperUnits("gripper.pos", _OPEN, 0.0))
-
-
-def plain(description: RobotDescription) -> RobotUnits:
-    """Return the description's own names, in radians; the gripper from 0 (open) to 1, the base in radians."""
-    joints = {name: JointUnits(name, "radians") for name in description.arm_joints}
-    base = BaseUnits(unit="radians") if description.base.joints else None
-    grip = GripperUnits("gripper.pos", 0.0, 1.0) if description.end_effector.gripper else None
-    return RobotUnits(description, joints, base, grip)
-
-
-UNITS: Mapping[str, Callable[[RobotDescription], RobotUnits]] = {
-    "lekiwi": lekiwi,
-    "so_follower": so_follower,
-    "plain": plain,
-}
-
-
-@dataclass(frozen=True)
-class _UnitsTable:
-    """A robot's names and units, as a table says them."""
-
-    joints: dict[str, Any]
-    base: BaseUnits | None = None
-    gripper: GripperUnits | None = None
-
-
 def robot_units(said: str | Mapping[str, Any], description: RobotDescription) -> RobotUnits:
-    """Return names and units: those of a known robot, or as a table says."""
-    if isinstance(said, str):
-        if said not in UNITS:
-            raise unknown_name("units", said, UNITS)
-        return UNITS[said](description)
-    table = dict(said) if isinstance(said, Mapping) else said
-    if isinstance(table, dict):
-        for name, kind in (("base", BaseUnits), ("gripper", GripperUnits)):
-            if table.get(name) is not None:
-                table[name] = decoded(table[name], kind, f"units: {name}")
-    units = decoded(table, _UnitsTable, "units")
-    joints = {
-        name: decoded(joint, JointUnits, f"units: joint {name}") for name, joint in units.joints.items()
+    """Return names and units of a robot: of a table, or as LeRobot's LeKiwi, SO-100 and SO-101 have them.
+
+    `plain` are the description's own names in radians, the gripper from 0 (open) to 1, the base in radians.
+    """
+    if not isinstance(said, str):
+        return RobotUnits(description, decoded(said, UnitsTable, "units"))
+    arm, plain_base = description.arm_joints, BaseUnits(unit="radians") if description.base.joints else None
+    plain_gripper = GripperUnits("gripper.pos", 0.0, 1.0) if description.end_effector.gripper else None
+    known = {
+        "lekiwi": UnitsTable(
+            {name: JointUnits(f"arm_{name}") for name in arm},
+            BaseUnits(),
+            GripperUnits("arm_gripper.pos", _OPEN, 0.0),
+        ),
+        "so_follower": UnitsTable(
+            {name: JointUnits(name) for name in arm}, None, GripperUnits("gripper.pos", _OPEN, 0.0)
+        ),
+        "plain": UnitsTable({name: JointUnits(name, "radians") for name in arm}, plain_base, plain_gripper),
     }
-    if units.base and len(units.base.pose) not in (0, 3):
-        raise HandrailError(f"units: base: pose: expected three names, got {len(units.base.pose)}")
-    grip = units.gripper
-    if grip and grip.opened == grip.closed:
-        raise HandrailError("units: gripper: expected opened and closed to differ")
-    return RobotUnits(description, joints, units.base, grip)
-
-
-def _terms(joint: JointUnits, lower: float, upper: float) -> tuple[float, float]:
-    """Return `sign · s` and q₀."""
-    if joint.unit == "range":
-        return joint.sign * (upper - lower) / 200.0, 0.5 * (lower + upper)
-    return joint.sign * _angle(joint.unit), 0.0
-
-
-def _angle(unit: str) -> float:
-    return _DEGREE if unit == "degrees" else 1.0
+    if said not in known:
+        raise unknown_name("units", said, known)
+    return RobotUnits(description, known[said])
