@@ -19,8 +19,8 @@ from handrail.collect.session.rehearsal import Rehearsal
 from handrail.collect.world.env import HandrailEnv
 from handrail.controllers.interrupts import Interrupts
 from handrail.controllers.versions import SIMULATION, versions
-from handrail.datasets.format.columns import CLIENT, Scalar
 from handrail.datasets.format.manifest import Manifest
+from handrail.datasets.format.metadata import CLIENT, Scalar
 from handrail.datasets.recording.writer import EpisodeWriter
 
 _NICE = -10  # of a loop that a person steers, where the system allows that

@@ -19,10 +19,10 @@ from handrail.controllers.arrays import FloatArray
 from handrail.controllers.entries import is_count
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.intent import Intent
-from handrail.datasets.format.columns import CLIENT
+from handrail.datasets.format.metadata import CLIENT
 from handrail.datasets.reading.open_dataset import OpenDataset, open_dataset
 from handrail.datasets.recording.frames import Frame
-from handrail.datasets.recording.piece import TRIMMED
+from handrail.datasets.recording.slice import TRIMMED
 
 _MOST_TRIMMED = 100_000  # frames; more is a number made up
 

@@ -29,12 +29,12 @@ from handrail.controllers.errors import HandrailError, message_of
 from handrail.controllers.typed import Count, decoded
 from handrail.datasets.editing.merge import check_alike, merged_encodings, merged_types
 from handrail.datasets.editing.source import EditSource
+from handrail.datasets.format.episode_rows import each_record
 from handrail.datasets.format.layout import Layout
-from handrail.datasets.format.lines import each_line
 from handrail.datasets.format.manifest import Manifest
 from handrail.datasets.format.metadata import EpisodeRecord
-from handrail.datasets.recording.piece import Piece
 from handrail.datasets.recording.rewrite import settle, write_anew
+from handrail.datasets.recording.slice import EpisodeSlice
 from handrail.datasets.recording.writer import EpisodeWriter
 from handrail.datasets.storage.atomic import beside, explained, remove, write_whole
 from handrail.datasets.storage.lock import HeldError
@@ -165,7 +165,7 @@ class Shards:
         check_alike(sources[0], sources[-1])
         manifest, types = sources[0].manifest, merged_types(sources)
         new = (_pieces(job, found, manifest) for job, found in zip(jobs, chain([begin], lines), strict=True))
-        pieces = chain(sources[0].pieces() if self._plan.first else (), chain.from_iterable(new))
+        pieces = chain(sources[0].slices() if self._plan.first else (), chain.from_iterable(new))
         try:
             write_anew(self.root, manifest, pieces, types, merged_encodings(sources), in_place=True)
         except (pa.ArrowException, ValueError, KeyError) as error:
@@ -176,12 +176,12 @@ def _folder(job: Job) -> Path:
     return job.arguments[1]
 
 
-def _pieces(job: Job, lines: Sequence[EpisodeRecord], manifest: Manifest) -> Iterator[Piece]:
+def _pieces(job: Job, lines: Sequence[EpisodeRecord], manifest: Manifest) -> Iterator[EpisodeSlice]:
     """Yield the episodes of a shard."""
     folder = _folder(job)
     if len(lines) != job.size:
         raise HandrailError(f"dataset {str(folder)!r}: expected {job.size} episodes, found {len(lines)}")
-    yield from (Piece.of(Layout(folder), manifest, line) for line in lines)
+    yield from (EpisodeSlice.of(Layout(folder), manifest, line) for line in lines)
 
 
 def record_shard(
@@ -202,7 +202,7 @@ def record_shard(
     env, recording = _recording(config)
     own = replace(config, dataset=replace(config.dataset, place=str(folder), root=""))
     with _opened(own, folder, env) as writer:
-        lines = list(each_line(Layout(folder), with_stats=True))
+        lines = list(each_record(Layout(folder), with_stats=True))
         for _ in recording.episodes(writer, episodes, outcomes.append, first):
             assert writer.last
             lines.append(writer.last)

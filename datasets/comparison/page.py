@@ -22,7 +22,7 @@ from handrail.datasets.comparison.groups import Group, group_of
 from handrail.datasets.comparison.headline import cautions, headline
 from handrail.datasets.comparison.policies import Outcomes
 from handrail.datasets.comparison.report import write_report
-from handrail.datasets.format.path_pattern import fill
+from handrail.datasets.format.info_file import fill
 from handrail.datasets.format.schema import video_keys
 from handrail.datasets.presentation.drawing import Panel, address, svg
 from handrail.datasets.presentation.markup import (

@@ -24,13 +24,14 @@ from handrail.datasets.editing.config import (
 )
 from handrail.datasets.editing.pack import Edited, check_free, taken
 from handrail.datasets.editing.source import EditSource
-from handrail.datasets.format.columns import ColumnTypes
+from handrail.datasets.format.data_file import data_files
+from handrail.datasets.format.metadata import ColumnTypes
 from handrail.datasets.format.video import GROUP
 from handrail.datasets.quality.motion import FLOOR
 from handrail.datasets.reading.demonstration import Demonstration
 from handrail.datasets.reading.reader import read_rows_of
-from handrail.datasets.recording.piece import TRIMMED, Piece
 from handrail.datasets.recording.rewrite import drafted, write_anew
+from handrail.datasets.recording.slice import TRIMMED, EpisodeSlice
 from handrail.datasets.storage.atomic import explained
 
 _LABELS = {"success": pa.bool_(), "failure_reason": pa.string()}
@@ -182,16 +183,16 @@ def _split(config: SplitConfig, source: EditSource) -> list[Edited]:
     """Write the parts, which are there all together or none of them."""
     with drafted(config.target) as draft:
         edited = [
-            _write(config, draft.root / name, source, source.pieces(numbers), f"_{name}")
+            _write(config, draft.root / name, source, source.slices(numbers), f"_{name}")
             for name, numbers in split_parts(config.parts, source.successes).items()
         ]
     return [replace(each, root=config.target / each.root.name) for each in edited]
 
 
 def _write(
-    config: EditConfig, root: Path, source: EditSource, pieces: Iterable[Piece], suffix: str = ""
+    config: EditConfig, root: Path, source: EditSource, pieces: Iterable[EpisodeSlice], suffix: str = ""
 ) -> Edited:
-    manifest = source.manifest.named((config.name or source.manifest.repo_id) + suffix)
+    manifest = replace(source.manifest, repo_id=(config.name or source.manifest.repo_id) + suffix)
     manifest.check()
     types: ColumnTypes = source.types
     if isinstance(config, RelabelConfig):
@@ -202,41 +203,42 @@ def _write(
     return Edited(root, totals.episodes, totals.frames, source.info.frames)
 
 
-def _pieces(config: EditConfig, source: EditSource) -> Iterator[Piece]:
+def _pieces(config: EditConfig, source: EditSource) -> Iterator[EpisodeSlice]:
     """Yield what one dataset's episodes become."""
     everything = range(len(source.rows))
     words: Sequence[str] = getattr(config, "episodes", ())
     chosen = set(chosen_episodes("--episodes", words, source.successes))
     if isinstance(config, DeleteConfig):
-        return source.pieces([each for each in everything if each not in chosen])
+        return source.slices([each for each in everything if each not in chosen])
     if isinstance(config, KeepConfig):
-        return source.pieces(sorted(chosen))
+        return source.slices(sorted(chosen))
     if isinstance(config, RenameConfig) and config.old_task and config.old_task not in source.tasks:
         raise unknown_name("task", config.old_task, source.tasks)
     touched = chosen if words else set(everything)
     return (
         _changed(config, source, piece) if piece.record.episode in touched else piece
-        for piece in source.pieces()
+        for piece in source.slices()
     )
 
 
-def _changed(config: EditConfig, source: EditSource, piece: Piece) -> Piece:
+def _changed(config: EditConfig, source: EditSource, piece: EpisodeSlice) -> EpisodeSlice:
     if isinstance(config, TrimConfig):
         return _trimmed(config, source, piece)
     if isinstance(config, RelabelConfig):
         success = config.label == "success"
         said = piece.saying(success=success, failure_reason="" if success else config.reason or "relabelled")
-        return said.ending(success)
+        return replace(said, success=success)
     assert isinstance(config, RenameConfig)
     old = {task for task in piece.record.tasks if not config.old_task or task == config.old_task}
-    return piece.renamed(dict.fromkeys(old, config.task))
+    return replace(piece, sentences=dict.fromkeys(old, config.task))
 
 
-def _trimmed(config: TrimConfig, source: EditSource, piece: Piece) -> Piece:
+def _trimmed(config: TrimConfig, source: EditSource, piece: EpisodeSlice) -> EpisodeSlice:
     number = piece.record.episode
     columns = [name for name in (STATE, SUCCESS) if name in source.info.features]
-    frames = read_rows_of(source.info, source.rows[number], columns)
+    with data_files() as files:
+        frames = read_rows_of(source.info, source.rows[number], columns, files)
     episode = Demonstration(number, source.info, frames, source.rows[number])
     first, length = moving_stretch(episode, config.margin)
     before = piece.columns.get(TRIMMED) or 0
-    return piece.stretch(first, length).saying(**{TRIMMED: int(before) + first})
+    return replace(piece, first=first, length=length).saying(**{TRIMMED: int(before) + first})

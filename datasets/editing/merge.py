@@ -6,8 +6,8 @@ import pyarrow as pa
 
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.editing.source import EditSource
-from handrail.datasets.format.columns import ColumnTypes
-from handrail.datasets.recording.rewrite import Encodings
+from handrail.datasets.format.info_file import Encodings
+from handrail.datasets.format.metadata import ColumnTypes
 
 _NEEDED = ("video.codec", "video.pix_fmt")  # in which all videos of a camera have to agree
 

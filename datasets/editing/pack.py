@@ -3,7 +3,7 @@
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -11,8 +11,8 @@ from typing import Any
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.editing.merge import check_alike, merged_encodings, merged_types
 from handrail.datasets.editing.source import EditSource
+from handrail.datasets.format.episode_rows import row_files
 from handrail.datasets.format.layout import Layout
-from handrail.datasets.format.lines import rows_of_lines
 from handrail.datasets.recording.checksums import Checksums
 from handrail.datasets.recording.repair import tidy_locked
 from handrail.datasets.recording.rewrite import remove_whole, settle, write_anew
@@ -69,7 +69,7 @@ def merge_datasets(
 
 def _is_empty(root: Path) -> bool:
     """Return whether a dataset was begun, and nothing has been recorded."""
-    return Layout(root).manifest.is_file() and not rows_of_lines(Layout(root))
+    return Layout(root).manifest.is_file() and not row_files(Layout(root))
 
 
 def check_free(target: Path) -> None:
@@ -112,7 +112,7 @@ def drop_episodes(root: str | Path, dropped: Callable[[Mapping[str, Any]], bool]
         with taken(root, verify=True) as source:
             kept = [row["episode_index"] for row in source.rows if not dropped(row)]
             if 0 < len(kept) < len(source.rows):
-                pieces = source.pieces(kept)
+                pieces = source.slices(kept)
                 write_anew(root, source.manifest, pieces, source.types, source.encodings, in_place=True)
             elif not kept:
                 remove_whole(root)
@@ -122,9 +122,9 @@ def drop_episodes(root: str | Path, dropped: Callable[[Mapping[str, Any]], bool]
 def _merged(sources: Sequence[EditSource], target: Path, name: str, in_place: bool) -> Edited:
     for other in sources[1:]:
         check_alike(sources[0], other)
-    manifest = sources[0].manifest.named(name or sources[0].manifest.repo_id)
+    manifest = replace(sources[0].manifest, repo_id=name or sources[0].manifest.repo_id)
     manifest.check()
-    pieces = chain.from_iterable(source.pieces() for source in sources)
+    pieces = chain.from_iterable(source.slices() for source in sources)
     types, encodings = merged_types(sources), merged_encodings(sources)
     totals = write_anew(target, manifest, pieces, types, encodings, in_place)
     return Edited(target, totals.episodes, totals.frames, sum(source.info.frames for source in sources))

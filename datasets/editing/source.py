@@ -9,16 +9,15 @@ from pathlib import Path
 from typing import Any
 
 from handrail.controllers.errors import HandrailError
-from handrail.datasets.format.columns import ColumnTypes
+from handrail.datasets.format.episode_rows import EpisodeRows, ForeignRowError, read_column_types, row_files
+from handrail.datasets.format.info_file import Encodings, read_encodings
 from handrail.datasets.format.layout import Layout, episode_of
-from handrail.datasets.format.lines import ForeignLineError, Lines, read_column_types, rows_of_lines
 from handrail.datasets.format.manifest import Manifest, read_manifest
-from handrail.datasets.format.metadata import read_encodings
+from handrail.datasets.format.metadata import ColumnTypes
 from handrail.datasets.reading.check import check_whole
 from handrail.datasets.reading.reader import DatasetInfo, read_episodes, read_info, with_success
 from handrail.datasets.recording.folder import check_folders
-from handrail.datasets.recording.piece import Piece
-from handrail.datasets.recording.rewrite import Encodings
+from handrail.datasets.recording.slice import EpisodeSlice
 
 
 @dataclass(frozen=True)
@@ -41,7 +40,7 @@ class EditSource:
 
     @cached_property
     def rows(self) -> Sequence[dict[str, Any]]:
-        """Lines of metadata of its episodes, with `success` where that is known."""
+        """EpisodeRows of metadata of its episodes, with `success` where that is known."""
         return with_success(self.info, read_episodes(self.layout.root))
 
     @property
@@ -68,33 +67,33 @@ class EditSource:
         manifest = read_manifest(layout)
         check_folders(layout)
         check_whole(root, verify)
-        lines = rows_of_lines(layout)
+        lines = row_files(layout)
         if not lines:
             raise HandrailError(f"dataset {str(root)!r}: expected an episode or more, found none")
         try:
-            Lines.read(lines[0])
-        except (ForeignLineError, FileNotFoundError) as error:
+            EpisodeRows.read(lines[0])
+        except (ForeignRowError, FileNotFoundError) as error:
             raise _foreign(root, "its meta/episodes has been rewritten") from error
-        types, encodings = read_column_types(lines[0]), read_encodings(layout.info, manifest)
+        types, encodings = read_column_types(lines[0]), read_encodings(layout, manifest)
         return cls(layout, manifest, types, encodings, info)
 
-    def pieces(self, numbers: Sequence[int] | None = None) -> Iterator[Piece]:
+    def slices(self, numbers: Sequence[int] | None = None) -> Iterator[EpisodeSlice]:
         """Yield episodes, one at a time; all of them without numbers."""
-        files = rows_of_lines(self.layout)
+        files = row_files(self.layout)
         if numbers is None:
             for path in files:
-                yield from self._pieces(path)
+                yield from self._slices(path)
             return
         slots = sorted(number for path in files if (number := episode_of(path)) is not None)
         for slot, some in groupby(numbers, key=lambda number: slots[bisect_right(slots, number) - 1]):
-            yield from self._pieces(self.layout.row(slot), [number - slot for number in some])
+            yield from self._slices(self.layout.row(slot), [number - slot for number in some])
 
-    def _pieces(self, path: Path, places: Sequence[int] | None = None) -> Iterator[Piece]:
+    def _slices(self, path: Path, places: Sequence[int] | None = None) -> Iterator[EpisodeSlice]:
         """Yield the episodes of a volume."""
         try:
-            lines = Lines.read(path)
+            lines = EpisodeRows.read(path)
             for place in range(len(lines)) if places is None else places:
-                yield Piece.of(self.layout, self.manifest, lines.record(place, with_stats=True))
+                yield EpisodeSlice.of(self.layout, self.manifest, lines.record(place, with_stats=True))
         except (OSError, ValueError, KeyError, IndexError) as error:
             raise HandrailError(f"{str(path)!r} cannot be read ({error}); the dataset is damaged") from error
 

@@ -14,7 +14,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from handrail.controllers.regular_file import regular
-from handrail.datasets.format.arrow import numbers, to_numpy
+from handrail.datasets.format.tables import numbers, to_numpy
 
 _EPISODE = "episode_index"
 _SEARCHED = [_EPISODE, "index"]  # columns whose statistics readers look rows up by

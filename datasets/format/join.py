@@ -4,7 +4,6 @@ A stretch can be copied if it begins with a key frame and no picture in it needs
 be joined to another if both are encoded alike, since a file describes its pictures once.
 """
 
-from contextlib import closing
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
@@ -19,19 +18,16 @@ from handrail.datasets.format.video import place_of, sought, whole_mp4
 
 @dataclass(frozen=True)
 class Stretch:
-    """Packets that stand on their own.
-
-    Attributes:
-        packets: In the order in which they are decoded.
-        stream: The video that they are of, open.
-        first: Which of its pictures is shown first.
-        count: Number of pictures.
-    """
+    """Packets that stand on their own."""
 
     packets: list[Any]
+    """In the order in which they are decoded."""
     stream: Any
+    """The video that they are of, open."""
     first: int
+    """The picture of it that is shown first."""
     count: int
+    """Number of pictures."""
 
 
 class Videos:
@@ -42,7 +38,7 @@ class Videos:
         self._fps = fps
         self._open: dict[str, tuple[Path, Any]] = {}
 
-    def stretch(self, path: Path, first: int, count: int, camera: str = "") -> Stretch | None:
+    def stretch(self, path: Path, first: int, count: int, camera: str) -> Stretch | None:
         """Return some pictures of a video; None if they cannot be copied.
 
         Args:
@@ -52,7 +48,10 @@ class Videos:
             camera: Whose last video stays open until the next.
         """
         with whole_mp4(path):
-            container = self._opened(path, camera)
+            if camera not in self._open or self._open[camera][0] != path:
+                self.forget(camera)
+                self._open[camera] = path, av.open(str(regular(path)))
+            container = self._open[camera][1]
             stream = sought(container, first, self._fps)
             packets: list[Any] = []
             for packet in container.demux(stream):
@@ -67,39 +66,23 @@ class Videos:
             f"video {str(path)!r}: expected the pictures {first} to {first + count - 1}, got fewer"
         )
 
-    def close(self) -> None:
-        """Close what is open."""
-        for camera in tuple(self._open):
-            self.forget(camera)
-
     def forget(self, camera: str) -> None:
         """Close the video of a camera, if one is open."""
         if camera in self._open:
             self._open.pop(camera)[1].close()
 
-    def _opened(self, path: Path, camera: str) -> Any:
-        if camera not in self._open or self._open[camera][0] != path:
+    def close(self) -> None:
+        """Close what is open."""
+        for camera in tuple(self._open):
             self.forget(camera)
-            self._open[camera] = path, av.open(str(regular(path)))
-        return self._open[camera][1]
-
-
-def videos(fps: int) -> closing[Videos]:
-    """Provide a reader of mp4s that is closed in the end."""
-    return closing(Videos(fps))
 
 
 class VideoJoin:
     """One mp4 that grows by stretches of others."""
 
     def __init__(self, target: Path, fps: int):
-        """Begin a video.
-
-        Args:
-            target: The new mp4; it appears with the first stretch.
-            fps: Pictures a second [Hz].
-        """
-        self._target, self._fps = target, fps
+        """Begin a video at `fps` [Hz]; the file appears with the first stretch."""
+        self.target, self._fps = target, fps
         self._container: Any = None
         self._out: Any = None
         self._like: tuple = ()
@@ -112,7 +95,7 @@ class VideoJoin:
     def add(self, stretch: Stretch) -> None:
         """Append a stretch that fits."""
         if self._container is None:
-            self._container = av.open(str(self._target), "w", format="mp4")
+            self._container = av.open(str(self.target), "w", format="mp4")
             self._out = self._container.add_stream_from_template(stretch.stream)
             self._like = _encoding(stretch.stream)
         base = stretch.stream.time_base

@@ -26,7 +26,7 @@ def chunk_and_file(episode: int) -> tuple[int, int]:
     return divmod(episode, FILES_IN_A_CHUNK)
 
 
-def slot_of(chunk: int, file: int) -> int:
+def file_index_of(chunk: int, file: int) -> int:
     """Return the episode after which a file is named, the inverse of `chunk_and_file`."""
     return chunk * FILES_IN_A_CHUNK + file
 
@@ -36,7 +36,7 @@ def episode_of(path: Path) -> int | None:
     match = _NUMBERED.fullmatch("/".join(path.parts[-2:]))
     if match is None or int(match[2]) >= FILES_IN_A_CHUNK:
         return None
-    return slot_of(int(match[1]), int(match[2]))
+    return file_index_of(int(match[1]), int(match[2]))
 
 
 @dataclass(frozen=True)
@@ -75,6 +75,11 @@ class Layout:
     def tasks(self) -> Path:
         """The task sentences."""
         return self.root / "meta" / "tasks.parquet"
+
+    @property
+    def episodes(self) -> Path:
+        """The episode rows."""
+        return self.root / "meta" / "episodes"
 
     @property
     def manifest(self) -> Path:

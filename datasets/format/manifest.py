@@ -4,9 +4,8 @@
 folder without it was not written by Handrail and is never written to.
 """
 
-import json
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -15,12 +14,21 @@ from msgspec import Meta
 
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.typed import check_settings
-from handrail.datasets.format.info_file import ManifestFile, columns_of
 from handrail.datasets.format.layout import Layout
-from handrail.datasets.format.schema import OUTCOME_PREFIX, Feature, check_features
-from handrail.datasets.storage.strict_json import read_json
+from handrail.datasets.format.schema import OUTCOME_PREFIX, Feature, check_features, features_of
+from handrail.datasets.storage.strict_json import json_bytes, read_json
 
 FORMAT = 1
+
+
+class _ManifestFile(msgspec.Struct):
+    """`handrail.json` as it is stored."""
+
+    repo_id: str
+    fps: int
+    robot_type: str
+    features: dict[str, dict[str, Any]]
+    versions: dict[str, Any]
 
 
 @dataclass(frozen=True)
@@ -36,10 +44,6 @@ class Manifest:
     """The columns, without those that LeRobot adds."""
     versions: Mapping[str, str] = field(default_factory=dict)
     """Software versions of the session that created the dataset."""
-
-    def named(self, repo_id: str) -> "Manifest":
-        """Return it with another name."""
-        return replace(self, repo_id=repo_id)
 
     def check(self) -> None:
         """Check everything that can be checked without a disk."""
@@ -76,40 +80,35 @@ class Manifest:
 
 def read_manifest(layout: Layout) -> Manifest:
     """Read the manifest of a dataset that Handrail wrote."""
+    root = str(layout.root)
     try:
         content = read_json(layout.manifest)
         if content["format"] != FORMAT:  # first of all: a newer one may say anything else
             raise HandrailError(
-                f"dataset {str(layout.root)!r}: expected format {FORMAT}, got {str(content['format'])[:60]};"
-                " a newer Handrail wrote it"
+                f"expected format {FORMAT}, got {str(content['format'])[:60]}; a newer Handrail wrote it"
             )
-        said = msgspec.convert(content, ManifestFile)
-        manifest = Manifest(said.repo_id, said.fps, said.robot_type, columns_of(said.features), said.versions)
+        said = msgspec.convert(content, _ManifestFile)
+        manifest = Manifest(
+            said.repo_id, said.fps, said.robot_type, features_of(said.features), said.versions
+        )
+        manifest.check()
+        return manifest
     except (FileNotFoundError, NotADirectoryError) as error:
-        raise HandrailError(_why_no_manifest(layout)) from error
+        if not layout.root.is_dir():
+            why = f"dataset {root!r}: expected a folder, found none; create it first, or check the path"
+        elif layout.info.exists():
+            why = (
+                f"dataset {root!r} was not written by Handrail (no meta/handrail.json): choose another folder"
+            )
+        else:
+            why = f"{root!r} is not a LeRobot dataset (no meta/info.json): choose another folder"
+        raise HandrailError(why) from error
+    except HandrailError as error:
+        raise HandrailError(f"{str(layout.manifest)!r}: {error}") from error
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise HandrailError(
             f"{str(layout.manifest)!r}: expected Handrail's manifest, got {error!r}"
         ) from error
-    try:
-        manifest.check()
-    except HandrailError as error:
-        raise HandrailError(f"{str(layout.manifest)!r}: {error}") from error
-    return manifest
-
-
-def json_bytes(content: Any) -> bytes:
-    """Return JSON as LeRobot writes it, the same bytes for the same content."""
-    return json.dumps(content, indent=4, ensure_ascii=False, allow_nan=False).encode()
-
-
-def _why_no_manifest(layout: Layout) -> str:
-    root = str(layout.root)
-    if not layout.root.is_dir():
-        return f"dataset {root!r}: expected a folder, found none; create it first, or check the path"
-    if layout.info.exists():
-        return f"dataset {root!r} was not written by Handrail (no meta/handrail.json): choose another folder"
-    return f"{root!r} is not a LeRobot dataset (no meta/info.json): choose another folder"
 
 
 def _describe(feature: Feature | None) -> str:

@@ -1,37 +1,40 @@
-"""What a dataset knows about its episodes: one line an episode, and the totals that follow from the lines.
+"""What a dataset knows about its episodes: one row of metadata an episode, and what they add up to.
 
-`info.json`, `stats.json` and `tasks.parquet` are pure functions of the manifest and the lines, so they can be
-rebuilt to the byte whenever they are missing or late.
+Beside LeRobot's own, a row has extra columns: success, operator, seed and whatever else a session knows. The
+first saved episode fixes which there are and their types: one parquet schema for all episodes. Strings are
+never null (None becomes ""); other columns may be left out later.
 """
 
 import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import cast
 
+import numpy as np
+import pyarrow as pa
+
+from handrail.controllers.errors import HandrailError
 from handrail.controllers.regular_file import open_regular
-from handrail.datasets.format.columns import Scalar
-from handrail.datasets.format.layout import DATA_PATH, FILES_IN_A_CHUNK, VIDEO_PATH
-from handrail.datasets.format.manifest import Manifest, json_bytes
-from handrail.datasets.format.schema import AUTOMATIC, Feature, video_keys
-from handrail.datasets.format.stats import Stats, merge_stats, stats_to_lists
-from handrail.datasets.format.video import video_info
-from handrail.datasets.storage.strict_json import read_json
+from handrail.datasets.format.stats import Stats, merge_stats
 
-CODEBASE_VERSION = "v3.0"
+Scalar = str | bool | int | float
+ColumnTypes = dict[str, pa.DataType]
+CLIENT = "robot_client"  # which of LeRobot's robots was driven through its client; empty or missing for none
+_RESERVED = ("episode_index", "tasks", "length", "dataset_from_index", "dataset_to_index")
+_TYPES: dict[type, pa.DataType] = {bool: pa.bool_(), int: pa.int64(), float: pa.float64(), str: pa.string()}
 
 
 @dataclass(frozen=True)
-class FileSeal:
+class Checksum:
     """Size [byte] and SHA-256 of a file at the moment its episode was saved."""
 
     size: int
     sha256: str
 
     @classmethod
-    def of(cls, path: Path) -> "FileSeal":
-        """Return the seal of a file.
+    def of(cls, path: Path) -> "Checksum":
+        """Return the checksum of a file.
 
         Raises:
             OSError: The file cannot be read.
@@ -43,52 +46,44 @@ class FileSeal:
 
 @dataclass(frozen=True)
 class EpisodeRecord:
-    """The line of metadata of one episode.
-
-    Attributes:
-        episode: Its number.
-        start: Index of its first frame in the dataset.
-        length: Number of frames.
-        tasks: Its task sentences, in the order in which they first occur.
-        stats: Statistics of its columns; None where they were not read.
-        columns: Extra columns.
-        files: Seals of its data and video files by relative path.
-        slot: Of its volume: the first episode in its files, after which these are named.
-        offset: How many frames of the volume's files are before it.
-        alone: Whether it is the only one of its volume.
-    """
+    """The row of metadata of one episode."""
 
     episode: int
+    """Its number."""
     start: int
+    """Index of its first frame in the dataset."""
     length: int
+    """Number of frames."""
     tasks: tuple[str, ...]
+    """Its task sentences, in the order in which they first occur."""
     stats: Stats | None
+    """Statistics of its columns; None where they were not read."""
     columns: Mapping[str, Scalar | None]
-    files: Mapping[str, FileSeal]
-    slot: int
+    """Extra columns."""
+    files: Mapping[str, Checksum]
+    """Checksums of its data and video files by relative path."""
+    file_index: int
+    """The first episode in its files, after which these are named."""
     offset: int = 0
+    """How many frames in its files are before it."""
     alone: bool = True
+    """Whether it is the only one in its files."""
 
 
 @dataclass(frozen=True)
 class Totals:
-    """What the episodes add up to.
-
-    Attributes:
-        episodes: Number of saved episodes.
-        frames: Number of their frames.
-        tasks: Task sentences; the place is the `task_index`.
-        stats: Statistics over all frames.
-    """
+    """What the episodes add up to."""
 
     episodes: int = 0
     frames: int = 0
     tasks: tuple[str, ...] = ()
+    """Task sentences; the place is the `task_index`."""
     stats: Stats | None = field(default=None, compare=False)
+    """Statistics over all frames."""
 
     def with_tasks(self, tasks: tuple[str, ...]) -> tuple[str, ...]:
         """Return the task sentences after an episode: new ones are appended in their order."""
-        return (*self.tasks, *(task for task in dict.fromkeys(tasks) if task not in self.tasks))
+        return tuple(dict.fromkeys((*self.tasks, *tasks)))
 
     def grown(self, record: EpisodeRecord) -> "Totals":
         """Return the totals with one more episode."""
@@ -96,52 +91,54 @@ class Totals:
         return Totals(self.episodes + 1, self.frames + record.length, self.with_tasks(record.tasks), stats)
 
 
-def info_bytes(
-    manifest: Manifest, totals: Totals, encodings: Mapping[str, Mapping[str, Any]] | None = None
-) -> bytes:
-    """Return `meta/info.json`.
+def is_extra(column: str) -> bool:
+    """Return whether a column of `meta/episodes` is none of LeRobot's own."""
+    return "/" not in column and column not in _RESERVED
+
+
+def plain_columns(columns: Mapping[str, object]) -> dict[str, Scalar]:
+    """Return extra columns with plain Python values."""
+    found: dict[str, Scalar] = {}
+    for name, value in columns.items():
+        if not isinstance(name, str) or not name or not is_extra(name):
+            raise HandrailError(
+                f"episode column {name!r}: expected a name without '/' other than {', '.join(_RESERVED)}"
+            )
+        plain = value.item() if isinstance(value, np.generic) else "" if value is None else value
+        if type(plain) not in _TYPES:
+            raise HandrailError(
+                f"episode column {name!r}: expected str, bool, int or float, got {type(plain).__name__}"
+            )
+        found[name] = cast(Scalar, plain)
+    return found
+
+
+def column_types(columns: Mapping[str, Scalar]) -> ColumnTypes:
+    """Return the types that the first episode's columns fix."""
+    return {name: _TYPES[type(value)] for name, value in columns.items()}
+
+
+def fit_columns(columns: Mapping[str, Scalar | None], types: ColumnTypes) -> dict[str, Scalar | None]:
+    """Return one value for each column that the dataset has.
 
     Args:
-        manifest: The schema.
-        totals: What the episodes add up to.
-        encodings: How the videos of some cameras are encoded, where that is not as Handrail does it.
+        columns: Plain values.
+        types: What the first episode fixed.
     """
-    features = {**manifest.features, **AUTOMATIC}
-    described = {key: _info_feature(feature, manifest.fps) for key, feature in features.items()}
-    for key, encoding in (encodings or {}).items():
-        described[key]["info"] = dict(encoding)
-    content = {
-        "codebase_version": CODEBASE_VERSION,
-        "fps": manifest.fps,
-        "features": described,
-        "total_episodes": totals.episodes,
-        "total_frames": totals.frames,
-        "total_tasks": len(totals.tasks),
-        "chunks_size": FILES_IN_A_CHUNK,
-        "data_files_size_in_mb": 100,
-        "video_files_size_in_mb": 200,
-        "data_path": DATA_PATH,
-        "video_path": VIDEO_PATH,
-        "robot_type": manifest.robot_type,
-        "splits": {"train": f"0:{totals.episodes}"} if totals.episodes else {},
-    }
-    return json_bytes(content)
-
-
-def stats_bytes(stats: Stats) -> bytes:
-    """Return `meta/stats.json`."""
-    return json_bytes(stats_to_lists(stats))
-
-
-def read_encodings(info: Path, manifest: Manifest) -> dict[str, Mapping[str, Any]]:
-    """Return how `info.json` says that videos are encoded: another tool may have done it anew."""
-    try:
-        described = read_json(info)["features"]
-        found = {key: described[key]["info"] for key in video_keys(manifest.features)}
-    except (OSError, ValueError, KeyError, TypeError):
-        return {}
-    return {key: value for key, value in found.items() if isinstance(value, dict) and "video.codec" in value}
-
-
-def _info_feature(feature: Feature, fps: int) -> dict[str, Any]:
-    return feature.described | ({"info": video_info(feature, fps)} if feature.is_video else {})
+    if unknown := [name for name in columns if name not in types]:
+        raise HandrailError(
+            f"episode column {unknown[0]!r} is new: expected those of the first episode, {', '.join(types)}"
+        )
+    found: dict[str, Scalar | None] = {}
+    for name, kind in types.items():
+        value = columns.get(name)
+        if value is None or value == "":
+            value = "" if kind == pa.string() else None
+        elif kind == pa.float64() and type(value) is int:
+            value = float(value)
+        elif _TYPES[type(value)] != kind:
+            raise HandrailError(
+                f"episode column {name!r}: expected {kind} as in earlier episodes, got {value!r}"
+            )
+        found[name] = value
+    return found

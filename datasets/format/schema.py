@@ -4,35 +4,46 @@ Keys that begin `observation` or `action` become inputs and outputs of a LeRobot
 anything else (`teleop.*`, `controller.*`, …) is kept beside them.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
+import msgspec
 import numpy as np
+from msgspec import Meta
 
-from handrail.controllers.errors import HandrailError
+from handrail.controllers.errors import HandrailError, shown
 
 NUMBERS = (
-    "float32 float64 int8 int16 int32 int64 uint8 uint16 uint32 uint64 bool".split()  # noqa: SIM905
+    "float32",
+    "float64",
+    "int8",
+    "int16",
+    "int32",
+    "int64",
+    "uint8",
+    "uint16",
+    "uint32",
+    "uint64",
+    "bool",
 )
 DTYPES = (*NUMBERS, "string", "video")
 POLICY_PREFIXES = ("observation", "action")
 OUTCOME_PREFIX = "next."  # LeRobot's name for what came of a frame
+_LARGEST = 10**8  # numbers a frame and feature
 
 
 @dataclass(frozen=True)
 class Feature:
-    """One column of a dataset.
-
-    Attributes:
-        dtype: `float32`, `float64`, an integer type, `bool`, `string` or `video`.
-        shape: `(n,)`; `(1,)` is kept as a scalar; `string` is `(1,)`; `video` is `(height, width, 3)`, even.
-        names: A name for each entry (for a video, each axis), or None.
-    """
+    """One column of a dataset."""
 
     dtype: str
+    """`float32`, `float64`, an integer type, `bool`, `string` or `video`."""
     shape: tuple[int, ...] = (1,)
+    """`(n,)`; `(1,)` is kept as a scalar; `string` is `(1,)`; `video` is `(height, width, 3)`, even."""
     names: tuple[str, ...] | None = None
+    """A name for each entry (for a video, each axis), or None."""
 
     def __post_init__(self):
         object.__setattr__(self, "shape", tuple(int(size) for size in self.shape))
@@ -58,13 +69,34 @@ class Feature:
         return self.shape == (1,)
 
 
-AUTOMATIC: dict[str, Feature] = {
-    "timestamp": Feature("float32"),
-    "frame_index": Feature("int64"),
-    "episode_index": Feature("int64"),
-    "index": Feature("int64"),
-    "task_index": Feature("int64"),
+AUTOMATIC: dict[str, Feature] = {"timestamp": Feature("float32")} | {
+    name: Feature("int64") for name in ("frame_index", "episode_index", "index", "task_index")
 }
+
+
+class _Described(msgspec.Struct):
+    dtype: str
+    shape: list[Annotated[int, Meta(ge=0)]]
+    names: list[Any] | dict[str, Any] | None = None
+
+
+def features_of(described: Mapping[str, Mapping[str, Any]]) -> dict[str, Feature]:
+    """Return the columns of a dataset as a file describes them; else a ValueError, one line."""
+    found: dict[str, Feature] = {}
+    for key, value in described.items():
+        try:
+            said = msgspec.convert(value, _Described)
+            if math.prod(said.shape) > _LARGEST:
+                raise ValueError(f"a shape of {_LARGEST} numbers at most, got {shown(said.shape)}")
+        except ValueError as error:
+            raise ValueError(f"feature {key[:60]!r}: {error}") from error
+        names = said.names
+        if isinstance(names, dict):  # older datasets: {"motors": [...]}
+            names = next((entry for entry in names.values() if isinstance(entry, list)), None)
+        if names and said.dtype not in ("video", "image") and [len(names)] != said.shape[:1]:
+            names = None  # they name something else
+        found[key] = Feature(said.dtype, tuple(said.shape), tuple(names) if names else None)
+    return found
 
 
 def video_keys(features: Mapping[str, Feature]) -> tuple[str, ...]:
@@ -77,8 +109,26 @@ def check_features(features: Mapping[str, Feature]) -> None:
     if not features:
         raise HandrailError("features: expected at least one, got none")
     for key, feature in features.items():
-        _check_key(key)
-        _check_feature(key, feature)
+        if not isinstance(key, str) or not key or "/" in key or key.startswith("."):
+            raise HandrailError(f"feature {key!r}: expected a name without '/' that does not begin with '.'")
+        if key in AUTOMATIC or key == "task":
+            raise HandrailError(f"feature {key!r}: LeRobot writes this column itself; choose another name")
+        if feature.dtype not in DTYPES:
+            raise HandrailError(
+                f"feature {key!r}: unknown dtype {feature.dtype!r}; expected one of {', '.join(DTYPES)}"
+            )
+        shape, expected = feature.shape, "(n,) with n ≥ 1"
+        fits = len(shape) == 1 and shape[0] >= 1
+        if feature.dtype == "string":
+            fits, expected = feature.is_scalar, "(1,)"
+        elif feature.is_video:  # h264 keeps colour at half the size
+            fits = len(shape) == 3 and shape[2] == 3 and all(n >= 16 and n % 2 == 0 for n in shape[:2])
+            expected = "(height, width, 3) with even height and width of 16 or more"
+        if not fits:
+            raise HandrailError(f"feature {key!r}: expected the shape {expected}, got {shape}")
+        length = 3 if feature.is_video else shape[0]
+        if feature.names is not None and len(feature.names) != length:
+            raise HandrailError(f"feature {key!r}: expected {length} names, got {len(feature.names)}")
 
 
 def check_frame(frame: Mapping[str, Any], features: Mapping[str, Feature]) -> dict[str, Any]:
@@ -90,48 +140,13 @@ def check_frame(frame: Mapping[str, Any], features: Mapping[str, Feature]) -> di
         features: The schema.
     """
     missing = [key for key in features if key not in frame]
-    extra = [key for key in frame if key not in features]
+    extra = [str(key) for key in frame if key not in features]
     if missing or extra:
         raise HandrailError(
             f"frame: expected the keys {', '.join(features)};"
-            f" missing: {', '.join(missing) or 'none'}; unknown: {', '.join(map(str, extra)) or 'none'}"
+            f" missing: {', '.join(missing) or 'none'}; unknown: {', '.join(extra) or 'none'}"
         )
     return {key: _check_value(key, feature, frame[key]) for key, feature in features.items()}
-
-
-def _check_key(key: str) -> None:
-    if not isinstance(key, str) or not key or "/" in key or key.startswith("."):
-        raise HandrailError(f"feature {key!r}: expected a name without '/' that does not begin with '.'")
-    if key in AUTOMATIC or key == "task":
-        raise HandrailError(f"feature {key!r}: LeRobot writes this column itself; choose another name")
-
-
-def _check_feature(key: str, feature: Feature) -> None:
-    if feature.dtype not in DTYPES:
-        raise HandrailError(
-            f"feature {key!r}: unknown dtype {feature.dtype!r}; expected one of {', '.join(DTYPES)}"
-        )
-    if feature.is_video:
-        _check_camera(key, feature)
-    elif (
-        len(feature.shape) != 1
-        or feature.shape[0] < 1
-        or (feature.dtype == "string" and not feature.is_scalar)
-    ):
-        expected = "(1,)" if feature.dtype == "string" else "(n,) with n ≥ 1"
-        raise HandrailError(f"feature {key!r}: expected the shape {expected}, got {feature.shape}")
-    length = 3 if feature.is_video else feature.shape[0]
-    if feature.names is not None and len(feature.names) != length:
-        raise HandrailError(f"feature {key!r}: expected {length} names, got {len(feature.names)}")
-
-
-def _check_camera(key: str, feature: Feature) -> None:
-    shape = feature.shape
-    if len(shape) != 3 or shape[2] != 3 or shape[0] < 16 or shape[1] < 16 or shape[0] % 2 or shape[1] % 2:
-        raise HandrailError(
-            f"camera {key!r}: expected (height, width, 3) with even height and width of 16 or more,"
-            f" got {shape} (h264 keeps colour at half the size)"
-        )
 
 
 def _check_value(key: str, feature: Feature, value: Any) -> Any:
@@ -139,33 +154,23 @@ def _check_value(key: str, feature: Feature, value: Any) -> Any:
         if not isinstance(value, str):
             raise HandrailError(f"frame: {key!r} expected a str, got {type(value).__name__}")
         return str(value)
-    array = np.asarray(value)
-    expected = np.dtype("uint8" if feature.is_video else feature.dtype)
-    shape = (1,) if array.shape == () and feature.is_scalar else array.shape
+    given = np.asarray(value)
+    dtype = np.dtype("uint8" if feature.is_video else feature.dtype)
+    shape = (1,) if given.shape == () and feature.is_scalar else given.shape
     if shape != feature.shape:
-        raise HandrailError(f"frame: {key!r} expected the shape {feature.shape}, got {array.shape}")
-    casting = "equiv" if feature.is_video else "same_kind"
-    if not np.can_cast(array.dtype, expected, casting):
-        raise HandrailError(f"frame: {key!r} expected {expected}, got {array.dtype}")
+        raise HandrailError(f"frame: {key!r} expected the shape {feature.shape}, got {given.shape}")
+    if not np.can_cast(given.dtype, dtype, "equiv" if feature.is_video else "same_kind"):
+        raise HandrailError(f"frame: {key!r} expected {dtype}, got {given.dtype}")
     if feature.is_video:
-        return array
-    return _check_finite(key, feature, array.reshape(shape), expected)
-
-
-def _check_finite(key: str, feature: Feature, given: np.ndarray, dtype: np.dtype) -> np.ndarray:
-    array = given.copy() if given.dtype == dtype else _cast(key, given, dtype)
+        return given
+    with np.errstate(over="ignore"):
+        array = given.reshape(shape).astype(dtype)
+    if dtype.kind in "iu" and not np.array_equal(array.ravel(), given.ravel()):
+        raise HandrailError(f"frame: {key!r} expected values that fit {dtype}, got {given.tolist()}")
     if key.startswith(POLICY_PREFIXES) and dtype.kind == "f" and not np.isfinite(array).all():
         where = int(np.flatnonzero(~np.isfinite(array))[0])
         name = feature.names[where] if feature.names else str(where)
         raise HandrailError(
             f"frame: {key!r} expected finite values, got {array[where]} at {name} (a policy would read it)"
         )
-    return array
-
-
-def _cast(key: str, given: np.ndarray, dtype: np.dtype) -> np.ndarray:
-    with np.errstate(over="ignore"):
-        array = given.astype(dtype)
-    if dtype.kind in "iu" and not np.array_equal(array, given):
-        raise HandrailError(f"frame: {key!r} expected values that fit {dtype}, got {given.tolist()}")
     return array

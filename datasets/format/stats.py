@@ -198,8 +198,7 @@ def _is_large(column: Mapping[str, np.ndarray]) -> bool:
 
 
 def _wide(column: Mapping[str, np.ndarray]) -> Statistics:
-    kinds = dict.fromkeys(("mean", "std", *QUANTILES), np.longdouble)
-    return {name: values.astype(kinds.get(name, values.dtype)) for name, values in column.items()}
+    return dict(column) | {name: column[name].astype(np.longdouble) for name in ("mean", "std", *QUANTILES)}
 
 
 def _joined(stats: Stats, keys: Sequence[str]) -> Statistics:
@@ -212,12 +211,12 @@ def _joined(stats: Stats, keys: Sequence[str]) -> Statistics:
 
 def _split(joined: Mapping[str, np.ndarray], like: Stats, keys: Sequence[str]) -> Stats:
     """Return each column's own part again, in the shape that it has elsewhere."""
+    ends = np.cumsum([like[key]["mean"].size for key in keys])[:-1]
+    parts = {name: np.split(values, ends) for name, values in joined.items()}
     found: Stats = {}
-    end = 0
-    for key in keys:
-        begin, end = end, end + like[key]["mean"].size
-        found[key] = {name: joined[name][begin:end].reshape(like[key]["mean"].shape) for name in _OTHERS}
-        found[key]["count"] = joined["count"][begin : begin + 1]
+    for place, key in enumerate(keys):
+        found[key] = {name: parts[name][place].reshape(like[key]["mean"].shape) for name in _OTHERS}
+        found[key]["count"] = parts["count"][place][:1]
     return found
 
 

@@ -6,9 +6,10 @@ thread goes on emptying the queue, so that the recording is never stuck; `finish
 
 import queue
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from fractions import Fraction
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +25,10 @@ from handrail.datasets.storage.atomic import sync_file
 
 QUEUE_LENGTH = 64  # pictures; 3 MB at 128 x 128, 59 MB at 640 x 480
 GROUP, QUALITY, PRESET = 2, 23, "ultrafast"  # key frame every second picture: random access stays cheap
+_OPTIONS = {  # one thread, since pictures are small and cameras run side by side
+    **{"preset": PRESET, "crf": str(QUALITY), "g": str(GROUP)},
+    **{"threads": "1", "x264-params": "log=-1"},
+}
 
 
 def video_info(feature: Feature, fps: int) -> dict[str, Any]:
@@ -102,16 +107,7 @@ def decoded_stats(path: Path, frames: int, camera: Feature, first: int = 0, fps:
 
 
 def encode_stretch(source: Path, first: int, count: int, target: Path, fps: int, camera: Feature) -> None:
-    """Write a stretch of a video, whose packets cannot be copied, as one of its own.
-
-    Args:
-        source: An mp4 at `fps`.
-        first: The picture that it begins with.
-        count: Number of pictures.
-        target: The new mp4.
-        fps: Pictures a second [Hz].
-        camera: Whose pictures they are.
-    """
+    """Write a stretch of an mp4 at `fps` [Hz], whose packets cannot be copied, as one of its own."""
     encoder = VideoEncoder(target, fps, camera)
     try:
         with whole_mp4(source), av.open(str(regular(source))) as container:
@@ -148,7 +144,7 @@ class VideoEncoder:
         self._queue: queue.Queue[np.ndarray | None] = queue.Queue(maxsize=QUEUE_LENGTH)
         self._levels: list[np.ndarray] = []
         self._error: Exception | None = None
-        self._cancelled = self._ended = False
+        self._cancelled = False
         self._thread = threading.Thread(target=self._run, name=f"encode {path.name}", daemon=True)
         self._thread.start()
 
@@ -156,11 +152,8 @@ class VideoEncoder:
         """Hand over a copy of a picture, `(height, width, 3)` uint8; waits while the queue is full."""
         self._queue.put(np.array(image, order="C"))
 
-    def finish(self, expected: int) -> dict[str, np.ndarray]:
-        """Wait for the last picture, sync the file and check it.
-
-        Args:
-            expected: How many pictures the file must hold.
+    def finish(self, expected: int) -> Statistics:
+        """Wait for the last picture, sync the file, check that it holds as many as expected.
 
         Returns:
             The statistics of the pictures.
@@ -185,48 +178,29 @@ class VideoEncoder:
             self._thread.join()
 
     def _run(self) -> None:
+        images = self._images()
         try:
-            self._encode()
+            for image in images:  # the first one opens the file
+                self._encode(chain([image], images))
         except Exception as error:  # whatever it is, `finish` raises it in the recorder's thread
             self._error = error
-            while not self._ended:
-                self._next()
+            for _ in images:
+                pass
 
-    def _encode(self) -> None:
-        image = self._next()
-        if image is None:
-            return
+    def _images(self) -> Iterator[np.ndarray]:
+        while (image := self._queue.get()) is not None:
+            yield image
+
+    def _encode(self, images: Iterable[np.ndarray]) -> None:
+        time_base = Fraction(1, self._fps)
         with av.open(str(self._path), "w", format="mp4") as container:
-            stream = _open_stream(container, self._fps, self._feature)
-            while image is not None:
+            stream: Any = container.add_stream("libx264", rate=self._fps, options=_OPTIONS)
+            stream.height, stream.width = self._feature.shape[:2]
+            stream.pix_fmt, stream.time_base = "yuv420p", time_base
+            for image in images:
                 if not self._cancelled:
-                    self._encode_one(container, stream, image)
-                image = self._next()
+                    frame = av.VideoFrame.from_ndarray(image, format="rgb24")
+                    frame.pts, frame.time_base = len(self._levels), time_base
+                    container.mux(stream.encode(frame))
+                    self._levels.append(image_levels(image))
             container.mux(stream.encode(None))
-
-    def _next(self) -> np.ndarray | None:
-        """Wait for the next picture; None at the end of the episode."""
-        image = self._queue.get()
-        self._ended = image is None
-        return image
-
-    def _encode_one(self, container: Any, stream: Any, image: np.ndarray) -> None:
-        frame = av.VideoFrame.from_ndarray(image, format="rgb24")
-        frame.pts, frame.time_base = len(self._levels), Fraction(1, self._fps)
-        container.mux(stream.encode(frame))
-        self._levels.append(image_levels(image))
-
-
-def _open_stream(container: Any, fps: int, feature: Feature) -> Any:
-    """Return an h264 stream; one thread, since pictures are small and cameras run side by side."""
-    options = {
-        "preset": PRESET,
-        "crf": str(QUALITY),
-        "g": str(GROUP),
-        "threads": "1",
-        "x264-params": "log=-1",
-    }
-    stream = container.add_stream("libx264", rate=fps, options=options)
-    stream.height, stream.width = feature.shape[:2]
-    stream.pix_fmt, stream.time_base = "yuv420p", Fraction(1, fps)
-    return stream

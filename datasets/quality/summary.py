@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray
-from handrail.datasets.format.columns import CLIENT
+from handrail.datasets.format.metadata import CLIENT
 from handrail.datasets.quality import motion, safety
 from handrail.datasets.quality.metric import Metric
 from handrail.datasets.quality.metrics import corrections, high_frequency_content, rate_of_change

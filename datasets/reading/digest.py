@@ -2,12 +2,13 @@
 
 import hashlib
 from collections.abc import Iterable, Mapping
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
 from handrail.datasets.format.data_file import data_files
-from handrail.datasets.format.join import Videos, videos
-from handrail.datasets.format.path_pattern import fill
+from handrail.datasets.format.info_file import fill
+from handrail.datasets.format.join import Videos
 from handrail.datasets.format.schema import video_keys
 from handrail.datasets.reading.reader import DatasetInfo, read_episodes, read_info, read_rows_of
 
@@ -37,7 +38,7 @@ def digest_of_pictures(info: DatasetInfo, rows: Iterable[Mapping[str, Any]]) -> 
         rows: the episodes' lines of metadata.
     """
     digest, cameras = hashlib.sha256(), video_keys(info.features)
-    with videos(info.fps) as opened:
+    with closing(Videos(info.fps)) as opened:
         for row in rows:
             for camera in cameras:
                 digest.update(f"{camera} {row['length']} ".encode())

@@ -11,30 +11,24 @@ import os
 from pathlib import Path
 from typing import Any
 
-from handrail.datasets.format.metadata import FileSeal
+from handrail.datasets.format.metadata import Checksum
 from handrail.datasets.storage.atomic import write_whole
 from handrail.datasets.storage.strict_json import read_json
 
 
 class Checksums:
-    """Seals of files below one folder.
-
-    Args:
-        root: The folder.
-        anew: Read every file, whatever is remembered.
-    """
+    """Checksums of files below one folder; with `anew` every file is read, whatever is remembered."""
 
     def __init__(self, root: Path, anew: bool = False):
         """See the class."""
         self._root = root
-        self._memory = (
-            memory_folder() / f"{hashlib.sha256(os.path.realpath(root).encode()).hexdigest()[:24]}.json"
-        )
-        self._known: dict[str, Any] = {} if anew else self._remembered()
+        name = hashlib.sha256(os.path.realpath(root).encode()).hexdigest()[:24]
+        self._memory = memory_folder() / f"{name}.json"
+        self._known = {} if anew else self._remembered()
         self._used: dict[str, Any] = {}
 
-    def of(self, path: Path) -> FileSeal:
-        """Return the seal of a file, read only where it has changed.
+    def of(self, path: Path) -> Checksum:
+        """Return the checksum of a file, read only where it has changed.
 
         Raises:
             OSError: It is not there or cannot be read.
@@ -43,9 +37,9 @@ class Checksums:
         state = [found.st_size, found.st_mtime_ns, found.st_ctime_ns]
         known = self._known.get(name)
         if not (isinstance(known, list) and known[:-1] == state and isinstance(known[-1], str)):
-            known = [*state, FileSeal.of(path).sha256]
+            known = [*state, Checksum.of(path).sha256]
         self._used[name] = known
-        return FileSeal(found.st_size, known[-1])
+        return Checksum(found.st_size, known[-1])
 
     def remember(self) -> None:
         """Keep what was found for the next time; a full disk or a read-only home is no error."""
@@ -53,11 +47,10 @@ class Checksums:
             write_whole(self._memory, json.dumps(self._used).encode())
 
     def _remembered(self) -> dict[str, Any]:
-        try:
+        with contextlib.suppress(OSError, ValueError):
             content = read_json(self._memory)
-        except (OSError, ValueError):
-            return {}
-        return content if isinstance(content, dict) else {}
+            return content if isinstance(content, dict) else {}
+        return {}
 
 
 def memory_folder() -> Path:

@@ -6,14 +6,13 @@ import numpy as np
 import pyarrow as pa
 
 from handrail.controllers.errors import HandrailError
-from handrail.datasets.format.arrow import flat_numbers
-from handrail.datasets.format.data_file import DataFiles, data_files
-from handrail.datasets.format.lines import Lines
+from handrail.datasets.format.data_file import DataFile, data_files
+from handrail.datasets.format.episode_rows import EpisodeRows
 from handrail.datasets.format.manifest import Manifest
 from handrail.datasets.format.metadata import EpisodeRecord
 from handrail.datasets.format.schema import AUTOMATIC
 from handrail.datasets.format.stats import column_stats
-from handrail.datasets.format.tables import stored_features
+from handrail.datasets.format.tables import column_values, stored_features
 from handrail.datasets.format.video import decoded_stats
 
 UNREADABLE = (OSError, pa.ArrowException, ValueError, KeyError, TypeError, AttributeError, OverflowError)
@@ -21,31 +20,32 @@ _KEPT = ("min", "max", "mean", "std")
 _SHADE = 0.03  # of full brightness: how far encoding anew may move the mean of a colour
 
 
-def content_faults(path: Path, name: str, manifest: Manifest, lines: Lines) -> list[str]:
+def content_faults(path: Path, name: str, manifest: Manifest, rows: EpisodeRows) -> list[str]:
     """Return how each episode in a file that was rewritten differs from what was saved, or "".
 
     Args:
         path: The file.
         name: Its path in the dataset.
         manifest: The schema.
-        lines: Of its volume.
+        rows: The episode rows of its group.
     """
+    faults = []
     with data_files() as files:
-        return [_fault(path, name, manifest, record, files) for record in lines.records(with_stats=True)]
+        for record in rows.records(with_stats=True):
+            try:
+                if name.startswith("data/"):
+                    fault = _rows_fault(files.open(path), manifest, record)
+                else:
+                    fault = _pictures_fault(path, name.split("/")[1], manifest, record)
+            except (HandrailError, *UNREADABLE) as error:
+                fault = first_line(error)
+            faults.append(fault)
+    return faults
 
 
 def first_line(error: BaseException) -> str:
     """Return the first line of what an error says."""
     return str(error).partition("\n")[0]
-
-
-def _fault(path: Path, name: str, manifest: Manifest, record: EpisodeRecord, files: DataFiles) -> str:
-    try:
-        if name.startswith("data/"):
-            return _rows_fault(path, manifest, record, files)
-        return _pictures_fault(path, name.split("/")[1], manifest, record)
-    except (HandrailError, *UNREADABLE) as error:
-        return first_line(error)
 
 
 def _pictures_fault(path: Path, key: str, manifest: Manifest, record: EpisodeRecord) -> str:
@@ -56,30 +56,20 @@ def _pictures_fault(path: Path, key: str, manifest: Manifest, record: EpisodeRec
     return "" if same else "it shows other pictures than were saved"
 
 
-def _rows_fault(path: Path, manifest: Manifest, record: EpisodeRecord, files: DataFiles) -> str:
+def _rows_fault(file: DataFile, manifest: Manifest, record: EpisodeRecord) -> str:
     """Return how rows that can be read differ from those that were saved, or ""."""
-    file = files.open(path)
     table = file.all() if record.alone else file.rows(record.episode, record.length)
     lacking = [name for name in stored_features(manifest.features) if name not in table.column_names]
     if lacking or table.num_rows != record.length:
         return f"{table.num_rows} rows instead of {record.length}" + "".join(f", no {n}" for n in lacking[:1])
     frames = np.arange(record.length)
     expected = {"frame_index": frames, "index": frames + record.start, "episode_index": record.episode}
-    for name, values in expected.items():
-        if not np.array_equal(_values(table, name), np.broadcast_to(values, frames.shape)):
+    for name, wanted in expected.items():
+        if not np.array_equal(column_values(table, name), np.broadcast_to(wanted, frames.shape)):
             return f"{name} is not that of episode {record.episode}"
     for name, saved in (record.stats or {}).items():
-        if name in table.column_names and name not in AUTOMATIC and _differ(_values(table, name), saved):
-            return f"{name} holds other numbers than were saved"
+        if name in table.column_names and name not in AUTOMATIC:
+            now = column_stats(column_values(table, name))
+            if not all(np.allclose(now[each], saved[each].ravel(), rtol=1e-5, atol=1e-8) for each in _KEPT):
+                return f"{name} holds other numbers than were saved"
     return ""
-
-
-def _values(table: pa.Table, name: str) -> np.ndarray:
-    """Return a column of numbers, (N,) or (N, d)."""
-    flat = flat_numbers(table.column(name))
-    return flat if len(flat) == table.num_rows else flat.reshape(table.num_rows, -1)
-
-
-def _differ(values: np.ndarray, saved: dict[str, np.ndarray]) -> bool:
-    now = column_stats(values)
-    return not all(np.allclose(now[name], saved[name].ravel(), rtol=1e-5, atol=1e-8) for name in _KEPT)

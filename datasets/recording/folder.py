@@ -1,13 +1,13 @@
-"""Whether a folder may become a dataset, and emptying one that the user gave up."""
+"""Whether a folder may become a dataset, emptying one that the user gave up, and its quarantine."""
 
-import contextlib
 import os
 import re
+from collections.abc import Iterable
 from pathlib import Path
 
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.format.layout import DAMAGED, FOLDERS, STAGING, Layout
-from handrail.datasets.storage.atomic import make_folder, move, remove
+from handrail.datasets.storage.atomic import move, remove
 from handrail.datasets.storage.lock import LOCK_NAME
 
 _NUMBERED = r"chunk-(\d{3}|[1-9]\d{3,})/file-\d{3}"
@@ -15,7 +15,7 @@ _OURS = re.compile(
     rf"(\.damaged/[^/]+/)?((data|meta/episodes)/{_NUMBERED}\.parquet|videos/[^/]+/{_NUMBERED}\.mp4)"
     r"|meta/(info\.json|stats\.json|tasks\.parquet|handrail\.json)"
 )
-_GIVEN_UP = "episodes"  # the lines of a dataset that is being cleared, in the staging folder
+_GIVEN_UP = "episodes"  # the episode rows of a dataset that is being cleared, in the staging folder
 
 
 def check_target(layout: Layout, overwrite: bool) -> None:
@@ -26,12 +26,20 @@ def check_target(layout: Layout, overwrite: bool) -> None:
         overwrite: Whether a dataset that Handrail recorded there may go.
     """
     root = layout.root
-    _check_writable(root)
-    if not root.is_dir() or not _contents(root):
+    existing = next(path for path in (root, *root.parents) if path.exists())
+    if not existing.is_dir():
+        raise HandrailError(f"{str(root)!r}: expected a folder, but {str(existing)!r} is a file")
+    if not os.access(existing, os.W_OK | os.X_OK):
+        raise HandrailError(
+            f"{str(root)!r}: expected a folder that can be written, but {str(existing)!r} cannot"
+        )
+    paths = [path for path in root.iterdir() if path.name != STAGING] if root.is_dir() else []
+    names = sorted(path.name for path in paths if not path.is_dir() or any(path.iterdir()))
+    if not names:
         return
     if not is_dataset(layout):
         raise HandrailError(
-            f"{str(root)!r}: expected a missing or empty folder, found {_listed(root)}; this is no LeRobot"
+            f"{str(root)!r}: expected a missing or empty folder, found {_few(names)}; this is no LeRobot"
             " dataset (no meta/info.json) and is never removed: choose another folder"
         )
     if not overwrite:
@@ -45,25 +53,22 @@ def check_target(layout: Layout, overwrite: bool) -> None:
             " choose another root"
         )
     check_folders(layout)
-    foreign = _foreign(layout)
-    if foreign:
+    if foreign := _foreign(layout):
         raise HandrailError(
-            f"dataset {str(root)!r}: found what Handrail did not write, {', '.join(foreign[:3])}; --overwrite"
+            f"dataset {str(root)!r}: found what Handrail did not write, {_few(foreign)}; --overwrite"
             " removes only its own files: move this away, or choose another root"
         )
 
 
 def check_folders(layout: Layout) -> None:
     """Check that a dataset's folders are its own before anything in them is moved or removed."""
-    for name in (STAGING, DAMAGED, *FOLDERS):
-        top = layout.root / name
-        within = [Path(folder) / each for folder, folders, _ in os.walk(top) for each in folders]
-        linked = next((path for path in (top, *within) if path.is_symlink()), None)
-        if linked is not None:
-            raise HandrailError(
-                f"dataset {str(layout.root)!r}: expected a folder, found a link at {layout.relative(linked)};"
-                " nothing is written through it"
-            )
+    for top in (layout.root / name for name in (STAGING, DAMAGED, *FOLDERS)):
+        for path in (top, *(Path(folder, name) for folder, names, _ in os.walk(top) for name in names)):
+            if path.is_symlink():
+                raise HandrailError(
+                    f"dataset {str(layout.root)!r}: expected a folder, found a link at"
+                    f" {layout.relative(path)}; nothing is written through it"
+                )
 
 
 def is_dataset(layout: Layout) -> bool:
@@ -74,29 +79,16 @@ def is_dataset(layout: Layout) -> bool:
 def clear_dataset(layout: Layout) -> None:
     """Remove a dataset that `check_target` lets go, the lock excepted; what lies beside it stays.
 
-    The lines of metadata go first and at once, into the staging folder: whenever this is cut short later,
+    The episode rows go first and at once, into the staging folder: whenever this is cut short later,
     `finish_clearing` goes on, and what is left is an empty dataset, which may be overwritten and resumed.
 
     Raises:
         OSError: Something cannot be removed.
     """
     clear_staging(layout)
-    episodes = layout.root / "meta" / "episodes"
-    if episodes.exists():
-        os.replace(episodes, layout.staging / _GIVEN_UP)
+    if layout.episodes.exists():
+        os.replace(layout.episodes, layout.staging / _GIVEN_UP)
     _clear_given_up(layout)
-
-
-def remove_dataset(layout: Layout) -> None:
-    """Remove a dataset as `clear_dataset` does, and that there was one; its folder and the lock stay.
-
-    Raises:
-        OSError: Something cannot be removed.
-    """
-    clear_dataset(layout)
-    remove(layout.manifest)
-    with contextlib.suppress(OSError):  # something else is in it
-        layout.manifest.parent.rmdir()
 
 
 def finish_clearing(layout: Layout) -> None:
@@ -105,44 +97,37 @@ def finish_clearing(layout: Layout) -> None:
     Raises:
         OSError: Something cannot be removed.
     """
-    if (layout.staging / _GIVEN_UP).exists() and not (layout.root / "meta" / "episodes").exists():
+    if (layout.staging / _GIVEN_UP).exists() and not layout.episodes.exists():
         _clear_given_up(layout)
 
 
 def _clear_given_up(layout: Layout) -> None:
-    """Remove the files of a dataset whose lines of metadata are in the staging folder; these go last."""
-    for name in ("data", "videos", DAMAGED):
-        remove(layout.root / name)
-    for path in (layout.tasks, layout.stats, layout.info, layout.staging / _GIVEN_UP):
+    """Remove the files of a dataset whose episode rows are in the staging folder; these go last."""
+    folders = [layout.root / name for name in ("data", "videos", DAMAGED)]
+    for path in (*folders, layout.tasks, layout.stats, layout.info, layout.staging / _GIVEN_UP):
         remove(path)
 
 
 def clear_staging(layout: Layout) -> list[str]:
     """Remove everything in the staging folder but the lock, and return the names."""
-    if not layout.staging.is_dir():
-        return []
-    leftovers = sorted(path for path in layout.staging.iterdir() if path.name != LOCK_NAME)
+    found = layout.staging.iterdir() if layout.staging.is_dir() else ()
+    leftovers = sorted(path for path in found if path.name != LOCK_NAME)
     for path in leftovers:
         remove(path)
     return [layout.relative(path) for path in leftovers]
 
 
-def set_aside(layout: Layout, paths: list[Path]) -> list[str]:
-    """Move files into a new numbered folder below `.damaged`, at the same place in it.
-
-    Returns:
-        The paths in the dataset that they had.
+def quarantine(layout: Layout, paths: Iterable[Path]) -> list[str]:
+    """Move files into a new numbered folder below `.damaged`; return the paths in the dataset that they had.
 
     Raises:
         OSError: A file cannot be moved.
     """
-    if not paths:
-        return []
     target = next_damaged(layout)
-    make_folder(target)
-    for path in paths:
-        move(path, target / layout.relative(path))
-    return [layout.relative(path) for path in paths]
+    names = [layout.relative(path) for path in paths]
+    for name in names:
+        move(layout.root / name, target / name)
+    return names
 
 
 def next_damaged(layout: Layout) -> Path:
@@ -155,28 +140,9 @@ def _foreign(layout: Layout) -> list[str]:
     """Return what lies among a dataset's files, or among those in quarantine, and is none of them."""
     tops = [layout.root / name for name in (*FOLDERS, DAMAGED)]
     found = [path for top in tops for path in (top, *top.rglob("*")) if path.is_symlink() or path.is_file()]
-    names = {layout.relative(path) for path in found if path.is_symlink()}
-    return sorted(names | {name for name in map(layout.relative, found) if not _OURS.fullmatch(name)})
+    ours = {path for path in found if not path.is_symlink() and _OURS.fullmatch(layout.relative(path))}
+    return sorted(layout.relative(path) for path in found if path not in ours)
 
 
-def _contents(root: Path) -> list[str]:
-    """Return the names in a folder, but for the staging folder and folders that are empty."""
-    paths = [path for path in root.iterdir() if path.name != STAGING]
-    return sorted(path.name for path in paths if not path.is_dir() or any(path.iterdir()))
-
-
-def _listed(root: Path) -> str:
-    names = _contents(root)
+def _few(names: list[str]) -> str:
     return ", ".join(names[:3]) + (" …" if len(names) > 3 else "")
-
-
-def _check_writable(root: Path) -> None:
-    existing = root
-    while not existing.exists() and existing != existing.parent:
-        existing = existing.parent
-    if not existing.is_dir():
-        raise HandrailError(f"{str(root)!r}: expected a folder, but {str(existing)!r} is a file")
-    if not os.access(existing, os.W_OK | os.X_OK):
-        raise HandrailError(
-            f"{str(root)!r}: expected a folder that can be written, but {str(existing)!r} cannot"
-        )

@@ -12,53 +12,46 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from handrail.controllers.errors import HandrailError
+from handrail.datasets.format.episode_rows import with_checksums
+from handrail.datasets.format.info_file import read_encodings, summary_files
 from handrail.datasets.format.layout import Layout
-from handrail.datasets.format.lines import resealed_bytes
 from handrail.datasets.format.manifest import Manifest, read_manifest
-from handrail.datasets.format.metadata import Totals, info_bytes, read_encodings, stats_bytes
-from handrail.datasets.format.tables import tasks_bytes
+from handrail.datasets.format.metadata import Totals
 from handrail.datasets.recording.checksums import Checksums
-from handrail.datasets.recording.folder import check_folders, clear_staging, finish_clearing, set_aside
+from handrail.datasets.recording.folder import check_folders, clear_staging, finish_clearing, quarantine
 from handrail.datasets.recording.quarantine import restore, without_damaged
 from handrail.datasets.recording.rewrite import settle
-from handrail.datasets.recording.survey import Survey, said_to_be_saved, survey
+from handrail.datasets.recording.survey import Survey, said_to_be_saved, shortened, survey
 from handrail.datasets.storage.atomic import explained, remove, replace, sync_folder
 from handrail.datasets.storage.lock import DatasetLock
-
-_SHOWN = 3  # faults in one line
 
 
 @dataclass(frozen=True)
 class RepairReport:
-    """What a repair found and did; printing it gives one line.
-
-    Attributes:
-        root: The dataset.
-        episodes: Number of episodes in it now.
-        damage: What is wrong with each episode that is not whole and still in its place.
-        lost: What was wrong with each episode that was set aside.
-        rewritten: Files that another tool wrote anew and that are whole; a repair renews their checksums.
-        removed: Leftovers of an interrupted recording, deleted; paths in the dataset.
-        moved: Files set aside in `.damaged/`; the paths that they had.
-        restored: Files moved back from there to where they were.
-        rebuilt: Summary files written anew.
-    """
+    """What a repair found and did; printing it gives one line."""
 
     root: Path
     episodes: int
+    """Number of episodes in it now."""
     damage: tuple[str, ...] = ()
+    """Faults of the episodes that are not whole and still in their place."""
     lost: tuple[str, ...] = ()
+    """Faults of the episodes that are in quarantine now."""
     rewritten: tuple[str, ...] = ()
+    """Files that another tool wrote anew and that are whole; a repair renews their checksums."""
     removed: tuple[str, ...] = ()
+    """Leftovers of an interrupted recording, deleted."""
     moved: tuple[str, ...] = ()
+    """Files of no episode, moved to the quarantine; the paths that they had."""
     restored: tuple[str, ...] = ()
+    """Files moved back from there."""
     rebuilt: tuple[str, ...] = ()
+    """Summary files written anew."""
 
     @property
     def clean(self) -> bool:
         """Whether there was nothing to do."""
-        return not (self.damage or self.lost or any(self._files().values()))
+        return self.complete and not any(self._files().values())
 
     @property
     def complete(self) -> bool:
@@ -70,7 +63,7 @@ class RepairReport:
         said += [f"{len(self.damage)} damaged ({shortened(self.damage)})"] if self.damage else []
         said += [f"{len(self.lost)} set aside in .damaged ({shortened(self.lost)})"] if self.lost else []
         said += [f"{what}: {shortened(paths, ', ')}" for what, paths in self._files().items() if paths]
-        return "; ".join(said if not self.clean else [*said, "nothing to repair"])
+        return "; ".join([*said, "nothing to repair"] if self.clean else said)
 
     def _files(self) -> dict[str, tuple[str, ...]]:
         return {
@@ -82,18 +75,12 @@ class RepairReport:
         }
 
 
-def shortened(texts: tuple[str, ...] | list[str], comma: str = "; ") -> str:
-    """Return the first few of many texts, and how many more there are."""
-    more = f" and {len(texts) - _SHOWN} more" if len(texts) > _SHOWN else ""
-    return comma.join(texts[:_SHOWN]) + more
-
-
 def repair(root: str | Path, set_aside_damaged: bool = False) -> RepairReport:
     """Repair a dataset; doing it twice changes nothing more. Every byte is read.
 
     Args:
         root: The dataset's folder.
-        set_aside_damaged: Whether to set episodes aside that are not whole; without, they stay and are named.
+        set_aside_damaged: Whether episodes that are not whole go to the quarantine; without, they are named.
     """
     layout = Layout(Path(root).expanduser().absolute())
     with explained(f"cannot repair dataset {str(layout.root)!r}"):
@@ -101,7 +88,21 @@ def repair(root: str | Path, set_aside_damaged: bool = False) -> RepairReport:
         manifest = read_manifest(layout)
         check_folders(layout)
         with DatasetLock(layout.staging):
-            return _repair_locked(layout, manifest, set_aside_damaged)
+            finish_clearing(layout)
+            restored = restore(layout, said_to_be_saved(layout))
+            found = survey(layout, manifest, Checksums(layout.root, anew=True))
+            done = _clear(found)
+            for group in found.groups:
+                if group.rewritten and not all(group.faults):
+                    row = layout.row(group.first)
+                    replace(row, with_checksums(row, group.rewritten), layout.staging)
+            counted = found.totals.episodes == found.episodes
+            done["rebuilt"] = _rebuild(layout, manifest, found.totals) if counted else ()
+            done["restored"] = tuple(restored)
+            if found.damage and set_aside_damaged:
+                totals = without_damaged(found, manifest)
+                return RepairReport(layout.root, totals.episodes, lost=found.damage, **done)
+            return RepairReport(layout.root, found.episodes, found.damage, **done)
 
 
 def tidy_locked(layout: Layout, manifest: Manifest, sums: Checksums) -> tuple[RepairReport, Totals]:
@@ -115,90 +116,36 @@ def tidy_locked(layout: Layout, manifest: Manifest, sums: Checksums) -> tuple[Re
         OSError: A file cannot be moved, removed or written.
     """
     finish_clearing(layout)
-    found = survey(layout, manifest, sums.of)
-    sums.remember()
-    require_whole(layout, found)
-    done = _clear(layout, found)
-    rebuilt = _rebuild(layout, manifest, found.totals)
-    return _report(layout, found, found.totals, rebuilt=rebuilt, **done), found.totals
+    found = survey(layout, manifest, sums)
+    found.require_whole()
+    done = _clear(found)
+    done["rebuilt"] = _rebuild(layout, manifest, found.totals)
+    return RepairReport(layout.root, found.episodes, **done), found.totals
 
 
-def _report(layout: Layout, found: Survey, totals: Totals, **done: Any) -> RepairReport:
-    count = max(totals.episodes, len(found.states) + found.absent)
-    return RepairReport(layout.root, count, tuple(found.faults()), **done)
-
-
-def require_whole(layout: Layout, found: Survey) -> None:
-    """Check that no episode is damaged."""
-    if found.whole:
-        return
-    faults, count = found.faults(), len(found.states) + found.absent
-    lacking = found.absent or all("missing" in state.fault for state in found.damaged)
-    what = "was copied in part" if lacking else "is damaged"
-    raise HandrailError(
-        f"dataset {str(layout.root)!r} {what}: {len(found.damaged) + found.absent} of {count} episodes are"
-        f" not whole ({shortened(faults)}); nothing has been changed; copy it again, see what"
-        f" handrail-edit repair {layout.root} can mend, or go on without them with its --set_aside"
-    )
-
-
-def _repair_locked(layout: Layout, manifest: Manifest, set_aside_damaged: bool) -> RepairReport:
-    finish_clearing(layout)
-    sums = Checksums(layout.root, anew=True)
-    restored = restore(layout, said_to_be_saved(layout))
-    found = survey(layout, manifest, sums.of)
-    done = _clear(layout, found)
-    _reseal(layout, found)
-    rebuilt = _rebuild(layout, manifest, found.totals) if found.counted else ()
-    sums.remember()
-    done |= {"restored": tuple(restored), "rebuilt": rebuilt}
-    if found.whole or not set_aside_damaged:
-        return _report(layout, found, found.totals, **done)
-    totals = without_damaged(layout, manifest, found)
-    return RepairReport(layout.root, totals.episodes, lost=tuple(found.faults()), **done)
-
-
-def _clear(layout: Layout, found: Survey) -> dict[str, tuple[str, ...]]:
-    """Remove what a crash left and set aside what nobody can explain; return all of these."""
+def _clear(found: Survey) -> dict[str, Any]:
+    """Remove what a crash left, and put what nobody can explain into quarantine; return all of these."""
     for path in found.leftovers:
         remove(path)
     for folder in {path.parent for path in found.leftovers}:
         sync_folder(folder)
-    removed = [*clear_staging(layout), *map(layout.relative, found.leftovers)]
-    return {
-        "rewritten": tuple(dict.fromkeys(name for state in found.rewritten for name in state.rewritten)),
-        "removed": tuple(removed),
-        "moved": tuple(set_aside(layout, list(found.strays))),
-    }
-
-
-def _reseal(layout: Layout, found: Survey) -> None:
-    """Renew the checksums of files that another tool wrote anew and that are whole."""
-    for state in {state.slot: state for state in found.rewritten}.values():
-        assert state.record is not None
-        row, files = layout.row(state.slot), {**state.record.files, **state.rewritten}
-        replace(row, resealed_bytes(row, files), layout.staging)
+    layout = found.layout
+    removed = (*clear_staging(layout), *map(layout.relative, found.leftovers))
+    moved = tuple(quarantine(layout, found.unknown))
+    return {"rewritten": found.rewritten, "removed": removed, "moved": moved}
 
 
 def _rebuild(layout: Layout, manifest: Manifest, totals: Totals) -> tuple[str, ...]:
-    """Write the summary files that are not what the episodes say."""
-    encodings = read_encodings(layout.info, manifest)
-    wanted = {
-        layout.tasks: tasks_bytes(totals.tasks) if totals.tasks else None,
-        layout.stats: stats_bytes(totals.stats) if totals.stats else None,
-        layout.info: info_bytes(manifest, totals, encodings),
-    }
-    return tuple(layout.relative(path) for path, data in wanted.items() if _settle(layout, path, data))
-
-
-def _settle(layout: Layout, path: Path, data: bytes | None) -> bool:
-    """Make a file's content be `data`, or the file not be there; return whether that was work."""
-    current = path.read_bytes() if path.is_file() else None
-    if current == data:
-        return False
-    if data is None:
-        remove(path)
-        sync_folder(path.parent)
-    else:
-        replace(path, data, layout.staging)
-    return True
+    """Write the summary files that are not what the episodes say; return which."""
+    wanted = summary_files(layout, manifest, totals, read_encodings(layout, manifest))
+    rebuilt = []
+    for path, data in wanted.items():
+        if (path.read_bytes() if path.is_file() else None) == data:
+            continue
+        rebuilt.append(layout.relative(path))
+        if data is None:
+            remove(path)
+            sync_folder(path.parent)
+        else:
+            replace(path, data, layout.staging)
+    return tuple(rebuilt)

@@ -6,80 +6,70 @@ short before that, nothing has changed; after it, `settle` finishes what is left
 
 import os
 import shutil
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.regular_file import regular
-from handrail.datasets.format.columns import ColumnTypes
+from handrail.datasets.format.info_file import Encodings, summary_files
 from handrail.datasets.format.layout import DAMAGED, FOLDERS, STAGING, Layout
 from handrail.datasets.format.manifest import Manifest
-from handrail.datasets.format.metadata import Totals, info_bytes, stats_bytes
-from handrail.datasets.format.tables import tasks_bytes
+from handrail.datasets.format.metadata import ColumnTypes, Totals
+from handrail.datasets.recording.file_group import write_file_groups
 from handrail.datasets.recording.folder import clear_staging, next_damaged
-from handrail.datasets.recording.piece import Piece
-from handrail.datasets.recording.volume import write_volumes
-from handrail.datasets.storage.atomic import (
-    beside,
-    make_folder,
-    publish_folder,
-    remove,
-    replace,
-    sync_file,
-    sync_folder,
-)
+from handrail.datasets.recording.slice import EpisodeSlice
+from handrail.datasets.storage.atomic import beside, make_folder, publish_folder, remove, replace, sync_folder
 from handrail.datasets.storage.lock import DatasetLock
 
-Encodings = Mapping[str, Mapping[str, Any]]
 _OURS = (*FOLDERS, STAGING, DAMAGED)
 
 
 def write_anew(
     root: Path,
     manifest: Manifest,
-    pieces: Iterable[Piece],
+    slices: Iterable[EpisodeSlice],
     types: ColumnTypes,
     encodings: Encodings,
     in_place: bool = False,
     damaged: Sequence[Path] | None = None,
 ) -> Totals:
-    """Write a dataset in one pass over its pieces, in files of many episodes.
+    """Write a dataset in one pass over its episodes, in files of many; return what they add up to.
 
     Args:
         root: Its folder; what is there is replaced.
         manifest: Its schema.
-        pieces: Its episodes, in order.
+        slices: Its episodes, in order.
         types: Of its extra columns.
         encodings: How its videos are encoded, where that is not as Handrail does it.
-        in_place: Whether the pieces are of the dataset that is replaced: what lies beside its files stays.
-        damaged: Files of the dataset that is replaced, which are kept in its `.damaged/`; no piece need be
-            left then.
-
-    Returns:
-        What the episodes add up to.
+        in_place: Whether the slices are of the dataset that is replaced: what lies beside its files stays.
+        damaged: Files of the dataset that is replaced, for its quarantine; then no episode need be left.
 
     Raises:
-        HandrailError: There is no piece, one does not fit, or another process writes there. Nothing has been
-            changed then.
+        HandrailError: There is no episode, one does not fit, or another process writes there. Nothing has
+            been changed then.
         OSError: The disk does not take it.
     """
     with drafted(root) as draft:
-        totals = write_volumes(draft, manifest, pieces, types)
+        totals = write_file_groups(draft, manifest, slices, types)
         if not totals.episodes and damaged is None:
             raise HandrailError(
                 f"{str(root)!r}: expected at least one episode, got none; nothing was written"
             )
-        replace(draft.manifest, manifest.to_bytes(), draft.staging)
-        if totals.episodes:
-            replace(draft.tasks, tasks_bytes(totals.tasks), draft.staging)
-            replace(draft.stats, stats_bytes(totals.stats or {}), draft.staging)
-        replace(draft.info, info_bytes(manifest, totals, encodings), draft.staging)
+        summary = summary_files(draft, manifest, totals, encodings)
+        for path, data in {draft.manifest: manifest.to_bytes(), **summary}.items():
+            if data is not None:
+                replace(path, data, draft.staging)
         if in_place:
-            _carry_over(root, draft.root)
+            _copy_folder(root, draft.root, _OURS)
         if damaged is not None:
-            _keep(Layout(root), draft, damaged)
+            old = Layout(root)
+            if old.damaged.is_dir():
+                _copy_folder(old.damaged, draft.damaged)
+            target = next_damaged(draft)
+            for path in damaged:
+                make_folder((target / old.relative(path)).parent)
+                _second_name(path, target / old.relative(path))
     return totals
 
 
@@ -94,7 +84,9 @@ def drafted(root: Path) -> Iterator[Layout]:
     draft = Layout(_draft(root))
     with DatasetLock(draft.staging):
         try:
-            _clear(draft)
+            for path in set(draft.root.iterdir()) - {draft.staging}:  # of a writing that was cut short
+                remove(path)
+            clear_staging(draft)
             yield draft
         except BaseException:
             remove(draft.root)
@@ -116,7 +108,7 @@ def settle(root: Path) -> bool:
     Raises:
         OSError: Something cannot be renamed or removed.
     """
-    old, draft = _old(root), _draft(root)
+    old, draft = beside(root, "old"), _draft(root)  # as `publish_folder` calls them
     finished = old.exists()
     if finished:
         if not root.exists():
@@ -139,50 +131,25 @@ def _in_use(draft: Path) -> bool:
     return False
 
 
-def _clear(draft: Layout) -> None:
-    """Remove what a writing that was cut short left in a draft."""
-    for path in draft.root.iterdir():
-        if path != draft.staging:
-            remove(path)
-    clear_staging(draft)
+def _copy_folder(source: Path, target: Path, ours: Sequence[str] = ()) -> None:
+    """Copy a folder, but for some names in it."""
+
+    def ignored(folder: str, _: list[str]) -> Sequence[str]:
+        return ours if Path(folder) == source else ()
+
+    shutil.copytree(
+        source, target, symlinks=True, ignore=ignored, copy_function=_second_name, dirs_exist_ok=True
+    )
 
 
-def _carry_over(root: Path, draft: Path) -> None:
-    """Copy what lies in a dataset's folder and is not the dataset."""
-    for path in root.iterdir():
-        if path.name in _OURS:
-            continue
-        if path.is_dir() and not path.is_symlink():
-            shutil.copytree(path, draft / path.name, symlinks=True)
-        elif path.is_symlink():
-            os.symlink(os.readlink(path), draft / path.name)
-        else:
-            _copy_file(path, draft / path.name)
-
-
-def _keep(layout: Layout, draft: Layout, damaged: Sequence[Path]) -> None:
-    """Copy what lies in `.damaged/`, and files into a new folder there, at the same place in it."""
-    if layout.damaged.is_dir():
-        shutil.copytree(layout.damaged, draft.damaged)
-    target = next_damaged(draft)
-    for path in damaged:
-        _copy_file(path, target / layout.relative(path))
-
-
-def _copy_file(source: Path, target: Path) -> None:
+def _second_name(source: str | Path, target: str | Path) -> None:
     """Give a file a second name, or copy it where the file system has no such thing."""
-    make_folder(target.parent)
-    remove(target)
+    remove(Path(target))
     try:
-        os.link(regular(source), target)
+        os.link(regular(Path(source)), target)
     except OSError:
-        shutil.copyfile(regular(source), target)
-    sync_file(target)
+        shutil.copyfile(regular(Path(source)), target)
 
 
 def _draft(root: Path) -> Path:
     return beside(root, "partial")
-
-
-def _old(root: Path) -> Path:
-    return beside(root, "old")  # as `publish_folder` calls it

@@ -1,7 +1,7 @@
 """Writing a LeRobot v3.0 dataset so that a crash loses at most the episode being recorded.
 
 Every file of an episode is written in `.handrail/` inside the dataset and synced; only when all are whole
-are they renamed into place: videos, data, tasks, then **the episode's line of metadata, which is the
+are they renamed into place: videos, data, tasks, then **the episode's row of metadata, which is the
 commit**, then `info.json` and `stats.json`. A disk that fills up is noticed before the first rename.
 
     with EpisodeWriter.create(root, Manifest("me/cups", 50, "ridgeback_ur10", features)) as writer:
@@ -17,29 +17,25 @@ from pathlib import Path
 from typing import Any, Self
 
 from handrail.controllers.errors import HandrailError
-from handrail.datasets.format.columns import ColumnTypes, Scalar, column_types, fit_columns, plain_columns
+from handrail.datasets.format.episode_rows import read_column_types, row_files, rows_bytes
+from handrail.datasets.format.info_file import info_bytes, read_encodings, summary_files
 from handrail.datasets.format.layout import Layout
-from handrail.datasets.format.lines import lines_bytes, read_column_types, rows_of_lines
 from handrail.datasets.format.manifest import Manifest, read_manifest
 from handrail.datasets.format.metadata import (
+    Checksum,
+    ColumnTypes,
     EpisodeRecord,
-    FileSeal,
+    Scalar,
     Totals,
-    info_bytes,
-    read_encodings,
-    stats_bytes,
+    column_types,
+    fit_columns,
+    plain_columns,
 )
 from handrail.datasets.format.schema import Feature, video_keys
-from handrail.datasets.format.tables import data_bytes, tasks_bytes
+from handrail.datasets.format.tables import data_bytes
 from handrail.datasets.recording.checksums import Checksums
-from handrail.datasets.recording.episode import OpenEpisode, numeric_stats
-from handrail.datasets.recording.folder import (
-    check_folders,
-    check_target,
-    clear_dataset,
-    clear_staging,
-    remove_dataset,
-)
+from handrail.datasets.recording.episode import OpenEpisode
+from handrail.datasets.recording.folder import check_folders, check_target, clear_dataset, clear_staging
 from handrail.datasets.recording.repair import RepairReport, tidy_locked
 from handrail.datasets.storage.atomic import (
     explained,
@@ -59,10 +55,6 @@ class EpisodeWriter:
 
     Every error is a `HandrailError` with one line. After an error in `add_frame` the frame is not in; after
     one in `save_episode` the episode is gone, the saved ones are whole, and the next may be recorded.
-
-    Attributes:
-        repaired: What `resume` put in order.
-        last: The line of metadata of the episode that this writer saved last.
     """
 
     def __init__(
@@ -76,9 +68,12 @@ class EpisodeWriter:
     ):
         """Use `create` or `resume` instead."""
         self._layout, self._manifest, self._totals = layout, manifest, totals
-        self._lock, self._types, self.repaired, self._unusable = lock, types, repaired, ""
-        self._episode, self._encodings = OpenEpisode(layout, manifest), read_encodings(layout.info, manifest)
+        self._lock, self._types, self._unusable = lock, types, ""
+        self._episode, self._encodings = OpenEpisode(layout, manifest), read_encodings(layout, manifest)
+        self.repaired = repaired
+        """What `resume` put in order."""
         self.last: EpisodeRecord | None = None
+        """The row of metadata of the episode that this writer saved last."""
 
     @classmethod
     def create(cls, root: str | Path, manifest: Manifest, overwrite: bool = False) -> Self:
@@ -120,7 +115,7 @@ class EpisodeWriter:
         with explained(words), contextlib.ExitStack() as on_error:
             lock = on_error.enter_context(DatasetLock(layout.staging))
             report, totals = tidy_locked(layout, existing, Checksums(layout.root, anew=verify))
-            types = read_column_types(rows_of_lines(layout)[-1]) if totals.episodes else None
+            types = read_column_types(row_files(layout)[-1]) if totals.episodes else None
             on_error.pop_all()
         return cls(layout, manifest, totals, lock, types, report)
 
@@ -170,8 +165,9 @@ class EpisodeWriter:
             columns: Of the episode's metadata, such as success; the first episode fixes which there are.
         """
         self._check_usable()
+        number = self.num_episodes
         if not self._episode.length:
-            raise HandrailError(f"episode {self.num_episodes}: expected at least one frame, got none")
+            raise HandrailError(f"episode {number}: expected at least one frame, got none")
         versions = json.dumps(dict(self._manifest.versions), sort_keys=True)
         extras = plain_columns({"versions": versions, **(columns or {})})
         types = self._types or column_types(extras)
@@ -179,15 +175,27 @@ class EpisodeWriter:
         self._unusable = "was interrupted while it saved an episode"  # until the state is known again
         try:
             record, totals = self._stage(extras, types)
-            self._publish_files(totals)
+            self._publish(totals)
         except (OSError, HandrailError) as error:
-            raise self._abandoned(error) from error
-        self._types, self._totals, self.last, episode = types, totals, record, self.num_episodes
+            with contextlib.suppress(OSError):  # the next save overwrites leftovers, `repair` removes them
+                for _, path in self._streams():
+                    remove(path)
+                self._discard()
+            self._unusable = ""
+            why = error if isinstance(error, HandrailError) else reason(error)
+            raise HandrailError(
+                f"episode {number} in {str(self.root)!r} could not be saved: {why}; the {number} saved"
+                " episodes are whole"
+            ) from error
+        self._types, self._totals, self.last = types, totals, record
         self._episode = OpenEpisode(self._layout, self._manifest)
         self._unusable = ""
-        with explained(f"episode {episode} is saved, but the summary files are late; `repair` rebuilds them"):
-            self._publish_summary(episode)
-        return episode
+        with explained(f"episode {number} is saved, but the summary files are late; `repair` rebuilds them"):
+            sync_folder(self._layout.row(number).parent)
+            for path in (self._layout.info, self._layout.stats):
+                os.replace(self._layout.staging / path.name, path)
+            sync_folder(self._layout.info.parent)
+        return number
 
     def discard_episode(self) -> None:
         """Forget the open episode; nothing of it stays on the disk."""
@@ -200,7 +208,10 @@ class EpisodeWriter:
             return
         with explained(f"cannot remove the empty dataset {str(self.root)!r}"):
             self._discard()
-            remove_dataset(self._layout)
+            clear_dataset(self._layout)
+            remove(self._layout.manifest)
+            with contextlib.suppress(OSError):  # something else is in it
+                self._layout.manifest.parent.rmdir()
 
     def close(self) -> None:
         """Forget the open episode, remove the temporary files, give the dataset free. Safe to call twice."""
@@ -220,25 +231,23 @@ class EpisodeWriter:
 
     def _stage(self, extras: Mapping[str, Scalar | None], types: ColumnTypes) -> tuple[EpisodeRecord, Totals]:
         """Write every file under its temporary name; only renames are left to do."""
-        staging, episode = self._layout.staging, self._episode
-        stats = episode.finish_videos()
-        columns = episode.columns(self._totals)
-        write_synced(staging / "data.parquet", data_bytes(self._manifest.features, columns))
+        staging, episode, features = self._layout.staging, self._episode, self._manifest.features
+        columns, stats = episode.finish(self._totals)
+        write_synced(staging / "data.parquet", data_bytes(features, columns))
         record = EpisodeRecord(
             episode=self.num_episodes,
             start=self.num_frames,
             length=episode.length,
             tasks=tuple(dict.fromkeys(episode.tasks)),
-            stats=numeric_stats(columns) | stats,
+            stats=stats,
             columns=extras,
-            files={self._layout.relative(path): FileSeal.of(staged) for staged, path in self._streams()},
-            slot=self.num_episodes,
+            files={self._layout.relative(path): Checksum.of(staged) for staged, path in self._streams()},
+            file_index=self.num_episodes,
         )
         totals = self._totals.grown(record)
-        write_synced(staging / "row.parquet", lines_bytes(self._manifest, [record], types))
-        write_synced(staging / "tasks.parquet", tasks_bytes(totals.tasks))
-        write_synced(staging / "info.json", info_bytes(self._manifest, totals, self._encodings))
-        write_synced(staging / "stats.json", stats_bytes(totals.stats or {}))
+        write_synced(staging / "row.parquet", rows_bytes(self._manifest, [record], types))
+        for path, data in summary_files(self._layout, self._manifest, totals, self._encodings).items():
+            write_synced(staging / path.name, data or b"")
         for path in (self._layout.row(self.num_episodes), *(path for _, path in self._streams())):
             make_folder(path.parent)
         return record, totals
@@ -249,29 +258,13 @@ class EpisodeWriter:
         videos = [(self._episode.staged_video(key), self._layout.video(key, number)) for key in keys]
         return [*videos, (self._layout.staging / "data.parquet", self._layout.data(number))]
 
-    def _publish_files(self, totals: Totals) -> None:
+    def _publish(self, totals: Totals) -> None:
+        """Rename the files into place; the last rename is the commit."""
         for staged, path in self._streams():
             move(staged, path)
         if totals.tasks != self._totals.tasks:
             move(self._layout.staging / "tasks.parquet", self._layout.tasks)
-        os.replace(self._layout.staging / "row.parquet", self._layout.row(self.num_episodes))  # the commit
-
-    def _publish_summary(self, episode: int) -> None:
-        sync_folder(self._layout.row(episode).parent)
-        os.replace(self._layout.staging / "info.json", self._layout.info)
-        os.replace(self._layout.staging / "stats.json", self._layout.stats)
-        sync_folder(self._layout.info.parent)
-
-    def _abandoned(self, error: Exception) -> HandrailError:
-        """Drop the episode that could not be saved and return the error that says so."""
-        number, saved = self.num_episodes, f"the {self.num_episodes} saved episodes are whole"
-        with contextlib.suppress(OSError):  # the next save overwrites leftovers, `repair` removes them
-            for _, path in self._streams():
-                remove(path)
-            self._discard()
-        self._unusable = ""
-        why = error if isinstance(error, HandrailError) else reason(error)
-        return HandrailError(f"episode {number} in {str(self.root)!r} could not be saved: {why}; {saved}")
+        os.replace(self._layout.staging / "row.parquet", self._layout.row(self.num_episodes))
 
     def _discard(self) -> None:
         self._episode.cancel()

@@ -53,6 +53,11 @@ def write_json(path: Path, content: Any, indent: int | None = 1) -> None:
     write_whole(path, (json.dumps(finite, indent=indent) + "\n").encode())
 
 
+def json_bytes(content: Any) -> bytes:
+    """Return JSON as LeRobot writes it, the same bytes for the same content."""
+    return json.dumps(content, indent=4, ensure_ascii=False, allow_nan=False).encode()
+
+
 def parse_json(data: bytes) -> Any:
     """Return a JSON text as Python values.
 

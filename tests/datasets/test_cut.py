@@ -1,5 +1,6 @@
 """A stretch of a video shows exactly its pictures, whoever encoded the whole, copied or encoded anew."""
 
+from contextlib import closing
 from fractions import Fraction
 
 import av
@@ -7,7 +8,7 @@ import numpy as np
 import pytest
 
 from handrail.controllers.errors import HandrailError
-from handrail.datasets.format.join import VideoJoin, videos
+from handrail.datasets.format.join import VideoJoin, Videos
 from handrail.datasets.format.schema import Feature
 from handrail.datasets.format.video import VideoEncoder, count_frames, encode_stretch
 
@@ -47,8 +48,8 @@ def video(request, tmp_path_factory):
 
 def cut(source, first, count, target):
     """Write a stretch as a volume does: its packets if they can be copied, else encoded anew."""
-    with videos(FPS) as opened:
-        stretch = opened.stretch(source, first, count)
+    with closing(Videos(FPS)) as opened:
+        stretch = opened.stretch(source, first, count, "")
         if stretch is None:
             encode_stretch(source, first, count, target, FPS, CAMERA)
             return

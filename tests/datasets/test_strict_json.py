@@ -11,8 +11,8 @@ from datasets_helpers import create, record
 
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.comparison.evaluations import read_evaluations
+from handrail.datasets.format.info_file import check_pattern, fill
 from handrail.datasets.format.layout import Layout
-from handrail.datasets.format.path_pattern import check_pattern, fill
 from handrail.datasets.format.schema import Feature
 from handrail.datasets.quality.measure import measure
 from handrail.datasets.quality.summary import summarize
@@ -138,7 +138,8 @@ def test_a_type_that_numpy_would_make_room_for_is_not_read(root):
 
 
 def test_a_camera_cannot_lead_out_of_the_dataset():
-    pattern = check_pattern("videos/{video_key}/file-{file_index:03d}.mp4", ("video_key", "file_index"))
+    pattern = "videos/{video_key}/file-{file_index:03d}.mp4"
+    check_pattern(pattern, ("video_key", "file_index"))
     assert fill(pattern, 0, 7, "front") == "videos/front/file-007.mp4"
     for key in ("../../secret", "..", "a/../../b", "..\\up"):
         with pytest.raises(ValueError, match="inside the dataset"):

@@ -41,7 +41,7 @@ def started(root):
 
 
 def _frames(info, row, opened):
-    frames = read_rows_of(info, row, files=opened)
+    frames = read_rows_of(info, row, None, opened)
     return {key: (np.asarray(frames[key]).tolist()) for key in frames if key not in CLOCKS}
 
 

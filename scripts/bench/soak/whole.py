@@ -6,8 +6,8 @@ from pathlib import Path
 
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.format.data_file import data_files
+from handrail.datasets.format.episode_rows import count_rows
 from handrail.datasets.format.layout import Layout
-from handrail.datasets.format.lines import count_lines
 from handrail.datasets.reading.digest import CLOCKS, digest_of_pictures
 from handrail.datasets.reading.reader import read_episodes, read_info, read_rows_of
 
@@ -60,7 +60,7 @@ def saved_by(root: Path) -> Saved:
 def lines_of(root: Path) -> int:
     """Return how many episodes a recording has saved: quick, and whatever runs."""
     shards = root.parent.glob(f".{root.name}.shards/shard-*/meta/episodes/*/*.parquet")
-    return sum(map(count_lines, [*shards, *root.glob("meta/episodes/*/*.parquet")]))
+    return sum(map(count_rows, [*shards, *root.glob("meta/episodes/*/*.parquet")]))
 
 
 def rollouts_of(file: Path) -> Saved:

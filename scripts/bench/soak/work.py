@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 from filelock import FileLock
 
+from handrail.datasets.format.episode_rows import count_rows, row_files
 from handrail.datasets.format.layout import Layout
-from handrail.datasets.format.lines import count_lines, rows_of_lines
 from handrail.scripts.bench.soak.child import Child, command, send, session, wait_until
 from handrail.scripts.bench.soak.faults import CLUSTER, KILLED, Fault
 from handrail.scripts.bench.soak.whole import Saved, lines_of, rollouts_of, saved_by, saved_in
@@ -184,7 +184,7 @@ class RecordingWork(GrowingWork):
 
     def words(self) -> list[str] | None:
         if not (self.folder / f".{self.place.name}.shards" / "plan.json").exists():
-            there = sum(map(count_lines, rows_of_lines(Layout(self.place)))) if self.root else 0
+            there = sum(map(count_rows, row_files(Layout(self.place)))) if self.root else 0
             if there == _EPISODES:
                 return None
             more = "--resume " if self.root else ""

@@ -29,7 +29,7 @@ from handrail.datasets.format import data_file
 from handrail.datasets.format.layout import Layout
 from handrail.datasets.reading.check import check_report
 from handrail.datasets.reading.reader import read_episodes
-from handrail.datasets.recording import volume
+from handrail.datasets.recording import file_group
 from handrail.datasets.recording.repair import repair
 
 GUILLOTINE = Guillotine()
@@ -52,7 +52,7 @@ def whole():
 @settings(max_examples=6, deadline=None)
 @given(
     cuts=st.sets(st.integers(1, 6), max_size=3),
-    most=st.sampled_from([1, 4000, volume.MOST_ROWS]),
+    most=st.sampled_from([1, 4000, file_group.MOST_ROWS]),
     rows=st.sampled_from([1, 25, data_file.ROWS]),
 )
 def test_shards_become_what_one_recording_is(whole, tmp_path_factory, cuts, most, rows):
@@ -61,7 +61,7 @@ def test_shards_become_what_one_recording_is(whole, tmp_path_factory, cuts, most
     bounds = [0, *sorted(cuts), 7]
     roots = [part(folder / str(a), a, b) for a, b in pairwise(bounds)]
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(volume, "MOST_ROWS", most)
+        patch.setattr(file_group, "MOST_ROWS", most)
         patch.setattr(data_file, "ROWS", rows)
         merge_datasets(roots, folder / "all")
         merge_datasets([folder / "all"], folder / "again")
@@ -69,7 +69,7 @@ def test_shards_become_what_one_recording_is(whole, tmp_path_factory, cuts, most
     files, recorded = tree(folder / "all"), tree(whole)
     assert {name: files[name] for name in SUMMARIES} == {name: recorded[name] for name in SUMMARIES}
     written = sorted(name for name in files if name.startswith("data/"))
-    assert len(written) in {1: [7], volume.MOST_ROWS: [1]}.get(most, range(2, 7))
+    assert len(written) in {1: [7], file_group.MOST_ROWS: [1]}.get(most, range(2, 7))
     groups = [group for name in written for group in groups_of(folder / "all" / name)]
     assert [episode for group in groups for episode in group] == list(range(7))
     assert all(sum(map(length_of, group)) <= rows for group in groups if len(group) > 1)
@@ -88,7 +88,7 @@ def test_shards_are_added_to_a_dataset_in_its_place(whole, tmp_path):
 
 
 def test_a_packed_dataset_goes_on_and_is_packed_again(whole, tmp_path, monkeypatch):
-    monkeypatch.setattr(volume, "MOST_ROWS", 4000)
+    monkeypatch.setattr(file_group, "MOST_ROWS", 4000)
     root = part(tmp_path / "set", 0, 4)
     merge_datasets([root], root)
     with resume(root) as writer:

@@ -11,7 +11,7 @@ from datasets_helpers import CAMERAS, record, tree
 
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.format.layout import Layout
-from handrail.datasets.format.metadata import FileSeal
+from handrail.datasets.format.metadata import Checksum
 from handrail.datasets.reading.check import check_report, check_whole
 from handrail.datasets.recording import checksums
 from handrail.policies.imitation.config import StoredConfig, TrainConfig
@@ -21,9 +21,9 @@ from handrail.policies.imitation.training.source import read_source
 @pytest.fixture
 def hashed(monkeypatch):
     """Return which files are read in full."""
-    names, real = [], FileSeal.of.__func__
+    names, real = [], Checksum.of.__func__
     monkeypatch.setattr(
-        FileSeal, "of", classmethod(lambda cls, path: names.append(path.name) or real(cls, path))
+        Checksum, "of", classmethod(lambda cls, path: names.append(path.name) or real(cls, path))
     )
     return names
 

@@ -14,7 +14,7 @@ from datasets_helpers import create, resume, tree
 
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.format.layout import Layout
-from handrail.datasets.format.metadata import FileSeal
+from handrail.datasets.format.metadata import Checksum
 from handrail.datasets.recording.repair import repair
 
 COMMANDS = (
@@ -50,7 +50,7 @@ def test_a_line_cannot_name_files_outside(root):
     secret.write_text("mine")
     path, name = layout.row(1), "../../../secret"
     (root / ".damaged" / "000").mkdir(parents=True)
-    seals = json.dumps({name: [4, FileSeal.of(secret).sha256]})
+    seals = json.dumps({name: [4, Checksum.of(secret).sha256]})
     pq.write_table(pq.read_table(path).replace_schema_metadata({"handrail": seals}), path)
     assert "inside the dataset" in str(repair(root))
     assert "inside the dataset" in str(repair(root, set_aside_damaged=True))
