@@ -19,9 +19,8 @@ def evaluate(config: EvaluateConfig) -> int:
     """Run trained policies on declared seeds; return the exit code."""
     check_installed("handrail-evaluate", ("torch",))
     from handrail.datasets.presentation.terminal import Terminal
-    from handrail.policies.imitation.evaluation.evaluation import UnevaluatedError, evaluate
+    from handrail.policies.imitation.evaluation.evaluation import UnevaluatedError, evaluate, film
     from handrail.policies.imitation.evaluation.table import evaluation_table
-    from handrail.policies.imitation.evaluation.video import film
 
     reasons: tuple[str, ...] = ()
     try:

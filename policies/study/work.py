@@ -159,7 +159,7 @@ def _train_and_evaluate(
         file = layout.evaluation(policy, what)
         file.parent.mkdir(parents=True, exist_ok=True)
         evaluate(replace(config, json=str(file)))
-    _, meta = read_meta(folder)
+    meta = read_meta(folder)
     for other in (layout.policy(policy) / "checkpoints").glob("*"):
         if other.name.isdecimal() and other != folder.parent:  # one was needed only to go on from
             remove(other)

@@ -77,7 +77,7 @@ def load(folder: Path) -> StandIn:
     kind = (folder / "kind").read_text()
     if kind == "torch":
         import torch  # noqa: F401  (as a trained policy does)
-    return StandIn(read_meta(folder)[0], kind)
+    return StandIn(read_meta(folder).interface, kind)
 
 
 def checkpoint(
@@ -94,11 +94,11 @@ def checkpoint(
     owned = tuple(sorted(masks)) if actions == "intent" else ()
     interface = PolicyInterface(actions, env.agent_names, env.state_names, channels.names, owned, True)
     trained_on = {"episodes": 50, "operator_time": 312.5}
-    what = (task, mode, "ridgeback_ur10", 20, actions, training_seed, 0, trained_on, "act", 100)
+    what = (interface, task, mode, "ridgeback_ur10", 20, actions, training_seed, 0, trained_on, "act", 100)
     meta = PolicyMeta(*what, time_limit=time_limit)
     env.close()
     folder.mkdir(parents=True)
-    write_meta(folder, interface, meta)
+    write_meta(folder, meta)
     (folder / "config.json").write_text('{"type": "act"}')
     for name in PROCESSORS:
         (folder / name).write_text('{"steps": []}')
@@ -146,8 +146,9 @@ def untrained_act(folder, actions):
         ACTPolicy(config).save_pretrained(folder)
     for processor in make_pre_post_processors(config):
         processor.save_pretrained(folder)
-    meta = PolicyMeta("reach", "ee", "ridgeback_ur10", 20, actions, 0, 0, {"episodes": 1}, "act", 0)
-    write_meta(folder, None if actions == "recorded" else interface, meta)
+    said = None if actions == "recorded" else interface
+    meta = PolicyMeta(said, "reach", "ee", "ridgeback_ur10", 20, actions, 0, 0, {"episodes": 1}, "act", 0)
+    write_meta(folder, meta)
     return str(folder)
 
 

@@ -1,21 +1,23 @@
 """Evaluates trained policies: every checkpoint under every condition on the same declared seeds."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from time import monotonic
 from typing import Any
 
 from handrail.collect.execution.execution import Execution
 from handrail.collect.execution.job import Job
+from handrail.collect.session.film import SIZE, Filmer
+from handrail.collect.world.gl import graphics_trouble
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.presentation.terminal import Terminal
-from handrail.policies.imitation.evaluation.conditions import PolicyCondition, policy_conditions
+from handrail.datasets.recording.frames import Frame
+from handrail.policies.imitation.evaluation.conditions import policy_conditions
 from handrail.policies.imitation.evaluation.config import EvaluateConfig
 from handrail.policies.imitation.evaluation.file import EvaluationFile
 from handrail.policies.imitation.evaluation.rollout import Load, run_rollout
 from handrail.policies.imitation.interface.trained import load_policy
 
-Rollout = tuple[PolicyCondition, int]  # and the seed of its episode
 _PRELOAD = ("handrail.policies.imitation.evaluation.rollout",)
 _SAVE_EVERY = 2.0  # [s]
 
@@ -55,11 +57,34 @@ def evaluate(
     conditions, refused = policy_conditions(config)
     file = EvaluationFile(config.file if config.json else None)
     file.open(conditions)
-    rollouts = [(each, seed) for each in conditions for seed in config.seeds if seed not in file.done(each)]
+    asked = {
+        f"{each.label} of {each.checkpoint.folder}, seed {seed}": (each, seed)
+        for each in conditions
+        for seed in config.seeds
+        if seed not in file.done(each)
+    }
+    failed, successes, saved = dict[Path, str](), 0, monotonic()
+
+    def wanted(job: Job) -> bool:
+        return asked[job.name][0].checkpoint.folder not in failed
+
+    jobs = [Job(name, run_rollout, (*rollout, load)) for name, rollout in asked.items()]
     try:
-        refused += _run_all(rollouts, config, load, file, console)
+        with Execution(config, "rollouts", console, _PRELOAD) as execution:
+            for count, result in enumerate(execution.run(jobs, wanted), start=1):
+                condition, _ = asked[result.job.name]
+                if result.error:
+                    failed.setdefault(condition.checkpoint.folder, result.error)
+                    continue
+                file.add(condition, result.value)
+                successes += result.value["success"]
+                execution.say(f"{successes}/{count} succeeded")
+                if monotonic() - saved > _SAVE_EVERY:
+                    file.save()
+                    saved = monotonic()
     finally:
         file.save()
+    refused += failed.values()
     if refused and not file.content["arms"]:
         raise HandrailError("; ".join(refused))
     if refused:
@@ -67,35 +92,31 @@ def evaluate(
     return file.content
 
 
-def _run_all(
-    rollouts: Sequence[Rollout],
-    config: EvaluateConfig,
-    load: Load,
-    file: EvaluationFile,
-    console: Terminal | None,
-) -> list[str]:
-    """Run rollouts; return why some policies could not be."""
-    conditions = {_name(*rollout): rollout[0] for rollout in rollouts}
-    jobs = [Job(_name(*rollout), run_rollout, (*rollout, load)) for rollout in rollouts]
-    saved, successes, refused = monotonic(), 0, dict[Path, str]()
+def film(config: EvaluateConfig, content: Mapping[str, Any], load: Load = load_policy) -> str:
+    """Film the first rollout of the first policy that drove; return why there is no video, or nothing.
 
-    def wanted(job: Job) -> bool:
-        return conditions[job.name].checkpoint.folder not in refused
-
-    with Execution(config, "rollouts", console, _PRELOAD) as execution:
-        for count, result in enumerate(execution.run(jobs, wanted), start=1):
-            condition = conditions[result.job.name]
-            if result.error:
-                refused.setdefault(condition.checkpoint.folder, result.error)
-                continue
-            file.add(condition, result.value)
-            successes += result.value["success"]
-            execution.say(f"{successes}/{count} succeeded")
-            if monotonic() - saved > _SAVE_EVERY:
-                file.save()
-                saved = monotonic()
-    return list(refused.values())
+    Args:
+        config: what was evaluated.
+        content: of the evaluation file.
+        load: reads the policy of a checkpoint folder.
+    """
+    if trouble := graphics_trouble():
+        return trouble
+    drove = {entry.get("checkpoint") for entries in content["arms"].values() for entry in entries}
+    conditions, _ = policy_conditions(config)
+    condition = next((each for each in conditions if each.checkpoint.digest in drove), None)
+    if condition is None:
+        return "no policy drove"
+    fps = condition.checkpoint.meta.fps
+    with Filmer(Path(config.video).expanduser(), fps, condition.label, _words) as filmer:
+        run_rollout(condition, config.seeds[0], load, (filmer,), SIZE)
+    return ""
 
 
-def _name(condition: PolicyCondition, seed: int) -> str:
-    return f"{condition.label} of {condition.checkpoint.folder}, seed {seed}"
+def _words(frame: Frame) -> str:
+    """Return the time, the nearest distance and the state of the controller."""
+    diagnostics = frame.diagnostics
+    return (
+        f"{frame.intent.time:5.1f} s     nearest: {diagnostics.smallest_distance:.3f} m     "
+        f"contacts: {frame.contacts}     controller: {diagnostics.status.value}"
+    )

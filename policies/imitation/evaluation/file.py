@@ -9,7 +9,7 @@ from handrail.controllers.errors import HandrailError
 from handrail.datasets.comparison.evaluations import FORMAT, read_evaluations
 from handrail.datasets.storage.atomic import explained, write_whole
 from handrail.datasets.storage.strict_json import read_json
-from handrail.policies.imitation.evaluation.conditions import Checkpoint, PolicyCondition
+from handrail.policies.imitation.evaluation.conditions import PolicyCondition
 
 
 class EvaluationFile:
@@ -37,7 +37,7 @@ class EvaluationFile:
         """Check that conditions fit what is there."""
         task = self.content.setdefault("task", conditions[0].checkpoint.meta.environment)
         for condition in conditions:
-            label, checkpoint = condition.label, condition.checkpoint
+            label, checkpoint, entry = condition.label, condition.checkpoint, self._entry(condition)
             where = f"--json {self._path}: condition {label!r}"
             if checkpoint.meta.environment != task:
                 raise HandrailError(f"{where}: expected task {task}, got {checkpoint.meta.environment}")
@@ -47,7 +47,6 @@ class EvaluationFile:
                     f"{where}: expected {before}, got {condition.conditions};"
                     " choose another --label or --json"
                 )
-            entry = self._entry(condition)
             if entry and entry.get("checkpoint") != checkpoint.digest:
                 raise HandrailError(
                     f"{where}: has another policy with dataset draw and training seed {checkpoint.key} "
@@ -56,14 +55,20 @@ class EvaluationFile:
 
     def done(self, condition: PolicyCondition) -> set[int]:
         """Return the seeds that have been run."""
-        entry = self._entry(condition)
-        return {row["seed"] for row in entry["rollouts"]} if entry else set()
+        return {row["seed"] for row in (self._entry(condition) or {"rollouts": ()})["rollouts"]}
 
     def add(self, condition: PolicyCondition, row: dict[str, Any]) -> None:
         """Add a rollout; they are kept in the order of their seeds."""
-        entry = self._entry(condition)
+        entry, checkpoint = self._entry(condition), condition.checkpoint
         if entry is None:
-            entry = _new_entry(condition.checkpoint)
+            draw, seed = checkpoint.key
+            entry = {
+                "training_seed": seed,
+                "dataset_draw": draw,
+                "trained_on": dict(checkpoint.meta.trained_on),
+                "checkpoint": checkpoint.digest,
+                "rollouts": [],
+            }
             self.content["conditions"][condition.label] = condition.conditions
             self.content["arms"].setdefault(condition.label, []).append(entry)
         entry["rollouts"].append(row)
@@ -71,25 +76,12 @@ class EvaluationFile:
 
     def save(self) -> None:
         """Write everything, so that a reader sees the old file or the new one, whole."""
-        if self._path is None or not self.content["arms"]:
-            return
-        with explained(f"--json {self._path}"):
-            write_whole(self._path, (json.dumps(self.content, indent=1, allow_nan=False) + "\n").encode())
+        if self._path is not None and self.content["arms"]:
+            with explained(f"--json {self._path}"):
+                write_whole(self._path, (json.dumps(self.content, indent=1, allow_nan=False) + "\n").encode())
 
     def _entry(self, condition: PolicyCondition) -> dict[str, Any] | None:
-        key = condition.checkpoint.key
         for entry in self.content["arms"].get(condition.label, ()):
-            if (int(entry.get("dataset_draw", 0)), int(entry["training_seed"])) == key:
+            if (int(entry.get("dataset_draw", 0)), int(entry["training_seed"])) == condition.checkpoint.key:
                 return entry
         return None
-
-
-def _new_entry(checkpoint: Checkpoint) -> dict[str, Any]:
-    draw, seed = checkpoint.key
-    return {
-        "training_seed": seed,
-        "dataset_draw": draw,
-        "trained_on": dict(checkpoint.meta.trained_on),
-        "checkpoint": checkpoint.digest,
-        "rollouts": [],
-    }

@@ -5,10 +5,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from handrail.collect.config import SessionConfig
 from handrail.collect.operators.operator import View
+from handrail.collect.session.build import build_mode
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.interface.channels import Channels
-from handrail.controllers.interface.intent import Intent, decided_gripper
+from handrail.controllers.interface.intent import Intent
+from handrail.controllers.robot.model import load_model
+from handrail.policies.imitation.interface.checkpoint import PolicyMeta
 from handrail.policies.imitation.interface.interface import PolicyInterface
 from handrail.policies.imitation.interface.trained import TrainedPolicy
 
@@ -16,42 +20,25 @@ if TYPE_CHECKING:
     from handrail.collect.lerobot.mode_action import ModeAction
 
 
-class AsRecorded:
-    """Observations and commanded joint velocities as the dataset has them; in place of a `PolicyInterface`.
+class RecordedColumns:
+    """Reads and writes what was recorded, in place of a `PolicyInterface`: an action is a mode's channels.
 
     Args:
-        channels: of the robot.
+        action: of the mode; of `direct` it is joint velocities, as in every dataset of ours.
+        joined: whether robot and scene are one vector, as `lerobot-record` records `handrail_sim`.
     """
 
-    def __init__(self, channels: Channels) -> None:
-        self._channels = channels
-
-    @property
-    def action_names(self) -> tuple[str, ...]:
-        """The joints' velocities and the gripper, (n + 1,)."""
-        return (*self._channels.joints, "gripper")
-
-    def observe(self, state: FloatArray, environment: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the observation."""
-        return state, environment
-
-    def decode(self, action: FloatArray, state: FloatArray) -> Intent:
-        """Return an intent on every joint."""
-        values = np.zeros(self._channels.size)
-        values[self._channels.joint_slice] = action[:-1]
-        return Intent(values, self._channels.mask("joint"), gripper=decided_gripper(action[-1]))
-
-
-class AsSteered:
-    """What `lerobot-record` records of `handrail_sim`: a mode's channels; perhaps robot and scene as one.
-
-    Args:
-        action: of the mode.
-        joined: whether robot and scene are one vector.
-    """
-
-    def __init__(self, action: "ModeAction", joined: bool) -> None:
+    def __init__(self, action: "ModeAction", joined: bool = False) -> None:
         self._action, self._joined = action, joined
+
+    @classmethod
+    def of(cls, meta: PolicyMeta, joined: bool = False) -> "RecordedColumns":
+        """Return the columns of a policy."""
+        from handrail.collect.lerobot.mode_action import ModeAction
+
+        model = load_model(meta.robot)
+        mode = build_mode(SessionConfig(task=meta.environment, mode=meta.intent_mode or "direct"), model)
+        return cls(ModeAction(mode, Channels.of(model.description)), joined)
 
     @property
     def action_names(self) -> tuple[str, ...]:
@@ -87,16 +74,13 @@ class PolicyOperator:
     def __init__(
         self,
         policy: TrainedPolicy,
-        interface: PolicyInterface | AsRecorded | AsSteered,
+        interface: PolicyInterface | RecordedColumns,
         channels: Channels,
         mode: str,
         task: str = "",
     ) -> None:
-        self._policy = policy
-        self._interface = interface
-        self._channels = channels
-        self._mode = mode
-        self._task = task
+        self._policy, self._interface, self._mode, self._task = policy, interface, mode, task
+        self._unusable = Intent(np.full(channels.size, np.nan), np.ones(channels.size, bool))
         self.malformed = 0
 
     def reset(self, view: View, rng: np.random.Generator) -> None:
@@ -109,12 +93,9 @@ class PolicyOperator:
         seen = view.observation
         observed = self._interface.observe(seen["agent_pos"], seen["environment_state"])
         action = np.asarray(self._policy.act(*observed, seen.get("pixels", {}), self._task))
-        if action.shape != (len(self._interface.action_names),) or not np.all(np.isfinite(action)):
+        if action.shape == (len(self._interface.action_names),) and np.all(np.isfinite(action)):
+            intent = self._interface.decode(action, seen["agent_pos"])
+        else:
             self.malformed += 1
-            return self._unusable(view.state.time)
-        intent = self._interface.decode(action, seen["agent_pos"])
+            intent = self._unusable
         return replace(intent, mode=self._mode, time=view.state.time)
-
-    def _unusable(self, time: float) -> Intent:
-        size = self._channels.size
-        return Intent(np.full(size, np.nan), np.ones(size, bool), mode=self._mode, time=time)

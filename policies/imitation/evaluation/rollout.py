@@ -23,17 +23,14 @@ from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import Controller
 from handrail.datasets.recording.frames import Frame
-from handrail.policies.imitation.evaluation.conditions import Checkpoint, PolicyCondition, own_protection
-from handrail.policies.imitation.evaluation.features import action_of
-from handrail.policies.imitation.evaluation.operator import AsRecorded, AsSteered, PolicyOperator
+from handrail.policies.imitation.evaluation.conditions import PolicyCondition, own_protection
+from handrail.policies.imitation.evaluation.operator import PolicyOperator, RecordedColumns
 from handrail.policies.imitation.interface.torch_state import repeatable, threads
 from handrail.policies.imitation.interface.trained import TrainedPolicy
 
 Load = Callable[[Path], TrainedPolicy]
 Row = dict[str, Any]
 _STAND_IN = {"mpc": "joints", "filter": "direct_filtered"}  # the mode whose controller it is
-
-
 _LATELY = 5.0  # [s]
 _STILL = 0.05  # extent of the tool's way in that time, at the scale of the robot's world [m]
 
@@ -96,10 +93,10 @@ def run_rollout(
     checkpoint, perturbation = condition.checkpoint, condition.perturbation
     meta = checkpoint.meta
     env = _env(_session_config(condition), meta.fps, perturbation.shift, render)
-    controller = _controller(condition.protection, checkpoint.intent_mode, meta.environment, env)
+    controller = _controller(condition.protection, meta.intent_mode, meta.environment, env)
     policy = _policy(checkpoint.folder, checkpoint.digest, load)
     channels = Channels.of(env.model.description)
-    interface = policy.interface or _columns(checkpoint, channels)
+    interface = policy.interface or RecordedColumns.of(meta, checkpoint.joined)
     with threads(1), repeatable(seed):
         operator = PolicyOperator(policy, interface, channels, meta.mode, env.task_description)
         late = DelayedOperator(operator, perturbation.delay)
@@ -108,14 +105,6 @@ def run_rollout(
         session = Session(env, controller, late, (*observers, progress), disturbances=pushers)
         outcome = session.run(seed)
     return _row(outcome, operator.malformed) | ({} if outcome.success else progress.failed(outcome))
-
-
-def _columns(checkpoint: Checkpoint, channels: Channels) -> AsRecorded | AsSteered:
-    """Return what a policy reads and writes that says nothing of it itself."""
-    meta, mode = checkpoint.meta, checkpoint.intent_mode
-    if not mode:
-        return AsRecorded(channels)
-    return AsSteered(action_of(mode, meta.robot, meta.environment), checkpoint.joined)
 
 
 def _session_config(condition: PolicyCondition) -> SessionConfig:

@@ -17,7 +17,7 @@ from typing import Annotated, Any, Literal, TypedDict
 from msgspec import Meta
 
 from handrail.collect.config import FPS_RANGE, MOST_TIME
-from handrail.controllers.errors import HandrailError
+from handrail.controllers.errors import HandrailError, shown
 from handrail.controllers.regular_file import is_inside
 from handrail.controllers.typed import Count, Name, NonNegative, Number, decoded
 from handrail.datasets.reading.reader import DatasetInfo
@@ -47,6 +47,8 @@ class TrainingSizes(TypedDict, total=False):
 class PolicyMeta:
     """What a policy is and how it came about."""
 
+    interface: PolicyInterface | None
+    """What it reads and writes; None if that is what was recorded."""
     environment: Name
     """The task of its episodes; "" if they do not say."""
     mode: Name
@@ -80,6 +82,11 @@ class PolicyMeta:
     validation: Mapping[Annotated[str, Meta(pattern=r"\A[0-9]+\Z")], Number] = field(default_factory=dict)
     """Loss on the episodes that were held out, by update."""
 
+    @property
+    def intent_mode(self) -> str:
+        """Teleop mode whose intents it decides on; empty for joint velocities."""
+        return self.mode if self.actions == "intent" else ""
+
 
 def origin_of(info: DatasetInfo, rows: Sequence[Mapping[str, Any]]) -> tuple[str, str, str]:
     """Return task, mode and robot of episodes: "mixed" of several, "" where they do not say.
@@ -92,30 +99,25 @@ def origin_of(info: DatasetInfo, rows: Sequence[Mapping[str, Any]]) -> tuple[str
     return task, mode, robot if is_name else info.robot_type
 
 
-def read_meta(folder: Path) -> tuple[PolicyInterface | None, PolicyMeta]:
+def read_meta(folder: Path) -> PolicyMeta:
     """Return what `handrail.json` in a `pretrained_model` folder says."""
     path = folder / NAME
     content = load_json(path, "a policy of handrail-train")
-    if not isinstance(content, dict) or content.get("format") != FORMAT or "interface" not in content:
-        known = content.get("format") if isinstance(content, dict) else content
-        raise HandrailError(f"{str(path)!r}: expected the format {FORMAT}, got {known!r:.80}")
-    del content["format"]
-    interface = content.pop("interface")
+    if not isinstance(content, dict) or content.pop("format", None) != FORMAT:
+        raise HandrailError(f"{str(path)!r}: expected the format {FORMAT}, got {shown(content)}")
     meta = decoded(content, PolicyMeta, repr(str(path)))
-    described = None if interface is None else PolicyInterface.from_dict(interface)
-    written = "recorded" if described is None else described.actions
+    written = meta.interface.actions if meta.interface else "recorded"
     if meta.actions != written or (written == "intent" and not meta.mode):
         raise HandrailError(
             f"{str(path)!r}: expected actions {written}, as its interface has them, and a mode for an intent;"
             f" got {meta.actions} of mode {meta.mode!r}"
         )
-    return described, meta
+    return meta
 
 
-def write_meta(folder: Path, interface: PolicyInterface | None, meta: PolicyMeta) -> None:
+def write_meta(folder: Path, meta: PolicyMeta) -> None:
     """Write `handrail.json` into a `pretrained_model` folder."""
-    described = None if interface is None else asdict(interface)
-    content = {"format": FORMAT, "interface": described} | asdict(meta)
+    content = {"format": FORMAT} | asdict(meta)
     write_whole(folder / NAME, (json.dumps(content, indent=1, allow_nan=False) + "\n").encode())
 
 

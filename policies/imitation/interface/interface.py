@@ -4,26 +4,25 @@ It writes the joint velocities that came about, or the operator's own command: b
 the base's axes like what the policy sees. Whatever comes out, the robot's limits bound it.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
 from handrail.controllers.arrays import FloatArray
-from handrail.controllers.errors import HandrailError
+from handrail.controllers.errors import HandrailError, shown
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.intent import Intent, decided_gripper
-from handrail.controllers.typed import Text, decoded
+from handrail.controllers.typed import Text
 from handrail.datasets.format.schema import Feature
 from handrail.policies.imitation.interface.relative import RelativeView
 
 Columns = Mapping[str, np.ndarray]
-Mask = tuple[bool, ...]
 STATE, ENVIRONMENT, ACTION = "observation.state", "observation.environment_state", "action"
-MASK = "teleop.mask"
-COLUMNS = (STATE, ENVIRONMENT, ACTION, "teleop.values", MASK)
+VALUES, MASK = "teleop.values", "teleop.mask"
+COLUMNS = (STATE, ENVIRONMENT, ACTION, VALUES, MASK)
 _GRIPPER = "gripper"
 
 
@@ -39,10 +38,19 @@ class PolicyInterface:
     """Of `observation.environment_state` as recorded, (e,)."""
     channels: tuple[Text, ...]
     """Names of the command channels as recorded, (m,)."""
-    masks: tuple[Mask, ...] = ()
+    masks: tuple[tuple[bool, ...], ...] = ()
     """The sets of channels that the operator owned, (m,) each; of `intent` alone."""
     base_pose: bool = False
     """Whether it sees where the base is; older checkpoints do not say, and do not."""
+
+    def __post_init__(self) -> None:
+        """Check the masks."""
+        count = len(self.channels)
+        if {len(mask) for mask in self.masks} != ({count} if self.actions == "intent" else set()):
+            raise HandrailError(
+                f"masks: expected some of {count} channels for an intent and none else, got"
+                f" {shown(self.masks)} for {self.actions}"
+            )
 
     @classmethod
     def of_dataset(
@@ -60,10 +68,15 @@ class PolicyInterface:
             actions: what it writes.
             base_pose: whether it shall see where the base is.
         """
-        state, environment, asked = (_names(features, key) for key in (STATE, ENVIRONMENT, "teleop.values"))
-        names = tuple(name for name in asked if name != _GRIPPER)
-        masks = _masks_of(_channels(names), episodes) if actions == "intent" else ()
-        return cls(actions, state, environment, names, masks, base_pose)
+        state, environment, values = (_names(features, key) for key in (STATE, ENVIRONMENT, VALUES))
+        channels = tuple(name for name in values if name != _GRIPPER)
+        masks: set[tuple[bool, ...]] = set()
+        for columns in episodes if actions == "intent" else ():
+            rows = columns[MASK][:, : len(channels)].astype(bool)
+            masks |= set(map(tuple, np.unique(rows, axis=0).tolist()))
+        if actions == "intent" and not any(map(any, masks)):
+            raise HandrailError("intent as action: expected episodes in which an operator steers, got none")
+        return cls(actions, state, environment, channels, tuple(sorted(masks)), base_pose)
 
     @property
     def observation_names(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
@@ -73,13 +86,13 @@ class PolicyInterface:
     @property
     def action_names(self) -> tuple[str, ...]:
         """Names of what the policy writes: channels, a number for each mask if several, the gripper, (a,)."""
-        flags = tuple(f"mask.{index}" for index in range(len(self.masks))) if len(self.masks) > 1 else ()
-        return (*(self.channels[index] for index in self.commanded), *flags, _GRIPPER)
+        flags = (f"mask.{index}" for index in range(len(self.masks)) if len(self.masks) > 1)
+        return (*(self.channels[index] for index in self._commanded), *flags, _GRIPPER)
 
     @property
     def is_partial(self) -> bool:
         """Whether it writes less than the motion of the whole robot."""
-        return self.actions == "intent" and len(self.commanded) < len(self._known.joints)
+        return self.actions == "intent" and len(self._commanded) < len(self._known.joints)
 
     def observe(self, state: FloatArray, environment: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return what the policy reads, ([T,] s') and ([T,] e') float32, of what is recorded."""
@@ -92,7 +105,7 @@ class PolicyInterface:
         """Return the actions of a recorded episode, (T, a) float32, from its `COLUMNS`."""
         state = columns[STATE].astype(float)
         if self.masks:
-            values, gripper = np.split(columns["teleop.values"].astype(float), [-1], axis=1)
+            values, gripper = np.split(columns[VALUES].astype(float), [-1], axis=1)
         else:  # the next frame's joint velocities, the last frame's its own
             velocities, gripper = self._view.velocities(state), columns[ACTION][:, -1]
             values = np.zeros((len(state), len(self.channels)))
@@ -102,14 +115,14 @@ class PolicyInterface:
             values[:, pair] = pose.turned(values[:, pair])
         rows = columns[MASK][:, : len(self.channels)].astype(bool)
         flags = [(rows == mask).all(axis=1) for mask in self.masks] if len(self.masks) > 1 else []
-        return np.column_stack([values[:, self.commanded], *flags, gripper]).astype(np.float32)
+        return np.column_stack([values[:, self._commanded], *flags, gripper]).astype(np.float32)
 
     def decode(self, action: FloatArray, state: FloatArray) -> Intent:
         """Return what an action (a,) asks for, on the likeliest mask, in an observed state (s,)."""
         action, state = np.asarray(action, float), np.asarray(state, float)[None]
         pose = self._view.pose(state)
-        values, count = np.zeros((1, len(self.channels))), len(self.commanded)
-        values[0, self.commanded] = action[:count]
+        values, count = np.zeros((1, len(self.channels))), len(self._commanded)
+        values[0, self._commanded] = action[:count]
         for pair in self._pairs:
             values[:, pair] = pose.turned_back(values[:, pair])
         flags = action[count:-1]
@@ -123,23 +136,12 @@ class PolicyInterface:
         """
         intent = self.decode(action, state)
         focus = [float(intent.mask[0])] if len(self.masks) > 1 else []
-        return np.array([*intent.values[self.commanded], *focus, intent.gripper])
-
-    @classmethod
-    def from_dict(cls, content: Mapping[str, Any]) -> "PolicyInterface":
-        """Return the interface that JSON describes."""
-        interface = decoded(content, cls, "policy interface")
-        count = len(interface.channels)
-        if {len(mask) for mask in interface.masks} != ({count} if interface.actions == "intent" else set()):
-            raise HandrailError(
-                f"policy interface: expected masks of {count} channels for an intent and none else,"
-                f" got {content.get('masks')!r:.80} for {interface.actions}"
-            )
-        return interface
+        return np.array([*intent.values[self._commanded], *focus, intent.gripper])
 
     @cached_property
     def _known(self) -> Channels:
-        return _channels(self.channels)
+        parts = [tuple(n for n in self.channels if n.startswith(kind)) for kind in ("base.", "ee.", "joint.")]
+        return Channels(*parts)
 
     @cached_property
     def _view(self) -> RelativeView:
@@ -149,13 +151,13 @@ class PolicyInterface:
         )
 
     @cached_property
-    def _sets(self) -> tuple[Mask, ...]:
+    def _sets(self) -> tuple[tuple[bool, ...], ...]:
         """Every set of channels that is commanded."""
         return self.masks or (tuple(self._known.mask("joint").tolist()),)
 
     @cached_property
-    def commanded(self) -> list[int]:
-        """Which channels it writes, by index."""
+    def _commanded(self) -> list[int]:
+        """The channels that it writes, by index."""
         return np.flatnonzero(np.any(self._sets, axis=0)).tolist()
 
     @cached_property
@@ -163,28 +165,7 @@ class PolicyInterface:
         """(x, y) pairs of velocities along the world's axes; one that a mask splits stays so."""
         tool, joint = self._known.tool_slice.start, self._known.joint_slice.start
         starts = (tool, tool + 3, joint) if self._known.base else (tool, tool + 3)
-        whole = [start for start in starts if all(mask[start] == mask[start + 1] for mask in self._sets)]
-        return [[start, start + 1] for start in whole]
-
-
-def _masks_of(channels: Channels, episodes: Iterable[Columns]) -> tuple[Mask, ...]:
-    """Return every set of channels that an operator owned in some episodes."""
-    masks: set[Mask] = set()
-    for columns in episodes:
-        rows = columns[MASK][:, : channels.size].astype(bool)
-        masks |= set(map(tuple, np.unique(rows, axis=0).tolist()))
-    if not any(map(any, masks)):
-        raise HandrailError("intent as action: expected episodes in which an operator steers, got none")
-    return tuple(sorted(masks))
-
-
-def _channels(names: Sequence[str]) -> Channels:
-    """Return the channels that have these names."""
-
-    def part(prefix: str) -> tuple[str, ...]:
-        return tuple(name for name in names if name.startswith(prefix))
-
-    return Channels(part("base."), part("ee."), part("joint."))
+        return [[s, s + 1] for s in starts if all(mask[s] == mask[s + 1] for mask in self._sets)]
 
 
 def _names(features: Mapping[str, Feature], key: str) -> tuple[str, ...]:

@@ -14,28 +14,25 @@ from handrail.controllers.arrays import FloatArray
 from handrail.controllers.errors import HandrailError, message_of
 from handrail.policies.imitation.interface.checkpoint import NAME, PolicyMeta, model_folder, read_meta
 from handrail.policies.imitation.interface.interface import ENVIRONMENT, STATE, PolicyInterface
-from handrail.policies.imitation.interface.numbers import check_statistics, check_weights
 from handrail.policies.imitation.interface.steps import interface_in, without_steps
+from handrail.policies.imitation.interface.torch_state import check_numbers
 from handrail.policies.imitation.interface.trust import check_policy_folder, registered_policies
 
 
 @dataclass(frozen=True)
 class TrainedPolicy:
-    """A policy that can drive.
-
-    Attributes:
-        interface: what it reads and writes; None if that is what was recorded.
-        meta: what it is; None of a policy of plain LeRobot.
-        policy: LeRobot's policy.
-        before: LeRobot's preprocessor: normalises.
-        after: LeRobot's postprocessor: the reverse.
-    """
+    """A policy that can drive."""
 
     interface: PolicyInterface | None
+    """What it reads and writes; None if that is what was recorded."""
     meta: PolicyMeta | None
+    """What it is; None of a policy of plain LeRobot."""
     policy: Any
+    """LeRobot's."""
     before: Callable[[dict[str, Any]], dict[str, Any]]
+    """LeRobot's preprocessor: normalises."""
     after: Callable[[Any], Any]
+    """LeRobot's postprocessor: the reverse."""
 
     def reset(self) -> None:
         """Forget the last episode."""
@@ -80,7 +77,7 @@ def load_policy(folder: str | Path, device: str = "cpu") -> TrainedPolicy:
     Whoever made it, loading it runs no code of theirs (`trust.py`).
     """
     place = model_folder(Path(folder).expanduser())
-    interface, meta = read_meta(place) if (place / NAME).is_file() else (None, None)
+    meta = read_meta(place) if (place / NAME).is_file() else None
     settings = check_policy_folder(place)
     kind, override = settings.pop("type"), {"device_processor": {"device": device}}
     try:
@@ -89,13 +86,11 @@ def load_policy(folder: str | Path, device: str = "cpu") -> TrainedPolicy:
         around = make_pre_post_processors(config, str(place), preprocessor_overrides=override)
     except Exception as error:  # of LeRobot and all below it: whatever the files hold, they are refused
         raise HandrailError(f"policy {str(place)!r}: {message_of(error)}") from error
-    check_weights(policy, place)
-    for pipeline in around:
-        check_statistics(pipeline, place)
-    stepped = interface_in(around[0])
-    if stepped is not None and interface not in (None, stepped):
+    check_numbers(policy, around, place)
+    stepped, said = interface_in(around[0]), meta.interface if meta else None
+    if stepped is not None and said not in (None, stepped):
         raise HandrailError(f"policy {str(place)!r}: expected {NAME} and the steps to agree on the interface")
     before, after = map(without_steps, around)  # an operator sees and acts through the interface itself
     policy.eval()
     policy.eval = lambda: policy  # LeRobot asks for it twice an action: a third of its time
-    return TrainedPolicy(interface or stepped, meta, policy, before, after)
+    return TrainedPolicy(said or stepped, meta, policy, before, after)

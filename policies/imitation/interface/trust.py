@@ -16,13 +16,15 @@ from dataclasses import MISSING, fields
 from pathlib import Path, PurePath
 from typing import Any
 
-from handrail.controllers.errors import HandrailError, unknown_name
+from handrail.controllers.errors import HandrailError, shown, unknown_name
 from handrail.controllers.regular_file import is_inside, regular
 from handrail.datasets.storage.atomic import reason
 from handrail.datasets.storage.strict_json import load_json
 
 CONFIG, WEIGHTS = "config.json", "model.safetensors"
 PROCESSORS = ("policy_preprocessor.json", "policy_postprocessor.json")
+VIEW, ACT, COMPLETE = "handrail_policy_view", "handrail_policy_action", "handrail_policy_mpc"
+"""Our own steps (`steps.py`): their settings are names, which they check themselves."""
 # notes, by which nothing is loaded
 _NOTES = ("pretrained_path", "pretrained_revision", "repo_id", "license", "tags")
 # what names no place: kinds are registered names, the device is the user's, a state file is checked by
@@ -44,37 +46,69 @@ def check_links(folder: Path) -> None:
             raise HandrailError(f"{str(path)!r}: {reason(error)}") from error
 
 
-def _settings(folder: Path) -> dict[str, Any]:
-    """Return the settings in `config.json`, `type` included, without what is only noted."""
-    path = folder / CONFIG
-    settings = load_json(path, "a policy of LeRobot")
-    if not isinstance(settings, dict):
-        raise HandrailError(f"{str(path)!r}: expected a policy of LeRobot, got {settings!r:.80}")
-    kinds = registered_policies()
-    kind = settings.get("type")
-    if not isinstance(kind, str) or kind not in kinds:
-        raise HandrailError(f"{str(path)!r}: {unknown_name('policy', kind, kinds)}")
-    return {key: value for key, value in settings.items() if key not in _NOTES}
-
-
 def check_policy_folder(folder: Path, asked: Iterable[Any] = ()) -> dict[str, Any]:
-    """Check all that LeRobot would load from a folder; return the settings of the policy.
+    """Check all that LeRobot would load from a folder; return the settings of the policy, but for notes.
 
     Args:
         folder: `pretrained_model` of a checkpoint.
         asked: what the user gave themselves; it may name other places.
     """
     check_links(folder)
-    settings = _settings(folder)
-    known = {*_texts(_defaults(registered_policies()[settings["type"]])), *_texts(list(asked))}
-    _check_places(folder / CONFIG, settings, known)
-    for name in PROCESSORS:
-        for step in _steps(folder / name, settings["type"]):
-            if step["registry_name"] not in _ours():  # their settings are names, which they check themselves
-                _check_places(folder / name, step, known)
+    path = folder / CONFIG
+    settings, kinds = load_json(path, "a policy of LeRobot"), registered_policies()
+    kind = settings.get("type") if isinstance(settings, dict) else None
+    if not isinstance(kind, str) or kind not in kinds:
+        raise HandrailError(f"{str(path)!r}: {unknown_name('policy', kind, kinds)}")
+    settings = {key: value for key, value in settings.items() if key not in _NOTES}
+    known = {*_texts(_defaults(kinds[kind])), *_texts(list(asked))}
+    _check_places(path, settings, known)
+    for path in (folder / name for name in PROCESSORS):
+        for step in _steps(path, kinds[kind]):
+            if step["registry_name"] not in (VIEW, ACT, COMPLETE):
+                _check_places(path, step, known)
     if not (folder / WEIGHTS).is_file():
         raise HandrailError(f"policy {str(folder)!r}: expected weights in {WEIGHTS}, found none")
     return settings
+
+
+@functools.cache  # LeRobot looks through all installed packages
+def registered_policies() -> Mapping[str, type]:
+    """Return the policies that LeRobot knows, by name; those of installed plugins too."""
+    import lerobot.policies  # noqa: F401  (registers its own)
+    from lerobot.configs.policies import PreTrainedConfig
+    from lerobot.utils.import_utils import register_third_party_plugins
+
+    register_third_party_plugins()
+    return PreTrainedConfig.get_known_choices()
+
+
+def _steps(path: Path, policy: type) -> list[dict[str, Any]]:
+    """Return the steps of a processor, each registered, with its numbers in the folder."""
+    from lerobot.processor.pipeline import ProcessorStepRegistry
+
+    import handrail.policies.imitation.interface.steps  # noqa: F401  (registers those of handrail-train)
+
+    content = load_json(path, "a processor of LeRobot")
+    steps = content.get("steps") if isinstance(content, dict) else None
+    if not isinstance(steps, list):
+        raise HandrailError(f"{str(path)!r}: expected a processor with steps, got {shown(content)}")
+    with contextlib.suppress(
+        ImportError
+    ):  # of a policy's own steps; what is missing is said when it is loaded
+        importlib.import_module(policy.__module__.replace("configuration_", "processor_"))
+    known = ProcessorStepRegistry.list()
+    for number, step in enumerate(steps):
+        where = f"{str(path)!r}: step {number}"
+        entry = step if isinstance(step, dict) else {}
+        if "class" in entry:
+            raise HandrailError(f"{where}: expected a registered name, got the class {shown(entry['class'])}")
+        if entry.get("registry_name") not in known:
+            raise HandrailError(f"{where}: expected a registered name, got {shown(step)}")
+        file = entry.get("state_file", "")
+        plain = isinstance(file, str) and PurePath(file).name == file and file.endswith(".safetensors")
+        if "state_file" in entry and not (plain and (path.parent / file).is_file()):
+            raise HandrailError(f"{where}: expected a .safetensors file in the folder, got {shown(file)}")
+    return steps
 
 
 def _check_places(path: Path, settings: Any, known: Iterable[str]) -> None:
@@ -82,72 +116,9 @@ def _check_places(path: Path, settings: Any, known: Iterable[str]) -> None:
     for text in set(_texts(settings)).difference(known):
         if "/" in text or "\\" in text or (text and _is_there(text)):
             raise HandrailError(
-                f"{str(path)!r}: expected settings of the policy alone, got {text!r:.80}, which names a file,"
-                " a folder or a repository elsewhere"
+                f"{str(path)!r}: expected settings of the policy alone, got {shown(text)}, which names"
+                " a file, a folder or a repository elsewhere"
             )
-
-
-def registered_policies() -> Mapping[str, type]:
-    """Return the policies that LeRobot knows, by name; those of installed plugins too."""
-    from lerobot.configs.policies import PreTrainedConfig
-
-    _register()
-    return PreTrainedConfig.get_known_choices()
-
-
-@functools.cache
-def _register() -> None:
-    """Import what registers policies, once: LeRobot looks through all installed packages."""
-    import lerobot.policies  # noqa: F401  (registers its own)
-    from lerobot.utils.import_utils import register_third_party_plugins
-
-    register_third_party_plugins()
-
-
-def _steps(path: Path, policy: str) -> list[dict[str, Any]]:
-    """Return the steps of a processor, each checked."""
-    content = load_json(path, "a processor of LeRobot")
-    steps = content.get("steps") if isinstance(content, dict) else None
-    if not isinstance(steps, list):
-        raise HandrailError(f"{str(path)!r}: expected a processor with steps, got {content!r:.80}")
-    known = _registered_steps(policy)
-    for number, step in enumerate(steps):
-        where = f"{str(path)!r}: step {number}"
-        name = step.get("registry_name") if isinstance(step, dict) else step
-        if isinstance(step, dict) and "class" in step:
-            raise HandrailError(f"{where}: expected a registered name, got the class {step['class']!r:.80}")
-        if not isinstance(name, str) or name not in known:
-            raise HandrailError(f"{where}: expected a registered name, got {name!r:.80}")
-        _check_numbers(path.parent, step, where)
-    return steps
-
-
-def _check_numbers(folder: Path, step: Mapping[str, Any], where: str) -> None:
-    if "state_file" not in step:
-        return
-    name = step["state_file"]
-    plain = isinstance(name, str) and PurePath(name).name == name and name.endswith(".safetensors")
-    if not plain or not (folder / name).is_file():
-        raise HandrailError(f"{where}: expected a .safetensors file in the folder, got {name!r:.80}")
-
-
-def _registered_steps(policy: str) -> frozenset[str]:
-    """Return the names of the steps that LeRobot knows, those that a policy brings included."""
-    from lerobot.processor.pipeline import ProcessorStepRegistry
-
-    import handrail.policies.imitation.interface.steps  # noqa: F401  (registers those of handrail-train)
-
-    module = registered_policies()[policy].__module__.replace("configuration_", "processor_")
-    with contextlib.suppress(ImportError):  # what is missing for it is said when it is loaded
-        importlib.import_module(module)  # where LeRobot looks for them; beside a registered policy
-    return frozenset(ProcessorStepRegistry.list())
-
-
-def _ours() -> tuple[str, ...]:
-    """Return the names of the steps of handrail-train."""
-    from handrail.policies.imitation.interface.steps import NAMES
-
-    return NAMES
 
 
 def _defaults(kind: type) -> Iterator[Any]:

@@ -3,8 +3,9 @@
 import math
 import os
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 from handrail.controllers.typed import check
 from handrail.datasets.storage.atomic import write_whole
@@ -40,8 +41,9 @@ class Curve:
             os.fsync(file.fileno())
 
 
-def write_sums(checkpoint: Path, sums: Mapping[str, tuple[float, float]]) -> None:
+def write_sums(checkpoint: Path, meters: Mapping[str, Any]) -> None:
     """Write sum and count of columns since the last row, so that a training goes on to the same rows."""
+    sums = {name: (meters[name].sum, meters[name].count) for name in COLUMNS if name in meters}
     write_json(checkpoint / _SUMS, {name: each for name, each in sums.items() if math.isfinite(each[0])})
 
 
@@ -52,22 +54,17 @@ def read_sums(checkpoint: Path | None) -> dict[str, tuple[float, float]]:
     return check(load_json(path, "sums of a training's curve"), _Sums, repr(str(path)))
 
 
-def _line(row: Row) -> str:
-    return ",".join(str(row[name]) for name in COLUMNS)
-
-
 def read_curve(folder: Path) -> list[dict[str, float]]:
     """Return the rows of a training's curve; a line that was cut off is left out."""
-    path = folder / NAME
-    if not path.is_file():
-        return []
-    lines = path.read_text(encoding="utf-8", errors="replace").splitlines(keepends=True)[1:]
-    rows = [_numbers(line) for line in lines if line.endswith("\n")]
-    return [dict(zip(COLUMNS, row, strict=True)) for row in rows if len(row) == len(COLUMNS)]
+    path, rows = folder / NAME, []
+    text = path.read_text(encoding="utf-8", errors="replace") if path.is_file() else ""
+    for line in text.splitlines(keepends=True)[1:]:
+        with suppress(ValueError):
+            numbers = [float(cell) for cell in line.split(",")]
+            if line.endswith("\n"):
+                rows.append(dict(zip(COLUMNS, numbers, strict=True)))
+    return rows
 
 
-def _numbers(line: str) -> list[float]:
-    try:
-        return [float(cell) for cell in line.split(",")]
-    except ValueError:
-        return []
+def _line(row: Row) -> str:
+    return ",".join(str(row[name]) for name in COLUMNS)

@@ -6,7 +6,6 @@ The tensors are the same.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,20 +17,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class MemoryMeta:
-    """What LeRobot's policies ask a dataset's metadata for.
-
-    Attributes:
-        features: by key, each with `dtype`, `shape` and `names`.
-        stats: by key, each with `mean`, `std`, `min`, `max`, quantiles.
-        fps: frames a second [Hz].
-        lengths: frames of each episode.
-        robot_type: the robot.
-    """
+    """The answers to what LeRobot's policies ask a dataset's metadata for."""
 
     features: dict[str, dict[str, Any]]
+    """By key, each with `dtype`, `shape` and `names`."""
     stats: dict[str, dict[str, np.ndarray]]
+    """By key, each with `mean`, `std`, `min`, `max`, quantiles."""
     fps: int
+    """Frames a second [Hz]."""
     lengths: tuple[int, ...]
+    """Frames of each episode."""
     robot_type: str = ""
 
     @property
@@ -53,22 +48,18 @@ class MemoryMeta:
 
 @dataclass(frozen=True)
 class MemoryDataset:
-    """Samples of some episodes, with a window of frames where a policy asks for one.
-
-    Attributes:
-        meta: what the columns are.
-        columns: all that are not pictures, (N, …) each.
-        tasks: the task sentence of each episode.
-        windows: by key the offsets [frames] of its window; beyond an episode's ends its first or last frame
-            is repeated, and `KEY_is_pad` says so.
-        pictures: LeRobot's reader of the same episodes, for the pictures alone.
-    """
+    """Samples of some episodes, with a window of frames where a policy asks for one."""
 
     meta: MemoryMeta
     columns: Mapping[str, torch.Tensor]
+    """All that are not pictures, (N, …) each, `frame_index` and `episode_index` among them."""
     tasks: Sequence[str]
+    """The task sentence of each episode."""
     windows: Mapping[str, Sequence[int]] = field(default_factory=dict)
+    """By key the offsets [frames] of its window; beyond an episode's ends its first or last frame is
+    repeated, and `KEY_is_pad` says so."""
     pictures: "LeRobotDataset | None" = None
+    """LeRobot's reader of the same episodes, for the pictures alone."""
 
     def __len__(self) -> int:
         return sum(self.meta.lengths)
@@ -76,40 +67,21 @@ class MemoryDataset:
     def batch(self, indices: Sequence[int]) -> dict[str, Any]:
         """Return samples (B,), each column stacked, (B, …) or (B, W, …)."""
         rows = torch.as_tensor(indices)
-        batch: dict[str, Any] = dict(self._pictures_of(indices)) if self.pictures else {}
+        episodes = self.columns["episode_index"][rows]
+        first = rows - self.columns["frame_index"][rows]
+        last = first + torch.tensor(self.meta.lengths)[episodes] - 1
+        batch = self._pictures_of(self.pictures, indices) if self.pictures else {}
         for key, values in self.columns.items():
-            if key in self._offsets:
-                batch[key], batch[f"{key}_is_pad"] = self._window(values, rows, self._offsets[key])
+            if key in self.windows:
+                places = rows[:, None] + torch.tensor(list(self.windows[key]))
+                inside = places.clamp(first[:, None], last[:, None])
+                batch[key], batch[f"{key}_is_pad"] = values[inside], places != inside
             else:
                 batch[key] = values[rows]
-        batch["task"] = [self.tasks[episode] for episode in self._spans[0][rows].tolist()]
+        batch["task"] = [self.tasks[episode] for episode in episodes.tolist()]
         return batch
 
-    def _window(
-        self, values: torch.Tensor, rows: torch.Tensor, offsets: torch.Tensor
-    ) -> tuple[torch.Tensor, torch.Tensor]:
-        """Return the windows around rows, (B, W, …), and which of them lie outside, (B, W)."""
-        places = rows[:, None] + offsets
-        _, starts, ends = self._spans
-        first, last = starts[rows][:, None], ends[rows][:, None] - 1
-        inside = places.clamp(first, last)
-        return values[inside], places != inside
-
-    @cached_property
-    def _spans(self) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
-        """For each sample its episode, where that begins and where it ends, (N,) each."""
-        lengths = torch.tensor(self.meta.lengths)
-        ends = torch.cumsum(lengths, 0)
-        episode = torch.repeat_interleave(torch.arange(len(lengths)), lengths)
-        return episode, (ends - lengths)[episode], ends[episode]
-
-    @cached_property
-    def _offsets(self) -> dict[str, torch.Tensor]:
-        return {key: torch.tensor(list(offsets)) for key, offsets in self.windows.items()}
-
-    def _pictures_of(self, indices: Sequence[int]) -> dict[str, torch.Tensor]:
-        assert self.pictures is not None
-        samples: list[Any] = [self.pictures[int(index)] for index in indices]
-        keys = self.meta.camera_keys
-        windows = [f"{key}_is_pad" for key in keys if f"{key}_is_pad" in samples[0]]
-        return {key: torch.stack([sample[key] for sample in samples]) for key in (*keys, *windows)}
+    def _pictures_of(self, pictures: "LeRobotDataset", indices: Sequence[int]) -> dict[str, Any]:
+        samples: list[Any] = [pictures[int(index)] for index in indices]
+        names = [name for key in self.meta.camera_keys for name in (key, f"{key}_is_pad")]
+        return {name: torch.stack([each[name] for each in samples]) for name in names if name in samples[0]}

@@ -1,7 +1,7 @@
 """Sizes of policies that suit a CPU or a GPU, and LeRobot's configuration of a policy."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from typing import TYPE_CHECKING, Any
 
 from handrail.controllers.errors import HandrailError, message_of, unknown_name
@@ -16,21 +16,18 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Preset:
-    """Sizes of a policy and of its training.
-
-    Attributes:
-        options: of the policy, as LeRobot calls them.
-        lr: highest learning rate.
-        cosine: whether the learning rate falls along a cosine; else as the policy has it.
-        steps: updates.
-        batch_size: samples an update.
-    """
+    """Sizes of a policy and of its training."""
 
     options: Mapping[str, Any] = field(default_factory=dict)
+    """Of the policy, as LeRobot calls them."""
     lr: float = 1e-4
+    """Highest learning rate."""
     cosine: bool = False
+    """Whether the learning rate falls along a cosine; else as the policy has it."""
     steps: int = 100_000
+    """Updates."""
     batch_size: int = 64
+    """Samples an update."""
 
 
 _ENSEMBLE = "temporal_ensemble_coeff"
@@ -45,13 +42,12 @@ ACT_CPU: dict[str, Any] = {
     "use_vae": False,
     "dropout": 0.0,  # as good on reach as 0.1 (98 and 96 %), a third of the time less
 }
-_ACT_GPU: dict[str, Any] = {"chunk_size": 50, "n_action_steps": 25}
 _DIFFUSION: dict[str, Any] = {"noise_scheduler_type": "DDIM", "num_inference_steps": 10}
 _DIFFUSION_CPU = _DIFFUSION | {"horizon": 16, "n_action_steps": 8, "down_dims": [64, 128, 256]}
 _DIFFUSION_GPU = _DIFFUSION | {"horizon": 32, "n_action_steps": 16, "drop_n_last_frames": 15}
 _PRESETS = {
     ("act", "cpu"): Preset(ACT_CPU, lr=5e-4, cosine=True, steps=10_000, batch_size=32),
-    ("act", "gpu"): Preset(_ACT_GPU, lr=5e-5, cosine=True),
+    ("act", "gpu"): Preset({"chunk_size": 50, "n_action_steps": 25}, lr=5e-5, cosine=True),
     ("diffusion", "cpu"): Preset(_DIFFUSION_CPU, lr=3e-4, steps=10_000),
     ("diffusion", "gpu"): Preset(_DIFFUSION_GPU, lr=1e-4),
 }
@@ -63,14 +59,13 @@ def resolved(config: TrainConfig) -> Preset:
     A policy without a preset is trained as LeRobot has it.
     """
     preset = _PRESETS.get((config.policy, config.preset), Preset(lr=0.0))
-    options = dict(preset.options)
-    given = {key: _value(text) for key, text in config.options().items()}
+    options, given = dict(preset.options), {key: _value(text) for key, text in config.options().items()}
     if "n_action_steps" in given:
         options.pop(_ENSEMBLE, None)  # averaging is for a look at every step
-    return Preset(
+    return replace(
+        preset,
         options=options | given,
         lr=config.lr or preset.lr,
-        cosine=preset.cosine,
         steps=config.steps or preset.steps,
         batch_size=config.batch_size or preset.batch_size,
     )
@@ -81,10 +76,9 @@ def device_of(config: TrainConfig) -> str:
     import torch
 
     device = config.device or ("cuda" if config.preset == "gpu" else "cpu")
-    kind = device.partition(":")[0]
-    there = {"cpu": True, "cuda": torch.cuda.is_available(), "mps": torch.backends.mps.is_available()}
-    if not there.get(kind, False):
-        raise unknown_name("device", device, [name for name, here in there.items() if here])
+    available = {"cpu": True, "cuda": torch.cuda.is_available(), "mps": torch.backends.mps.is_available()}
+    if not available.get(device.partition(":")[0], False):
+        raise unknown_name("device", device, [name for name, here in available.items() if here])
     return device
 
 
@@ -95,21 +89,24 @@ def policy_config(config: TrainConfig) -> "PreTrainedConfig":
     """
     import draccus
 
-    choices = registered_policies()
+    choices, sizes = registered_policies(), resolved(config)
     if config.policy not in choices:
         raise unknown_name("policy", config.policy, choices)
-    kind = choices[config.policy]
-    known = {entry.name for entry in fields(kind)}
-    given = _given(config, known)
+    known = {entry.name for entry in fields(choices[config.policy])}
+    if config.lr and "optimizer_lr" not in known:
+        raise HandrailError(f"--lr: the policy {config.policy} has none; give its own with --policy_options")
+    for key in sizes.options:
+        if key not in known:
+            raise unknown_name(f"setting of the policy {config.policy}", key, known)
     wanted = {"pretrained_backbone_weights": None, "push_to_hub": False, "device": device_of(config)}
-    settings = {key: value for key, value in wanted.items() if key in known} | given
+    wanted |= {"optimizer_lr": sizes.lr, "optimizer_lr_backbone": sizes.lr} if sizes.lr else {}
+    settings = {key: value for key, value in wanted.items() if key in known} | dict(sizes.options)
     try:
-        policy: Any = draccus.decode(kind, settings)
-    except draccus.utils.DecodingError as error:
-        raise HandrailError(f"policy {config.policy}: {message_of(error)}") from error
+        policy: Any = draccus.decode(choices[config.policy], settings)
     # LeRobot's ACT raises NotImplementedError at averaging with more than one action a look
     except (draccus.utils.ParsingError, ValueError, TypeError, NotImplementedError) as error:
-        raise HandrailError(f"policy {config.policy}: {message_of(error.__cause__ or error)}") from error
+        cause = error if isinstance(error, draccus.utils.DecodingError) else error.__cause__ or error
+        raise HandrailError(f"policy {config.policy}: {message_of(cause)}") from error
     mapping = policy.normalization_mapping
     if "STATE" in mapping and "ENV" not in mapping:
         policy.normalization_mapping = mapping | {"ENV": mapping["STATE"]}
@@ -134,17 +131,6 @@ def check_policy(config: TrainConfig) -> None:
     described.output_features = {"action": PolicyFeature(FeatureType.ACTION, (2,))}
     with in_one_line(config):
         get_policy_class(config.policy)(described)
-
-
-def _given(config: TrainConfig, known: set[str]) -> dict[str, Any]:
-    if config.lr and "optimizer_lr" not in known:
-        raise HandrailError(f"--lr: the policy {config.policy} has none; give its own with --policy_options")
-    sizes = resolved(config)
-    for key in sizes.options:
-        if key not in known:
-            raise unknown_name(f"setting of the policy {config.policy}", key, known)
-    rates = ("optimizer_lr", "optimizer_lr_backbone") if sizes.lr else ()
-    return {key: sizes.lr for key in rates if key in known} | dict(sizes.options)
 
 
 def _value(text: str) -> Any:

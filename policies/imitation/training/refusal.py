@@ -18,14 +18,9 @@ def in_one_line(config: TrainConfig) -> Iterator[None]:
     except OSError as error:
         raise HandrailError(f"training in {config.output}: {message_of(error)}") from error
     except _REFUSALS as error:
-        if not _of_lerobot(error):
+        frames = traceback.walk_tb(error.__traceback__)
+        names = [str(frame.f_globals.get("__name__")).partition(".")[0] for frame, _ in frames]
+        known = [name for name in names if name in ("handrail", "lerobot", "accelerate")]
+        if known[-1:] in ([], ["handrail"]):  # neither LeRobot nor accelerate, nor what they called
             raise
         raise HandrailError(f"policy {config.policy}: {message_of(error)}") from error
-
-
-def _of_lerobot(error: BaseException) -> bool:
-    """Return whether LeRobot or accelerate, or what they called, raised it; not Handrail or the rest."""
-    modules = [str(frame.f_globals.get("__name__")) for frame, _ in traceback.walk_tb(error.__traceback__)]
-    packages = [name.partition(".")[0] for name in modules]
-    known = [name for name in packages if name in ("handrail", "lerobot", "accelerate")]
-    return known[-1:] not in ([], ["handrail"])

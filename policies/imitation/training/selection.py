@@ -17,17 +17,14 @@ _FEWEST_HELD_OUT = 5  # episodes
 
 @dataclass(frozen=True)
 class Selection:
-    """Episodes to train on.
-
-    Attributes:
-        rows: their lines of metadata, in the order of the dataset.
-        attempts: how many episodes it took, failed ones included.
-        operator_time: simulated length of all attempts [s].
-    """
+    """Episodes to train on."""
 
     rows: tuple[Row, ...]
+    """Their lines of metadata, in the order of the dataset."""
     attempts: int
+    """Number of episodes that it took, failed ones included."""
     operator_time: float
+    """Simulated length of all attempts [s]."""
 
 
 def select(rows: Sequence[Row], fps: float, config: TrainConfig) -> Selection:
@@ -37,10 +34,10 @@ def select(rows: Sequence[Row], fps: float, config: TrainConfig) -> Selection:
     front until there are enough: the operator would have had to make the failed ones too.
     """
     attempts = _attempts(rows, config)
-    order = np.random.default_rng(config.draw).permutation(len(attempts))
     kept: list[Row] = []
     taken, frames, most = 0, 0, config.minutes * _MINUTE * fps * (1.0 + 1e-9)
-    for attempt in (attempts[place] for place in order):
+    for place in np.random.default_rng(config.draw).permutation(len(attempts)):
+        attempt = attempts[place]
         if config.minutes and frames + attempt["length"] > most:
             break
         taken, frames = taken + 1, frames + attempt["length"]
@@ -49,7 +46,15 @@ def select(rows: Sequence[Row], fps: float, config: TrainConfig) -> Selection:
         if len(kept) == config.episodes > 0:
             break
     else:
-        _check_enough(config, len(kept), frames / fps)
+        minutes = frames / fps / _MINUTE
+        if config.minutes and minutes < config.minutes * (1.0 - 1e-9):
+            raise HandrailError(
+                f"--minutes {config.minutes:g}: expected at most the {minutes:.2f} min recorded"
+            )
+        if config.episodes and not config.minutes:
+            raise HandrailError(
+                f"--episodes {config.episodes}: expected at most the {len(kept)} that there are"
+            )
     if not kept:
         raise HandrailError(
             f"no episode left to train on: expected one or more among {len(attempts)}"
@@ -102,12 +107,3 @@ def _attempts(rows: Sequence[Row], config: TrainConfig) -> list[Row]:
     if config.mode and config.mode not in modes:
         raise unknown_name("mode in the dataset", config.mode, modes)
     return [row for row in rows if not config.mode or row["mode"] == config.mode]
-
-
-def _check_enough(config: TrainConfig, kept: int, seconds: float) -> None:
-    if config.minutes and seconds < config.minutes * _MINUTE * (1.0 - 1e-9):
-        raise HandrailError(
-            f"--minutes {config.minutes:g}: expected at most the {seconds / _MINUTE:.2f} min recorded"
-        )
-    if config.episodes and not config.minutes and kept < config.episodes:
-        raise HandrailError(f"--episodes {config.episodes}: expected at most the {kept} that there are")

@@ -2,10 +2,10 @@
 
 import hashlib
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 import torch
@@ -13,6 +13,7 @@ import torch
 from handrail.collect.operators.modes import MODES
 from handrail.controllers.errors import HandrailError
 from handrail.datasets.format.data_file import data_files
+from handrail.datasets.format.schema import Feature
 from handrail.datasets.format.stats import column_stats
 from handrail.datasets.reading.check import check_whole
 from handrail.datasets.reading.digest import digest_of_pictures
@@ -27,48 +28,37 @@ from handrail.policies.imitation.interface.interface import (
     STATE,
     PolicyInterface,
 )
-from handrail.policies.imitation.training.columns import (
-    described,
-    described_cameras,
-    picture_stats,
-    pictured,
-    steadied,
-)
 from handrail.policies.imitation.training.memory import MemoryDataset, MemoryMeta
+from handrail.policies.imitation.training.pictures import PICTURES, open_pictures, picture_stats, pictured
 from handrail.policies.imitation.training.selection import Row, Selection, hold_out, select, select_again
 
 if TYPE_CHECKING:
     from lerobot.configs.policies import PreTrainedConfig
-    from lerobot.datasets.lerobot_dataset import LeRobotDataset
 
 Columns = dict[str, np.ndarray]
+Features = dict[str, Feature]
 _LEARNT = ("observation", "action", "next.")
 _NORMALISED = ("observation", "action")  # LeRobot rounds their statistics to the type that they come in
-_COUNTERS = ("timestamp", "frame_index", "episode_index", "index", "task_index")
-_NOWHERE = "handrail/local--only"  # no name on the hub, from where LeRobot would fetch what is missing
 _READ_STATE = ("act", "diffusion", "multi_task_dit", "vqbet")  # of LeRobot's, what cannot do without it
 _READ_SCENE = ("act", "diffusion")  # what needs pictures or the environment's state
+_FLOOR = 1e-2  # [m, rad, m/s, …] least spread of a number: what hardly moved in training must not explode
+_RANGES = (("min", "max"), ("q01", "q99"), ("q10", "q90"))
 
 
 @dataclass(frozen=True)
 class TrainingSource:
-    """Chosen episodes of a dataset.
-
-    Attributes:
-        config: what was asked for.
-        info: the dataset.
-        selection: the episodes.
-        interface: what the policy reads and writes; None where that is what was recorded.
-        features: LeRobot's description of every column and camera.
-        columns: all columns of all episodes, (N, …) each.
-    """
+    """Chosen episodes of a dataset."""
 
     config: TrainConfig
+    """The settings that chose them."""
     info: DatasetInfo
     selection: Selection
     interface: PolicyInterface | None
-    features: dict[str, dict[str, Any]]
+    """What the policy reads and writes; None where that is what was recorded."""
+    features: Features
+    """Every column that it learns from, and every camera."""
     columns: Columns
+    """All columns of all episodes, (N, …) each, and LeRobot's counters."""
 
     @cached_property
     def digest(self) -> str:
@@ -82,12 +72,12 @@ class TrainingSource:
 
     @property
     def trained_on(self) -> dict[str, float]:
-        """How many episodes it learns from, how many attempts all took, and how long those were [s]."""
-        chosen, (_, held_out) = self.selection, self.split
+        """The number of episodes that it learns from, of all attempts, and the time of these [s]."""
+        learnt, held_out = self.split
         numbers: dict[str, float] = {
-            "episodes": len(chosen.rows) - len(held_out),
-            "attempts": chosen.attempts,
-            "operator_time": chosen.operator_time,
+            "episodes": len(learnt),
+            "attempts": self.selection.attempts,
+            "operator_time": self.selection.operator_time,
         }
         return numbers | ({"held_out": len(held_out)} if held_out else {})
 
@@ -101,52 +91,30 @@ class TrainingSource:
         numbers, all_rows = {row["episode_index"] for row in rows}, self.selection.rows
         inside = [row["episode_index"] in numbers for row in all_rows]
         kept = np.repeat(inside, [row["length"] for row in all_rows])
-        selection = replace(self.selection, rows=tuple(rows))
         columns = {key: values[kept] for key, values in self.columns.items()}
-        return replace(self, selection=selection, columns=columns | _counters(selection, self.info.fps))
+        selection = replace(self.selection, rows=tuple(rows))
+        return replace(self, selection=selection, columns=columns | _counters(rows, self.info.fps))
 
     def dataset(self, policy: "PreTrainedConfig") -> MemoryDataset:
         """Return what LeRobot trains a policy on."""
         from lerobot.datasets.factory import resolve_delta_timestamps
         from lerobot.datasets.feature_utils import get_delta_indices
 
-        lengths = tuple(row["length"] for row in self.selection.rows)
-        stats = {key: steadied(column_stats(self.columns[key])) for key in self._numeric}
-        meta = MemoryMeta(self.features, stats, self.info.fps, lengths, self.info.robot_type)
+        rows = self.selection.rows
+        features = {key: each.described | {"shape": each.shape} for key, each in self.features.items()}
+        stats = {key: steadied(column_stats(self.columns[key])) for key in self.columns if key in features}
+        lengths = tuple(row["length"] for row in rows)
+        meta = MemoryMeta(features, stats, self.info.fps, lengths, self.info.robot_type)
         stamps = resolve_delta_timestamps(policy, meta) or {}  # pyright: ignore[reportArgumentType]
-        cameras = meta.camera_keys
         pictures = None
-        if cameras:
-            pictures = self._pictures({key: stamps[key] for key in cameras if key in stamps})
+        if cameras := meta.camera_keys:
+            numbers = [row["episode_index"] for row in rows]
+            seen = {key: stamps[key] for key in cameras if key in stamps}
+            pictures = open_pictures(self.info, numbers, seen)
             stats |= {key: picture_stats(pictures, key) for key in cameras}
-        windows = {
-            key: offsets
-            for key, offsets in get_delta_indices(stamps, meta.fps).items()
-            if key in self.columns
-        }
+        windows = {key: w for key, w in get_delta_indices(stamps, meta.fps).items() if key in self.columns}
         columns = {key: torch.from_numpy(np.ascontiguousarray(v)) for key, v in self.columns.items()}
-        sentences = ["; ".join(row.get("tasks") or []) for row in self.selection.rows]
-        return MemoryDataset(meta, columns, sentences, windows, pictures)
-
-    @property
-    def _numeric(self) -> list[str]:
-        return [key for key in self.columns if key in self.features]
-
-    def _pictures(self, stamps: Mapping[str, list[float]]) -> "LeRobotDataset":
-        from huggingface_hub.errors import HFValidationError
-        from lerobot.datasets.lerobot_dataset import LeRobotDataset
-
-        try:
-            return LeRobotDataset(
-                _NOWHERE,
-                root=self.info.root,
-                episodes=[row["episode_index"] for row in self.selection.rows],
-                delta_timestamps=dict(stamps) or None,
-            )
-        except HFValidationError as error:
-            raise HandrailError(
-                f"dataset {str(self.info.root)!r}: expected all its files, found some missing"
-            ) from error
+        return MemoryDataset(meta, columns, _sentences(rows), windows, pictures)
 
 
 def read_source(config: TrainConfig, began: PolicyMeta | None = None) -> TrainingSource:
@@ -164,21 +132,57 @@ def read_source(config: TrainConfig, began: PolicyMeta | None = None) -> Trainin
         selection = select_again(rows, began.episodes, began.trained_on)
     else:
         selection = select(rows, info.fps, config)
-    if config.actions == "intent":
-        _check_one_mode(selection, config.mode)
     if config.actions == "recorded":
         interface, features, columns = None, *_recorded(info, selection, config)
-        _check_inputs(config, info, features)
     else:
-        interface, features, columns = _interpreted(info, selection, config.actions, config.base_pose)
+        interface, features, columns = _interpreted(info, selection, config, config.actions)
     if config.images:
-        features |= described_cameras(info)
+        if not (cameras := pictured(info)):
+            raise HandrailError(f"--images: expected cameras in {str(info.root)!r}, found none")
+        features |= cameras
     if not config.scene:
         features.pop(ENVIRONMENT, None)
         columns.pop(ENVIRONMENT, None)
-    return TrainingSource(
-        config, info, selection, interface, features, columns | _counters(selection, info.fps)
-    )
+    columns |= _counters(selection.rows, info.fps)
+    return TrainingSource(config, info, selection, interface, features, columns)
+
+
+def steadied(stats: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Return statistics in which nothing is steadier than 0.01.
+
+    A number that was the same throughout would otherwise be divided by (almost) nothing, and the least
+    change of it when the policy drives would be huge.
+    """
+    stats = dict(stats, std=np.maximum(stats["std"], _FLOOR))
+    for low, high in _RANGES:
+        lack = np.maximum(0.0, _FLOOR - (stats[high] - stats[low]) / 2.0)
+        stats |= {low: stats[low] - lack, high: stats[high] + lack}
+    return stats
+
+
+def _interpreted(
+    info: DatasetInfo, selection: Selection, config: TrainConfig, actions: Literal["realised", "intent"]
+) -> tuple[PolicyInterface, Features, Columns]:
+    """Return what a policy learns through an interface."""
+    if actions == "intent":
+        _check_one_mode(selection, config.mode)
+    missing = [key for key in COLUMNS if key not in info.features]
+    if missing:
+        raise HandrailError(
+            f"--actions {actions}: expected the columns that handrail-record writes, found no"
+            f" {', '.join(missing)}; for other datasets say --actions recorded"
+        )
+    masks = _episodes(info, selection, [MASK])
+    interface = PolicyInterface.of_dataset(info.features, masks, actions, config.base_pose)
+
+    def learnt(episode: Columns) -> Columns:
+        state, environment = interface.observe(episode[STATE], episode[ENVIRONMENT])
+        return {STATE: state, ENVIRONMENT: environment, ACTION: interface.encode(episode)}
+
+    columns = _joined(map(learnt, _episodes(info, selection, COLUMNS)))
+    names = zip(columns, (*interface.observation_names, interface.action_names), strict=True)
+    features = {key: Feature("float32", (len(each),), each) for key, each in names if each}
+    return interface, features, {key: columns[key] for key in features}
 
 
 def _check_one_mode(selection: Selection, said: str) -> None:
@@ -195,53 +199,39 @@ def _check_one_mode(selection: Selection, said: str) -> None:
     )
 
 
-def _interpreted(
-    info: DatasetInfo, selection: Selection, actions: Literal["realised", "intent"], base_pose: bool
-) -> tuple[PolicyInterface, dict[str, dict[str, Any]], Columns]:
-    missing = [key for key in COLUMNS if key not in info.features]
-    if missing:
-        raise HandrailError(
-            f"--actions {actions}: expected the columns that handrail-record writes, found no"
-            f" {', '.join(missing)}; for other datasets say --actions recorded"
-        )
-    masks = _each(info, selection, [MASK])
-    interface = PolicyInterface.of_dataset(info.features, masks, actions, base_pose)
-    columns = _joined(
-        dict(zip((STATE, ENVIRONMENT), interface.observe(episode[STATE], episode[ENVIRONMENT]), strict=True))
-        | {ACTION: interface.encode(episode)}
-        for episode in _each(info, selection, COLUMNS)
-    )
-    names = dict(zip(columns, (*interface.observation_names, interface.action_names), strict=True))
-    columns = {key: values for key, values in columns.items() if values.shape[1]}
-    return interface, {key: described("float32", (len(names[key]),), names[key]) for key in columns}, columns
-
-
-def _recorded(
-    info: DatasetInfo, selection: Selection, config: TrainConfig
-) -> tuple[dict[str, dict[str, Any]], Columns]:
-    keys = [
-        key
+def _recorded(info: DatasetInfo, selection: Selection, config: TrainConfig) -> tuple[Features, Columns]:
+    """Return what a policy learns of any dataset: its columns as they are."""
+    where, cameras = f"dataset {str(info.root)!r}", pictured(info)
+    features = {
+        key: feature
         for key, feature in info.features.items()
-        if key.startswith(_LEARNT) and feature.dtype not in ("video", "image", "string")
-    ]
-    if ACTION not in keys:
-        raise HandrailError(
-            f"dataset {str(info.root)!r}: expected a column 'action', got {', '.join(keys) or 'none'}"
-        )
-    columns = _joined(
-        {
-            key: v.astype(np.float32) if v.dtype == np.float64 or key.startswith(_NORMALISED) else v
-            for key, v in episode.items()
-        }
-        for episode in _each(info, selection, keys)
-    )
-    features = {key: described(f.dtype, f.shape, f.names) for key in keys for f in (info.features[key],)}
-    if config.policy in _READ_SCENE and STATE in columns and not (ENVIRONMENT in columns or pictured(info)):
+        if key.startswith(_LEARNT) and feature.dtype not in (*PICTURES, "string")
+    }
+    if ACTION not in features:
+        raise HandrailError(f"{where}: expected a column 'action', got {', '.join(features) or 'none'}")
+    columns = _joined(_episodes(info, selection, list(features)))
+    for key, values in columns.items():
+        if values.dtype == np.float64 or key.startswith(_NORMALISED):
+            columns[key] = values.astype(np.float32)
+    if config.policy in _READ_SCENE and STATE in columns and not (ENVIRONMENT in columns or cameras):
         features[ENVIRONMENT], columns[ENVIRONMENT] = features[STATE], columns[STATE]
+    numbers = [key for key in features if key.startswith("observation")]
+    if STATE not in numbers and config.policy in _READ_STATE:
+        beside = " beside pictures (--images)" if cameras else ""
+        raise HandrailError(
+            f"{where}: expected a column {STATE!r}, which policy {config.policy} needs{beside};"
+            f" got {', '.join((*numbers, *cameras)) or 'no observation'}"
+        )
+    blind = not numbers or (config.policy in _READ_SCENE and ENVIRONMENT not in numbers)
+    if blind and cameras and not config.images:
+        raise HandrailError(
+            f"{where}: expected {ENVIRONMENT!r} or --images for policy {config.policy};"
+            f" there are pictures ({', '.join(cameras)}): say --images"
+        )
     return features, columns
 
 
-def _each(info: DatasetInfo, selection: Selection, columns: Sequence[str]) -> Iterator[Columns]:
+def _episodes(info: DatasetInfo, selection: Selection, columns: Sequence[str]) -> Iterator[Columns]:
     """Yield columns of the selected episodes, one episode in memory at a time."""
     with data_files() as files:
         for row in selection.rows:
@@ -257,35 +247,19 @@ def _joined(episodes: Iterable[Columns]) -> Columns:
     return {key: np.concatenate(parts.pop(key)) for key in list(parts)}
 
 
-def _check_inputs(config: TrainConfig, info: DatasetInfo, features: Mapping[str, Any]) -> None:
-    """Check that there is what the policy reads, before LeRobot stumbles over what is not there."""
-    numbers = [key for key in features if key.startswith("observation")]
-    dataset, cameras = f"dataset {str(info.root)!r}", pictured(info)
-    if STATE not in numbers and config.policy in _READ_STATE:
-        beside = " beside pictures (--images)" if cameras else ""
-        raise HandrailError(
-            f"{dataset}: expected a column {STATE!r}, which policy {config.policy} needs{beside};"
-            f" got {', '.join((*numbers, *cameras)) or 'no observation'}"
-        )
-    blind = not numbers or (config.policy in _READ_SCENE and ENVIRONMENT not in numbers)
-    if blind and cameras and not config.images:
-        raise HandrailError(
-            f"{dataset}: expected {ENVIRONMENT!r} or --images for policy {config.policy};"
-            f" there are pictures ({', '.join(cameras)}): say --images"
-        )
+def _sentences(rows: Sequence[Row]) -> list[str]:
+    return ["; ".join(row.get("tasks") or []) for row in rows]
 
 
-def _counters(selection: Selection, fps: float) -> Columns:
+def _counters(rows: Sequence[Row], fps: float) -> Columns:
     """Return the columns that LeRobot adds to every dataset, counted in the chosen part."""
-    lengths = [row["length"] for row in selection.rows]
+    lengths, sentences = [row["length"] for row in rows], _sentences(rows)
     frames = np.concatenate([np.arange(length) for length in lengths])
-    sentences = ["; ".join(row.get("tasks") or []) for row in selection.rows]
     task = {sentence: number for number, sentence in enumerate(dict.fromkeys(sentences))}
-    values = (
-        (frames / fps).astype(np.float32),
-        frames,
-        np.repeat(np.arange(len(lengths)), lengths),
-        np.arange(len(frames)),
-        np.repeat([task[sentence] for sentence in sentences], lengths),
-    )
-    return dict(zip(_COUNTERS, values, strict=True))
+    return {
+        "timestamp": (frames / fps).astype(np.float32),
+        "frame_index": frames,
+        "episode_index": np.repeat(np.arange(len(lengths)), lengths),
+        "index": np.arange(len(frames)),
+        "task_index": np.repeat([task[sentence] for sentence in sentences], lengths),
+    }

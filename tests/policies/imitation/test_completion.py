@@ -17,10 +17,14 @@ from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.robot.model import load_model
 from handrail.controllers.robot.shape import Obstacle, Shape
-from handrail.policies.imitation.interface.completion import Completion, PolicyCompletionStep
+from handrail.policies.imitation.interface.completion import Completion
 from handrail.policies.imitation.interface.interface import PolicyInterface
-from handrail.policies.imitation.interface.steps import PolicyActionStep, with_steps
-from handrail.policies.imitation.interface.view_step import PolicyViewStep
+from handrail.policies.imitation.interface.steps import (
+    PolicyActionStep,
+    PolicyCompletionStep,
+    PolicyViewStep,
+    with_steps,
+)
 
 BY = Completion("ridgeback_ur10", "pick_place", "ee", 20)
 STEPS = 12

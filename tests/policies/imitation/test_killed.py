@@ -75,7 +75,7 @@ def test_a_training_killed_while_it_writes(tmp_path):
         for step in {Path(path).parts[1] for path in now}:
             folder = output / "checkpoints" / step / "pretrained_model"
             assert load_policy(folder).policy is not None
-            assert read_meta(folder)[1].steps == int(step)
+            assert read_meta(folder).steps == int(step)
         assert all(np.isfinite(row["loss"]) for row in read_curve(output))
         kept = now
     assert kept, "killed too early to see anything"

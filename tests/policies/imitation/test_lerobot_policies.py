@@ -14,9 +14,8 @@ from rich.console import Console
 from handrail.controllers.errors import HandrailError
 from handrail.policies.imitation.evaluation.conditions import policy_conditions
 from handrail.policies.imitation.evaluation.config import EvaluateConfig
-from handrail.policies.imitation.evaluation.evaluation import UnevaluatedError, evaluate
+from handrail.policies.imitation.evaluation.evaluation import UnevaluatedError, evaluate, film
 from handrail.policies.imitation.evaluation.table import evaluation_table
-from handrail.policies.imitation.evaluation.video import film
 from handrail.policies.imitation.interface.checkpoint import NAME
 
 FEATURES = {
@@ -132,7 +131,7 @@ def test_what_lerobot_record_recorded_is_driven_with_its_mode(size, mode, number
     task = {33: "reach", 54: "pick_place"}[size]
     (condition,), _ = policy_conditions(config(plain, mode=mode, task=task))
     checkpoint = condition.checkpoint
-    assert (checkpoint.intent_mode, checkpoint.joined, condition.protection) == (mode, True, "mpc")
+    assert (checkpoint.meta.intent_mode, checkpoint.joined, condition.protection) == (mode, True, "mpc")
 
 
 @pytest.mark.parametrize(

@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 from handrail.controllers.errors import HandrailError
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.robot.description import load_description
+from handrail.controllers.typed import decoded
 from handrail.datasets.format.schema import Feature
 from handrail.policies.imitation.interface.interface import PolicyInterface
 
@@ -36,6 +37,10 @@ FEATURES = {
     "observation.environment_state": Feature("float32", (len(ENVIRONMENT),), ENVIRONMENT),
     "teleop.values": Feature("float32", (CHANNELS.size + 1,), (*CHANNELS.names, "gripper")),
 }
+
+
+def read_interface(content):
+    return decoded(content, PolicyInterface, "policy interface")
 
 
 def episode(rng, masks, length=6):
@@ -115,11 +120,11 @@ def test_an_older_checkpoint_keeps_its_view():
     """It does not say whether it sees where the base is: then it does not."""
     interface = PolicyInterface.of_dataset(FEATURES, [episode(np.random.default_rng(3), [("ee",)])], "intent")
     content = json.loads(json.dumps(dataclasses.asdict(interface)))
-    assert PolicyInterface.from_dict(content) == interface
+    assert read_interface(content) == interface
     del content["base_pose"]
-    assert PolicyInterface.from_dict(content) == dataclasses.replace(interface, base_pose=False)
+    assert read_interface(content) == dataclasses.replace(interface, base_pose=False)
     with pytest.raises(HandrailError, match="base_pose: expected true or false"):
-        PolicyInterface.from_dict(content | {"base_pose": "yes"})
+        read_interface(content | {"base_pose": "yes"})
 
 
 def test_a_policy_does_not_see_how_fast_the_robot_moves():
@@ -184,7 +189,7 @@ def test_what_is_not_there_stays_zero():
 def test_json_round_trip(actions):
     columns = episode(np.random.default_rng(5), [("base",), ("ee",)])
     interface = PolicyInterface.of_dataset(FEATURES, [columns], actions)
-    assert PolicyInterface.from_dict(json.loads(json.dumps(dataclasses.asdict(interface)))) == interface
+    assert read_interface(json.loads(json.dumps(dataclasses.asdict(interface)))) == interface
 
 
 def test_wrong_inputs_are_named():
@@ -197,7 +202,7 @@ def test_wrong_inputs_are_named():
     with pytest.raises(HandrailError, match="steers"):
         PolicyInterface.of_dataset(FEATURES, [idle], "intent")
     with pytest.raises(HandrailError, match="policy interface"):
-        PolicyInterface.from_dict({"actions": "realised"})
+        read_interface({"actions": "realised"})
     lacking = dict(FEATURES)
     names = tuple("other" if name == "tool.x" else name for name in STATE)
     lacking["observation.state"] = dataclasses.replace(FEATURES["observation.state"], names=names)

@@ -35,7 +35,7 @@ def test_a_resumed_training_is_the_same_to_the_bit(trained, tmp_path):
     shutil.rmtree(tmp_path / "cut" / "checkpoints" / "000006")
     assert weights(train(again, quiet=True)) == weights(folder)
     longer = train(dataclasses.replace(again, steps=8), quiet=True)
-    assert read_meta(longer)[1].steps == 8
+    assert read_meta(longer).steps == 8
 
 
 def test_a_training_goes_on_with_its_own_episodes_however_the_dataset_grew(recorded, tmp_path):
@@ -45,12 +45,12 @@ def test_a_training_goes_on_with_its_own_episodes_however_the_dataset_grew(recor
     assert weights(train(cut(part, tmp_path / "cut"), quiet=True)) == weights(whole)
     later = dataclasses.replace(cut(part, tmp_path / "later"), dataset=grown)
     chosen = read_source(dataclasses.replace(later, resume=False)).selection
-    before, meta = read_source(part).selection, read_meta(whole)[1]
+    before, meta = read_source(part).selection, read_meta(whole)
     assert [row["episode_index"] for row in before.rows] == list(meta.episodes)
     assert [row["episode_index"] for row in chosen.rows] != list(meta.episodes), "a draw that shows nothing"
     resumed = train(later, quiet=True)
     assert weights(resumed) == weights(whole)
-    assert read_meta(resumed)[1].trained_on == meta.trained_on
+    assert read_meta(resumed).trained_on == meta.trained_on
 
 
 def test_a_training_does_not_go_on_with_other_data_fewer_steps_or_other_sizes(
@@ -92,8 +92,8 @@ def test_a_checkpoint_of_an_earlier_version_goes_on_with_as_much_data(recorded, 
         again = dataclasses.replace(
             cut(config, tmp_path / f"cut{number}"), dataset=StoredConfig(root=str(root))
         )
-        interface, meta = read_meta(folder := again.folder / "checkpoints" / "000003" / "pretrained_model")
-        write_meta(folder, interface, dataclasses.replace(meta, episodes=(), data="", sizes={}))
+        meta = read_meta(folder := again.folder / "checkpoints" / "000003" / "pretrained_model")
+        write_meta(folder, dataclasses.replace(meta, episodes=(), data="", sizes={}))
         if number:
             with pytest.raises(HandrailError, match="expected the 3 episodes"):
                 train(again, quiet=True)
@@ -152,7 +152,7 @@ def test_a_training_that_is_interrupted_saves_a_checkpoint_and_goes_on_to_the_sa
     assert str(said.value) == "training: interrupted; --resume goes on after update 63"
     policies = train(dataclasses.replace(cut_off, resume=True), quiet=True), train(whole, quiet=True)
     assert weights(policies[0]) == weights(policies[1])
-    metas = [read_meta(each)[1].validation for each in policies]
+    metas = [read_meta(each).validation for each in policies]
     assert metas[0] == metas[1]
     curves = [[(row["step"], row["loss"]) for row in read_curve(each.folder)] for each in (cut_off, whole)]
     assert curves[0] == curves[1]

@@ -13,11 +13,14 @@ from lerobot.policies.factory import get_policy_class, make_pre_post_processors
 from training_helpers import CHANNELS, ENVIRONMENT, STATE, frame, tiny, write_dataset
 
 from handrail.controllers.errors import HandrailError
-from handrail.policies.imitation.interface.completion import PolicyCompletionStep
 from handrail.policies.imitation.interface.interface import PolicyInterface
-from handrail.policies.imitation.interface.steps import PolicyActionStep, with_steps
+from handrail.policies.imitation.interface.steps import (
+    PolicyActionStep,
+    PolicyCompletionStep,
+    PolicyViewStep,
+    with_steps,
+)
 from handrail.policies.imitation.interface.trained import load_policy
-from handrail.policies.imitation.interface.view_step import PolicyViewStep
 from handrail.policies.imitation.training.training import train
 
 MASKS = tuple(sorted(tuple(CHANNELS.mask(group).tolist()) for group in ("ee", "base")))

@@ -259,7 +259,7 @@ def test_what_a_policy_says_of_itself_is_checked(entry, value, policy):
 def test_what_an_interface_says_is_checked(entry, value, policy):
     interface = json.loads((policy / "handrail.json").read_text())["interface"]
     change(policy / "handrail.json", interface=interface | {entry: value})
-    refused(policy, "policy interface|action space")
+    refused(policy, "interface|action space")
 
 
 def test_a_training_that_goes_on_runs_no_code_either(tmp_path):

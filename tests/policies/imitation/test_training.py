@@ -22,9 +22,8 @@ from handrail.policies.imitation.interface.checkpoint import read_meta
 from handrail.policies.imitation.interface.interface import PolicyInterface
 from handrail.policies.imitation.interface.trained import load_policy
 from handrail.policies.imitation.training import presets
-from handrail.policies.imitation.training.columns import steadied
 from handrail.policies.imitation.training.presets import policy_config
-from handrail.policies.imitation.training.source import read_source
+from handrail.policies.imitation.training.source import read_source, steadied
 from handrail.policies.imitation.training.training import train
 
 pytestmark = pytest.mark.filterwarnings("ignore:.*(torchcodec|pin_memory|video).*")
@@ -87,11 +86,11 @@ def test_what_hardly_moved_is_not_blown_up():
 
 def test_a_checkpoint_says_all_that_is_needed(trained, recorded):
     folder, _ = trained
-    interface, meta = read_meta(folder)
+    meta = read_meta(folder)
     assert folder.parent.name == "000006"
     assert os.readlink(folder.parents[1] / "last") == "000006"
     frames = [read_frames(recorded, row["episode_index"]) for row in read_episodes(recorded)]
-    assert interface == PolicyInterface.of_dataset(features(), frames, "realised")
+    assert meta.interface == PolicyInterface.of_dataset(features(), frames, "realised")
     assert (meta.environment, meta.mode, meta.robot, meta.fps) == ("reach", "ee", "ridgeback_ur10", FPS)
     assert meta.trained_on == {"episodes": 3, "attempts": 3, "operator_time": 24 / FPS}
     assert (meta.steps, meta.policy, meta.training["batch_size"]) == (6, "act", 8)
@@ -104,7 +103,7 @@ def test_a_checkpoint_says_how_long_its_episodes_could_last(limits, longest, tmp
     """0 is the task's own limit, 30 s of `reach`."""
     root = write_dataset(tmp_path / "set", lengths=(9, 7), limits=limits)
     folder = train(tiny(root, tmp_path / "policy", steps=1), quiet=True)
-    assert read_meta(folder)[1].time_limit == longest
+    assert read_meta(folder).time_limit == longest
 
 
 def test_a_loaded_policy_acts_like_lerobot_s(trained, recorded):

@@ -85,7 +85,7 @@ def test_an_intent_of_several_modes_is_refused_with_the_flag(modes, said, tmp_pa
     )
     assert (done.returncode, done.stderr.count("\n")) == (2, 1), done.stderr
     if "ee" in modes:
-        assert read_meta(train(dataclasses.replace(config, mode="ee"), quiet=True))[1].mode == "ee"
+        assert read_meta(train(dataclasses.replace(config, mode="ee"), quiet=True)).mode == "ee"
 
 
 def test_what_a_dataset_lacks_is_not_fetched_from_anywhere(tmp_path):

@@ -97,7 +97,7 @@ def test_held_out_episodes_teach_nothing_not_even_a_scale(many, tmp_path):
 
 def test_it_ends_where_the_rule_says_and_says_so(flat):
     folder, config = flat
-    meta = read_meta(folder)[1]
+    meta = read_meta(folder)
     found = {int(step): loss for step, loss in meta.validation.items()}
     plateau = Plateau(found, 1, 0.5, 40, 4)
     assert plateau.flat is not None
@@ -124,7 +124,7 @@ def test_cut_off_anywhere_it_ends_the_same_to_the_bit(flat, tmp_path):
             shutil.rmtree(cut / "checkpoints" / name)
         again = train(dataclasses.replace(config, output=str(cut), resume=True), quiet=True)
         assert weights(again) == weights(folder)
-        assert read_meta(again)[1].validation == read_meta(folder)[1].validation
+        assert read_meta(again).validation == read_meta(folder).validation
 
 
 @pytest.mark.parametrize(
