@@ -61,12 +61,14 @@ class Recording:
     def warm_up(self, seed: int) -> None:
         """Compile what an update needs, before somebody waits for it in real time; no robot moves."""
         rehearsal = Rehearsal(self._env.model, build_modes(self._config, self._env))
+        unseen = {"operator": rehearsal, "observers": (), "realtime": False}
         if not self._env.real:
-            self._session.warm_up(seed, rehearsal)
+            replace(self._session, **unseen).run(seed)
             return
         config, fps = replace(self._config, cameras=""), self._config.dataset.fps
         with closing(build_env(config, fps)) as simulated:
-            build_session(config, simulated, (), fps, *self._people).warm_up(seed, rehearsal)
+            session = build_session(config, simulated, (), fps, *self._people)
+            replace(session, **unseen).run(seed)
 
     def episode(
         self, seed: int, interrupts: Interrupts, note: Callable[[Outcome], None] = lambda outcome: None

@@ -22,7 +22,6 @@ from handrail.collect.world.tasks.catalogue import TASKS
 from handrail.controllers.baselines.catalogue import CONTROLLERS
 from handrail.controllers.interface.channels import Channels
 from handrail.controllers.interface.controller import Controller
-from handrail.controllers.objectives.objective import Objective
 from handrail.controllers.objectives.regularisation import narrow_joint_centring
 from handrail.controllers.registry import resolved
 from handrail.controllers.robot.model import RobotModel
@@ -67,9 +66,10 @@ def build_env(
 
 def build_task(config: SessionConfig) -> Task:
     """Return the task, with the time limit and the moving obstacles of the settings."""
-    limit = {"horizon": config.time_limit} if config.time_limit else {}
-    moving = {"moving_obstacles": config.moving_obstacles} if config.moving_obstacles else {}
-    return resolved(TASKS.find(config.task).task)(**limit, **moving)
+    settings = {"horizon": config.time_limit, "moving_obstacles": config.moving_obstacles}
+    return resolved(TASKS.find(config.task).task)(
+        **{name: value for name, value in settings.items() if value}
+    )
 
 
 def build_session(
@@ -93,13 +93,12 @@ def build_session(
     mode = build_mode(config, env.model)
     operator = person or build_operator(config, mode, env.model)
     build = partial(build_controller, model=env.model, fps=control_fps, task=config.task)
-    controller = ModeController(build_modes(config, env), build, mode) if person else build(mode)
     return Session(
         env,
-        controller,
+        ModeController(build_modes(config, env), build, mode) if person else build(mode),
         operator,
         observers,
-        (config.realtime or person is not None) and not env.real,
+        realtime=(config.realtime or person is not None) and not env.real,
         control_period=1.0 / control_fps,
         record_period=1.0 / fps,
         undoes=person is not None and not env.real,
@@ -115,16 +114,14 @@ def build_operator(config: SessionConfig, mode: TeleopMode, model: RobotModel) -
 
 def build_controller(mode: TeleopMode, model: RobotModel, fps: float, task: str = "") -> Controller:
     """Return the controller of a mode; the masked MPC's knows the objectives that robot and task bring."""
-    spec = CONTROLLERS.find(mode.controller)
-    objectives = (_objectives(model, task if mode.task_objectives else ""),) if spec.objectives else ()
-    return resolved(spec.build)(model, 1.0 / fps, *objectives)
-
-
-def _objectives(model: RobotModel, task: str) -> tuple[Objective, ...]:
+    spec, build = CONTROLLERS.find(mode.controller), resolved(CONTROLLERS.find(mode.controller).build)
+    if not spec.objectives:
+        return build(model, 1.0 / fps)
     channels = Channels.of(model.description)
-    make = TASKS.find(task).objectives if task else None
+    make = TASKS.find(task).objectives if task and mode.task_objectives else None
     of_task = resolved(make)(channels) if make else ()
-    return (*of_task, *narrow_joint_centring(channels, model.description.limits, _CENTRED))
+    centring = narrow_joint_centring(channels, model.description.limits, _CENTRED)
+    return build(model, 1.0 / fps, (*of_task, *centring))
 
 
 def build_mode(config: SessionConfig, model: RobotModel) -> TeleopMode:

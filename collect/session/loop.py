@@ -9,7 +9,7 @@ step(intent) ─▶ controller ─ command ─▶ env.step ─▶ robot.send ─
 
 from collections.abc import Sequence
 from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -19,77 +19,12 @@ from handrail.collect.session.outcome import Tally
 from handrail.collect.world.env import HandrailEnv, Observation
 from handrail.controllers.arrays import FloatArray
 from handrail.controllers.interface.command import Command
-from handrail.controllers.interface.controller import Controller, State
+from handrail.controllers.interface.controller import Controller
 from handrail.controllers.interface.intent import Intent
 from handrail.datasets.recording.frames import Frame
 
 ROUNDING = 1e-9  # of times [s]
 _CREEP = 1e-3  # slower, a robot that brakes is sent rest [m/s, rad/s]
-
-
-class Rate:
-    """Says at which steps something is due that happens once a period.
-
-    Args:
-        period: [s].
-        start: when it is due first [s].
-    """
-
-    def __init__(self, period: float, start: float = 0.0) -> None:
-        self._period, self._next = period, start
-
-    def due(self, time: float) -> bool:
-        """Whether it is due at a step's time [s]."""
-        return time >= self._next - ROUNDING
-
-    def take(self) -> None:
-        """Take note that it happens."""
-        self._next += self._period
-
-
-class Driver:
-    """Drives the robot of one episode: a command is followed until the controller is asked again.
-
-    It tells the controller what there is to avoid: at the beginning, and while it moves or is held.
-
-    Args:
-        controller: is reset.
-        env: in which an episode has begun.
-        period: of the controller [s].
-        step: with which it begins.
-
-    Attributes:
-        command: of the controller's last update.
-    """
-
-    command: Command
-
-    def __init__(self, controller: Controller, env: HandrailEnv, period: float, step: int = 0) -> None:
-        self._controller, self._env, self._rate = controller, env, Rate(period, step * env.period)
-        self._moving, self._holding = bool(env.start.scene.movers), bool(env.world.held())
-        self._asked = step
-        controller.reset(env.world.obstacles())
-
-    def drive(self, step: int, state: State, intent: Intent) -> bool:
-        """Ask the controller if it is due at a step; return whether it was."""
-        if not self._rate.due(step * self._env.period):
-            return False
-        self._observe()
-        self.command = self._controller.update(state, intent)
-        self._asked = step
-        self._rate.take()
-        return True
-
-    def action(self, step: int) -> FloatArray:
-        """Return what to send for a step: the velocities at its end, and the gripper, (n + 1,)."""
-        time = (step + 1 - self._asked) * self._env.period
-        return np.append(self.command.velocity(time), self.command.gripper)
-
-    def _observe(self) -> None:
-        """Say where things are now, if that can have changed."""
-        before, self._holding = self._holding, bool(self._env.world.held())
-        if self._moving or self._holding or before:
-            self._controller.update_scene(self._env.world.obstacles())
 
 
 class Disturbance(Protocol):
@@ -104,29 +39,31 @@ class Disturbance(Protocol):
 
 @dataclass
 class Moment:
-    """Everything that lasts from one step of an episode to the next.
-
-    Attributes:
-        observation: after the last step.
-        info: of the environment's last step.
-        driver: of the robot.
-        tally: the counts along the episode.
-        view: the robot and its world at the last look.
-        success: whether the task has succeeded in this episode.
-        terminated: whether the task or a person has ended it.
-        truncated: whether its time limit has.
-        looked: wall time of the last look since the episode began [s].
-    """
+    """Everything that lasts from one step of an episode to the next."""
 
     observation: Observation
+    """After the last step."""
     info: dict[str, Any]
-    driver: Driver
+    """Of the environment's last step."""
     tally: Tally
     view: View
+    """The robot and its world at the last look."""
+    holding: bool
+    """Whether something was held when the controller was asked last."""
+    command: Command = field(init=False)
+    """Of the controller's last update."""
+    asked: int = 0
+    """Step of that update."""
+    due: float = 0.0
+    """Time of the next one [s]."""
     success: bool = False
+    """Whether the task has succeeded in this episode."""
     terminated: bool = False
+    """Whether the task or a person has ended it."""
     truncated: bool = False
+    """Whether its time limit has."""
     looked: float = 0.0
+    """Wall time of the last look since the episode began [s]."""
 
     @property
     def done(self) -> bool:
@@ -172,6 +109,12 @@ class EpisodeLoop:
         """Time since the episode began, on the robot's clock [s]."""
         return self.tally.frames * self.env.period
 
+    @property
+    def rests(self) -> bool:
+        """Whether the robot was at rest at the last look, as it was told."""
+        commanded = self.now.view.state.commanded
+        return commanded is not None and not commanded.any()
+
     def begin(self, seed: int | None) -> View:
         """Begin an episode; the same seed begins the same one.
 
@@ -179,9 +122,9 @@ class EpisodeLoop:
             seed: of the environment.
         """
         observation, info = self.env.reset(seed=seed)
-        driver = Driver(self._controller, self.env, self.control_period)
+        self._controller.reset(self.env.world.obstacles())
         tally = Tally(seed or 0, self.env.period)
-        self.now = Moment(observation, info, driver, tally, self._view(observation))
+        self.now = Moment(observation, info, tally, self._view(observation), self._holds)
         for disturbance in self._disturbances:
             disturbance.begin(self.env, seed or 0)
         return self.now.view
@@ -192,12 +135,6 @@ class EpisodeLoop:
         self.now.view = self._view(self.now.observation)
         return self.now.view
 
-    @property
-    def rests(self) -> bool:
-        """Whether the robot was at rest at the last look, as it was told."""
-        commanded = self.now.view.state.commanded
-        return commanded is not None and not commanded.any()
-
     def step(self, intent: Intent, event: EpisodeEvent | None = None, counts: bool = True) -> Frame:
         """Move the robot for one of its periods; return what happened.
 
@@ -206,12 +143,9 @@ class EpisodeLoop:
             event: what they say of the episode; a judgement makes this step the last.
             counts: whether the task judges this step.
         """
-        env, now, seen, wall_clock = self.env, self.now, self.now.observation, self.now.looked
-        driver, tally = now.driver, now.tally
+        env, now, tally, seen = self.env, self.now, self.now.tally, self.now.observation
         with tally.timed("controller"):
-            if driver.drive(tally.frames, now.view.state, intent):
-                tally.updated(driver.command)
-            action = driver.action(tally.frames)
+            action = self._action(intent)
             if event is EpisodeEvent.PAUSE and np.abs(action[:-1]).max() < _CREEP:
                 action[:-1] = 0.0  # a controller may come ever nearer to rest
         commanded = tally.elapsed
@@ -232,14 +166,14 @@ class EpisodeLoop:
             intent=intent,
             action=now.info["sent"],
             command=action.astype(np.float32),
-            diagnostics=driver.command.diagnostics,
+            diagnostics=now.command.diagnostics,
             contacts=now.info["contacts"],
             success=now.success,
             done=now.done,
-            wall_clock=wall_clock,
+            wall_clock=now.looked,
             number=tally.frames - 1,
             undos=tally.undos,
-            plan=driver.command.plan or driver.command,
+            plan=now.command.plan or now.command,
             commanded=commanded,
         )
 
@@ -251,9 +185,31 @@ class EpisodeLoop:
         """Come back to where the episode stood; the clock and what was spent go on."""
         world, then = checkpoint
         observation, info = self.env.restore(world)
+        self._controller.reset(self.env.world.obstacles())
         tally = self.tally.back_to(then.tally)
-        driver = Driver(self._controller, self.env, self.control_period, tally.frames)
-        self.now = replace(then, observation=observation, info=info, driver=driver, tally=tally)
+        self.now = replace(then, observation=observation, info=info, tally=tally, holding=self._holds)
+        self.now.asked, self.now.due = tally.frames, self.time
+
+    def _action(self, intent: Intent) -> FloatArray:
+        """Return what to send now: the velocities at the end of the step, and the gripper, (n + 1,).
+
+        The controller is asked if that is due; before, it is told what there is to avoid, if that can have
+        changed: while things move or are held.
+        """
+        now, step = self.now, self.tally.frames
+        if self.time >= now.due - ROUNDING:
+            before, now.holding = now.holding, self._holds
+            if self.env.start.scene.movers or now.holding or before:
+                self._controller.update_scene(self.env.world.obstacles())
+            now.command = self._controller.update(now.view.state, intent)
+            now.asked, now.due = step, now.due + self.control_period
+            self.tally.updated(now.command)
+        time = (step + 1 - now.asked) * self.env.period
+        return np.append(now.command.velocity(time), now.command.gripper)
+
+    @property
+    def _holds(self) -> bool:
+        return bool(self.env.world.held())
 
     def _view(self, observation: Observation) -> View:
         return View(self.env.robot.state(), self.env.task_state(), observation)

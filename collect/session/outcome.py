@@ -4,7 +4,7 @@ import contextlib
 import time
 from collections.abc import Iterator, Mapping
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -13,49 +13,46 @@ from handrail.collect.operators.operator import EpisodeEvent
 from handrail.controllers.interface.command import Command, Status
 
 _NOT_DONE = "judge: not done"  # why an episode failed that the operator calls a success
+_COUNTED = (
+    *("seed", "frames", "brakes", "late", "contact_onsets", "contact_periods", "smallest_distance"),
+    *("started", "undos"),
+)
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """How an episode went.
-
-    Attributes:
-        seed: of the environment.
-        success: whether the task was done, as its judge says; on a real robot, as the operator says.
-        failure_reason: why not; empty after a success.
-        frames: periods of the robot.
-        seconds: simulated time [s].
-        wall_time: time it took [s].
-        brakes: updates in which the controller braked the robot.
-        late: periods that a real-time loop overran.
-        contact_onsets: forbidden contacts that began.
-        contact_periods: periods with a forbidden contact.
-        smallest_distance: smallest signed distance, tool against work surfaces left out [m].
-        spent: where the wall time went, by part of the loop [s].
-        started: Unix time at its beginning [s].
-        ended_by: what the operator said to end it; None where the task was the judge.
-        paused: time for which the operator had the robot stand still, the braking not counted [s].
-        undos: how often the operator went back to an earlier moment.
-        practice: whether it was only tried, and is not to be saved.
-    """
+    """How an episode went."""
 
     seed: int
+    """Of the environment."""
     success: bool
+    """Whether the task was done, as its judge says; on a real robot, as the operator says."""
     failure_reason: str
+    """Empty after a success."""
     frames: int
+    """Periods of the robot."""
     seconds: float
+    """Simulated time [s]."""
     wall_time: float
     brakes: int
+    """Updates in which the controller braked the robot."""
     late: int
+    """Periods that a real-time loop overran."""
     contact_onsets: int
+    """Forbidden contacts that began."""
     contact_periods: int
     smallest_distance: float
+    """Signed, tool against work surfaces left out [m]."""
     spent: Mapping[str, float]
+    """Wall time by part of the loop [s]."""
     started: float
+    """Unix time at its beginning [s]."""
     ended_by: EpisodeEvent | None = None
-    paused: float = 0.0
+    """What the operator said to end it; None where the task was the judge."""
     undos: int = 0
+    """How often the operator went back to an earlier moment."""
     practice: bool = False
+    """Whether it was only tried, and is not to be saved."""
 
     @property
     def operator_says(self) -> str:
@@ -68,26 +65,31 @@ class Outcome:
         return not self.practice and (self.ended_by is None or self.ended_by.judges)
 
 
+@dataclass
 class Tally:
-    """Counts along an episode and keeps its pace.
+    """Counts along an episode, and its clock; what they mean is said of `Outcome`."""
 
-    Args:
-        seed: of the episode.
-        period: of the robot [s].
-    """
+    seed: int
+    period: float
+    """Of the robot [s]."""
+    frames: int = 0
+    undos: int = 0
+    brakes: int = 0
+    late: int = 0
+    contact_onsets: int = 0
+    contact_periods: int = 0
+    smallest_distance: float = np.inf
+    solve_times: list[float] = field(default_factory=list)
+    _contacts: int = 0  # now
+    _spent: dict[str, float] = field(default_factory=dict)
 
-    def __init__(self, seed: int, period: float) -> None:
-        self._seed, self._period = seed, period
-        self.frames = self.undos = self.brakes = 0
-        self._late = self._held = self._contacts = self._contacts_begun = self._contact_periods = 0
-        self._smallest = np.inf
-        self._spent: dict[str, float] = {}
-        self.solve_times: list[float] = []
+    def __post_init__(self) -> None:
+        """Let the clock begin."""
         self.start()
 
     def start(self) -> None:
         """Let the clock begin now."""
-        self._started, self._start, self._deadline = time.time(), time.perf_counter(), 0.0
+        self.started, self._start, self._deadline = time.time(), time.perf_counter(), 0.0
 
     @property
     def elapsed(self) -> float:
@@ -105,24 +107,19 @@ class Tally:
         """Count an update of the controller."""
         self.solve_times.append(command.diagnostics.solve_time)
         self.brakes += Status(command.diagnostics.status).brakes
-        self._smallest = min(self._smallest, command.diagnostics.smallest_distance)
+        self.smallest_distance = min(self.smallest_distance, float(command.diagnostics.smallest_distance))
 
     def moved(self, contacts: int) -> None:
         """Count a period of the robot."""
         self.frames += 1
-        self._contacts_begun += max(contacts - self._contacts, 0)
-        self._contact_periods += contacts > 0
+        self.contact_onsets += max(contacts - self._contacts, 0)
+        self.contact_periods += contacts > 0
         self._contacts = contacts
-
-    def held(self) -> None:
-        """Count a period in which a paused robot stood still."""
-        self._held += 1
 
     def back_to(self, before: "Tally") -> "Tally":
         """Return the counts of an earlier moment; how often that happened, and the clock, go on."""
         tally = copy(before)
-        tally.undos, tally._late, tally._held = self.undos + 1, self._late, self._held
-        tally._deadline = self._deadline
+        tally.undos, tally.late, tally._deadline = self.undos + 1, self.late, self._deadline
         return tally
 
     def pace(self) -> None:
@@ -130,13 +127,13 @@ class Tally:
 
         After a halt of more than a period the beat begins anew: what was missed is not caught up in a rush.
         """
-        self._deadline += self._period
+        self._deadline += self.period
         ahead = self._deadline - self.elapsed
         if ahead > 0:
             time.sleep(ahead)
             return
-        self._late += 1
-        if -ahead > self._period:
+        self.late += 1
+        if -ahead > self.period:
             self._deadline = self.elapsed
 
     def outcome(self, info: Mapping[str, Any], ended_by: EpisodeEvent | None, judged: bool = True) -> Outcome:
@@ -153,20 +150,11 @@ class Tally:
             success = success if judged else says
             reason = "" if success else (reason or _NOT_DONE) if says else f"operator: {ended_by}"
         return Outcome(
-            seed=self._seed,
             success=success,
             failure_reason=reason,
-            frames=self.frames,
-            seconds=self.frames * self._period,
+            seconds=self.frames * self.period,
             wall_time=self.elapsed,
-            brakes=self.brakes,
-            late=self._late,
-            contact_onsets=self._contacts_begun,
-            contact_periods=self._contact_periods,
-            smallest_distance=float(self._smallest),
             spent=dict(self._spent),
-            started=self._started,
             ended_by=ended_by,
-            paused=self._held * self._period,
-            undos=self.undos,
+            **{name: getattr(self, name) for name in _COUNTED},
         )
